@@ -1,0 +1,25 @@
+"""The few kinds of error hiproof raises; every message is one sentence: what was expected, what came, what to try."""
+
+
+class HiproofError(Exception):
+    """Base of every error hiproof raises on purpose. Its text is meant for the user, without a traceback."""
+
+
+class InputError(HiproofError):
+    """A file or an array that cannot be used: unreadable, empty, of the wrong kind, without the classes asked for."""
+
+
+class SettingsError(HiproofError):
+    """A setting that is unknown, of the wrong type or out of its bounds."""
+
+
+class OutputError(HiproofError):
+    """A place that cannot be written: no permission, no space, not a folder."""
+
+
+class FitError(HiproofError):
+    """Points from which no roof can be determined (fewer than a plane needs, all in one place, not finite)."""
+
+
+class CompositionError(HiproofError):
+    """A roof that cannot become a valid solid; the caller falls back to a simpler roof."""

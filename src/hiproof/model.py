@@ -1,0 +1,209 @@
+"""The frozen values handed from stage to stage. Arrays are float64; plan geometry is shapely; frames are in the names.
+
+A roof is a max of mins of planes: over the plan,
+
+    z(x, y) = max over pieces whose outline holds (x, y)  of  min over that piece's planes of  a x + b y + c
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .frames import LocalFrame
+from .status import Status
+
+ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
+
+
+@dataclass(frozen=True)
+class PointCloud:
+    """Points of one or several files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a pyproj CRS or None."""
+
+    xyz: np.ndarray
+    classification: np.ndarray | None = None
+    crs: Any = None
+    sources: tuple[str, ...] = ()
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """One building asked for: a plan polygon in world coordinates (possibly invalid as read) and what the user knew of it."""
+
+    id: str
+    polygon: shapely.Polygon
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Where `outline` (plan polygon) covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the outline's frame."""
+
+    outline: shapely.Polygon
+    planes: np.ndarray
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        """Height (n,) of the lower envelope at `xy` (n, 2), the outline not asked."""
+        return (np.asarray(xy, float) @ self.planes[:, :2].T + self.planes[:, 2]).min(axis=1)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One primitive of a roof: its type (a name of the catalogue, or "free"), parameters and the pieces it covers.
+
+    `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L (3,) in the roof's
+    local frame, `sigma` the standard deviation by parameter name. A saw-tooth has a piece a tooth; all others have one.
+    """
+
+    type: str
+    pieces: tuple[Piece, ...]
+    parameters: dict[str, float] = field(default_factory=dict)
+    kappa: float = 0.0
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    sigma: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def area(self) -> float:
+        return float(sum(piece.outline.area for piece in self.pieces))
+
+
+@dataclass(frozen=True)
+class Roof:
+    """All parts of one building's roof in the local `frame`, over the plan `outline` (a polygon with holes, same frame)."""
+
+    parts: tuple[Part, ...]
+    outline: shapely.Polygon
+    frame: LocalFrame
+
+    @property
+    def type(self) -> str:
+        """Type of the part with the largest area."""
+        return max(self.parts, key=lambda part: part.area).type
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        return tuple(piece for part in self.parts for piece in part.pieces)
+
+    def height_at(self, xy_local: np.ndarray) -> np.ndarray:
+        """Roof height (n,) at `xy_local` (n, 2) in the local frame; NaN where no piece covers."""
+        xy_local = np.asarray(xy_local, float)
+        z = np.full(len(xy_local), -np.inf)
+        for piece in self.pieces:
+            inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
+            z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
+        return np.where(np.isfinite(z), z, np.nan)
+
+
+@dataclass(frozen=True)
+class Face:
+    """A planar polygon of a solid: `rings` of vertex indices (outer ring first, counter-clockwise seen from outside).
+
+    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part a RoofSurface belongs to, else -1.
+    """
+
+    rings: tuple[tuple[int, ...], ...]
+    kind: str
+    part: int = -1
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed shell: `vertices` (n, 3) in the frame its maker names (world for a Building), `faces` oriented outwards."""
+
+    vertices: np.ndarray
+    faces: tuple[Face, ...]
+
+    def moved(self, shift: np.ndarray) -> Solid:
+        return Solid(self.vertices + shift, self.faces)
+
+    def of_kind(self, kind: str) -> tuple[Face, ...]:
+        return tuple(face for face in self.faces if face.kind == kind)
+
+
+@dataclass(frozen=True)
+class Quality:
+    """How well a model stands for its points; metres unless named otherwise, NaN where it cannot be told."""
+
+    points: int = 0
+    density: float = float("nan")
+    psd_mean: float = float("nan")
+    psd_std: float = float("nan")
+    rmse: float = float("nan")
+    p95: float = float("nan")
+    share_within_20cm: float = float("nan")
+    outline_iou: float = float("nan")
+    nodata_share: float = float("nan")
+    unexplained_area_m2: float = float("nan")
+
+
+@dataclass(frozen=True)
+class Fit:
+    """One primitive fitted to points: the outcome of `fit_roof`.
+
+    `parameters` theta_p by name in metres, `kappa` rad, `translation` T_L (3,) relative to `global_translation` T_G (3,),
+    `sigma` standard deviations by name (parameters, "kappa", "t_x", "t_y", "t_z"), `bic` of the chosen type and
+    `bics` of every type tried (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and `faces`
+    (tuples of vertex indices, counter-clockwise from above) are the roof surfaces in the frame of the points given.
+    """
+
+    type: str
+    parameters: dict[str, float]
+    kappa: float
+    translation: np.ndarray
+    global_translation: np.ndarray
+    sigma: dict[str, float]
+    objective: str
+    value: float
+    bic: float
+    bics: dict[str, float]
+    points_used: int
+    noise_m: float
+    outlier_share: float
+    evaluations: int
+    part: Part
+    vertices: np.ndarray
+    faces: tuple[tuple[int, ...], ...]
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        """Roof height (n,) at `xy` (n, 2), both in the frame of the points given; NaN outside the outline."""
+        frame = LocalFrame(self.global_translation)
+        roof = Roof((self.part,), self.part.pieces[0].outline, frame)
+        return roof.height_at(frame.to_local(np.asarray(xy, float))) + self.global_translation[2]
+
+
+@dataclass(frozen=True)
+class Building:
+    """Everything known of one building after reconstruction. `solid` and `terrain_intersection` are in world coordinates.
+
+    `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for this
+    building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed lines.
+    `types` are posterior probabilities by roof type where a choice was made. `attributes` are the input's own.
+    """
+
+    id: str
+    status: Status
+    detail: str = ""
+    roof: Roof | None = None
+    solid: Solid | None = None
+    quality: Quality = field(default_factory=Quality)
+    z_ground: float = float("nan")
+    ground_source: str = ""
+    terrain_intersection: tuple[np.ndarray, ...] = ()
+    objective: float = float("nan")
+    types: dict[str, float] = field(default_factory=dict)
+    attributes: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def type(self) -> str | None:
+        """Roof type of the largest part, None without a model."""
+        return self.roof.type if self.roof is not None else None
+
+    @property
+    def parts(self) -> tuple[Part, ...]:
+        return self.roof.parts if self.roof is not None else ()

@@ -1,0 +1,175 @@
+"""Every setting once: default, unit, bounds, help. The command line, the TOML file and the error texts derive from here."""
+
+from __future__ import annotations
+
+import dataclasses
+import tomllib
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from .errors import SettingsError
+
+
+def setting(
+    default: Any, help: str, unit: str = "", low: float | None = None, high: float | None = None, choices: tuple = ()
+) -> Any:
+    """Declare one setting of a section; `low` and `high` are inclusive bounds, `choices` the allowed values."""
+    metadata = {"help": help, "unit": unit, "low": low, "high": high, "choices": choices}
+    return field(default=default, metadata=metadata)
+
+
+@dataclass(frozen=True)
+class ReadSettings:
+    """[read] which points count."""
+
+    building_classes: tuple[int, ...] = setting((6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)")
+    ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points")
+
+
+@dataclass(frozen=True)
+class FitSettings:
+    """[fit] one primitive fitted to points."""
+
+    types: tuple[str, ...] = setting((), "roof types to choose among; empty means the whole catalogue")
+    objective: str = setting("likelihood", "objective to minimise", choices=("likelihood", "paper"))
+
+
+@dataclass(frozen=True)
+class ComposeSettings:
+    """[compose] from fitted roof to solid."""
+
+    snap_m: float = setting(0.001, "plan vertices closer than this are one", "m", 1e-6, 0.05)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All settings by section; immutable, comparable, and written beside every run.
+
+    >>> Settings().fit.objective
+    'likelihood'
+    >>> Settings.from_dict({"read": {"building_classes": [67]}}).read.building_classes
+    (67,)
+    """
+
+    read: ReadSettings = field(default_factory=ReadSettings)
+    fit: FitSettings = field(default_factory=FitSettings)
+    compose: ComposeSettings = field(default_factory=ComposeSettings)
+
+    @classmethod
+    def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
+        """Settings with the given sections replaced. Raises SettingsError for unknown names and values out of bounds."""
+        return cls().replace(values)
+
+    @classmethod
+    def from_toml(cls, path: str | Path) -> Settings:
+        """Settings from a TOML file with one table a section. Raises SettingsError when it cannot be read."""
+        try:
+            values = tomllib.loads(Path(path).read_text())
+        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+            raise SettingsError(
+                f"expected a TOML settings file at {path}, got: {error}; `hiproof settings` prints one"
+            ) from error
+        return cls.from_dict(values)
+
+    def replace(self, values: dict[str, dict[str, Any]]) -> Settings:
+        """A copy with `values[section][name]` replaced, each checked."""
+        sections = {}
+        for section_name, changes in values.items():
+            section = getattr(self, section_name, None)
+            if section_name not in {f.name for f in fields(self)} or not isinstance(changes, dict):
+                names = ", ".join(f.name for f in fields(self))
+                raise SettingsError(
+                    f"expected a settings section (one of {names}), got [{section_name}]; `hiproof settings` lists them"
+                )
+            known = {f.name: f for f in fields(section)}
+            for name in changes:
+                if name not in known:
+                    raise SettingsError(f"expected a setting of [{section_name}] ({', '.join(known)}), got {name!r}")
+            checked = {
+                name: check_value(f"{section_name}.{name}", known[name], value) for name, value in changes.items()
+            }
+            sections[section_name] = dataclasses.replace(section, **checked)
+        return dataclasses.replace(self, **sections)
+
+    def to_dict(self) -> dict[str, dict[str, Any]]:
+        """Plain nested dictionary, ready for JSON."""
+        return {
+            s.name: {f.name: plain(getattr(getattr(self, s.name), f.name)) for f in fields(getattr(self, s.name))}
+            for s in fields(self)
+        }
+
+    def to_toml(self) -> str:
+        """TOML text with every setting, its unit, bounds and meaning as comments."""
+        lines = []
+        for section_field in fields(self):
+            section = getattr(self, section_field.name)
+            lines.append(f"[{section_field.name}]")
+            for f in fields(section):
+                lines.append(f"# {describe(f)}")
+                lines.append(f"{f.name} = {toml_value(getattr(section, f.name))}")
+            lines.append("")
+        return "\n".join(lines)
+
+
+def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
+    """`value` converted to the declared setting's type. Raises SettingsError with the full sentence when it does not fit."""
+    default, bounds = declared.default, declared.metadata
+    try:
+        if isinstance(default, tuple):
+            value = tuple(value) if isinstance(value, (list, tuple)) else (value,)
+            if any(isinstance(v, (dict, list)) for v in value):
+                raise ValueError
+        elif isinstance(default, bool):
+            if not isinstance(value, bool):
+                raise ValueError
+        elif isinstance(default, int):
+            if isinstance(value, bool) or int(value) != value:
+                raise ValueError
+            value = int(value)
+        elif isinstance(default, float):
+            value = float(value)
+        elif not isinstance(value, str):
+            raise ValueError
+    except (TypeError, ValueError) as error:
+        kind = type(default).__name__
+        raise SettingsError(
+            f"expected {name} to be a {kind} such as {default!r}, got {value!r}; {bounds['help']}"
+        ) from error
+    low, high, choices = bounds["low"], bounds["high"], bounds["choices"]
+    if low is not None and not value >= low or high is not None and not value <= high:
+        raise SettingsError(
+            f"expected {name} between {low} and {high} {bounds['unit']}, got {value}; the default is {default}".replace(
+                "  ", " "
+            )
+        )
+    if choices and value not in choices:
+        raise SettingsError(f"expected {name} to be one of {', '.join(map(str, choices))}, got {value!r}")
+    return value
+
+
+def describe(declared: dataclasses.Field) -> str:
+    """One line: meaning, unit, bounds or choices, default."""
+    m = declared.metadata
+    parts = [m["help"]]
+    if m["low"] is not None or m["high"] is not None:
+        parts.append(f"{m['low']} to {m['high']} {m['unit']}".strip())
+    elif m["unit"]:
+        parts.append(f"in {m['unit']}")
+    if m["choices"]:
+        parts.append("one of " + ", ".join(map(str, m["choices"])))
+    return f"{'; '.join(parts)} (default {toml_value(declared.default)})"
+
+
+def toml_value(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, tuple):
+        return "[" + ", ".join(toml_value(v) for v in value) + "]"
+    if isinstance(value, str):
+        return '"' + value.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return repr(value)
+
+
+def plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value

@@ -1,0 +1,30 @@
+"""What became of a building: an outcome is a value, and its text is the sentence the user reads."""
+
+from enum import Enum
+
+
+class Status(Enum):
+    """Outcome of one building. `is_model` tells whether a solid exists, `is_failure` whether it was our fault."""
+
+    MODELLED = "modelled: the roof follows its points"
+    POOR_FIT = "modelled, but poorly: many of its points lie away from the roof; look at it before you use it"
+    SPARSE = "modelled from few points: heights are right, the roof's shape may be simplified"
+    SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a flat block stands in for it"
+    FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
+    NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
+    BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"
+    NO_ROOF = "no model: the points form no roof (all in one place or on one line)"
+    INTERNAL_ERROR = "no model: hiproof failed on this building; please report it with its points"
+
+    @property
+    def is_model(self) -> bool:
+        return not self.value.startswith("no model")
+
+    @property
+    def is_failure(self) -> bool:
+        return self is Status.INTERNAL_ERROR
+
+    @property
+    def code(self) -> str:
+        """Stable lower-case name for files and tables."""
+        return self.name.lower()
