@@ -7,7 +7,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """A frame whose axes are the world's and whose origin is `origin` (3,), in metres of the world frame (the paper's T_G).
+    """A frame with the world's axes and its origin at `origin` (3,), in metres of the world frame (the paper's T_G).
 
     >>> frame = LocalFrame.around(np.array([[85000.0, 446000.0, 3.0], [85002.0, 446002.0, 5.0]]))
     >>> frame.to_local(np.array([[85001.0, 446001.0, 4.0]])).tolist()

@@ -21,7 +21,7 @@ ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
 
 @dataclass(frozen=True)
 class PointCloud:
-    """Points of one or several files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a pyproj CRS or None."""
+    """Points of some files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a pyproj CRS or None."""
 
     xyz: np.ndarray
     classification: np.ndarray | None = None
@@ -34,7 +34,7 @@ class PointCloud:
 
 @dataclass(frozen=True)
 class Footprint:
-    """One building asked for: a plan polygon in world coordinates (possibly invalid as read) and what the user knew of it."""
+    """One building asked for: a plan polygon in world coordinates (empty if unusable) and what the user knew of it."""
 
     id: str
     polygon: shapely.Polygon
@@ -43,7 +43,7 @@ class Footprint:
 
 @dataclass(frozen=True)
 class Piece:
-    """Where `outline` (plan polygon) covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the outline's frame."""
+    """Where `outline` covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the outline's frame."""
 
     outline: shapely.Polygon
     planes: np.ndarray
@@ -75,7 +75,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Roof:
-    """All parts of one building's roof in the local `frame`, over the plan `outline` (a polygon with holes, same frame)."""
+    """All parts of one building's roof in the local `frame`, over the plan `outline` (polygon with holes, same frame)."""
 
     parts: tuple[Part, ...]
     outline: shapely.Polygon
@@ -104,7 +104,7 @@ class Roof:
 class Face:
     """A planar polygon of a solid: `rings` of vertex indices (outer ring first, counter-clockwise seen from outside).
 
-    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part a RoofSurface belongs to, else -1.
+    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part of a RoofSurface, else -1.
     """
 
     rings: tuple[tuple[int, ...], ...]
@@ -114,7 +114,7 @@ class Face:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shell: `vertices` (n, 3) in the frame its maker names (world for a Building), `faces` oriented outwards."""
+    """A closed shell: `vertices` (n, 3) in the frame its maker names (world in a Building), `faces` oriented outwards."""
 
     vertices: np.ndarray
     faces: tuple[Face, ...]
@@ -146,10 +146,10 @@ class Quality:
 class Fit:
     """One primitive fitted to points: the outcome of `fit_roof`.
 
-    `parameters` theta_p by name in metres, `kappa` rad, `translation` T_L (3,) relative to `global_translation` T_G (3,),
-    `sigma` standard deviations by name (parameters, "kappa", "t_x", "t_y", "t_z"), `bic` of the chosen type and
-    `bics` of every type tried (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and `faces`
-    (tuples of vertex indices, counter-clockwise from above) are the roof surfaces in the frame of the points given.
+    `parameters` theta_p by name in metres, `kappa` rad, `translation` T_L (3,) relative to `global_translation`
+    T_G (3,), `sigma` standard deviations by name (parameters, "kappa", "t_x", "t_y", "t_z"), `bic` of the chosen type
+    and `bics` of every type tried (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and
+    `faces` (vertex indices, counter-clockwise from above) are the roof surfaces in the frame of the points given.
     """
 
     type: str
@@ -179,11 +179,11 @@ class Fit:
 
 @dataclass(frozen=True)
 class Building:
-    """Everything known of one building after reconstruction. `solid` and `terrain_intersection` are in world coordinates.
+    """Everything known of one building after reconstruction; `solid` and `terrain_intersection` in world coordinates.
 
-    `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for this
-    building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed lines.
-    `types` are posterior probabilities by roof type where a choice was made. `attributes` are the input's own.
+    `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for
+    this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
+    lines. `types` are posterior probabilities by roof type where a choice was made. `attributes` are the input's own.
     """
 
     id: str

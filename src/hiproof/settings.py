@@ -1,4 +1,4 @@
-"""Every setting once: default, unit, bounds, help. The command line, the TOML file and the error texts derive from here."""
+"""Every setting once: default, unit, bounds, help. Command line, TOML file and error texts derive from here."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ class Settings:
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
-        """Settings with the given sections replaced. Raises SettingsError for unknown names and values out of bounds."""
+        """Settings with the given sections replaced. Raises SettingsError for unknown names or values out of bounds."""
         return cls().replace(values)
 
     @classmethod
@@ -113,7 +113,7 @@ class Settings:
 
 
 def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
-    """`value` converted to the declared setting's type. Raises SettingsError with the full sentence when it does not fit."""
+    """`value` as the declared setting's type. Raises SettingsError with the full sentence when it does not fit."""
     default, bounds = declared.default, declared.metadata
     try:
         if isinstance(default, tuple):
@@ -137,7 +137,7 @@ def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
             f"expected {name} to be a {kind} such as {default!r}, got {value!r}; {bounds['help']}"
         ) from error
     low, high, choices = bounds["low"], bounds["high"], bounds["choices"]
-    if low is not None and not value >= low or high is not None and not value <= high:
+    if (low is not None and not value >= low) or (high is not None and not value <= high):
         raise SettingsError(
             f"expected {name} between {low} and {high} {bounds['unit']}, got {value}; the default is {default}".replace(
                 "  ", " "
