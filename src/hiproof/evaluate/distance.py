@@ -1,0 +1,170 @@
+"""Exact distances from points to bounded planar polygons, compiled: the measure under every residual figure.
+
+The distance of a point to a polygon is the distance to its plane where the foot of the perpendicular lies inside the
+polygon, else the distance to the nearest edge. The plane distance bounds both from below, so a polygon whose plane is
+farther than the best distance so far is skipped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numba import njit
+
+from ..errors import InputError
+
+Ring = np.ndarray
+"""(m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer first, holes after."""
+
+
+def point_surface_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
+    """Distance (n,) in metres from `points` (n, 3) to the nearest of the bounded `polygons`, all in one frame.
+
+    inf without polygons. Raises InputError for arrays of another shape.
+
+    >>> square = np.array([[0.0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0]])
+    >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
+    [3.0, 5.0]
+    """
+    points = _checked_points(points)
+    return _nearest(points, *_flattened(polygons))
+
+
+def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
+    """Least |dz| (n,) from `points` (n, 3) to the polygons over or under them; inf where none covers a point in plan.
+
+    >>> square = np.array([[0.0, 0, 0], [2, 0, 2], [2, 2, 2], [0, 2, 0]])
+    >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
+    [2.0, inf]
+    """
+    points = _checked_points(points)
+    return _nearest_vertical(points, *_flattened(polygons))
+
+
+def _checked_points(points: np.ndarray) -> np.ndarray:
+    points = np.ascontiguousarray(points, float)
+    if points.ndim != 2 or points.shape[1] != 3:
+        raise InputError(f"expected points of shape (n, 3), got {points.shape}; pass x, y, z as columns")
+    return points
+
+
+def _flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All vertices (m, 3), where each ring starts in them, and each polygon in the rings (both with the end)."""
+    rings: list[np.ndarray] = []
+    polygon_start = [0]
+    for polygon in polygons:
+        single = isinstance(polygon, np.ndarray) and polygon.ndim == 2
+        for ring in (polygon,) if single else polygon:
+            ring = np.asarray(ring, float)
+            if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
+                raise InputError(f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}")
+            rings.append(ring)
+        polygon_start.append(len(rings))
+    vertices = np.concatenate(rings) if rings else np.empty((0, 3))
+    ring_start = np.concatenate([[0], np.cumsum([len(ring) for ring in rings])]).astype(np.int64)
+    return np.ascontiguousarray(vertices), ring_start, np.array(polygon_start, np.int64)
+
+
+@njit(cache=True)
+def _nearest(points, vertices, ring_start, polygon_start):
+    nearest = np.full(points.shape[0], np.inf)
+    for polygon in range(polygon_start.shape[0] - 1):
+        rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
+        normal, origin, is_flat = _plane(vertices, rings)
+        first, second = _plan_axes(normal)
+        for i in range(points.shape[0]):
+            p = points[i]
+            height = 0.0
+            if is_flat:
+                height = (
+                    (p[0] - origin[0]) * normal[0] + (p[1] - origin[1]) * normal[1] + (p[2] - origin[2]) * normal[2]
+                )
+                if abs(height) >= nearest[i]:
+                    continue
+                x, y = p[first] - height * normal[first], p[second] - height * normal[second]
+                if _contains(vertices, rings, first, second, x, y):
+                    nearest[i] = abs(height)
+                    continue
+            nearest[i] = min(nearest[i], _edge_distance(vertices, rings, p))
+    return nearest
+
+
+@njit(cache=True)
+def _nearest_vertical(points, vertices, ring_start, polygon_start):
+    nearest = np.full(points.shape[0], np.inf)
+    for polygon in range(polygon_start.shape[0] - 1):
+        rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
+        normal, origin, is_flat = _plane(vertices, rings)
+        if not is_flat or abs(normal[2]) < 1e-6:
+            continue
+        for i in range(points.shape[0]):
+            x, y = points[i, 0], points[i, 1]
+            height = origin[2] - ((x - origin[0]) * normal[0] + (y - origin[1]) * normal[1]) / normal[2]
+            gap = abs(points[i, 2] - height)
+            if gap < nearest[i] and _contains(vertices, rings, 0, 1, x, y):
+                nearest[i] = gap
+    return nearest
+
+
+@njit(cache=True)
+def _plane(vertices, rings):
+    """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without area."""
+    origin, normal = np.zeros(3), np.zeros(3)
+    begin, end = rings[0], rings[1]
+    for i in range(begin, end):
+        origin += vertices[i]
+    origin /= end - begin
+    for i in range(begin, end):
+        a = vertices[i] - origin
+        b = vertices[i + 1 if i + 1 < end else begin] - origin
+        normal[0] += a[1] * b[2] - a[2] * b[1]
+        normal[1] += a[2] * b[0] - a[0] * b[2]
+        normal[2] += a[0] * b[1] - a[1] * b[0]
+    length = np.sqrt(normal[0] ** 2 + normal[1] ** 2 + normal[2] ** 2)
+    if length < 1e-12:
+        return normal, origin, False
+    return normal / length, origin, True
+
+
+@njit(cache=True)
+def _plan_axes(normal):
+    """The two coordinate axes onto which a polygon of this normal projects with the largest area."""
+    largest = np.argmax(np.abs(normal))
+    return (largest + 1) % 3, (largest + 2) % 3
+
+
+@njit(cache=True)
+def _contains(vertices, rings, first, second, x, y):
+    """Even-odd rule over all rings, so that holes are outside; a point on a shared edge belongs to one side only."""
+    inside = False
+    for ring in range(rings.shape[0] - 1):
+        j = rings[ring + 1] - 1
+        for i in range(rings[ring], rings[ring + 1]):
+            yi, yj = vertices[i, second], vertices[j, second]
+            if (yi > y) != (yj > y):
+                xi, xj = vertices[i, first], vertices[j, first]
+                if x < (xj - xi) * (y - yi) / (yj - yi) + xi:
+                    inside = not inside
+            j = i
+    return inside
+
+
+@njit(cache=True)
+def _edge_distance(vertices, rings, p):
+    nearest_squared = np.inf
+    for ring in range(rings.shape[0] - 1):
+        j = rings[ring + 1] - 1
+        for i in range(rings[ring], rings[ring + 1]):
+            ex = vertices[i, 0] - vertices[j, 0]
+            ey = vertices[i, 1] - vertices[j, 1]
+            ez = vertices[i, 2] - vertices[j, 2]
+            dx, dy, dz = p[0] - vertices[j, 0], p[1] - vertices[j, 1], p[2] - vertices[j, 2]
+            length_squared = ex * ex + ey * ey + ez * ez
+            t = 0.0
+            if length_squared > 0.0:
+                t = min(1.0, max(0.0, (dx * ex + dy * ey + dz * ez) / length_squared))
+            squared = (dx - t * ex) ** 2 + (dy - t * ey) ** 2 + (dz - t * ez) ** 2
+            nearest_squared = min(nearest_squared, squared)
+            j = i
+    return np.sqrt(nearest_squared)

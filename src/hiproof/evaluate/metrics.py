@@ -1,0 +1,122 @@
+"""How well a model stands for its points: point-surface distance (PSD), outline IoU and the shares users ask for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+
+from ..model import ROOF, Fit, Quality, Solid
+from .distance import point_surface_distances, vertical_distances
+
+NEAR_M = 0.2
+"""A point within this vertical distance of the roof counts as explained well (the field's share within 20 cm)."""
+
+UNEXPLAINED_M = 0.5
+"""A cell most of whose points lie farther than this above or below the roof holds something the model lacks."""
+
+CELL_M = 1.0
+"""Side of the plan cells behind the no-data share and the unexplained area."""
+
+Polygons = Sequence[np.ndarray | Sequence[np.ndarray]]
+
+
+def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
+    """Roof surfaces of a model as lists of rings (m, 3), the outer first, in the model's own frame."""
+    if isinstance(model, Solid):
+        return [[model.vertices[list(ring)] for ring in face.rings] for face in model.of_kind(ROOF)]
+    if isinstance(model, Fit):
+        return [[model.vertices[list(face)]] for face in model.faces]
+    return [[polygon] if isinstance(polygon, np.ndarray) else list(polygon) for polygon in model]
+
+
+def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
+    """The roof's outline in plan: the union of its roof surfaces seen from above (empty without any)."""
+    polygons = [shapely.Polygon(rings[0][:, :2], [hole[:, :2] for hole in rings[1:]]) for rings in roof_polygons(model)]
+    return shapely.union_all([p if p.is_valid else p.buffer(0) for p in polygons])
+
+
+def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:
+    """Distance (n,) in metres of `points` (n, 3) to the nearest bounded roof surface of `model`, in the same frame."""
+    return point_surface_distances(points, roof_polygons(model))
+
+
+def iou(a: shapely.Geometry, b: shapely.Geometry) -> float:
+    """Area of the intersection over the area of the union; NaN when neither has an area.
+
+    >>> iou(shapely.box(0, 0, 2, 1), shapely.box(1, 0, 3, 1))
+    0.3333333333333333
+    """
+    common = shapely.intersection(a, b).area
+    together = a.area + b.area - common
+    return float(common / together) if together > 0 else float("nan")
+
+
+def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.Polygon | None = None) -> Quality:
+    """Every residual figure of one model against the `points` (n, 3) it stands for, all in one frame.
+
+    `outline` is the plan polygon asked for (a footprint); without one the alpha shape of the points takes its place, as
+    in the paper. `share_within_20cm` and `unexplained_area_m2` count vertical distances, and a point with no roof over
+    or under it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
+    """
+    points = np.ascontiguousarray(points, float).reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=1)]
+    polygons = roof_polygons(model)
+    outline = _observed_outline(points) if outline is None else outline
+    has_outline = outline is not None and outline.area > 0
+    figures = {}
+    if has_outline:
+        figures["outline_iou"] = iou(plan_outline(polygons), outline)
+        figures["density"] = len(points) / outline.area
+        figures["nodata_share"] = nodata_share(points[:, :2], outline)
+    if len(points) and polygons:
+        distances = point_surface_distances(points, polygons)
+        dz = vertical_distances(points, polygons)
+        figures |= {
+            "psd_mean": float(distances.mean()),
+            "psd_std": float(distances.std()),
+            "rmse": float(np.sqrt(np.mean(distances**2))),
+            "p95": float(np.percentile(distances, 95)),
+            "share_within_20cm": float(np.mean(dz < NEAR_M)),
+            "unexplained_area_m2": unexplained_area(points[:, :2], dz),
+        }
+    return Quality(points=len(points), **figures)
+
+
+def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
+    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2); NaN without cells."""
+    west, south, east, north = np.array(outline.bounds) / CELL_M
+    columns, rows = np.arange(np.floor(west), np.ceil(east)), np.arange(np.floor(south), np.ceil(north))
+    x, y = (axis.ravel() for axis in np.meshgrid(columns, rows))
+    shapely.prepare(outline)
+    inside = shapely.intersects_xy(outline, (x + 0.5) * CELL_M, (y + 0.5) * CELL_M)
+    if not inside.any():
+        return float("nan")
+    seen = _cell_keys(xy)
+    wanted = _cell_keys(np.column_stack([x[inside] + 0.5, y[inside] + 0.5]) * CELL_M)
+    return float(1 - np.isin(wanted, seen).mean())
+
+
+def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
+    """Area (m2) of the 1 m cells most of whose points lie more than half a metre vertically off the roof."""
+    _, cell = np.unique(_cell_keys(xy), return_inverse=True)
+    total = np.bincount(cell)
+    away = np.bincount(cell, weights=dz > UNEXPLAINED_M)
+    return float(np.count_nonzero(away > total / 2) * CELL_M**2)
+
+
+def _cell_keys(xy: np.ndarray) -> np.ndarray:
+    """One integer a 1 m cell, so that cells can be compared and counted."""
+    column, row = np.floor(np.asarray(xy) / CELL_M).astype(np.int64).T
+    return (column << 32) ^ (row & 0xFFFFFFFF)
+
+
+def _observed_outline(points: np.ndarray) -> shapely.Polygon | None:
+    from ..errors import FitError
+    from ..fit.alpha_shape import alpha_shape
+
+    try:
+        return alpha_shape(points[:, :2])
+    except FitError:
+        return None

@@ -1,0 +1,49 @@
+"""The 2D alpha shape: the outline of a set of points, concave where the points leave a bay wider than the radius.
+
+Edelsbrunner, Kirkpatrick and Seidel (1983): the triangles of the Delaunay triangulation whose circumradius is below
+alpha. Its boundary lies inside the true outline by about half the spacing of the points.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from ..errors import FitError
+
+SPACINGS = 2.5
+"""Default radius in point spacings: below 2 the shapes of sparse uniform points fall apart, above 3 bays fill up."""
+
+
+def default_radius(xy: np.ndarray) -> float:
+    """Radius in metres for `xy` (n, 2): 2.5 spacings, those of the points spread evenly over their hull."""
+    hull_area = shapely.convex_hull(shapely.MultiPoint(xy)).area
+    return SPACINGS * float(np.sqrt(hull_area / max(len(xy), 1)))
+
+
+def alpha_shape(xy: np.ndarray, radius: float | None = None) -> shapely.Polygon:
+    """Outline of `xy` (n, 2): the largest component of the alpha shape of `radius` metres, its holes filled.
+
+    Raises FitError for points that span no area.
+
+    >>> grid = np.stack(np.meshgrid(np.arange(5.0), np.arange(3.0)), axis=-1).reshape(-1, 2)
+    >>> alpha_shape(grid, 1.0).area
+    8.0
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    xy = np.asarray(xy, float)
+    try:
+        triangles = xy[Delaunay(xy).simplices]
+    except (QhullError, ValueError) as error:
+        raise FitError(f"expected points that span an area, got {len(xy)} in one place or on one line") from error
+    a, b, c = (np.linalg.norm(triangles[:, i] - triangles[:, j], axis=1) for i, j in ((1, 2), (0, 2), (0, 1)))
+    half = (a + b + c) / 2
+    area = np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 1e-18))
+    radius = default_radius(xy) if radius is None else radius
+    kept = triangles[a * b * c / (4 * area) < radius]
+    if len(kept) == 0:
+        raise FitError(f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger one")
+    shape = shapely.coverage_union_all(shapely.polygons(kept))
+    largest = max(shapely.get_parts(shape), key=lambda polygon: polygon.area)
+    return shapely.Polygon(largest.exterior)

@@ -1,0 +1,104 @@
+"""Quality figures on solids whose figures are known by hand."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.evaluate.metrics import iou, nodata_share, plan_outline, psd, quality, unexplained_area
+from hiproof.model import GROUND, ROOF, WALL, Face, Solid
+
+
+def block(width=10.0, length=6.0, height=5.0):
+    """A flat-roofed box standing on z = 0 with its corner at the origin."""
+    x, y = [0, width, width, 0], [0, 0, length, length]
+    vertices = np.array([*zip(x, y, [0.0] * 4, strict=True), *zip(x, y, [height] * 4, strict=True)])
+    walls = tuple(Face(((i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4),), WALL) for i in range(4))
+    return Solid(vertices, (Face(((4, 5, 6, 7),), ROOF, 0), *walls, Face(((3, 2, 1, 0),), GROUND)))
+
+
+def roof_points(dz=0.0, step=0.5):
+    x, y = np.meshgrid(np.arange(0.25, 10, step), np.arange(0.25, 6, step))
+    return np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 5.0 + dz)])
+
+
+def test_points_on_the_roof_leave_nothing_over():
+    figures = quality(block(), roof_points(), shapely.box(0, 0, 10, 6))
+    assert (figures.psd_mean, figures.psd_std, figures.rmse, figures.p95) == (0, 0, 0, 0)
+    assert (figures.share_within_20cm, figures.outline_iou, figures.nodata_share) == (1, 1, 0)
+    assert figures.points == 240 and figures.density == 4 and figures.unexplained_area_m2 == 0
+
+
+def test_walls_and_ground_are_no_roof():
+    assert psd(block(), np.array([[5.0, 0, 2.0]])) == pytest.approx(3.0)
+
+
+def test_a_dormer_is_unexplained_by_its_area():
+    points = roof_points()
+    dormer = (points[:, 0] < 3) & (points[:, 1] < 2)
+    points[dormer, 2] += 1
+    figures = quality(block(), points, shapely.box(0, 0, 10, 6))
+    assert figures.unexplained_area_m2 == 6
+    assert figures.share_within_20cm == pytest.approx(1 - 6 / 60)
+
+
+def test_points_beyond_the_roof_are_misses():
+    points = np.concatenate([roof_points(), [[20.0, 3, 5]]])
+    figures = quality(block(), points, shapely.box(0, 0, 10, 6))
+    assert figures.share_within_20cm == pytest.approx(240 / 241)
+    assert psd(block(), points)[-1] == 10
+
+
+def test_a_bare_corner_is_no_data():
+    points = roof_points()
+    points = points[(points[:, 0] > 5) | (points[:, 1] > 3)]
+    assert quality(block(), points, shapely.box(0, 0, 10, 6)).nodata_share == pytest.approx(0.25)
+
+
+def test_without_a_footprint_the_alpha_shape_is_the_outline():
+    figures = quality(block(), roof_points())
+    assert figures.outline_iou == pytest.approx(9.5 * 5.5 / 60, abs=0.01)
+
+
+def test_cells_across_the_origin_are_told_apart():
+    xy = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]])
+    assert nodata_share(xy, shapely.box(-1, -1, 1, 1)) == 0
+    assert unexplained_area(xy, np.ones(4)) == 4
+
+
+def test_figures_do_not_depend_on_the_order_of_points():
+    rng = np.random.default_rng(3)
+    points = roof_points() + rng.normal(0, 0.2, (240, 3))
+    a = quality(block(), points, shapely.box(0, 0, 10, 6))
+    b = quality(block(), rng.permutation(points), shapely.box(0, 0, 10, 6))
+    assert a.rmse == pytest.approx(b.rmse) and a.p95 == b.p95 and a.unexplained_area_m2 == b.unexplained_area_m2
+
+
+def test_iou_laws():
+    a, b = shapely.box(0, 0, 2, 2), shapely.box(1, 1, 3, 3)
+    assert iou(a, a) == 1 and iou(a, b) == iou(b, a) == pytest.approx(1 / 7)
+    assert iou(a, shapely.box(5, 5, 6, 6)) == 0
+    assert math.isnan(iou(shapely.Polygon(), shapely.Polygon()))
+
+
+def test_outline_of_a_solid_is_its_plan():
+    assert plan_outline(block()).equals(shapely.box(0, 0, 10, 6))
+
+
+def test_no_points_no_figures():
+    figures = quality(block(), np.empty((0, 3)), shapely.box(0, 0, 10, 6))
+    assert figures.points == 0 and math.isnan(figures.rmse) and figures.nodata_share == 1
+
+
+def test_points_that_are_not_finite_are_left_out():
+    points = np.concatenate([roof_points(), [[np.nan, 1, 5], [1, np.inf, 5]]])
+    assert quality(block(), points, shapely.box(0, 0, 10, 6)) == quality(
+        block(), roof_points(), shapely.box(0, 0, 10, 6)
+    )
+
+
+@pytest.mark.parametrize("xy", [np.zeros((2, 2)), np.zeros((9, 2)), np.arange(10.0).reshape(5, 2)])
+def test_points_without_area_give_no_outline_but_figures(xy):
+    figures = quality(block(), np.column_stack([xy, np.full(len(xy), 5.0)]))
+    assert math.isnan(figures.outline_iou) and figures.psd_mean >= 0
