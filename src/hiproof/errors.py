@@ -23,3 +23,7 @@ class FitError(HiproofError):
 
 class CompositionError(HiproofError):
     """A roof that cannot become a valid solid; the caller falls back to a simpler roof."""
+
+
+class InputWarning(UserWarning):
+    """Input that was used after putting something right (points dropped, a CRS assumed); it says what and how much."""

@@ -25,6 +25,14 @@ class ReadSettings:
 
     building_classes: tuple[int, ...] = setting((6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)")
     ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points")
+    crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say')
+    split_gap_m: float = setting(
+        0.0, "without footprints: clear space that separates buildings; 0 adapts it to the density", "m", 0.0, 20.0
+    )
+    split_min_points: int = setting(30, "without footprints: groups of fewer points are no building", "", 3, 100000)
+    ground_reach_m: float = setting(
+        50.0, "terrain is unknown farther than this from any ground point", "m", 1.0, 1000.0
+    )
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,26 @@
+"""Which column of a table of points holds what."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+NAMES = {
+    "x": ("x", "east", "easting", "x_coord", "point_x"),
+    "y": ("y", "north", "northing", "y_coord", "point_y"),
+    "z": ("z", "height", "elevation", "z_coord", "point_z"),
+    "classification": ("classification", "class", "scalar_classification"),
+}
+
+
+def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:
+    """Indices of x, y, z and, where there is one, classification among column names; None unless x, y and z are named.
+
+    >>> find_columns(["Intensity", "X", "Y", "Z", "Classification"])
+    (1, 2, 3, 4)
+    """
+    names = [name.strip().strip("\"'").lower() for name in header]
+    found = []
+    for wanted in NAMES.values():
+        matches = [names.index(alias) for alias in wanted if alias in names]
+        found += matches[:1]
+    return tuple(found) if len(found) >= 3 and names[found[2]] in NAMES["z"] else None

@@ -1,0 +1,104 @@
+"""Points of PLY files, ascii and binary. A reader of its own: only the vertices' scalars are needed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+
+from ..errors import InputError
+from .columns import find_columns
+from .las import Chunk
+from .text import TextLayout, classes_of, parse_rows
+
+TYPES = {
+    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
+    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
+}
+BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+
+
+@dataclass(frozen=True)
+class PlyLayout:
+    """What the header says: byte order ("" is ascii), vertices, properties (name, NumPy type), x y z (class) columns."""
+
+    byte_order: str
+    count: int
+    properties: tuple[tuple[str, str], ...]
+    columns: tuple[int, ...]
+
+
+def ply_chunks(path: Path, chunk_points: int) -> Iterator[Chunk]:
+    """Yield the vertices of a PLY file. Raises InputError for a header or a body that is not one."""
+    with open(path, "rb") as file:
+        layout = read_ply_header(file, path)
+        remaining = layout.count
+        while remaining:
+            table = read_vertices(file, layout, min(remaining, chunk_points), path, layout.count - remaining)
+            yield np.ascontiguousarray(table[:, :3]), classes_of(table)
+            remaining -= len(table)
+
+
+def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: Path, read: int) -> np.ndarray:
+    """The next `count` vertices as a float64 table of x, y, z and, where there is one, class."""
+    if layout.byte_order == "":
+        table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
+        found = len(table)
+    else:
+        dtype = np.dtype([(name, layout.byte_order + kind) for name, kind in layout.properties])
+        buffer = file.read(dtype.itemsize * count)
+        found = len(buffer) // dtype.itemsize
+        records = np.frombuffer(buffer, dtype, found)
+        table = np.column_stack([records[layout.properties[column][0]].astype(float) for column in layout.columns])
+    if found < count:
+        raise InputError(
+            f"expected {layout.count} vertices in {path} as its header says, got {read + found}; "
+            "the file is truncated: copy or download it again"
+        )
+    return table
+
+
+def read_ply_header(file: BinaryIO, path: Path) -> PlyLayout:
+    """Read up to `end_header`, leaving `file` at the first vertex."""
+    byte_order, count, properties, element = None, None, [], None
+    for words in header_lines(file, path):
+        if words[0] == "format" and len(words) > 1:
+            byte_order = BYTE_ORDERS.get(words[1])
+        elif words[0] == "element" and len(words) == 3:
+            if count is None and words[1] != "vertex":
+                raise unreadable(path, f"the element {words[1]!r} before the vertices")
+            element = words[1]
+            if element == "vertex":
+                count = int(words[2]) if words[2].isdigit() else None
+        elif words[0] == "property" and element == "vertex":
+            if len(words) != 3 or words[1] not in TYPES:
+                raise unreadable(path, f"the vertex property {' '.join(words[1:])!r}")
+            properties.append((words[2], TYPES[words[1]]))
+    columns = find_columns([name for name, _ in properties])
+    if byte_order is None or count is None or columns is None:
+        raise unreadable(path, "a header without format, vertices or their x, y, z")
+    return PlyLayout(byte_order, count, tuple(properties), columns)
+
+
+def header_lines(file: BinaryIO, path: Path) -> Iterator[list[str]]:
+    for _ in range(1000):
+        line = file.readline(4096)
+        words = line.decode("latin-1").split()
+        if words == ["end_header"]:
+            return
+        if not line:
+            break
+        if words and words[0] not in ("ply", "comment", "obj_info"):
+            yield words
+    raise unreadable(path, "a header that does not end")
+
+
+def unreadable(path: Path, got: str) -> InputError:
+    return InputError(
+        f"expected a PLY file whose first element is the vertices with scalar x, y, z in {path}, got {got}; "
+        "export the points alone, or write them as LAZ"
+    )

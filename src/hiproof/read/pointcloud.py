@@ -1,0 +1,182 @@
+"""Point clouds from files: LAS, LAZ, COPC, text and PLY, found by their content and ending, read in chunks."""
+
+from __future__ import annotations
+
+import glob
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, InputWarning
+from ..model import PointCloud
+from ..settings import Settings
+from . import las, ply, text
+from .crs import parse_crs, require_metres, same_horizontal
+
+LAS_SUFFIXES = (".las", ".laz")
+TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
+POINT_SUFFIXES = (*LAS_SUFFIXES, *TEXT_SUFFIXES, ".ply")
+FORMATS = "LAS, LAZ, COPC, PLY or text (" + " ".join(TEXT_SUFFIXES) + ")"
+CHUNK_POINTS = 1_000_000
+
+Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
+
+
+@dataclass(frozen=True)
+class PointFileHeader:
+    """What a point file says of itself; `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax)."""
+
+    path: str
+    bounds: tuple[float, float, float, float, float, float]
+    count: int
+    crs: Any = None
+    point_format: int | None = None
+
+
+def read_points(*paths: str | Path, settings: Settings | None = None, box: Box | None = None) -> PointCloud:
+    """All points of the files, folders or wildcards `paths`, those outside `box` in plan left out.
+
+    Classes are kept, NaN and infinite coordinates dropped with an InputWarning. The CRS is `settings.read.crs` where
+    that is given, else the files' own. Raises InputError for what is missing, unreadable, empty, in degrees or feet, or
+    in different CRSs.
+    """
+    files = expand_paths(paths)
+    crs = common_crs(files, settings)
+    clouds = [chunk for file in files for chunk in iter_points(file, box=box)]
+    xyz = np.concatenate([cloud.xyz for cloud in clouds]) if clouds else np.empty((0, 3))
+    if not len(xyz):
+        where = "" if box is None else f" inside the box {tuple(float(side) for side in box)}"
+        raise InputError(
+            f"expected points{where} in {', '.join(map(str, files))}, got none; "
+            + ("check the file" if box is None else "check the box against the files' bounds and CRS")
+        )
+    return PointCloud(xyz, joined_classes(clouds), crs, tuple(str(file) for file in files))
+
+
+def iter_points(path: str | Path, chunk_points: int = CHUNK_POINTS, box: Box | None = None) -> Iterator[PointCloud]:
+    """Yield the points of one file, at most `chunk_points` at a time, without their CRS: memory stays bounded.
+
+    Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Raises InputError as
+    `read_points` does, an empty file excepted, which yields nothing.
+    """
+    kind = file_kind(path)
+    if kind == "las":
+        chunks = las.las_chunks(path, chunk_points, box)
+    else:
+        chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(Path(path), chunk_points)
+    dropped = 0
+    for xyz, classes in chunks:
+        finite = np.isfinite(xyz).all(axis=1)
+        dropped += len(xyz) - int(finite.sum())
+        keep = finite if box is None else finite & in_box(xyz, box)
+        if not keep.all():
+            xyz, classes = xyz[keep], None if classes is None else classes[keep]
+        if len(xyz):
+            yield PointCloud(xyz, classes, None, (str(path),))
+    if dropped:
+        warnings.warn(f"{path}: {dropped} points with NaN or infinite coordinates were left out", InputWarning)
+
+
+def read_header(path: str | Path) -> PointFileHeader:
+    """Bounds, count and CRS of one file: from the header of LAS, LAZ and COPC, by one pass over text and PLY."""
+    if file_kind(path) == "las":
+        header = las.read_las_header(path)
+        bounds = tuple(float(value) for value in (*header.mins, *header.maxs))
+        crs = las.las_crs(header, path)
+        return PointFileHeader(str(path), bounds, header.point_count, crs, header.point_format.id)
+    count, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
+    for cloud in iter_points(path):
+        count += len(cloud)
+        low, high = np.minimum(low, cloud.xyz.min(axis=0)), np.maximum(high, cloud.xyz.max(axis=0))
+    return PointFileHeader(str(path), (*low.tolist(), *high.tolist()), count)
+
+
+def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
+    """The files that paths, folders and wildcards name, each once, in the order given; folders are sorted."""
+    if not paths:
+        raise InputError(
+            "expected at least one point cloud, got none; name a file, a folder or a wildcard"
+        )
+    files: dict[str, str | Path] = {}
+    for path in paths:
+        for file in expand_path(path):
+            files.setdefault(str(file) if las.is_url(file) else str(Path(file).resolve()), file)
+    return list(files.values())
+
+
+def expand_path(path: str | Path) -> list[str | Path]:
+    if las.is_url(path):
+        return [path]
+    folder = Path(path)
+    if folder.is_dir():
+        found = sorted(p for p in folder.iterdir() if p.suffix.lower() in POINT_SUFFIXES and p.is_file())
+        if not found:
+            raise InputError(f"expected point files in the folder {path}, got none; it may hold {FORMATS}")
+        return list(found)
+    if folder.exists():
+        return [folder]
+    matches = sorted(match for match in glob.glob(str(path), recursive=True) if Path(match).is_file())
+    if not matches:
+        raise InputError(f"expected a point cloud at {path}, got no such file; check the path (or the wildcard)")
+    return [Path(match) for match in matches]
+
+
+def file_kind(path: str | Path) -> str:
+    """ "las", "ply" or "text", from the first bytes and the ending. Raises InputError for anything else."""
+    if las.is_url(path):
+        return "las"
+    try:
+        with open(path, "rb") as file:
+            head = file.read(4)
+    except OSError as error:
+        raise InputError(f"expected a readable point cloud at {path}, got: {error.strerror or error}") from error
+    suffix = Path(path).suffix.lower()
+    if not head:
+        raise InputError(f"expected points in {path}, got an empty file; copy or download it again")
+    if head == b"LASF":
+        return "las"
+    if head[:3] == b"ply":
+        return "ply"
+    if suffix in TEXT_SUFFIXES:
+        return "text"
+    got = "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
+    raise InputError(
+        f"expected {FORMATS} at {path}, got {got} that starts with {head!r}; "
+        "if it is text with x y z on each line, rename it to .xyz"
+    )
+
+
+def common_crs(files: list[str | Path], settings: Settings | None) -> Any:
+    """The CRS the files share: the setting's, else the headers'. Files that name none go with those that do."""
+    given = parse_crs((settings or Settings()).read.crs)
+    crs, first = given, None
+    if given is None:
+        for file in files:
+            other = las.las_crs(las.read_las_header(file), file) if file_kind(file) == "las" else None
+            if crs is not None and other is not None and not same_horizontal(crs, other):
+                raise InputError(
+                    f"expected all clouds in one CRS, got {crs.name} in {first} and {other.name} in {file}; "
+                    "reproject one of them, or set [read] crs where a header is wrong"
+                )
+            if crs is None and other is not None:
+                crs, first = other, file
+    require_metres(crs, "the point cloud")
+    return crs
+
+
+def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
+    """Classes of all clouds one after the other; 0 (never classified) where a file has none; None where no file has."""
+    if all(cloud.classification is None for cloud in clouds):
+        return None
+    return np.concatenate(
+        [np.zeros(len(c), np.uint8) if c.classification is None else c.classification for c in clouds]
+    )
+
+
+def in_box(xyz: np.ndarray, box: Box) -> np.ndarray:
+    x, y = xyz[:, 0], xyz[:, 1]
+    return (x >= box[0]) & (y >= box[1]) & (x <= box[2]) & (y <= box[3])

@@ -1,0 +1,109 @@
+"""Points as text: XYZ, CSV, TXT, ASC and PTS, with or without a header, the delimiter found from the first lines."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from .columns import find_columns
+from .las import Chunk
+
+COMMENTS = ("#", "//")
+
+
+@dataclass(frozen=True)
+class TextLayout:
+    """How a text file lays out points: lines to skip, delimiter (None: white space), columns of x, y, z (and class)."""
+
+    skip: int
+    delimiter: str | None
+    columns: tuple[int, ...]
+
+
+def text_chunks(path: Path, chunk_points: int) -> Iterator[Chunk]:
+    """Yield the points of a text file. Raises InputError naming the first line that holds no point."""
+    layout = sniff(path)
+    read = 0
+    with open(path, encoding="utf-8-sig", errors="replace") as file:
+        list(islice(file, layout.skip))
+        while True:
+            table = parse_rows(file, layout, chunk_points, path, read)
+            read += len(table)
+            if len(table):
+                yield table[:, :3], classes_of(table)
+            if len(table) < chunk_points:
+                return
+
+
+def parse_rows(file, layout: TextLayout, count: int, path: Path, read: int) -> np.ndarray:
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # NumPy warns of an empty rest, which is the normal end
+            return np.loadtxt(
+                file, delimiter=layout.delimiter, usecols=layout.columns, max_rows=count, comments=COMMENTS, ndmin=2
+            )
+    except (ValueError, IndexError) as error:
+        raise InputError(
+            f"expected three numbers x y z on every line of {path}, got another after {read} points ({error}); "
+            "write one point a line with a decimal point, the columns separated by blanks, commas, semicolons or tabs"
+        ) from error
+
+
+def classes_of(table: np.ndarray) -> np.ndarray | None:
+    if table.shape[1] < 4:
+        return None
+    return np.clip(np.nan_to_num(table[:, 3]), 0, 255).astype(np.uint8)
+
+
+def sniff(path: Path) -> TextLayout:
+    """Find the layout from the first lines. Raises InputError when they are no text or hold no three numbers."""
+    with open(path, "rb") as file:
+        head = file.read(65536)
+    if b"\0" in head:
+        raise InputError(
+            f"expected text with x y z on each line in {path}, got binary data; rename it"
+        )
+    lines = head.decode("utf-8-sig", errors="replace").splitlines()
+    names: list[str] = []
+    for number, line in enumerate(lines):
+        text = strip_comment(line)
+        delimiter = find_delimiter(text)
+        fields = [field for field in text.split(delimiter) if delimiter or field]
+        if len(fields) < 3 or not text:  # blank, or the count that starts a PTS file
+            continue
+        if not line.lstrip().startswith(COMMENTS) and all(is_number(field) for field in fields[:3]):
+            return TextLayout(number, delimiter, find_columns(names) or (0, 1, 2))
+        if find_columns(fields):
+            names = fields
+            columns = find_columns(names)
+            following = next((rest for rest in lines[number + 1 :] if rest.strip()), None)
+            if following and not line.lstrip().startswith(COMMENTS):
+                return TextLayout(number + 1, find_delimiter(following), columns)
+        elif number > 20:
+            break
+    raise InputError(
+        f"expected lines of x y z in {path}, got {lines[0][:60]!r} and nothing like a point after it; "
+        "give LAS, LAZ, COPC, PLY or text with one point a line"
+    )
+
+
+def strip_comment(line: str) -> str:
+    return line.strip().lstrip("#/").strip()
+
+
+def find_delimiter(line: str) -> str | None:
+    return next((mark for mark in (";", "\t", ",") if mark in line), None)
+
+
+def is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,53 @@
+"""CRSs are compared in plan, named for CityGML and combined with heights."""
+
+import doctest
+
+import pytest
+from pyproj import CRS
+
+import hiproof.read.columns
+import hiproof.read.crs
+from hiproof.errors import InputError
+from hiproof.read.crs import combine, parse_crs, require_metres, same_horizontal, srs_name, vertical_crs
+
+
+@pytest.mark.parametrize("module", [hiproof.read.crs, hiproof.read.columns])
+def test_examples_in_the_docstrings_run(module):
+    assert doctest.testmod(module).failed == 0
+
+
+@pytest.mark.parametrize(
+    "first, second, same",
+    [(7415, 28992, True), (28992, 28992, True), (28992, 25832, False), (4326, 4979, True), (7415, None, False)],
+)
+def test_plan_decides_whether_two_are_the_same(first, second, same):
+    assert same_horizontal(parse_crs(first), parse_crs(second)) is same
+    assert same_horizontal(parse_crs(second), parse_crs(first)) is same
+
+
+def test_wkt_without_a_code_is_recognised():
+    bare = CRS.from_wkt(CRS.from_epsg(28992).to_wkt("WKT1_GDAL").replace(',AUTHORITY["EPSG","28992"]', ""))
+    assert same_horizontal(bare, parse_crs(7415))
+
+
+def test_combining_keeps_heights_that_are_there():
+    assert vertical_crs(combine(parse_crs(28992), parse_crs(5709))).to_epsg() == 5709
+    assert combine(parse_crs(7415), parse_crs(5773)).to_epsg() == 7415
+    assert combine(parse_crs(28992), None).to_epsg() == 28992
+    assert combine(None, parse_crs(5709)) is None
+
+
+def test_nothing_is_called_nothing():
+    assert srs_name(None) is None and parse_crs(None) is None and parse_crs("  ") is None
+    assert srs_name(CRS.from_proj4("+proj=tmerc +lon_0=9.3 +x_0=1234 +datum=WGS84")) is None
+
+
+@pytest.mark.parametrize("code", [4326, 2263, 6360])
+def test_degrees_and_feet_are_refused(code):
+    with pytest.raises(InputError, match="axes are metres"):
+        require_metres(CRS.from_epsg(code), "the cloud")
+
+
+def test_a_name_nobody_knows_is_refused():
+    with pytest.raises(InputError, match='such as "EPSG:7415"'):
+        parse_crs("the Dutch one")

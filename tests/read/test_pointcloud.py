@@ -1,0 +1,271 @@
+"""Point clouds come back as they were written, in every format; what cannot be read gets one sentence."""
+
+import struct
+
+import laspy
+import numpy as np
+import pytest
+
+from hiproof.errors import InputError, InputWarning
+from hiproof.read.columns import find_columns
+from hiproof.read.las import is_copc
+from hiproof.read.pointcloud import expand_paths, iter_points, read_header, read_points
+from hiproof.settings import Settings
+
+
+def some_points(count=500, seed=0):
+    rng = np.random.default_rng(seed)
+    xyz = np.round(rng.uniform([85000, 446000, -3], [85060, 446040, 20], (count, 3)), 3)
+    return xyz, rng.choice([1, 2, 6], count).astype(np.uint8)
+
+
+def write_las(path, xyz, classes=None, epsg=None, version="1.4", point_format=6):
+    header = laspy.LasHeader(version=version, point_format=point_format)
+    header.offsets, header.scales = np.floor(xyz.min(axis=0)) if len(xyz) else np.zeros(3), np.full(3, 0.001)
+    if epsg is not None:
+        from pyproj import CRS
+
+        header.add_crs(CRS.from_epsg(epsg))
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = xyz.T
+    if classes is not None:
+        las.classification = classes
+    las.write(path)
+    return path
+
+
+def write_copc(path, xyz, classes):
+    """A COPC file of one octree node: a LAZ file whose first VLR is COPC's and whose last EVLR is the hierarchy."""
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.offsets, header.scales = np.floor(xyz.min(axis=0)), np.full(3, 0.001)
+    centre, half = (xyz.min(axis=0) + xyz.max(axis=0)) / 2, float(np.ptp(xyz, axis=0).max())
+    info = struct.pack("<5d2Q2d11Q", *centre, half, half, 0, 32, 0.0, 0.0, *[0] * 11)
+    header.vlrs.append(laspy.VLR("copc", 1, "copc info", info))
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = xyz.T
+    las.classification = classes
+    las.write(path)
+    raw = bytearray(path.read_bytes())
+    data_start = struct.unpack_from("<I", raw, 96)[0]
+    table = struct.unpack_from("<q", raw, data_start)[0]
+    entry = struct.pack("<4iQ2i", 0, 0, 0, 0, data_start + 8, table - data_start - 8, len(xyz))
+    struct.pack_into("<QI", raw, 235, len(raw), 1)
+    struct.pack_into("<Q", raw, 375 + 54 + 40, len(raw) + 60)  # where the root hierarchy page starts
+    raw += struct.pack("<H16sHQ32s", 0, b"copc", 1000, len(entry), b"") + entry
+    path.write_bytes(raw)
+    return path
+
+
+def write_ply(path, xyz, classes, form):
+    head = f"ply\nformat {form} 1.0\ncomment a test\nelement vertex {len(xyz)}\nproperty uchar red\n"
+    head += "property double x\nproperty double y\nproperty double z\nproperty uchar scalar_Classification\n"
+    head += "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
+    if form == "ascii":
+        rows = "".join(f"7 {x:.3f} {y:.3f} {z:.3f} {c}\n" for (x, y, z), c in zip(xyz, classes, strict=True))
+        path.write_bytes(head.encode() + rows.encode())
+        return path
+    order = "<" if "little" in form else ">"
+    kinds = [("red", "u1"), ("x", order + "f8"), ("y", order + "f8"), ("z", order + "f8"), ("c", "u1")]
+    records = np.zeros(len(xyz), np.dtype(kinds))
+    records["x"], records["y"], records["z"], records["c"] = *xyz.T, classes
+    path.write_bytes(head.encode() + records.tobytes())
+    return path
+
+
+def write_text(path, xyz, classes, delimiter=",", header="x,y,z,classification"):
+    rows = [delimiter.join([*(f"{v:.3f}" for v in p), str(c)]) for p, c in zip(xyz, classes, strict=True)]
+    path.write_text("\n".join(([header] if header else []) + rows) + "\n")
+    return path
+
+
+FORMATS = {
+    "las 1.2": lambda p, xyz, c: write_las(p / "a.las", xyz, c, version="1.2", point_format=1),
+    "laz 1.4": lambda p, xyz, c: write_las(p / "a.laz", xyz, c),
+    "copc": lambda p, xyz, c: write_copc(p / "a.copc.laz", xyz, c),
+    "ply ascii": lambda p, xyz, c: write_ply(p / "a.ply", xyz, c, "ascii"),
+    "ply little": lambda p, xyz, c: write_ply(p / "a.ply", xyz, c, "binary_little_endian"),
+    "ply big": lambda p, xyz, c: write_ply(p / "a.ply", xyz, c, "binary_big_endian"),
+    "csv": lambda p, xyz, c: write_text(p / "a.csv", xyz, c),
+    "semicolons": lambda p, xyz, c: write_text(p / "a.txt", xyz, c, ";", "X;Y;Z;Class"),
+    "commented header": lambda p, xyz, c: write_text(p / "a.xyz", xyz, c, " ", "//X Y Z Classification"),
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_points_and_classes_come_back_in_every_format(tmp_path, name):
+    xyz, classes = some_points()
+    path = FORMATS[name](tmp_path, xyz, classes)
+    cloud = read_points(path)
+    assert np.allclose(cloud.xyz, xyz, atol=1e-6)
+    assert np.array_equal(cloud.classification, classes)
+    header = read_header(path)
+    assert header.count == len(xyz)
+    assert np.allclose(header.bounds, [*xyz.min(axis=0), *xyz.max(axis=0)])
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_chunks_and_boxes_agree_with_the_whole(tmp_path, name):
+    xyz, classes = some_points()
+    path = FORMATS[name](tmp_path, xyz, classes)
+    chunks = list(iter_points(path, chunk_points=64))
+    assert max(map(len, chunks)) <= 64
+    assert np.allclose(np.concatenate([c.xyz for c in chunks]), xyz, atol=1e-6)
+    box = (85010.0, 446005.0, 85030.0, 446030.0)
+    inside = (xyz[:, 0] >= 85010) & (xyz[:, 0] <= 85030) & (xyz[:, 1] >= 446005) & (xyz[:, 1] <= 446030)
+    assert np.allclose(read_points(path, box=box).xyz, xyz[inside], atol=1e-6)
+
+
+def test_copc_is_told_from_laz_by_its_first_record(tmp_path):
+    xyz, classes = some_points(50)
+    assert is_copc(write_copc(tmp_path / "a.laz", xyz, classes))
+    assert not is_copc(write_las(tmp_path / "b.laz", xyz, classes))
+
+
+def test_coordinates_at_ten_million_keep_their_millimetres(tmp_path):
+    xyz = np.round(some_points()[0] + [1e7, 1e7, 0], 3)
+    assert np.allclose(read_points(write_las(tmp_path / "far.laz", xyz)).xyz, xyz, atol=1e-6)
+
+
+def test_crs_comes_from_the_header_and_the_setting_overrules_it(tmp_path):
+    xyz, _ = some_points(20)
+    path = write_las(tmp_path / "a.laz", xyz, epsg=28992)
+    assert read_points(path).crs.to_epsg() == 28992
+    assert read_header(path).crs.to_epsg() == 28992
+    assert read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:7415"}})).crs.to_epsg() == 7415
+    assert read_points(write_las(tmp_path / "b.las", xyz)).crs is None
+
+
+def test_folders_wildcards_and_repeats_name_each_file_once(tmp_path):
+    xyz, classes = some_points(20)
+    a, b = write_las(tmp_path / "a.laz", xyz), write_text(tmp_path / "b.csv", xyz, classes)
+    (tmp_path / "notes.md").write_text("no points")
+    assert expand_paths((tmp_path,)) == [a, b]
+    assert expand_paths((str(tmp_path / "*.laz"), tmp_path, str(b))) == [a, b]
+    cloud = read_points(tmp_path)
+    assert len(cloud) == 40 and cloud.sources == (str(a), str(b))
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["1 2 3\n4 5 6\n", "2\n1 2 3 9 9\n4 5 6 9 9\n", "id;z;y;x\n7;3;2;1\n8;6;5;4\n", "\n# made by\n1\t2\t3\n4\t5\t6"],
+)
+def test_text_layouts_are_recognised(tmp_path, text):
+    (tmp_path / "a.pts").write_text(text)
+    cloud = read_points(tmp_path / "a.pts")
+    assert cloud.xyz.tolist() == [[1, 2, 3], [4, 5, 6]] and cloud.classification is None
+
+
+def test_columns_need_all_three_coordinates():
+    assert find_columns(["x", "y", "classification"]) is None
+    assert find_columns(["Easting", "Northing", "Elevation"]) == (0, 1, 2)
+
+
+def test_points_that_are_not_finite_are_dropped_with_a_warning(tmp_path):
+    (tmp_path / "a.xyz").write_text("1 2 3\nnan 2 3\n1 inf 3\n4 5 6\n")
+    with pytest.warns(InputWarning, match="2 points with NaN or infinite"):
+        assert read_points(tmp_path / "a.xyz").xyz.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
+def test_withheld_points_are_left_out_with_a_warning(tmp_path):
+    xyz, classes = some_points(10)
+    las = laspy.read(write_las(tmp_path / "a.las", xyz, classes))
+    las.withheld = np.arange(10) < 4
+    las.write(tmp_path / "b.las")
+    with pytest.warns(InputWarning, match="4 points flagged as withheld"):
+        assert np.allclose(read_points(tmp_path / "b.las").xyz, xyz[4:], atol=1e-6)
+
+
+def damaged(tmp_path, kind):
+    xyz, classes = some_points(5000)
+    path = tmp_path / "bad.laz"
+    if kind == "truncated laz":
+        raw = write_las(path, xyz, classes).read_bytes()
+        path.write_bytes(raw[: len(raw) // 2])
+    elif kind == "truncated las":
+        path = write_las(tmp_path / "bad.las", xyz, classes)
+        path.write_bytes(path.read_bytes()[: 375 + 30 * 400])
+    elif kind == "header only":
+        path.write_bytes(write_las(path, xyz, classes).read_bytes()[:100])
+    elif kind == "garbled laz":
+        raw = bytearray(write_las(path, xyz, classes).read_bytes())
+        raw[600:4000:3] = bytes(len(raw[600:4000:3]))
+        path.write_bytes(raw)
+    elif kind == "text as laz":
+        path.write_text("1 2 3\n4 5 6\n")
+    elif kind == "empty":
+        path.write_bytes(b"")
+    elif kind == "zero points":
+        path = write_las(tmp_path / "zero.las", np.empty((0, 3)))
+    elif kind == "empty folder":
+        path = tmp_path / "folder"
+        path.mkdir()
+    elif kind == "truncated ply":
+        path = write_ply(tmp_path / "bad.ply", xyz, classes, "binary_little_endian")
+        path.write_bytes(path.read_bytes()[:5000])
+    elif kind == "ply of faces":
+        path = tmp_path / "bad.ply"
+        path.write_text("ply\nformat ascii 1.0\nelement face 2\nproperty int a\nend_header\n1\n2\n")
+    elif kind == "ply without end":
+        path = tmp_path / "bad.ply"
+        path.write_text("ply\nformat ascii 1.0\nelement vertex 2\n")
+    elif kind == "prose":
+        path = tmp_path / "bad.txt"
+        path.write_text("Dear reader, this is\nno point cloud at all\n")
+    elif kind == "word among numbers":
+        path = tmp_path / "bad.xyz"
+        path.write_text("1 2 3\n4 five 6\n")
+    elif kind == "two columns":
+        path = tmp_path / "bad.csv"
+        path.write_text("1,2\n3,4\n")
+    elif kind == "binary text":
+        path = tmp_path / "bad.xyz"
+        path.write_bytes(bytes(range(256)))
+    elif kind == "degrees":
+        path = write_las(path, xyz - [85000, 446000, 0], epsg=4326)
+    elif kind == "feet":
+        path = write_las(path, xyz, epsg=2263)
+    elif kind == "other ending":
+        path = tmp_path / "cloud.jpg"
+        path.write_bytes(b"\xff\xd8\xff\xe0")
+    return path
+
+
+BAD = {
+    **{
+        "truncated laz": "truncated",
+        "truncated las": "truncated",
+        "header only": "truncated",
+        "garbled laz": "truncated",
+    },
+    **{"text as laz": "rename it to .xyz", "empty": "an empty file", "zero points": "got none"},
+    **{
+        "missing": "no such file",
+        "empty folder": "point files in the folder",
+        "truncated ply": "the file is truncated",
+    },
+    **{"ply of faces": "'face' before the vertices", "ply without end": "does not end", "prose": "Dear reader"},
+    **{"word among numbers": "after 0 points", "two columns": "nothing like a point", "binary text": "binary data"},
+    **{"degrees": "in degree", "feet": "survey foot", "other ending": r"ending in \.jpg"},
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_what_cannot_be_read_gets_one_full_sentence(tmp_path, kind):
+    with pytest.raises(InputError, match=BAD[kind]) as caught:
+        read_points(damaged(tmp_path, kind))
+    message = str(caught.value)
+    assert message.startswith("expected") and "got" in message and "Traceback" not in message
+
+
+def test_files_in_different_crs_are_refused(tmp_path):
+    xyz, _ = some_points(20)
+    files = write_las(tmp_path / "a.laz", xyz, epsg=28992), write_las(tmp_path / "b.laz", xyz, epsg=25832)
+    with pytest.raises(InputError, match=r"in one CRS, got .*New in .*a\.laz and .*b\.laz"):
+        read_points(*files)
+
+
+def test_no_path_and_a_box_beside_the_points_are_refused(tmp_path):
+    with pytest.raises(InputError, match="at least one"):
+        read_points()
+    with pytest.raises(InputError, match="inside the box"):
+        read_points(write_las(tmp_path / "a.laz", some_points(9)[0]), box=(0, 0, 1, 1))
