@@ -1,3 +1,57 @@
-"""hiproof: HolIstic Parametric ROOFs. Airborne LiDAR point clouds into watertight, semantic LoD2 building models."""
+"""hiproof: HolIstic Parametric ROOFs. Airborne LiDAR point clouds into watertight, semantic LoD2 building models.
+
+    import hiproof
+    fit = hiproof.fit_roof(points)                       # one primitive, all points
+    building = hiproof.reconstruct(points, footprint)    # a valid solid, with status and quality
+
+Most names below are imported when first used, so that `import hiproof` stays fast; `reconstruct` is imported at once,
+since a module of the same name would otherwise take its place.
+"""
+
+from importlib import import_module
+from typing import Any
+
+from .reconstruct import reconstruct
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "reconstruct_area": "city.run",
+    "Request": "city.run",
+    "fit_roof": "fit",
+    "check_solid": "compose",
+    "read_points": "read",
+    "read_footprints": "read",
+    "read_terrain": "read",
+    "read_solids": "read.solids",
+    "write_citygml": "write",
+    "write_cityjson": "write",
+    "write_parameters": "write",
+    "write_attributes": "write",
+    "Building": "model",
+    "Fit": "model",
+    "Footprint": "model",
+    "Part": "model",
+    "Piece": "model",
+    "Roof": "model",
+    "Solid": "model",
+    "Quality": "model",
+    "Settings": "settings",
+    "Status": "status",
+    "HiproofError": "errors",
+}
+
+__all__ = ["__version__", "reconstruct", *sorted(_HOME)]
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name from its module when it is first asked for (PEP 562)."""
+    if name not in _HOME:
+        raise AttributeError(f"module 'hiproof' has no attribute {name!r}")
+    value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return list(__all__)

@@ -75,7 +75,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Roof:
-    """All parts of one building's roof in the local `frame`, over the plan `outline` (polygon with holes, same frame)."""
+    """All parts of one building's roof in the local `frame`, over the plan `outline` (may have holes)."""
 
     parts: tuple[Part, ...]
     outline: shapely.Polygon
@@ -114,7 +114,7 @@ class Face:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shell: `vertices` (n, 3) in the frame its maker names (world in a Building), `faces` oriented outwards."""
+    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented outwards."""
 
     vertices: np.ndarray
     faces: tuple[Face, ...]
@@ -183,7 +183,8 @@ class Building:
 
     `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for
     this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
-    lines. `types` are posterior probabilities by roof type where a choice was made. `attributes` are the input's own.
+    lines. `types` are posterior probabilities by roof type where a choice was made. `footprint` (world) and `attributes`
+    are the input's own.
     """
 
     id: str
@@ -197,6 +198,7 @@ class Building:
     terrain_intersection: tuple[np.ndarray, ...] = ()
     objective: float = float("nan")
     types: dict[str, float] = field(default_factory=dict)
+    footprint: shapely.Polygon | None = None
     attributes: dict[str, Any] = field(default_factory=dict)
 
     @property

@@ -41,6 +41,7 @@ class FitSettings:
 
     types: tuple[str, ...] = setting((), "roof types to choose among; empty means the whole catalogue")
     objective: str = setting("likelihood", "objective to minimise", choices=("likelihood", "paper"))
+    parts: str = setting("compound", "as many primitives as the evidence pays for, or one", choices=("compound", "one"))
 
 
 @dataclass(frozen=True)
@@ -48,6 +49,13 @@ class ComposeSettings:
     """[compose] from fitted roof to solid."""
 
     snap_m: float = setting(0.001, "plan vertices closer than this are one", "m", 1e-6, 0.05)
+
+
+@dataclass(frozen=True)
+class ReconstructSettings:
+    """[reconstruct] one building from points to solid."""
+
+    poor_share: float = setting(0.5, "a model with a smaller share of points within 0.2 m is called poor", "", 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -63,6 +71,7 @@ class Settings:
     read: ReadSettings = field(default_factory=ReadSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     compose: ComposeSettings = field(default_factory=ComposeSettings)
+    reconstruct: ReconstructSettings = field(default_factory=ReconstructSettings)
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:

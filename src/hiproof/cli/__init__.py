@@ -1,0 +1,20 @@
+"""The command line: one thin module a command, imported only when that command runs."""
+
+from __future__ import annotations
+
+import sys
+
+
+def main() -> None:
+    """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C exit code 130."""
+    from ..errors import HiproofError
+    from .app import app
+
+    try:
+        app()
+    except HiproofError as error:
+        print(f"hiproof: {error}", file=sys.stderr)
+        sys.exit(2)
+    except KeyboardInterrupt:
+        print("hiproof: interrupted; what was finished is kept, the same command goes on from there", file=sys.stderr)
+        sys.exit(130)

@@ -1,0 +1,48 @@
+# Two commands do everything on a machine with Python 3.11 to 3.13 and git: `make demo` and `make test`.
+PYTHON ?= python3
+VENV ?= .venv
+BIN := $(VENV)/bin
+# one thread for linear algebra: the work is many small buildings, and processes are how they share the cores
+export OPENBLAS_NUM_THREADS := 1
+export OMP_NUM_THREADS := 1
+
+.PHONY: demo test test-train lint bench clean
+
+$(VENV)/core: pyproject.toml
+	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+$(VENV)/test: $(VENV)/core
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[test,city]'
+	touch $@
+
+$(VENV)/train: $(VENV)/test
+	$(BIN)/pip install --quiet --disable-pip-version-check torch==2.13.0 onnx matplotlib
+	touch $@
+
+$(VENV)/lint: $(VENV)/core
+	$(BIN)/pip install --quiet --disable-pip-version-check ruff
+	touch $@
+
+demo: $(VENV)/core
+	$(BIN)/hiproof demo demo
+	$(BIN)/hiproof check demo/buildings.city.jsonl
+	@echo "The models lie in demo/: buildings.gml (CityGML), buildings.city.jsonl (CityJSON), parameters.jsonl, buildings.gpkg"
+
+test: $(VENV)/test
+	$(BIN)/python -m pytest -m "not train" -n 2 --dist loadfile
+
+test-train: $(VENV)/train
+	$(BIN)/python -m pytest -m train
+
+lint: $(VENV)/lint
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
+bench: $(VENV)/test
+	$(BIN)/python -m benchmarks
+
+clean:
+	rm -rf $(VENV) demo .pytest_cache .ruff_cache
+	find . -name __pycache__ -prune -exec rm -rf {} +

@@ -1,0 +1,133 @@
+"""Where tasks run: in this process, in processes of this machine, or on a Dask cluster. One verb: `run`.
+
+`run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that dies does not end the
+run: its tasks come back with a `WorkerLost`, and the caller decides whether to try them again.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from multiprocessing import get_context
+from typing import Any
+
+from ..errors import InputError
+
+
+class WorkerLost(Exception):
+    """The process that ran the task died (killed, out of memory)."""
+
+
+class InProcess:
+    """One task after the other in this process."""
+
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        for task in tasks:
+            try:
+                yield task, function(*task), None
+            except Exception as error:
+                yield task, None, error
+
+    def close(self) -> None:
+        pass
+
+
+class Processes:
+    """`jobs` worker processes. They are spawned, not forked: a fork would copy locks of compiled code mid-flight."""
+
+    def __init__(self, jobs: int):
+        self.jobs = jobs
+        self.pool: ProcessPoolExecutor | None = None
+
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        waiting, running = iter(tasks), {}
+        while True:
+            # two tasks a worker in the queue: enough to keep it busy, few enough to lose little when one dies
+            while len(running) < 2 * self.jobs and (task := next(waiting, None)) is not None:
+                running[self.submit(function, task)] = task
+            if not running:
+                return
+            finished, _ = wait(running, return_when=FIRST_COMPLETED)
+            if any(isinstance(future.exception(), BrokenProcessPool) for future in finished):
+                yield from self.bury(running)
+                continue
+            for future in finished:
+                error = future.exception()
+                yield running.pop(future), None if error else future.result(), error
+
+    def submit(self, function: Callable, task: tuple) -> Future:
+        if self.pool is None:
+            self.pool = ProcessPoolExecutor(
+                self.jobs, mp_context=get_context("spawn"), initializer=leave_with_parent, initargs=(os.getpid(),)
+            )
+        try:
+            return self.pool.submit(function, *task)
+        except BrokenProcessPool as error:
+            lost: Future = Future()
+            lost.set_exception(error)
+            return lost
+
+    def bury(self, running: dict[Future, tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        """A worker died and the pool with it: hand back what finished, report the rest as lost, start a new pool."""
+        wait(running)
+        self.close()
+        for future, task in list(running.items()):
+            error = future.exception()
+            lost = isinstance(error, BrokenProcessPool)
+            yield task, None if error else future.result(), WorkerLost("a worker process died") if lost else error
+        running.clear()
+
+    def close(self) -> None:
+        if self.pool is not None:
+            self.pool.shutdown(wait=True, cancel_futures=True)
+            self.pool = None
+
+
+def leave_with_parent(parent: int) -> None:
+    """Make a worker end when its parent is gone, so that kill -9 of the main process leaves nothing running."""
+
+    def watch() -> None:
+        tick = threading.Event()
+        while os.getppid() == parent:
+            tick.wait(0.5)
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+class Dask:
+    """A Dask cluster at `address`; its workers must see the same files (a shared file system)."""
+
+    def __init__(self, address: str):
+        try:
+            from distributed import Client
+        except ImportError as error:
+            raise InputError("expected the extra `city` for --scheduler; try: pip install 'hiproof[city]'") from error
+        try:
+            self.client = Client(address, timeout="20s")
+        except (OSError, ValueError) as error:
+            raise InputError(f"expected a Dask scheduler at {address}, got: {error}; check the address") from error
+
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        from distributed import as_completed
+        from distributed.scheduler import KilledWorker
+
+        futures = {self.client.submit(function, *task, pure=False, retries=0): task for task in tasks}
+        for future in as_completed(list(futures)):
+            error = future.exception()
+            lost = isinstance(error, KilledWorker)
+            result = None if error else future.result()
+            yield futures.pop(future), result, WorkerLost("a worker process died") if lost else error
+
+    def close(self) -> None:
+        self.client.close()
+
+
+def make_executor(jobs: int, scheduler: str | None) -> InProcess | Processes | Dask:
+    """The executor that the options ask for."""
+    if scheduler:
+        return Dask(scheduler)
+    return Processes(jobs) if jobs > 1 else InProcess()

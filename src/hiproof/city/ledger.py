@@ -1,0 +1,86 @@
+"""What is done, what failed and why: SQLite in WAL mode, from the standard library.
+
+SQLite rather than DuckDB: it needs no further dependency, survives kill -9 at any moment, and `hiproof status` may read
+while the run writes. Only the main process writes; a row changes after its task's file stands whole on disk.
+"""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from pathlib import Path
+
+SCHEMA = """
+create table if not exists run (key text primary key, value text);
+create table if not exists task (
+    name text primary key, kind text, position integer, buildings integer, state text default 'open',
+    attempts integer default 0, message text default '', finished real);
+create table if not exists building (
+    position integer primary key, id text, task text, status text, type text, detail text, share real, psd real,
+    seconds real);
+"""
+
+
+class Ledger:
+    """The run's memory in `folder`. States of a task: open, done, failed (its input cannot be used), lost (gave up)."""
+
+    def __init__(self, path: Path, read_only: bool = False):
+        mode = "?mode=ro" if read_only else ""
+        self.database = sqlite3.connect(f"file:{path}{mode}", uri=True, isolation_level=None, timeout=60)
+        if not read_only:
+            self.database.execute("pragma journal_mode=wal")
+            self.database.execute("pragma synchronous=normal")
+            self.database.executescript(SCHEMA)
+
+    def close(self) -> None:
+        self.database.close()
+
+    def set(self, **values: str) -> None:
+        self.database.executemany("insert or replace into run values (?, ?)", list(values.items()))
+
+    def get(self, key: str) -> str | None:
+        row = self.database.execute("select value from run where key = ?", (key,)).fetchone()
+        return row[0] if row else None
+
+    def add_tasks(self, rows: list[tuple[str, str, int, int]]) -> None:
+        """Enter (name, kind, position, buildings) rows that are not there yet."""
+        self.database.execute("begin")
+        sql = "insert or ignore into task (name, kind, position, buildings) values (?, ?, ?, ?)"
+        self.database.executemany(sql, rows)
+        self.database.execute("commit")
+
+    def open_tasks(self, kind: str) -> list[str]:
+        sql = "select name from task where kind = ? and state = 'open' order by position"
+        return [name for (name,) in self.database.execute(sql, (kind,))]
+
+    def attempt(self, names: list[str]) -> None:
+        self.database.executemany("update task set attempts = attempts + 1 where name = ?", [(n,) for n in names])
+
+    def attempts(self, name: str) -> int:
+        return self.database.execute("select attempts from task where name = ?", (name,)).fetchone()[0]
+
+    def finish(self, name: str, state: str, message: str = "", outcomes: list[tuple] = ()) -> None:
+        """Close a task together with its buildings' (position, id, status, type, detail, share, psd, seconds) rows."""
+        self.database.execute("begin")
+        sql = "update task set state = ?, message = ?, finished = ? where name = ?"
+        self.database.execute(sql, (state, message, time.time(), name))
+        rows = [(position, id, name, *rest) for position, id, *rest in outcomes]
+        self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        self.database.execute("commit")
+
+    def tasks(self) -> list[tuple]:
+        sql = "select name, kind, buildings, state, attempts, message, finished from task order by kind, position"
+        return self.database.execute(sql).fetchall()
+
+    def counts(self, column: str) -> dict[str, int]:
+        """Buildings by `column` ("status" or "type"), most frequent first."""
+        sql = f"select {column}, count(*) from building group by 1 order by 2 desc, 1"
+        return {key: number for key, number in self.database.execute(sql) if key is not None}
+
+    def column(self, name: str) -> list:
+        return [value for (value,) in self.database.execute(f"select {name} from building order by position")]
+
+    def failures(self, limit: int = 20) -> list[tuple[str, str]]:
+        """(id, detail) of buildings that hit an internal error."""
+        sql = "select id, detail from building where status = 'internal_error' order by position limit ?"
+        return self.database.execute(sql, (limit,)).fetchall()

@@ -1,0 +1,63 @@
+"""Make the plan of a run: which buildings there are, from footprints or from the cloud itself."""
+
+from __future__ import annotations
+
+import shapely
+
+from ..errors import InputError
+from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints
+
+TILE_M = 250.0
+MOST_BUILDINGS_A_TILE = 100
+
+
+def make_plan(request, mark: str) -> Plan:
+    """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
+    headers, crs = read_headers(request.clouds)
+    if request.footprints:
+        jobs = jobs_from_footprints(request, headers, crs)
+    else:
+        jobs = jobs_from_cloud(request)
+    return Plan(
+        clouds=request.clouds,
+        jobs=jobs,
+        tiles=cut_into_tiles(jobs, TILE_M, MOST_BUILDINGS_A_TILE),
+        crs_wkt=crs.to_wkt() if crs is not None else None,
+        terrain=request.terrain,
+        settings=request.settings,
+        fingerprint=mark,
+    )
+
+
+def read_headers(clouds: tuple[str, ...]) -> tuple[list, object]:
+    """Headers of the readable point files, and the first CRS among them; one unreadable file does not end the run."""
+    from ..read import read_header
+
+    headers, errors = [], []
+    for name in clouds:
+        try:
+            headers.append(read_header(name))
+        except InputError as error:
+            errors.append(error)
+    if not headers:
+        raise errors[0]
+    return headers, next((h.crs for h in headers if h.crs is not None), None)
+
+
+def jobs_from_footprints(request, headers: list, crs) -> tuple[Job, ...]:
+    from ..read import check_overlap, read_footprints
+
+    footprints = read_footprints(request.footprints, id_attribute=request.id_attribute, target_crs=crs)
+    bounds = [h.bounds for h in headers if h.bounds is not None]
+    if bounds:
+        check_overlap(footprints, bounds)
+    return jobs_of_footprints(footprints)
+
+
+def jobs_from_cloud(request) -> tuple[Job, ...]:
+    """Without footprints, the connected groups of roof points are the buildings."""
+    from ..read import read_points, split_buildings
+
+    groups = split_buildings(read_points(*request.clouds, settings=request.settings), request.settings)
+    areas = [(group.id, shapely.make_valid(group.area)) for group in groups]
+    return tuple(Job(i, id, area, None) for i, (id, area) in enumerate(areas))

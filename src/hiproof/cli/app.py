@@ -1,0 +1,109 @@
+"""All commands, with their options; the work is done elsewhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from .. import __version__
+
+app = typer.Typer(
+    name="hiproof",
+    help="Airborne LiDAR point clouds into watertight, semantic, parametric LoD2 building models.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+Clouds = Annotated[list[str], typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them")]
+
+
+def version(wanted: bool) -> None:
+    if wanted:
+        print(f"hiproof {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=version, is_eager=True, help="print the version")
+    ] = False,
+) -> None:
+    pass
+
+
+@app.command()
+def reconstruct(
+    clouds: Clouds,
+    out: Annotated[Path, typer.Option(help="folder for the results")],
+    footprints: Annotated[str | None, typer.Option(help="building polygons; without them the cloud is split")] = None,
+    terrain: Annotated[str | None, typer.Option(help="terrain model (GeoTIFF); else the cloud's ground class")] = None,
+    id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
+    building_class: Annotated[list[int] | None, typer.Option(help="LAS class of roof points [default: 6]")] = None,
+    ground_class: Annotated[list[int] | None, typer.Option(help="LAS class of terrain points [default: 2]")] = None,
+    types: Annotated[str | None, typer.Option(help="roof types to choose among, such as gable,hip")] = None,
+    objective: Annotated[str | None, typer.Option(help="likelihood or paper [default: likelihood]")] = None,
+    detail: Annotated[str | None, typer.Option(help="full, or main: without dormers and small parts")] = None,
+    parts: Annotated[str | None, typer.Option(help="compound, or one: one primitive a building")] = None,
+    network: Annotated[bool | None, typer.Option(help="recognise roof types with the network first")] = None,
+    config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
+    jobs: Annotated[int, typer.Option(min=1, help="processes on this machine")] = 1,
+    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
+    restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
+) -> None:
+    """Reconstruct the buildings of point clouds into CityGML, CityJSON, parameters and attributes.
+
+    Exit code: 0 all buildings were modelled or explained by their data, 1 an internal error, 2 unusable input.
+    """
+    from .reconstruct import run
+
+    options = {
+        "read": {"building_classes": building_class, "ground_classes": ground_class},
+        "fit": {"types": types.split(",") if types else None, "objective": objective, "parts": parts},
+        "compound": {"detail": detail},
+        "segment": {"enabled": network},
+    }
+    raise typer.Exit(run(clouds, out, footprints, terrain, id_attribute, options, config, jobs, scheduler, restart))
+
+
+@app.command()
+def demo(folder: Annotated[Path, typer.Argument(help="folder for the results")] = Path("demo")) -> None:
+    """Run the main job on the bundled simulated neighbourhood, all roof types in it."""
+    from .demo import run
+
+    raise typer.Exit(run(folder))
+
+
+@app.command()
+def check(
+    files: Annotated[list[Path], typer.Argument(help="CityJSON, CityJSONSeq or CityGML files")],
+    planarity: Annotated[
+        float, typer.Option(min=0.0, help="largest distance of a vertex from its face's plane, m")
+    ] = 0.01,
+) -> None:
+    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid."""
+    from .check import run
+
+    raise typer.Exit(run(files, planarity))
+
+
+@app.command()
+def settings(
+    config: Annotated[Path | None, typer.Option(help="start from this settings file")] = None,
+    write: Annotated[Path | None, typer.Option(help="write the TOML here instead of printing it")] = None,
+) -> None:
+    """Print every setting as TOML, with default, unit, bounds and meaning."""
+    from .settings import run
+
+    raise typer.Exit(run(config, write))
+
+
+@app.command()
+def status(folder: Annotated[Path, typer.Argument(help="output folder of a run")]) -> None:
+    """Show how far a run is: progress, failures by kind, throughput and time left, while it runs or after."""
+    from .status import run
+
+    raise typer.Exit(run(folder))

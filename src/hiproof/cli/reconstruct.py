@@ -1,0 +1,123 @@
+"""`hiproof reconstruct`: the options become a request, the summary becomes a table."""
+
+from __future__ import annotations
+
+import glob
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar
+
+from ..city.run import Request, Summary, reconstruct_area
+from ..errors import InputError
+from ..settings import Settings
+from ..status import Status
+
+POINT_FILES = (".las", ".laz", ".xyz", ".csv", ".txt", ".pts", ".ply")
+
+
+def run(
+    clouds: list[str],
+    out: Path,
+    footprints: str | None,
+    terrain: str | None,
+    id_attribute: str | None,
+    options: dict[str, dict[str, Any]],
+    config: Path | None,
+    jobs: int,
+    scheduler: str | None,
+    restart: bool,
+) -> int:
+    """Run the main job and print its summary; returns the exit code."""
+    given = {s: {k: v for k, v in changes.items() if v is not None} for s, changes in options.items()}
+    settings = (Settings.from_toml(config) if config else Settings()).replace({s: c for s, c in given.items() if c})
+    request = Request(
+        clouds=point_files(clouds),
+        out=out,
+        footprints=footprints,
+        terrain=terrain,
+        id_attribute=id_attribute,
+        settings=settings,
+        jobs=jobs,
+        scheduler=scheduler,
+        restart=restart,
+    )
+    return run_request(request)
+
+
+def run_request(request: Request) -> int:
+    with Bar() as bar:
+        summary = reconstruct_area(request, bar.update)
+    print_summary(summary)
+    return summary.exit_code
+
+
+def point_files(names: list[str]) -> tuple[str, ...]:
+    """Files, folders and wildcards as a sorted tuple of files without repeats."""
+    files: set[str] = set()
+    for name in names:
+        path = Path(name)
+        if path.is_dir():
+            inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in POINT_FILES)
+            if not inside:
+                raise InputError(
+                    f"expected point files ({', '.join(POINT_FILES)}) in {path}, got none; check the folder"
+                )
+            files.update(inside)
+        elif not path.exists() and "://" not in name:
+            found = glob.glob(name)
+            if not found:
+                raise InputError(f"expected a point file or folder, got {name}, which does not exist; check the path")
+            files.update(found)
+        else:
+            files.add(name)
+    return tuple(sorted(files))
+
+
+class Bar:
+    """A progress bar on standard error, none when that is no terminal."""
+
+    STEPS: ClassVar = {"sort": "reading points", "solve": "fitting roofs", "merge": "writing models"}
+
+    def __enter__(self) -> Bar:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        self.bar = Progress(console=console, transient=True, disable=not console.is_terminal)
+        self.tasks: dict[str, Any] = {}
+        self.bar.start()
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.bar.stop()
+
+    def update(self, step: str, done: int, total: int) -> None:
+        if step not in self.tasks:
+            self.tasks[step] = self.bar.add_task(self.STEPS.get(step, step), total=total)
+        self.bar.update(self.tasks[step], completed=done, total=total)
+
+
+def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> None:
+    """The table at the end: buildings by status and by type, figures, time, and every failure by name."""
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(soft_wrap=True)
+    show = show or console.print
+    table = Table("buildings", "outcome", title=f"{summary.buildings} buildings")
+    for code, number in summary.by_status.items():
+        table.add_row(str(number), Status[code.upper()].value)
+    show(table)
+    if summary.by_type:
+        show("roof types: " + ", ".join(f"{number} {name}" for name, number in summary.by_type.items()))
+    if summary.median_psd is not None:
+        share = (
+            f", {100 * summary.median_share:.0f} % of points within 0.2 m" if summary.median_share is not None else ""
+        )
+        show(f"median over buildings: {summary.median_psd:.3f} m from points to roof{share}")
+    show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
+    for name, why in summary.broken_inputs:
+        show(f"[red]could not be read:[/red] {name}: {why}")
+    for id, why in summary.failures:
+        show(f"[red]internal error:[/red] building {id}: {why}")
+    show(f"models: {summary.out / 'buildings.gml'}, {summary.out / 'buildings.city.jsonl'}")

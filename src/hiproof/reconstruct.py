@@ -1,0 +1,51 @@
+"""One building, from points to a valid solid: the paper's steps, one line each."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+import shapely
+
+from . import stages
+from .frames import LocalFrame
+from .model import Building, Footprint, Roof
+from .settings import Settings
+from .status import Status
+
+
+def reconstruct(
+    points: np.ndarray,
+    footprint: shapely.Polygon | Footprint | None = None,
+    terrain: Any = None,
+    settings: Settings | None = None,
+    id: str = "building",
+) -> Building:
+    """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits).
+
+    points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; non-finite and repeated
+    ones are dropped. footprint: plan polygon in the same frame; without one the outline is estimated. terrain: anything
+    with `height_at(xy_world (n, 2)) -> (n,)` and `source`; without one the ground is assumed below the lowest point.
+    What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why.
+
+    >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
+    >>> roof = np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)])
+    >>> reconstruct(roof).type
+    'gable'
+    """
+    settings = settings or Settings()
+    building = stages.asked_for(footprint, id)
+    points, outline, status = stages.usable(points, building.footprint)
+    if status is not Status.MODELLED:
+        return dataclasses.replace(building, status=status, detail=status.value)
+    frame = LocalFrame.around(points)
+    points, outline = frame.to_local(points), stages.to_local(outline, frame)
+    recognised = stages.recognise(points, settings)
+    fitted = stages.fit(points, outline, recognised, settings)
+    if not fitted.parts:
+        return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
+    ground = stages.find_ground(fitted.outline, points, frame, terrain)
+    roof = Roof(fitted.parts, fitted.outline, frame)
+    roof, solid, fitted = stages.solid_or_simpler(roof, points, ground.z_local, fitted, settings)
+    return stages.judge(building, roof, solid, points, fitted, ground, settings)

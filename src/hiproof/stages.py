@@ -1,0 +1,232 @@
+"""What each line of `reconstruct` does: every step takes values and returns values, and a failure becomes a status."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .errors import CompositionError, FitError
+from .frames import LocalFrame
+from .model import Building, Footprint, Part, Piece, Roof, Solid
+from .settings import Settings
+from .status import Status
+
+FEWEST_POINTS = 4
+"""A roof plane and one point to doubt it; below that a building is a flat block."""
+
+ASSUMED_WALL_M = 3.0
+"""Height of the lowest wall where nothing is known of the terrain."""
+
+LOWEST_WALL_M = 0.1
+"""A wall is at least this high: terrain above the eaves (a cellar roof, a wrong terrain model) is lowered to it."""
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """What the network says: a weight (n,) a point (1 roof, 0 not), and probabilities by roof type; empty without it."""
+
+    weights: np.ndarray | None = None
+    types: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """Parts over an outline in the local frame, how they were chosen, and what became of the fit."""
+
+    parts: tuple[Part, ...]
+    outline: shapely.Polygon
+    objective: float = math.nan
+    types: dict[str, float] = field(default_factory=dict)
+    status: Status = Status.MODELLED
+    detail: str = ""
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where the walls end: height in the local frame, the source of it, and the terrain's line along the outline."""
+
+    z_local: float
+    source: str
+    intersection: tuple[np.ndarray, ...] = ()
+
+
+def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
+    """The outcome to start from: the building's name, its footprint and the attributes it came with."""
+    if isinstance(footprint, Footprint):
+        return Building(footprint.id, Status.MODELLED, footprint=footprint.polygon, attributes=footprint.attributes)
+    return Building(id, Status.MODELLED, footprint=footprint)
+
+
+def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
+    """Finite, distinct points inside the footprint, in one order whatever order they came in."""
+    if footprint is not None:
+        footprint = largest_polygon(footprint)
+        if footprint.is_empty or not footprint.area >= 0.1:
+            return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
+    points = np.asarray(points, float).reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=1)]
+    if footprint is not None:
+        points = points[shapely.intersects_xy(footprint, points[:, 0], points[:, 1])]
+    points = distinct(points)
+    if len(points) == 0:
+        return points, footprint, Status.NO_POINTS
+    if footprint is None and (len(points) < FEWEST_POINTS or on_a_line(points[:, :2])):
+        return points, None, Status.NO_ROOF
+    return points, footprint, Status.MODELLED
+
+
+def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
+    """The largest polygon of a geometry, made valid; an empty polygon where there is none."""
+    geometry = geometry if geometry.is_valid else shapely.make_valid(geometry)
+    polygons = [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon"]
+    return max(polygons, key=lambda polygon: polygon.area, default=shapely.Polygon())
+
+
+def distinct(points: np.ndarray) -> np.ndarray:
+    """Points (n, 3) sorted by x, y, z without repeats: the same set gives the same array."""
+    points = points[np.lexsort(points.T[::-1])]
+    return points[np.r_[True, np.any(np.diff(points, axis=0) != 0, axis=1)]] if len(points) else points
+
+
+def on_a_line(xy: np.ndarray, width_m: float = 0.05) -> bool:
+    """Whether plan points (n, 2) lie within a strip too narrow to be a roof."""
+    across = np.linalg.svd(xy - xy.mean(axis=0), full_matrices=False)[2][-1]
+    return bool(np.ptp((xy - xy.mean(axis=0)) @ across) < width_m)
+
+
+def to_local(outline: shapely.Polygon | None, frame: LocalFrame) -> shapely.Polygon | None:
+    return None if outline is None else shapely.transform(outline, frame.to_local)
+
+
+def recognise(points: np.ndarray, settings: Settings) -> Recognised:
+    """The network's opinion of the points (paper section 3.1), nothing where it is switched off or too few points came."""
+    return Recognised()
+
+
+def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
+    """Roof parts that explain the points: one primitive (the paper's case) or as many as the evidence pays for."""
+    if len(points) < FEWEST_POINTS:
+        return flat(points, outline, Status.FLAT_FALLBACK)
+    try:
+        return fit_one(points, outline, recognised, settings)
+    except FitError as error:
+        if outline is None:
+            return Fitted((), shapely.Polygon(), status=Status.NO_ROOF, detail=str(error))
+        return flat(points, outline, Status.FLAT_FALLBACK, str(error))
+
+
+def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
+    """One primitive for the whole building (paper section 3.2)."""
+    from .fit import fit_roof
+
+    found = fit_roof(points, outline=outline, settings=settings)
+    shift = found.global_translation
+    part = dataclasses.replace(
+        found.part, translation=found.part.translation + shift, pieces=tuple(moved(p, shift) for p in found.part.pieces)
+    )
+    outline = shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
+    return Fitted((part,), outline, found.value, posterior(found.bics))
+
+
+def moved(piece: Piece, shift: np.ndarray) -> Piece:
+    """A piece moved by `shift` (3,): its outline, and its planes with it."""
+    planes = piece.planes.copy()
+    planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
+    return Piece(shapely.transform(piece.outline, lambda xy: xy + shift[:2]), planes)
+
+
+def posterior(bics: dict[str, float]) -> dict[str, float]:
+    """Probabilities by type from their BIC (exp(-BIC / 2), normalised)."""
+    best = min(bics.values(), default=0.0)
+    weights = {name: math.exp(-0.5 * min(bic - best, 1400.0)) for name, bic in bics.items() if math.isfinite(bic)}
+    total = sum(weights.values())
+    return {name: weight / total for name, weight in weights.items()}
+
+
+def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:
+    """A flat roof at the median height: what a building becomes when nothing better can be told or built."""
+    height = float(np.median(points[:, 2]))
+    part = Part("flat", (Piece(outline, np.array([[0.0, 0.0, height]])),), {}, 0.0, np.array([0.0, 0.0, height]))
+    return Fitted((part,), outline, status=status, detail=detail or status.value)
+
+
+def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Any) -> Ground:
+    """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them."""
+    from .compose import terrain_intersection
+
+    lowest_roof = float(points[:, 2].min())
+    if terrain is not None:
+        corners = np.concatenate([np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)])
+        heights = terrain.height_at(frame.to_world(corners)) - frame.origin[2]
+        if np.isfinite(heights).any():
+            z = float(np.nanmin(heights))
+            lines = terrain_intersection(outline, lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2], z)
+            return Ground(z, terrain.source, tuple(frame.to_world(line) for line in lines))
+    return Ground(lowest_roof - ASSUMED_WALL_M, f"assumed {ASSUMED_WALL_M:g} m below the lowest point")
+
+
+def solid_or_simpler(
+    roof: Roof, points: np.ndarray, z_ground: float, fitted: Fitted, settings: Settings
+) -> tuple[Roof, Solid | None, Fitted]:
+    """The roof as a checked solid in the local frame; a flat block where the fitted roof cannot become a valid one."""
+    try:
+        return roof, checked_solid(roof, z_ground, settings), fitted
+    except CompositionError as error:
+        why = f"{Status.SIMPLIFIED.value} ({error})"
+    fitted = flat(points, roof.outline, Status.SIMPLIFIED, why)
+    roof = dataclasses.replace(roof, parts=fitted.parts)
+    try:
+        return roof, checked_solid(roof, z_ground, settings), fitted
+    except CompositionError as error:
+        return roof, None, dataclasses.replace(fitted, status=Status.BAD_FOOTPRINT, detail=str(error))
+
+
+def checked_solid(roof: Roof, z_ground: float, settings: Settings) -> Solid:
+    """Compose and check; the ground is lowered where the roof would touch it."""
+    from .compose import check_solid, compose
+
+    solid = compose(roof, z_ground, settings)
+    findings = check_solid(solid)
+    if findings:
+        raise CompositionError(f"expected a valid solid, got {findings[0]}")
+    return solid
+
+
+def judge(
+    building: Building,
+    roof: Roof,
+    solid: Solid | None,
+    points: np.ndarray,
+    fitted: Fitted,
+    ground: Ground,
+    settings: Settings,
+) -> Building:
+    """The finished building: quality measured on its solid, an honest status, everything back in the world's frame."""
+    from .evaluate.metrics import quality
+
+    if solid is None:
+        return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
+    measured = quality(solid, points, roof.outline)
+    status, detail = fitted.status, fitted.detail
+    if status is Status.MODELLED and measured.share_within_20cm < settings.reconstruct.poor_share:
+        share = 100 * measured.share_within_20cm
+        status, detail = Status.POOR_FIT, f"only {share:.0f} % of its points lie within 0.2 m of the roof"
+    origin = roof.frame.origin
+    return dataclasses.replace(
+        building,
+        status=status,
+        detail=detail,
+        roof=roof,
+        solid=solid.moved(origin),
+        quality=measured,
+        z_ground=ground.z_local + float(origin[2]),
+        ground_source=ground.source,
+        terrain_intersection=ground.intersection,
+        objective=fitted.objective,
+        types=fitted.types,
+    )
