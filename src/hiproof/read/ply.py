@@ -24,7 +24,7 @@ BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">
 
 @dataclass(frozen=True)
 class PlyLayout:
-    """What the header says: byte order ("" is ascii), vertices, properties (name, NumPy type), x y z (class) columns."""
+    """The header: byte order ("" is ascii), vertices, their properties (name, NumPy type), columns of x y z class."""
 
     byte_order: str
     count: int

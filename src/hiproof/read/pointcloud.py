@@ -98,9 +98,7 @@ def read_header(path: str | Path) -> PointFileHeader:
 def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
     """The files that paths, folders and wildcards name, each once, in the order given; folders are sorted."""
     if not paths:
-        raise InputError(
-            "expected at least one point cloud, got none; name a file, a folder or a wildcard"
-        )
+        raise InputError("expected at least one point cloud, got none; name a file, a folder or a wildcard")
     files: dict[str, str | Path] = {}
     for path in paths:
         for file in expand_path(path):

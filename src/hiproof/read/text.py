@@ -66,9 +66,7 @@ def sniff(path: Path) -> TextLayout:
     with open(path, "rb") as file:
         head = file.read(65536)
     if b"\0" in head:
-        raise InputError(
-            f"expected text with x y z on each line in {path}, got binary data; rename it"
-        )
+        raise InputError(f"expected text with x y z on each line in {path}, got binary data; rename it")
     lines = head.decode("utf-8-sig", errors="replace").splitlines()
     names: list[str] = []
     for number, line in enumerate(lines):

@@ -1,0 +1,234 @@
+"""Building footprints from whatever pyogrio reads: every feature becomes one Footprint or more, none is lost."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyogrio
+import shapely
+from pyogrio.errors import DataLayerError, DataSourceError
+from pyproj import CRS, Transformer
+
+from ..errors import InputError, InputWarning
+from ..model import Footprint
+from ..settings import Settings
+from .crs import parse_crs, require_metres, same_horizontal
+from .las import is_url
+from .polygons import simple_polygons
+
+ID_NAMES = (
+    *("id", "building_id", "identificatie", "identificatiebagpnd", "gml_id", "gmlid", "fid", "osm_id", "egid"),
+    *("objectid", "globalid", "uuid", "cleabs", "lokaalid"),
+)
+
+
+def read_footprints(
+    path: str | Path,
+    layer: str | int | None = None,
+    id_attribute: str | None = None,
+    target_crs: Any = None,
+    settings: Settings | None = None,
+) -> tuple[Footprint, ...]:
+    """Footprints of a file, URL or data source name, in `target_crs` (the cloud's) where one is given.
+
+    Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the feature's id; polygons
+    without area stay, with an empty polygon. Ids come from `id_attribute`, else from the first usual column without
+    gaps or repeats, else they are the feature's number. `settings.read.crs` stands in for a `target_crs` that is None.
+    Raises InputError for what cannot be read, holds no features, or names a CRS that cannot be transformed.
+    """
+    target = parse_crs(target_crs) or parse_crs((settings or Settings()).read.crs)
+    meta, numbers, geometries, columns = read_features(path, layer)
+    attributes = attribute_rows(list(meta["fields"]), columns, len(geometries))
+    ids = feature_ids(attributes, numbers, id_attribute, path)
+    geometries = transformed(geometries, parse_crs(meta["crs"]), target, path)
+    return tuple(unique_ids(split_features(ids, geometries, attributes, path), path))
+
+
+def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
+    """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
+    return parse_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
+
+
+def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and attribute columns."""
+    if not is_url(path) and "://" not in str(path) and not str(path).startswith(("/vsi", "PG:")):
+        if not Path(path).exists():
+            raise InputError(f"expected footprints at {path}, got no such file; check the path")
+        if Path(path).is_file() and Path(path).stat().st_size == 0:
+            raise InputError(f"expected footprints in {path}, got an empty file; copy or download it again")
+    meta, numbers, wkb, columns = reading(
+        lambda: pyogrio.raw.read(str(path), layer=layer, return_fids=True, datetime_as_string=True), path
+    )
+    if wkb is None:
+        raise InputError(f"expected polygons in {path}, got a table without geometry; name another file or layer")
+    if not len(wkb):
+        raise InputError(f"expected footprints in {path}, got a layer without features; name another file or layer")
+    geometries = shapely.from_wkb(wkb, on_invalid="fix")
+    kinds = {g.geom_type for g in geometries if g is not None}
+    if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
+        raise InputError(
+            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or close the lines first"
+        )
+    return meta, numbers, geometries, columns
+
+
+def reading(read, path: str | Path):
+    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that helps."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # pyogrio remarks on measured geometries and mixed layers, which are fine
+            return read()
+    except DataLayerError as error:
+        layers = ", ".join(str(name) for name, _ in pyogrio.list_layers(str(path)))
+        raise InputError(f"expected a layer of {path} (it has {layers}), got: {error}; use one of these") from error
+    except (DataSourceError, ValueError, OSError, RuntimeError) as error:
+        raise InputError(
+            f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, got: {error}; "
+            "check the file, or convert it with ogr2ogr"
+        ) from error
+
+
+def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:
+    """One dictionary a feature of plain Python values; what is not set (None, NaN) is left out."""
+    values = [[plain_value(value) for value in column.tolist()] for column in columns]
+    return [
+        {name: column[row] for name, column in zip(names, values, strict=True) if column[row] is not None}
+        for row in range(count)
+    ]
+
+
+def plain_value(value: Any) -> Any:
+    """A value as JSON knows it: NaN becomes None, dates ISO text, bytes hexadecimal."""
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    if hasattr(value, "isoformat"):
+        return value.isoformat()
+    return value.hex() if isinstance(value, bytes) else value
+
+
+def feature_ids(
+    rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: str | Path
+) -> list[str]:
+    """The id of each feature as text: by the attribute asked for, a usual one, or the feature's number."""
+    by_number = [str(number) for number in numbers]
+    names = {name.lower(): name for row in rows for name in row}
+    if id_attribute is not None:
+        name = id_attribute if any(id_attribute in row for row in rows) else names.get(id_attribute.lower())
+        if name is None:
+            raise InputError(
+                f"expected the attribute {id_attribute!r} in {path}, got {', '.join(names.values()) or 'none at all'}; "
+                "name one of these with --id-attribute"
+            )
+        missing = sum(name not in row for row in rows)
+        if missing:
+            warnings.warn(f"{path}: {missing} features have no {name}; they go by their number", InputWarning)
+        return [id_text(row.get(name, number)) for row, number in zip(rows, by_number, strict=True)]
+    for usual in ID_NAMES:
+        name = names.get(usual)
+        if name and all(name in row for row in rows) and len({id_text(row[name]) for row in rows}) == len(rows):
+            return [id_text(row[name]) for row in rows]
+    return by_number
+
+
+def id_text(value: Any) -> str:
+    """An id as text; whole numbers that a format stores as floats lose their decimal point."""
+    return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
+
+
+def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path) -> np.ndarray:
+    """Geometries in plan in the target CRS. Raises InputError where that is impossible or leads to no numbers."""
+    geometries = shapely.force_2d(geometries)
+    if target is None:
+        require_metres(source, f"the footprints of {path}")
+        return geometries
+    if source is None:
+        warnings.warn(f"{path}: names no coordinate reference system; the cloud's is assumed", InputWarning)
+        return geometries
+    if same_horizontal(source, target):
+        return geometries
+    transformer = Transformer.from_crs(source, target, always_xy=True)
+    moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1])))
+    if not np.isfinite(shapely.get_coordinates(moved)).any():
+        raise InputError(
+            f"expected footprints of {path} that can be moved from {source.name} to the cloud's {target.name}, got "
+            "coordinates outside that system; check which CRS each file names"
+        )
+    return moved
+
+
+def split_features(
+    ids: list[str], geometries: np.ndarray, attributes: list[dict[str, Any]], path: str | Path
+) -> list[Footprint]:
+    footprints, mended, empty = [], 0, 0
+    invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries))
+    for id, geometry, row, was_invalid in zip(ids, geometries, attributes, invalid, strict=True):
+        polygons = simple_polygons(geometry)
+        mended += bool(was_invalid and not polygons[0].is_empty)
+        empty += polygons[0].is_empty
+        if len(polygons) == 1:
+            footprints.append(Footprint(id, polygons[0], row))
+        else:
+            parts = enumerate(polygons, start=1)
+            footprints += [Footprint(f"{id}-{number}", polygon, {**row, "part_of": id}) for number, polygon in parts]
+    if mended:
+        warnings.warn(f"{path}: {mended} invalid footprints were repaired", InputWarning)
+    if empty:
+        warnings.warn(f"{path}: {empty} features enclose no area; they get no model, but a status", InputWarning)
+    return footprints
+
+
+def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footprint]:
+    """Ids made unique by a suffix `_2`, `_3`; a copy of an earlier polygon names it in its attribute `copy_of`."""
+    taken = {footprint.id for footprint in footprints}
+    used, first_by_shape, result, copies, renamed = set(), {}, [], 0, 0
+    for footprint in footprints:
+        id, suffix = footprint.id, 2
+        while id in used or (suffix > 2 and id in taken):
+            id, suffix = f"{footprint.id}_{suffix}", suffix + 1
+        renamed += id != footprint.id
+        used.add(id)
+        shape = shapely.normalize(footprint.polygon).wkb
+        original = first_by_shape.setdefault(shape, id)
+        attributes = footprint.attributes
+        if original != id and not footprint.polygon.is_empty:
+            attributes, copies = {**attributes, "copy_of": original}, copies + 1
+        result.append(Footprint(id, footprint.polygon, attributes))
+    if renamed:
+        warnings.warn(f"{path}: {renamed} footprints share an id; the later ones got a suffix such as _2", InputWarning)
+    if copies:
+        warnings.warn(
+            f"{path}: {copies} footprints repeat another's polygon; see their attribute copy_of", InputWarning
+        )
+    return result
+
+
+def check_overlap(
+    footprints: Sequence[Footprint],
+    bounds: Sequence[float],
+    footprints_crs: CRS | None = None,
+    cloud_crs: CRS | None = None,
+) -> None:
+    """Raise InputError when no footprint meets the cloud's plan `bounds` (xmin, ymin, xmax, ymax).
+
+    The CRSs only name in the message what the two sides were read as.
+    """
+    boxes = shapely.bounds([footprint.polygon for footprint in footprints if not footprint.polygon.is_empty])
+    if not len(boxes):
+        return
+    low, high = boxes[:, :2], boxes[:, 2:]
+    if ((low <= np.asarray(bounds[2:])) & (high >= np.asarray(bounds[:2]))).all(axis=1).any():
+        return
+    around = (*low.min(axis=0), *high.max(axis=0))
+    raise InputError(
+        f"expected footprints that overlap the cloud in x {bounds[0]:.1f} to {bounds[2]:.1f}, y {bounds[1]:.1f} to "
+        f"{bounds[3]:.1f} ({name_of(cloud_crs)}), got x {around[0]:.1f} to {around[2]:.1f}, y {around[1]:.1f} to "
+        f"{around[3]:.1f} ({name_of(footprints_crs)}); check the CRS each file names, or set [read] crs"
+    )
+
+
+def name_of(crs: CRS | None) -> str:
+    return "no CRS named" if crs is None else crs.name

@@ -1,0 +1,208 @@
+"""Every feature of a footprint file comes back: split, repaired, renamed or empty, but never lost."""
+
+import doctest
+import json
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from pyproj import CRS, Transformer
+
+import hiproof.read.polygons
+from hiproof.errors import InputError, InputWarning
+from hiproof.model import Footprint
+from hiproof.read.footprints import check_overlap, footprint_crs, read_footprints
+from hiproof.read.polygons import simple_polygons
+from hiproof.settings import Settings
+
+pytestmark = pytest.mark.filterwarnings("ignore:'crs' was not provided", "ignore:invalid value encountered")
+SQUARE = shapely.box(85000, 446000, 85010, 446010)
+HOLED = shapely.Polygon(SQUARE.exterior, [[(85002, 446002), (85004, 446002), (85004, 446004), (85002, 446004)]])
+
+
+def write(path, geometries, crs="EPSG:28992", **fields):
+    wkb = np.array([None if g is None else shapely.to_wkb(g, output_dimension=3) for g in geometries], object)
+    pyogrio.raw.write(
+        str(path),
+        wkb,
+        [np.asarray(values) for values in fields.values()],
+        list(fields),
+        geometry_type="Unknown",
+        crs=crs,
+        layer=None if path.suffix != ".gpkg" else "buildings",
+    )
+    return path
+
+
+def shifted(polygon, x):
+    return shapely.transform(polygon, lambda xy: xy + [x, 0])
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(hiproof.read.polygons).failed == 0
+
+
+@pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
+def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
+    path = write(
+        tmp_path / f"a.{ending}",
+        [SQUARE, shifted(HOLED, 20)],
+        name=np.array(["A", "B"], object),
+        floors=np.array([2, 3], np.int32),
+        height=np.array([7.5, np.nan]),
+        built=np.array(["1931-05-17", "2001-01-01"], "datetime64[D]"),
+    )
+    first, second = sorted(read_footprints(path, id_attribute="name"), key=lambda f: f.id)  # FlatGeobuf reorders
+    assert (first.id, second.id) == ("A", "B")
+    assert first.polygon.equals(SQUARE) and second.polygon.equals(shifted(HOLED, 20))
+    built = first.attributes.pop("built")
+    assert built.startswith("1931-05-17") and first.attributes == {"name": "A", "floors": 2, "height": 7.5}
+    assert "height" not in second.attributes
+    json.dumps(second.attributes)
+
+
+def test_heights_of_the_outline_are_left_out(tmp_path):
+    path = write(tmp_path / "a.gpkg", [shapely.force_3d(SQUARE, 12.0)])
+    assert not read_footprints(path)[0].polygon.has_z
+
+
+def test_multipolygons_are_split_and_name_their_feature(tmp_path):
+    both = shapely.MultiPolygon([SQUARE, shifted(HOLED, 20)])
+    path = write(tmp_path / "a.gpkg", [both, shifted(SQUARE, 60)], id=np.array(["M", "N"], object))
+    footprints = read_footprints(path)
+    assert [f.id for f in footprints] == ["M-1", "M-2", "N"]
+    assert footprints[1].attributes == {"id": "M", "part_of": "M"} and "part_of" not in footprints[2].attributes
+    assert sum(f.polygon.area for f in footprints[:2]) == pytest.approx(both.area)
+
+
+@pytest.mark.parametrize("code", [28992, 25831, 4326])
+def test_footprints_move_into_the_clouds_plan_crs(tmp_path, code):
+    there = Transformer.from_crs(28992, code, always_xy=True)
+    polygon = shapely.transform(SQUARE, lambda xy: np.column_stack(there.transform(*xy.T)))
+    path = write(tmp_path / "a.gpkg", [polygon], crs=f"EPSG:{code}")
+    back = read_footprints(path, target_crs=CRS.from_epsg(7415))[0].polygon
+    assert np.abs(np.subtract(back.exterior.coords, SQUARE.exterior.coords)).max() < 0.001
+    assert footprint_crs(path).to_epsg() == code
+
+
+def test_the_same_plan_crs_leaves_every_bit_as_it_is(tmp_path):
+    path = write(tmp_path / "a.gpkg", [SQUARE])
+    assert read_footprints(path, target_crs="EPSG:7415")[0].polygon.equals_exact(SQUARE, 0)
+    in_cloud = Settings.from_dict({"read": {"crs": "EPSG:25831"}})
+    assert not read_footprints(path, settings=in_cloud)[0].polygon.equals_exact(SQUARE, 1)
+
+
+def test_footprints_without_a_crs_are_taken_to_be_in_the_clouds(tmp_path):
+    path = write(tmp_path / "a.gpkg", [SQUARE], crs=None)
+    with pytest.warns(InputWarning, match="the cloud's is assumed"):
+        assert read_footprints(path, target_crs="EPSG:7415")[0].polygon.equals(SQUARE)
+
+
+def test_ids_come_from_a_usual_attribute_without_gaps_or_repeats(tmp_path):
+    twins = np.array(["x", "x"], object)
+    geometries = [SQUARE, shifted(SQUARE, 20)]
+    path = write(tmp_path / "a.gpkg", geometries, id=twins, Identificatie=np.array([7.0, 9.0]))
+    assert [f.id for f in read_footprints(path)] == ["7", "9"]
+    path = write(tmp_path / "b.gpkg", geometries, id=twins)
+    assert [f.id for f in read_footprints(path)] == ["1", "2"]
+
+
+def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
+    path = write(
+        tmp_path / "a.gpkg", [SQUARE, SQUARE.reverse(), shifted(SQUARE, 20)], k=np.array(["x", "x", "x_2"], object)
+    )
+    with pytest.warns(InputWarning) as caught:
+        footprints = read_footprints(path, id_attribute="k")
+    assert [f.id for f in footprints] == ["x", "x_3", "x_2"]
+    assert footprints[1].attributes["copy_of"] == "x" and "copy_of" not in footprints[2].attributes
+    assert {"share an id", "repeat another's"} <= {
+        part for w in caught for part in ("share an id", "repeat another's") if part in str(w.message)
+    }
+
+
+def test_features_without_area_stay_with_an_empty_polygon(tmp_path):
+    line = shapely.Polygon([(0, 0), (5, 5), (2, 2), (0, 0)])
+    path = write(
+        tmp_path / "a.gpkg", [SQUARE, line, None, shapely.Point(1, 1)], id=np.array(["a", "b", "c", "d"], object)
+    )
+    with pytest.warns(InputWarning, match="3 features enclose no area"):
+        footprints = read_footprints(path)
+    assert [(f.id, f.polygon.is_empty) for f in footprints] == [("a", False), ("b", True), ("c", True), ("d", True)]
+
+
+def test_self_intersecting_footprints_are_repaired(tmp_path):
+    bow_tie = shapely.Polygon([(0, 0), (8, 8), (8, 0), (0, 8)])
+    spike = shapely.Polygon([(20, 0), (30, 0), (30, 10), (30, 15), (30, 10), (20, 10)])
+    path = write(tmp_path / "a.gpkg", [bow_tie, spike], id=np.array(["tie", "spike"], object))
+    with pytest.warns(InputWarning, match="2 invalid footprints were repaired"):
+        footprints = read_footprints(path)
+    assert [f.id for f in footprints] == ["tie-1", "tie-2", "spike"]
+    assert all(f.polygon.is_valid for f in footprints) and footprints[2].polygon.area == pytest.approx(100)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_any_tangle_of_edges_becomes_valid_polygons(seed):
+    rng = np.random.default_rng(seed)
+    for polygon in simple_polygons(shapely.Polygon(rng.uniform(0, 10, (rng.integers(3, 12), 2)))):
+        assert polygon.is_empty or (polygon.is_valid and polygon.geom_type == "Polygon" and polygon.area > 0)
+
+
+def test_coordinates_that_are_no_numbers_enclose_no_area():
+    assert simple_polygons(shapely.Polygon([(0, 0), (1, np.nan), (1, 1)]))[0].is_empty
+    assert simple_polygons(shapely.Polygon([(0, 0), (np.inf, 1), (1, 1)]))[0].is_empty
+
+
+def test_overlap_is_checked_and_both_boxes_are_named():
+    footprints = (Footprint("a", SQUARE), Footprint("empty", shapely.Polygon()))
+    check_overlap(footprints, (84990, 445990, 85001, 446001))
+    check_overlap(footprints[1:], (0, 0, 1, 1))
+    with pytest.raises(InputError, match=r"x 4\.0 to 5\.0.*Amersfoort / RD New.*x 85000\.0 to 85010\.0.*no CRS named"):
+        check_overlap(footprints, (4.0, 51.0, 5.0, 52.0), None, CRS.from_epsg(28992))
+
+
+def bad_file(tmp_path, kind):
+    path = tmp_path / "bad.gpkg"
+    if kind == "empty file":
+        path.write_bytes(b"")
+    elif kind == "not a vector file":
+        path.write_bytes(b"LASF" + bytes(400))
+    elif kind == "truncated":
+        path.write_bytes(write(path, [SQUARE] * 50).read_bytes()[:5000])
+    elif kind == "no features":
+        write(path, [])
+    elif kind == "no polygons":
+        write(path, [shapely.LineString([(0, 0), (1, 1)])])
+    elif kind == "no geometry":
+        path = tmp_path / "bad.csv"
+        path.write_text("name,floors\na,2\n")
+    elif kind == "metres called degrees":
+        write(path, [SQUARE], crs="EPSG:4326")
+    return path
+
+
+BAD = {
+    **{"missing": "no such file", "empty file": "an empty file", "not a vector file": "that GDAL reads"},
+    **{"truncated": "that GDAL reads|layer", "no features": "without features", "no polygons": "got LineString"},
+    **{"no geometry": "without geometry", "metres called degrees": "outside that system"},
+}
+
+
+@pytest.mark.parametrize("kind", BAD)
+def test_what_cannot_be_read_gets_one_full_sentence(tmp_path, kind):
+    with pytest.raises(InputError, match=BAD[kind]) as caught:
+        read_footprints(bad_file(tmp_path, kind), target_crs="EPSG:7415")
+    assert str(caught.value).startswith("expected") and "got" in str(caught.value)
+
+
+def test_unknown_layers_and_attributes_are_answered_with_the_known_ones(tmp_path):
+    path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
+    with pytest.raises(InputError, match="it has buildings"):
+        read_footprints(path, layer="roofs")
+    with pytest.raises(InputError, match="got name; name one"):
+        read_footprints(path, id_attribute="bag_id")
+
+
+def test_degrees_without_a_cloud_crs_are_refused(tmp_path):
+    with pytest.raises(InputError, match="axes are metres"):
+        read_footprints(write(tmp_path / "a.gpkg", [shapely.box(4, 52, 4.001, 52.001)], crs="EPSG:4326"))
