@@ -1,0 +1,172 @@
+"""buildings.gpkg: the outlines with every attribute as a table, for QGIS and its like.
+
+A table's columns need one type each, known before the first row, while the input's attributes may differ from building
+to building: rows wait in a temporary file until the last building has settled the types.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+from collections.abc import Iterable, Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import OutputError
+from ..model import GROUND, Building
+from .building_attributes import OWN, PREFIX, building_attributes, figures_of
+from .files import atomic_path, scratch
+from .roof_figures import RoofFigures
+from .writer import BuildingWriter
+
+LAYER = "buildings"
+ROWS_AT_ONCE = 5000
+RESERVED = ("fid", "geom")
+TEXT = (f"{OWN}roof_type", f"{OWN}ground_source")
+# GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
+FIXED_DATE = "2000-01-01T00:00:00.000Z"
+
+
+def write_attributes(
+    path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, prefix: str = PREFIX
+) -> None:
+    """Write the outline of each of `buildings` (world coordinates) with its attributes to the GeoPackage `path`.
+
+    A building whose outline is unknown gets a row without geometry. Values of one column are brought to one type: whole
+    numbers and decimals to decimals, anything beside text to text. Raises OutputError when the file cannot be written.
+    """
+    with AttributesWriter(path, crs, prefix) as writer:
+        for building in buildings:
+            writer.add(building)
+
+
+class AttributesWriter(BuildingWriter):
+    """Incremental form of `write_attributes`."""
+
+    def __init__(self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX) -> None:
+        super().__init__(path)
+        self.crs, self.prefix = crs, prefix
+        self.kinds: dict[str, set[type]] = {}
+        self.count = 0
+
+    def open(self, stack: ExitStack) -> None:
+        self.hidden = stack.enter_context(atomic_path(self.path))
+        self.waiting = stack.enter_context(scratch(self.path))
+
+    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+        values = building_attributes(building, figures or figures_of(building), self.prefix)
+        row = {"id": str(building.id), **{f"{n}_input" if n.lower() == "id" else n: v for n, v in values.items()}}
+        for name, value in row.items():
+            self.kinds.setdefault(name, set()).add(kind_of(value))
+        outline = plan_outline(building)
+        pickle.dump((None if outline is None else shapely.to_wkb(outline), row), self.waiting)
+        self.count += 1
+
+    def finish(self) -> None:
+        kinds = {name: column_kind(name, found, self.prefix) for name, found in self.kinds.items()} or {"id": str}
+        self.waiting.seek(0)
+        for number, rows in enumerate(self.batches()):
+            self.write_rows(rows, kinds, append=number > 0)
+
+    def batches(self) -> Iterator[list[tuple[bytes | None, dict[str, Any]]]]:
+        """The waiting rows, some thousands at a time; one empty batch if there are none."""
+        left = self.count
+        while True:
+            size = min(left, ROWS_AT_ONCE)
+            yield [pickle.load(self.waiting) for _ in range(size)]
+            left -= size
+            if not left:
+                return
+
+    def write_rows(self, rows: list, kinds: dict[str, type], append: bool) -> None:
+        import pyogrio
+        from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
+
+        columns = [column([row.get(name) for _, row in rows], kind) for name, kind in kinds.items()]
+        geometry = np.array([wkb for wkb, _ in rows] + [None], dtype=object)[:-1]
+        before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": FIXED_DATE})
+        try:
+            pyogrio.raw.write(
+                self.hidden,
+                geometry,
+                [values for values, _ in columns],
+                column_names(kinds),
+                [mask for _, mask in columns],
+                layer=LAYER,
+                driver="GPKG",
+                geometry_type="MultiPolygon",
+                promote_to_multi=True,
+                crs=plan_crs(self.crs),
+                append=append,
+            )
+        except (DataSourceError, DataLayerError, FeatureError, RuntimeError, OSError) as error:
+            raise OutputError(
+                f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions and the space left"
+            ) from error
+        finally:
+            pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})
+
+
+def plan_outline(building: Building) -> shapely.Geometry | None:
+    """The building's outline in world coordinates: the modelled one, else the one asked for, else None."""
+    if building.roof is not None:
+        return shapely.transform(building.roof.outline, building.roof.frame.to_world)
+    if building.solid is not None:
+        rings = [[building.solid.vertices[list(r), :2] for r in f.rings] for f in building.solid.of_kind(GROUND)]
+        return shapely.union_all([shapely.Polygon(outer, inner) for outer, *inner in rings])
+    return building.footprint
+
+
+def plan_crs(crs: Any) -> str | None:
+    """WKT of the horizontal part of `crs`: outlines have no height."""
+    if crs is None:
+        return None
+    from pyproj import CRS
+
+    crs = CRS.from_user_input(crs)
+    return (crs.sub_crs_list[0] if crs.is_compound else crs).to_wkt()
+
+
+def kind_of(value: Any) -> type:
+    """bool, int, float, str or NoneType; whole numbers beyond 64 bits count as text."""
+    return str if type(value) is int and abs(value) >= 2**63 else type(value)
+
+
+def column_kind(name: str, found: set[type], prefix: str) -> type:
+    """The one type that holds all values found; a computed figure that is always unknown stays a decimal."""
+    known = found - {type(None)}
+    if not known:
+        return float if name.startswith((prefix, OWN)) and name not in TEXT and "val3dity" not in name else str
+    if len(known) == 1:
+        return known.pop()
+    return str if str in known else float if float in known else int
+
+
+def column(values: list[Any], kind: type) -> tuple[np.ndarray, np.ndarray]:
+    """Values (n,) of one type, and where they are unknown (n,)."""
+    mask = np.array([value is None for value in values], dtype=bool)
+    if kind is str:
+        return np.array([*(None if v is None else str(v) for v in values), None], dtype=object)[:-1], mask
+    dtype = {bool: np.bool_, int: np.int64, float: np.float64}[kind]
+    return np.array([kind(0) if v is None else kind(v) for v in values], dtype=dtype), mask
+
+
+def column_names(names: Iterable[str]) -> list[str]:
+    """Names that SQLite, which does not tell upper from lower case, can hold beside its own columns.
+
+    >>> column_names(["id", "Year", "year", "fid"])
+    ['id', 'Year', 'year_2', 'fid_2']
+    """
+    taken, unique = set(RESERVED), []
+    for name in names:
+        candidate, number = name, 1
+        while candidate.lower() in taken:
+            number += 1
+            candidate = f"{name}_{number}"
+        taken.add(candidate.lower())
+        unique.append(candidate)
+    return unique

@@ -1,0 +1,126 @@
+"""What a building's record says in every format: roofer's attribute names, our own, and the input's."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from typing import Any
+
+import numpy as np
+
+from ..model import Building
+from ..status import Status
+from .roof_figures import RoofFigures, roof_figures
+
+PREFIX = "rf_"
+OWN = "hiproof_"
+FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
+
+
+def figures_of(building: Building) -> RoofFigures | None:
+    """Figures of the building's solid, None without one."""
+    return None if building.solid is None else roof_figures(building.solid)
+
+
+def building_attributes(building: Building, figures: RoofFigures | None = None, prefix: str = PREFIX) -> dict[str, Any]:
+    """Attributes by name, in a fixed order: the input's own, then roofer's (`prefix`), then ours (`hiproof_`).
+
+    Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what we computed wins.
+    Lengths are metres, `volume` m3, `pt_density` points/m2, `val3dity_lod22` "[]" because only valid solids are
+    written.
+    """
+    own = {name: plain(value) for name, value in building.attributes.items()}
+    computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
+    computed |= {OWN + name: value for name, value in hiproof_attributes(building).items()}
+    return own | {name: plain(value) for name, value in computed.items()}
+
+
+def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
+    """The attributes that users of roofer and 3DBAG look for, without prefix."""
+    quality = building.quality
+    if figures is None:
+        shape = dict.fromkeys(("h_roof_min", "h_roof_50p", "h_roof_70p", "h_roof_max", "h_roof_ridge", "volume_lod22"))
+        roof_type, mode = "no points" if building.status is Status.NO_POINTS else "unknown", "skip"
+    else:
+        shape = {
+            "h_roof_min": metres(figures.h_min),
+            "h_roof_50p": metres(figures.h_50p),
+            "h_roof_70p": metres(figures.h_70p),
+            "h_roof_max": metres(figures.h_max),
+            "h_roof_ridge": metres(figures.h_ridge),
+            "volume_lod22": metres(figures.volume_m3),
+        }
+        roof_type = figures.roofer_type
+        mode = "lod11_fallback" if building.status in FALLBACKS else "standard"
+    return {
+        "h_ground": metres(ground_height(building, figures)),
+        **shape,
+        "roof_type": roof_type,
+        "roof_n_surfaces": None if figures is None else figures.roof_faces,
+        "slope": None if figures is None else metres(figures.slope_deg),
+        "azimuth": None if figures is None else metres(figures.azimuth_deg),
+        "rmse_lod22": rounded(quality.rmse),
+        "val3dity_lod22": None if figures is None else "[]",
+        "pt_density": rounded(quality.density),
+        "nodata_frac": rounded(quality.nodata_share),
+        "extrusion_mode": mode,
+    }
+
+
+def hiproof_attributes(building: Building) -> dict[str, Any]:
+    """Our own attributes, without prefix."""
+    quality, kind = building.quality, building.type
+    probability = building.types.get(kind) if kind else None
+    return {
+        "status": building.status.code,
+        "detail": building.detail or building.status.value,
+        "roof_type": kind,
+        "roof_type_probability": None if probability is None else rounded(probability),
+        "parts": len(building.parts),
+        "points": int(quality.points),
+        "psd_mean": rounded(quality.psd_mean),
+        "psd_std": rounded(quality.psd_std),
+        "p95": rounded(quality.p95),
+        "share_within_20cm": rounded(quality.share_within_20cm),
+        "outline_iou": rounded(quality.outline_iou),
+        "unexplained_area_m2": rounded(quality.unexplained_area_m2),
+        "ground_source": building.ground_source or None,
+    }
+
+
+def ground_height(building: Building, figures: RoofFigures | None) -> float:
+    """Height of the building's ground: what reconstruction found, else the base of its solid, else NaN."""
+    if math.isfinite(building.z_ground) or figures is None:
+        return building.z_ground
+    return figures.h_base
+
+
+def rounded(value: float, digits: int = 6) -> float:
+    """`value` rounded, minus zero being zero; NaN and infinities stay."""
+    return round(float(value), digits) + 0.0
+
+
+def metres(value: float) -> float:
+    """Rounded to a tenth of a millimetre, as coordinates are written."""
+    return rounded(value, 4)
+
+
+def plain(value: Any) -> Any:
+    """`value` as str, int, float, bool or None, which every format can hold.
+
+    >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2), b"x", [1, 2])]
+    [3, None, True, '2020-01-02', 'x', '[1, 2]']
+    """
+    if value is None or isinstance(value, (bool, str, int)):
+        return value
+    if isinstance(value, float):
+        return float(value) if math.isfinite(value) else None
+    if isinstance(value, np.generic) and not isinstance(value, (np.datetime64, np.timedelta64)):
+        return plain(value.item())
+    if isinstance(value, np.datetime64) or type(value).__name__ == "NaTType":
+        return None if str(value) == "NaT" else str(value)
+    if isinstance(value, (datetime.date, datetime.time)):
+        return value.isoformat()
+    if isinstance(value, bytes):
+        return value.decode("utf-8", "replace")
+    return str(value)

@@ -1,0 +1,143 @@
+"""CityJSON 2.0: a sequence of features, one building a line (CityJSONSeq), or one document.
+
+A building is written as soon as it is added and forgotten, so a city needs no more memory than a street. The first
+line must name the offset of all coordinates and their extent, which only the last building settles: its place is
+reserved and filled in at the end. The offset is the first solid's corner rounded down to whole kilometres, so that
+small changes of the input leave the integers of all other buildings as they were.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from ..model import Building
+from .building_attributes import PREFIX, building_attributes, figures_of, metres
+from .cityjson_geometry import Vertices, building_geometry, first_corner
+from .files import scratch
+from .json_text import dump
+from .naming import UniqueNames, reference_system
+from .roof_figures import RoofFigures
+from .writer import BuildingWriter
+
+SCALE_M = 0.0001
+GRID_M = 1000.0
+WIDEST = -123456789.1234
+
+
+def write_cityjson(
+    path: str | os.PathLike,
+    buildings: Iterable[Building],
+    crs: Any = None,
+    prefix: str = PREFIX,
+    scale_m: float = SCALE_M,
+) -> None:
+    """Write `buildings` (solids in world metres) to `path`: CityJSONSeq 2.0, or one document if it ends in `.json`.
+
+    `crs` is anything pyproj understands or None; `prefix` goes before roofer's attribute names; `scale_m` is the grid
+    that coordinates are rounded to. Raises OutputError when the file cannot be written; an older file then stays.
+    """
+    with CityJSONWriter(path, crs, prefix, scale_m) as writer:
+        for building in buildings:
+            writer.add(building)
+
+
+class CityJSONWriter(BuildingWriter):
+    """Incremental form of `write_cityjson`."""
+
+    def __init__(
+        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, scale_m: float = SCALE_M
+    ) -> None:
+        super().__init__(path)
+        self.is_document = str(path).endswith(".json")
+        self.reference_system = reference_system(crs)
+        self.prefix, self.scale_m = prefix, scale_m
+        self.translate: np.ndarray | None = None
+        self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
+        self.ids = UniqueNames()
+        self.vertex_count = 0
+
+    def begin(self, stack: ExitStack) -> None:
+        self.header_length = len(self.header(np.full(3, WIDEST), [WIDEST] * 6))
+        self.file.write(b" " * self.header_length + b"\n")
+        # The vertices of a document stand in one list after all objects: they wait in a second file.
+        self.waiting = stack.enter_context(scratch(self.path)) if self.is_document else None
+
+    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+        figures = figures or figures_of(building)
+        name = self.ids.take(str(building.id))
+        vertices = Vertices(self.origin_for(building), self.scale_m)
+        geometry = building_geometry(building, figures, vertices, self.prefix)
+        city_object: dict[str, Any] = {"type": "Building"}
+        if geometry:
+            city_object["geographicalExtent"] = self.extended_by(vertices)
+        city_object["attributes"] = building_attributes(building, figures, self.prefix)
+        if geometry:
+            city_object["geometry"] = geometry
+        if self.is_document:
+            self.add_to_document(name, city_object, vertices)
+        else:
+            feature = {"type": "CityJSONFeature", "id": name, "CityObjects": {name: city_object}}
+            self.file.write(dump({**feature, "vertices": vertices.grid}) + b"\n")
+
+    def origin_for(self, building: Building) -> np.ndarray:
+        """The file's offset (3,), settled by the first building that has coordinates."""
+        if self.translate is None:
+            corner = first_corner(building)
+            if corner is None:
+                return np.zeros(3)
+            self.translate = np.append(np.floor(corner[:2] / GRID_M) * GRID_M, 0.0)
+        return self.translate
+
+    def extended_by(self, vertices: Vertices) -> list[float]:
+        """Extent of one building, the whole file's being widened by it."""
+        grid = np.array(vertices.grid)
+        low, high = (edge * self.scale_m + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0)))
+        self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
+        return [metres(v) for v in (*low, *high)]
+
+    def add_to_document(self, name: str, city_object: dict[str, Any], vertices: Vertices) -> None:
+        for geometry in city_object.get("geometry", ()):
+            geometry["boundaries"] = shifted(geometry["boundaries"], self.vertex_count)
+        comma = b",\n" if len(self.ids.taken) > 1 else b""
+        self.file.write(comma + dump(name) + b":" + dump(city_object))
+        if vertices.grid:
+            self.waiting.write((b",\n" if self.vertex_count else b"") + dump(vertices.grid)[1:-1])
+        self.vertex_count += len(vertices.grid)
+
+    def finish(self) -> None:
+        if self.is_document:
+            self.append_waiting_vertices()
+        translate = np.zeros(3) if self.translate is None else self.translate
+        extent = [metres(v) for v in (*self.low, *self.high)] if np.isfinite(self.low).all() else None
+        self.file.seek(0)
+        self.file.write(self.header(translate, extent).ljust(self.header_length))
+
+    def append_waiting_vertices(self) -> None:
+        self.file.write(b'},\n"vertices":[')
+        self.waiting.seek(0)
+        while chunk := self.waiting.read(1 << 20):
+            self.file.write(chunk)
+        self.file.write(b"]}\n")
+
+    def header(self, translate: np.ndarray, extent: list[float] | None) -> bytes:
+        """The first line; of a document, everything before the first object."""
+        metadata: dict[str, Any] = {}
+        if extent is not None:
+            metadata["geographicalExtent"] = extent
+        if self.reference_system is not None:
+            metadata["referenceSystem"] = self.reference_system
+        transform = {"scale": [self.scale_m] * 3, "translate": [float(v) for v in translate]}
+        head = {"type": "CityJSON", "version": "2.0", "transform": transform, "metadata": metadata}
+        if self.is_document:
+            return dump(head)[:-1] + b',"CityObjects":{'
+        return dump({**head, "CityObjects": {}, "vertices": []})
+
+
+def shifted(boundaries: Any, count: int) -> Any:
+    """Nested lists of vertex indices, each index raised by `count`."""
+    return boundaries + count if isinstance(boundaries, int) else [shifted(inner, count) for inner in boundaries]

@@ -1,0 +1,148 @@
+"""Files that appear whole or not at all: written beside their place under a hidden name, synced, then renamed.
+
+Whatever goes wrong on the way (an exception, Ctrl-C, a full disk), the half-written file is removed and a file that
+stood there before keeps its content. What the file system refuses becomes an OutputError, a full sentence for the
+user; errors of the caller's own code pass through unchanged.
+"""
+
+from __future__ import annotations
+
+import errno
+import io
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from ..errors import OutputError
+
+ADVICE = {
+    errno.ENOSPC: "the disk is full; free some space or choose another --out folder",
+    errno.EDQUOT: "your disk quota is used up; free some space or choose another --out folder",
+    errno.EFBIG: "the file grew beyond the size allowed here; raise the limit (ulimit -f) or write fewer buildings",
+    errno.EACCES: "permission denied; choose a folder you may write to",
+    errno.EPERM: "permission denied; choose a folder you may write to",
+    errno.EROFS: "the file system is read-only; choose another folder",
+    errno.ENOTDIR: "a part of this path is a file, not a folder; choose another path",
+    errno.EEXIST: "a part of this path is a file, not a folder; choose another path",
+    errno.EISDIR: "a folder of this name is in the way; choose another file name",
+    errno.ENAMETOOLONG: "the name is too long for this file system; choose a shorter one",
+}
+
+
+def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
+    """The sentence for `error`, met while writing `path`.
+
+    >>> str(output_error("out/a.gml", OSError(errno.ENOSPC, "No space left on device")))
+    'expected to write out/a.gml, but the disk is full; free some space or choose another --out folder'
+    """
+    advice = ADVICE.get(error.errno or 0, f"got: {error}; check the path, the permissions and the space left")
+    return OutputError(f"expected to write {os.fspath(path)}, but {advice}")
+
+
+class OutputFile(io.FileIO):
+    """A raw file opened for exclusive writing (and reading back) whose failing writes raise OutputError."""
+
+    def __init__(self, hidden: Path, path: Path):
+        self.path = path
+        super().__init__(hidden, "x+")
+
+    def write(self, data) -> int:
+        try:
+            return super().write(data)
+        except OSError as error:
+            raise output_error(self.path, error) from error
+
+
+@contextmanager
+def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
+    """Yield a free hidden path beside `path`, which becomes `path` when the block ends well and is removed when not.
+
+    For libraries that write by file name. The parent folder is made if missing. Raises OutputError where the place
+    cannot be written, before the block is entered if that can be known.
+    """
+    # A link is followed, so that its target is replaced and not the link.
+    path = Path(os.path.realpath(path))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.is_dir():
+            raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR))
+    except OSError as error:
+        raise output_error(path, error) from error
+    hidden = hidden_name(path)
+    try:
+        yield hidden
+        try:
+            sync(hidden)
+            os.replace(hidden, path)
+            sync(path.parent)
+        except OSError as error:
+            raise output_error(path, error) from error
+    finally:
+        # After a good end the hidden name is gone; SQLite leaves journals beside it after a bad one.
+        for leftover in (hidden, *(hidden.with_name(hidden.name + end) for end in ("-journal", "-wal", "-shm"))):
+            leftover.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic(path: str | os.PathLike) -> Iterator[BinaryIO]:
+    """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends well.
+
+    Raises OutputError when the place cannot be written or the disk fills.
+
+    >>> import tempfile
+    >>> folder = tempfile.TemporaryDirectory()
+    >>> with atomic(folder.name + "/a.txt") as file:
+    ...     _ = file.write(b"whole")
+    ...     visible_before = os.path.exists(folder.name + "/a.txt")
+    >>> visible_before, open(folder.name + "/a.txt").read()
+    (False, 'whole')
+    """
+    with atomic_path(path) as hidden, opened(hidden, Path(path)) as file:
+        yield file
+
+
+@contextmanager
+def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
+    """Yield a temporary binary file beside `path`, gone when the block ends; a full disk raises OutputError."""
+    hidden = hidden_name(Path(os.path.realpath(path)))
+    try:
+        with opened(hidden, Path(path)) as file:
+            yield file
+    finally:
+        hidden.unlink(missing_ok=True)
+
+
+@contextmanager
+def opened(hidden: Path, path: Path) -> Iterator[BinaryIO]:
+    """Yield a buffered file at `hidden`, whose errors speak of `path`."""
+    try:
+        raw = OutputFile(hidden, path)
+    except OSError as error:
+        raise output_error(path, error) from error
+    file = io.BufferedRandom(raw, 1 << 16)
+    try:
+        yield file
+        file.flush()
+    finally:
+        # Closing the raw file drops what is still buffered after a failure instead of failing again.
+        raw.close()
+
+
+def hidden_name(path: Path) -> Path:
+    """A free name beside `path` that listings do not show, with its suffix."""
+    return path.with_name(f".{path.name[:60]}-{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
+
+
+def sync(path: Path) -> None:
+    """Ask the operating system to put the file or folder at `path` on disk; folders cannot be opened everywhere."""
+    try:
+        descriptor = os.open(path, os.O_RDONLY)
+    except PermissionError:
+        return
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

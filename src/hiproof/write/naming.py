@@ -1,0 +1,91 @@
+"""Names in files: gml:ids that are valid, unique and the same in every run, and how a CRS is named."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
+NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def gml_name(building_id: str) -> str:
+    """`building_id` with every character that an XML name forbids replaced by its code between underscores.
+
+    >>> gml_name("NL.IMBAG.Pand.05031/a b")
+    'NL.IMBAG.Pand.05031_2f_a_20_b'
+    """
+    return NOT_IN_NAME.sub(lambda match: f"_{ord(match[0]):x}_", str(building_id))
+
+
+def xml_text(value: Any) -> str:
+    """`value` as text without the control characters XML cannot hold."""
+    return NOT_IN_XML.sub("\ufffd", str(value))
+
+
+class UniqueNames:
+    """Hands every name out once: the first comer keeps it, later ones get a number.
+
+    >>> names = UniqueNames()
+    >>> [names.take(name) for name in ("a", "b", "a", "a")]
+    ['a', 'b', 'a..2', 'a..3']
+    """
+
+    def __init__(self) -> None:
+        self.taken: set[str] = set()
+
+    def take(self, name: str) -> str:
+        unique, count = name, 1
+        while unique in self.taken:
+            count += 1
+            unique = f"{name}..{count}"
+        self.taken.add(unique)
+        return unique
+
+
+def epsg_codes(crs: Any) -> tuple[int, ...]:
+    """EPSG codes of `crs` (pyproj CRS, anything pyproj understands, or None): one, two for a compound, () if unknown.
+
+    >>> epsg_codes("EPSG:7415"), epsg_codes("EPSG:28992"), epsg_codes(None)
+    ((28992, 5709), (28992,), ())
+    """
+    if crs is None:
+        return ()
+    from pyproj import CRS
+
+    crs = CRS.from_user_input(crs)
+    parts = crs.sub_crs_list if crs.is_compound else [crs]
+    codes = [part.to_epsg() for part in parts]
+    if codes and codes[0] is not None:
+        return tuple(code for code in codes if code is not None)
+    whole = crs.to_epsg()
+    return () if whole is None else (whole,)
+
+
+def srs_name(crs: Any) -> str | None:
+    """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN; None when the CRS has no code.
+
+    >>> srs_name("EPSG:7415")
+    'urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709'
+    >>> srs_name("EPSG:26918")
+    'urn:ogc:def:crs:EPSG::26918'
+    """
+    codes = epsg_codes(crs)
+    if len(codes) < 2:
+        return f"urn:ogc:def:crs:EPSG::{codes[0]}" if codes else None
+    return "urn:ogc:def:crs," + ",".join(f"crs:EPSG::{code}" for code in codes)
+
+
+def reference_system(crs: Any) -> str | None:
+    """The `referenceSystem` of CityJSON, which holds one code: the compound's own where it has one, else the plan's.
+
+    >>> reference_system("EPSG:28992+5709")
+    'https://www.opengis.net/def/crs/EPSG/0/7415'
+    """
+    if crs is None:
+        return None
+    from pyproj import CRS
+
+    codes = epsg_codes(crs)
+    code = CRS.from_user_input(crs).to_epsg() or (codes[0] if codes else None)
+    return None if code is None else f"https://www.opengis.net/def/crs/EPSG/0/{code}"

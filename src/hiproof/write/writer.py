@@ -1,0 +1,48 @@
+"""The life of an output file: opened, given one building after another, finished, and only then seen."""
+
+from __future__ import annotations
+
+import os
+from contextlib import AbstractContextManager, ExitStack
+from typing import BinaryIO
+
+from ..model import Building
+from .files import atomic
+from .roof_figures import RoofFigures
+
+
+class BuildingWriter(AbstractContextManager):
+    """Base of the incremental writers: `with Writer(path, ...) as writer: writer.add(building)`.
+
+    The file appears when the block ends well; after an exception nothing is left and an older file stays. A format
+    fills in `begin`, `add` and `finish`.
+    """
+
+    file: BinaryIO
+
+    def __init__(self, path: str | os.PathLike) -> None:
+        self.path = path
+
+    def begin(self, stack: ExitStack) -> None:
+        """Write what comes before the first building; `stack` closes what the format opens beside the file."""
+
+    def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+        """Write one building; `figures` of its solid if the caller has them already."""
+        raise NotImplementedError
+
+    def finish(self) -> None:
+        """Write what comes after the last building."""
+
+    def open(self, stack: ExitStack) -> None:
+        self.file = stack.enter_context(atomic(self.path))
+
+    def __enter__(self):
+        with ExitStack() as stack:
+            self.open(stack)
+            self.begin(stack)
+            stack.push(lambda kind, error, trace: self.finish() if kind is None else None)
+            self.stack = stack.pop_all()
+        return self
+
+    def __exit__(self, kind, error, trace) -> bool | None:
+        return self.stack.__exit__(kind, error, trace)
