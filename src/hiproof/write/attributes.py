@@ -18,7 +18,7 @@ import shapely
 from ..errors import OutputError
 from ..model import GROUND, Building
 from .building_attributes import OWN, PREFIX, building_attributes, figures_of
-from .files import atomic_path, scratch
+from .files import atomic, scratch
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
@@ -53,7 +53,7 @@ class AttributesWriter(BuildingWriter):
         self.count = 0
 
     def open(self, stack: ExitStack) -> None:
-        self.hidden = stack.enter_context(atomic_path(self.path))
+        self.hidden = stack.enter_context(atomic(self.path))
         self.waiting = stack.enter_context(scratch(self.path))
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:

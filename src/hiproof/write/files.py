@@ -31,6 +31,9 @@ ADVICE = {
     errno.ENAMETOOLONG: "the name is too long for this file system; choose a shorter one",
 }
 
+# Reading never fails so: in a block that writes, these are errors of writing whatever file they name.
+ONLY_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+
 
 def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
     """The sentence for `error`, met while writing `path`.
@@ -57,11 +60,20 @@ class OutputFile(io.FileIO):
 
 
 @contextmanager
-def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
+def atomic(path: str | os.PathLike) -> Iterator[Path]:
     """Yield a free hidden path beside `path`, which becomes `path` when the block ends well and is removed when not.
 
-    For libraries that write by file name. The parent folder is made if missing. Raises OutputError where the place
-    cannot be written, before the block is entered if that can be known.
+    The parent folder is made if missing. Raises OutputError where the place cannot be written, before the block is
+    entered if that can be known, and for the block's own errors when they come from writing the hidden file.
+
+    >>> import tempfile
+    >>> folder = Path(tempfile.mkdtemp())
+    >>> with atomic(folder / "a.txt") as beside:
+    ...     _ = beside.write_text("whole")
+    ...     (folder / "a.txt").exists()
+    False
+    >>> [file.name for file in folder.iterdir()]
+    ['a.txt']
     """
     # A link is followed, so that its target is replaced and not the link.
     path = Path(os.path.realpath(path))
@@ -74,12 +86,13 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
     hidden = hidden_name(path)
     try:
         yield hidden
-        try:
-            sync(hidden)
-            os.replace(hidden, path)
-            sync(path.parent)
-        except OSError as error:
+        sync(hidden)
+        os.replace(hidden, path)
+        sync(path.parent)
+    except OSError as error:
+        if error.errno in ONLY_WRITING or str(hidden) in (str(error.filename), str(error.filename2)):
             raise output_error(path, error) from error
+        raise
     finally:
         # After a good end the hidden name is gone; SQLite leaves journals beside it after a bad one.
         for leftover in (hidden, *(hidden.with_name(hidden.name + end) for end in ("-journal", "-wal", "-shm"))):
@@ -87,20 +100,9 @@ def atomic_path(path: str | os.PathLike) -> Iterator[Path]:
 
 
 @contextmanager
-def atomic(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends well.
-
-    Raises OutputError when the place cannot be written or the disk fills.
-
-    >>> import tempfile
-    >>> folder = tempfile.TemporaryDirectory()
-    >>> with atomic(folder.name + "/a.txt") as file:
-    ...     _ = file.write(b"whole")
-    ...     visible_before = os.path.exists(folder.name + "/a.txt")
-    >>> visible_before, open(folder.name + "/a.txt").read()
-    (False, 'whole')
-    """
-    with atomic_path(path) as hidden, opened(hidden, Path(path)) as file:
+def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
+    """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends well; see `atomic`."""
+    with atomic(path) as hidden, opened(hidden, Path(path)) as file:
         yield file
 
 

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, ExitStack
 from typing import BinaryIO
 
 from ..model import Building
-from .files import atomic
+from .files import atomic_file
 from .roof_figures import RoofFigures
 
 
@@ -34,7 +34,7 @@ class BuildingWriter(AbstractContextManager):
         """Write what comes after the last building."""
 
     def open(self, stack: ExitStack) -> None:
-        self.file = stack.enter_context(atomic(self.path))
+        self.file = stack.enter_context(atomic_file(self.path))
 
     def __enter__(self):
         with ExitStack() as stack:
