@@ -1,0 +1,28 @@
+"""Roofs whose truth is known and an airborne scanner over them: for training, experiments, tests and the demo.
+
+building = random_building(rng, "hip")          one primitive (roofs) ...
+building = random_compound(rng, "L")            ... or several (compounds)
+cloud = scan(building, rng, ScanSettings())     labelled points (flight -> raycast -> scanner)
+points, labels, type = training_sample(rng)     the same for a network (training)
+"""
+
+from .roofs import SimBuilding, random_building
+from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
+from .scene import NOT_ROOF, SOURCES, Defects
+from .shapes import ROOF_TYPES
+from .training import training_sample
+
+__all__ = [
+    "NOT_ROOF",
+    "ROOF_TYPES",
+    "SOURCES",
+    "Defects",
+    "Scan",
+    "ScanSettings",
+    "SimBuilding",
+    "random_building",
+    "scan",
+    "scan_solids",
+    "training_sample",
+    "uniform_points",
+]

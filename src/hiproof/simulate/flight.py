@@ -1,0 +1,103 @@
+"""Where an airborne scanner's beams go: swaths of scan lines over a disc, with heading, scan angle and spacing.
+
+Within a swath, points lie at regular steps along each scan line and lines at regular steps along the flight; an
+oscillating mirror pushes lines together in pairs, away from the middle of its swath. Overlapping swaths differ in
+heading, angle and spacing, and a swath may end over the building.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Beams:
+    """Beams by height, p(z) = xy0 + slope z: `xy0`, `slope` (n, 2); `shift` (n, 3) is the swath's registration
+    error."""
+
+    xy0: np.ndarray
+    slope: np.ndarray
+    shift: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.xy0)
+
+    def chosen(self, keep: np.ndarray) -> Beams:
+        return Beams(self.xy0[keep], self.slope[keep], self.shift[keep])
+
+
+@dataclass(frozen=True)
+class Swath:
+    """One pass: flight `heading` (rad), spacings (m) of lines and of points on a line, tangent of the scan angle over
+    the centre and its growth a metre across track (1 / flying height), `pairing` 0-1 of an oscillating mirror, `edge`
+    (m across track, relative to the centre) where the swath ends, `shift` (3,) registration error."""
+
+    heading: float
+    line_spacing: float
+    point_spacing: float
+    tan_angle: float
+    tan_growth: float = 0.0
+    pairing: float = 0.0
+    edge: float = math.inf
+    shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+def random_swaths(
+    rng: np.random.Generator,
+    density: float,
+    tan_max: float,
+    registration_m: float,
+    edge_probability: float,
+    reach: float,
+) -> list[Swath]:
+    """One to three swaths that share `density` (points/m2); the second and third may end within `reach` (m)."""
+    count = 1 + int(rng.random() < 0.5) + int(rng.random() < 0.15)
+    share = rng.uniform(0.6, 1.4, count)
+    share *= density / share.sum()
+    heading = rng.uniform(-math.pi, math.pi)
+    swaths = []
+    for k in range(count):
+        ratio, turn, angle, pairing, ends, edge = rng.random(6)
+        spacing = 1.0 / math.sqrt(share[k])
+        stretch = 2.0 ** (1.6 * ratio - 0.8)
+        swaths.append(
+            Swath(
+                heading=heading + (math.pi if turn < 0.6 else math.pi * turn) * k,
+                line_spacing=spacing * stretch,
+                point_spacing=spacing / stretch,
+                tan_angle=tan_max * (2 * angle - 1),
+                pairing=max(0.0, 1.6 * pairing - 0.8),
+                edge=(2 * edge - 1) * reach if k and ends < edge_probability else math.inf,
+                shift=tuple(rng.normal(0.0, registration_m, 3) * (1.0, 1.0, 0.5)) if count > 1 else (0.0, 0.0, 0.0),
+            )
+        )
+    return swaths
+
+
+def beams_of(rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius: float, z_ref: float) -> Beams:
+    """Beams of `swath` that cross the disc of `radius` about `centre` (2,) at height `z_ref`."""
+    cosine, sine = math.cos(swath.heading), math.sin(swath.heading)
+    lines = int(2 * radius / swath.line_spacing) + 2
+    steps = int(2 * radius / swath.point_spacing) + 2
+    index = np.arange(lines)
+    along_lines = (index + swath.pairing * 0.5 * (index % 2) + rng.random()) * swath.line_spacing - radius
+    across_steps = np.arange(steps) * swath.point_spacing - radius
+    jitter = rng.normal(0.0, 0.07, (2, lines, steps))
+    phase = rng.random((lines, 1)) * swath.point_spacing
+    along = (along_lines[:, None] + swath.line_spacing * jitter[0]).ravel()
+    across = (across_steps + phase + swath.point_spacing * jitter[1]).ravel()
+    keep = (along**2 + across**2 < radius**2) & (across < swath.edge)
+    along, across = along[keep], across[keep]
+    xy_ref = np.column_stack([cosine * along - sine * across, sine * along + cosine * across]) + centre
+    tan = swath.tan_angle + swath.tan_growth * across
+    slope = tan[:, None] * (sine, -cosine)
+    return Beams(xy_ref - slope * z_ref, slope, np.broadcast_to(swath.shift, (len(tan), 3)))
+
+
+def joined(beams: list[Beams]) -> Beams:
+    if len(beams) == 1:
+        return beams[0]
+    return Beams(*(np.concatenate([getattr(b, name) for b in beams]) for name in ("xy0", "slope", "shift")))

@@ -1,0 +1,87 @@
+"""Compiled laser beams against a scene: the first surface a beam meets on its way down.
+
+A beam is written by height: p(z) = (x0 + sx z, y0 + sy z, z), so that a body bounded by half-spaces n . p <= d is
+entered at the lowest of the heights its upward-facing sides allow and left at the highest of the others. Three kinds
+of body: convex ones (roof pieces, chimneys, neighbours), triangles (any solid read from a file), and crowns of trees
+that let part of the light through.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def cast_convex(xy0, slope, halfspaces, starts, z_hit, face):
+    """Lower `z_hit` (n,) is raised to the entry height wherever a convex body lies above it; `face` (n,) gets its side.
+
+    Beams are `xy0` (n, 2) at z = 0 and `slope` (n, 2) = (dx/dz, dy/dz). Body b has the rows starts[b]:starts[b+1] of
+    `halfspaces` (k, 4) = (nx, ny, nz, d). Both outputs are changed in place; `face` is a row of `halfspaces`.
+    """
+    for i in range(len(xy0)):
+        x0, y0, sx, sy = xy0[i, 0], xy0[i, 1], slope[i, 0], slope[i, 1]
+        for b in range(len(starts) - 1):
+            z_in, z_out, side = np.inf, -np.inf, -1
+            for k in range(starts[b], starts[b + 1]):
+                climb = halfspaces[k, 0] * sx + halfspaces[k, 1] * sy + halfspaces[k, 2]
+                room = halfspaces[k, 3] - halfspaces[k, 0] * x0 - halfspaces[k, 1] * y0
+                if climb > 1e-12:
+                    if room / climb < z_in:
+                        z_in, side = room / climb, k
+                elif climb < -1e-12:
+                    z_out = max(z_out, room / climb)
+                elif room < 0.0:
+                    z_in = -np.inf
+                if z_in <= z_out or z_in <= z_hit[i]:
+                    side = -1
+                    break
+            if side >= 0 and z_in > z_hit[i] and z_in > z_out:
+                z_hit[i], face[i] = z_in, side
+
+
+@njit(cache=True)
+def cast_triangles(xy0, slope, triangles, z_hit, face):
+    """The same for `triangles` (m, 3, 3); `face` gets the triangle's index.
+
+    Each corner is carried along the beam to z = 0, where the beam is a point: its barycentric weights give the height.
+    """
+    for i in range(len(xy0)):
+        x0, y0, sx, sy = xy0[i, 0], xy0[i, 1], slope[i, 0], slope[i, 1]
+        for t in range(len(triangles)):
+            za, zb, zc = triangles[t, 0, 2], triangles[t, 1, 2], triangles[t, 2, 2]
+            if max(za, zb, zc) <= z_hit[i]:
+                continue
+            ax, ay = triangles[t, 0, 0] - sx * za - x0, triangles[t, 0, 1] - sy * za - y0
+            bx, by = triangles[t, 1, 0] - sx * zb - x0, triangles[t, 1, 1] - sy * zb - y0
+            cx, cy = triangles[t, 2, 0] - sx * zc - x0, triangles[t, 2, 1] - sy * zc - y0
+            wa, wb, wc = bx * cy - by * cx, cx * ay - cy * ax, ax * by - ay * bx
+            total = wa + wb + wc
+            inside = (wa >= 0 and wb >= 0 and wc >= 0) or (wa <= 0 and wb <= 0 and wc <= 0)
+            if inside and abs(total) > 1e-12:
+                z = (wa * za + wb * zb + wc * zc) / total
+                if z > z_hit[i]:
+                    z_hit[i], face[i] = z, t
+
+
+@njit(cache=True)
+def cast_crowns(xy0, slope, crowns, free_path, z_crown):
+    """Raise `z_crown` (n,) to where a beam is caught in a tree's crown, after `free_path` (n,) metres of leaves.
+
+    `crowns` (t, 5) = (x, y, z of the centre, horizontal and vertical half axes) of upright ellipsoids. A beam whose way
+    through a crown is shorter than its free path comes out below, so the ground and the roof under a tree are thinned,
+    not hidden.
+    """
+    for i in range(len(xy0)):
+        for t in range(len(crowns)):
+            x, y = xy0[i, 0] - crowns[t, 0], xy0[i, 1] - crowns[t, 1]
+            sx, sy, r, h = slope[i, 0], slope[i, 1], crowns[t, 3], crowns[t, 4]
+            a = (sx * sx + sy * sy) / (r * r) + 1.0 / (h * h)
+            b = (x * sx + y * sy) / (r * r) - crowns[t, 2] / (h * h)
+            c = (x * x + y * y) / (r * r) + crowns[t, 2] ** 2 / (h * h) - 1.0
+            root = b * b - a * c
+            if root > 0.0:
+                z_top, through = (-b + np.sqrt(root)) / a, 2.0 * np.sqrt(root) / a
+                stretch = np.sqrt(1.0 + sx * sx + sy * sy)
+                if through * stretch > free_path[i]:
+                    z_crown[i] = max(z_crown[i], z_top - free_path[i] / stretch)

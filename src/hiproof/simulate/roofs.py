@@ -1,0 +1,199 @@
+"""Buildings whose truth is known: one primitive with dimensions and slopes as real roofs have them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..frames import LocalFrame
+from ..model import Roof
+from .shapes import ROOF_TYPES, make_part
+
+
+@dataclass(frozen=True)
+class SimBuilding:
+    """A building made up, with its truth.
+
+    `type` is the roof type of its largest part, `kind` "single" or the compound's kind. `roof` is in its own frame,
+    whose origin (world) lies on the ground at the building: local heights are heights above that ground. `z_ground`
+    (world).
+    """
+
+    type: str
+    kind: str
+    roof: Roof
+    z_ground: float
+
+    @property
+    def outline(self) -> shapely.Polygon:
+        """Plan outline in the roof's local frame."""
+        return self.roof.outline
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """theta_p of the largest part, metres."""
+        return max(self.roof.parts, key=lambda part: part.area).parameters
+
+    @property
+    def kappa(self) -> float:
+        return max(self.roof.parts, key=lambda part: part.area).kappa
+
+    @property
+    def footprint(self) -> shapely.Polygon:
+        """Plan outline in world coordinates."""
+        return shapely.transform(self.outline, self.roof.frame.to_world)
+
+    def truth(self) -> dict:
+        """Plain values for JSON: type, kind, ground height, frame origin and every part's parameters."""
+        return {
+            "type": self.type,
+            "kind": self.kind,
+            "z_ground": float(self.z_ground),
+            "origin": [float(c) for c in self.roof.frame.origin],
+            "parts": [
+                {
+                    "type": part.type,
+                    "parameters": {name: float(value) for name, value in part.parameters.items()},
+                    "kappa": float(part.kappa),
+                    "translation": [float(c) for c in part.translation],
+                }
+                for part in self.roof.parts
+            ],
+        }
+
+
+def random_building(
+    rng: np.random.Generator,
+    type: str | None = None,
+    origin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    kappa: float | None = None,
+) -> SimBuilding:
+    """A building of one primitive, its ground at `origin` (world), turned by `kappa` (rad; drawn when None).
+
+    Raises InputError for a type that is not in the catalogue.
+
+    >>> random_building(np.random.default_rng(0), "hip").type
+    'hip'
+    """
+    if type is None:
+        type = ROOF_TYPES[rng.integers(len(ROOF_TYPES))]
+    if type not in ROOF_TYPES:
+        raise InputError(f"expected a roof type ({', '.join(ROOF_TYPES)}), got {type!r}")
+    kappa = rng.uniform(-math.pi, math.pi) if kappa is None else kappa
+    part = make_part(type, random_parameters(rng, type), kappa, np.array([0.0, 0.0, random_eave(rng)]))
+    return assemble((part,), "single", origin)
+
+
+def assemble(parts: tuple, kind: str, origin: np.ndarray | tuple[float, float, float]) -> SimBuilding:
+    """`parts` as a building on the ground at `origin`; the outline is the union of their pieces."""
+    outlines = [piece.outline for part in parts for piece in part.pieces]
+    outline = outlines[0] if len(outlines) == 1 else shapely.union_all(outlines, grid_size=1e-6)
+    roof = Roof(parts, outline, LocalFrame(np.asarray(origin, float)))
+    return SimBuilding(roof.type, kind, roof, float(origin[2]))
+
+
+def random_eave(rng: np.random.Generator) -> float:
+    """Height of the lowest eave over the ground: one to four storeys, sheds included."""
+    return float(rng.choice((2.4, 3.0, 5.5, 5.8, 8.5, 11.5)) + rng.uniform(-0.3, 0.5))
+
+
+def random_parameters(rng: np.random.Generator, type: str, width: float | None = None) -> dict[str, float]:
+    """theta_p of one roof of `type`; `width` (m) may be given, for parts that must fit together.
+
+    The draws keep each type apart from its neighbours in the catalogue: a hip has a ridge, a half-hip a gable wall
+    worth the name, an asymmetric gable a visible difference of slopes or eaves.
+    """
+    width = float(rng.uniform(5.0, 13.0)) if width is None else float(width)
+    return _DRAWS[type](rng, width)
+
+
+def _slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> float:
+    return math.tan(math.radians(rng.uniform(low_deg, high_deg)))
+
+
+def _plan(rng: np.random.Generator, width: float, low: float = 1.05, high: float = 2.2) -> dict[str, float]:
+    return {"width": width, "length": width * float(rng.uniform(low, high))}
+
+
+def _flat(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return _plan(rng, width, 1.0, 2.6)
+
+
+def _monopitch(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return _plan(rng, width, 0.9, 2.2) | {"height": width * _slope(rng, 6, 28)}
+
+
+def _gable(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return _plan(rng, width, 0.9) | {"height": width / 2 * _slope(rng, 15, 56)}
+
+
+def _hip(rng: np.random.Generator, width: float) -> dict[str, float]:
+    hip_run = width / 2 * float(rng.uniform(0.6, 1.15))
+    ridge = width * float(rng.uniform(0.25, 1.3))
+    return {
+        "width": width,
+        "length": 2 * hip_run + ridge,
+        "height": width / 2 * _slope(rng, 18, 48),
+        "hip_run": hip_run,
+    }
+
+
+def _half_hip(rng: np.random.Generator, width: float) -> dict[str, float]:
+    height = width / 2 * _slope(rng, 30, 54)
+    hip_height = height * float(rng.uniform(0.3, 0.65))
+    hip_run = (height - hip_height) / _slope(rng, 35, 60)
+    length = 2 * hip_run + width * float(rng.uniform(0.35, 1.4))
+    return {"width": width, "length": length, "height": height, "hip_height": hip_height, "hip_run": hip_run}
+
+
+def _pyramid(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return _plan(rng, width, 1.0, 1.15) | {"height": width / 2 * _slope(rng, 15, 52)}
+
+
+def _mansard(rng: np.random.Generator, width: float) -> dict[str, float]:
+    inset = width * float(rng.uniform(0.12, 0.26))
+    return _plan(rng, width, 1.0, 1.9) | {"height": inset * _slope(rng, 45, 70), "inset": inset}
+
+
+def _shed(rng: np.random.Generator, width: float) -> dict[str, float]:
+    teeth = int(rng.integers(3, 7))
+    tooth = float(rng.uniform(3.5, 7.0))
+    width = max(width, 7.0) * float(rng.uniform(1.0, 1.6))
+    return {"width": width, "length": teeth * tooth, "height": tooth * _slope(rng, 14, 34), "teeth": float(teeth)}
+
+
+def _asymmetric_gable(rng: np.random.Generator, width: float) -> dict[str, float]:
+    height = width / 2 * _slope(rng, 22, 46)
+    offset = width * float(rng.uniform(0.1, 0.28)) * float(rng.choice((-1.0, 1.0)))
+    same_slope = rng.random() < 0.4
+    # With one slope on both sides the eaves differ (a catslide); otherwise the slopes do.
+    eave = height * (1 - (width / 2 - offset) / (width / 2 + offset)) if same_slope else 0.0
+    if eave < 0:
+        offset, eave = -offset, height * (1 - (width / 2 + offset) / (width / 2 - offset))
+    return _plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_difference": eave}
+
+
+def _gambrel(rng: np.random.Generator, width: float) -> dict[str, float]:
+    run = width / 2 * float(rng.uniform(0.22, 0.45))
+    knee = run * _slope(rng, 54, 70)
+    upper = (width / 2 - run) * _slope(rng, 15, 34)
+    return _plan(rng, width, 0.9, 2.0) | {"height": knee + upper, "knee_run": run, "knee_height": knee}
+
+
+_DRAWS: dict[str, Callable[[np.random.Generator, float], dict[str, float]]] = {
+    "flat": _flat,
+    "monopitch": _monopitch,
+    "gable": _gable,
+    "hip": _hip,
+    "half_hip": _half_hip,
+    "pyramid": _pyramid,
+    "mansard": _mansard,
+    "shed": _shed,
+    "asymmetric_gable": _asymmetric_gable,
+    "gambrel": _gambrel,
+}

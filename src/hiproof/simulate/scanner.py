@@ -1,0 +1,244 @@
+"""An airborne laser scanner over made-up buildings and over solids: labelled points with the faults of real clouds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..model import Solid
+from .flight import Beams, beams_of, joined, random_swaths
+from .raycast import cast_convex, cast_crowns, cast_triangles
+from .roofs import SimBuilding
+from .scene import (
+    NOT_ROOF,
+    SOURCE_CLUTTER,
+    SOURCE_GROUND,
+    SOURCE_TREE,
+    Defects,
+    Scene,
+    building_bodies,
+    random_scene,
+    scene_of,
+    solids_scene,
+)
+from .shapes import ROOF_TYPES
+
+MERGED_RETURNS_M = 0.6
+LEAF_PATH_M = 1.8
+
+
+@dataclass(frozen=True)
+class ScanSettings:
+    """The scanner. `density` (points/m2 in plan, all swaths together), one-sigma noises (m) along the beam and in plan,
+    the beam's radius on the ground (m), the largest scan angle (deg), the registration error between swaths (m), how
+    far around the outline points are kept (m), and the defects' probabilities."""
+
+    density: float = 5.0
+    range_noise_m: float = 0.025
+    horizontal_noise_m: float = 0.05
+    beam_radius_m: float = 0.12
+    max_scan_angle_deg: float = 20.0
+    registration_m: float = 0.03
+    margin_m: float = 1.0
+    defects: Defects = field(default_factory=Defects)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """`points` (n, 3) world metres; `label` (n,) index into ROOF_TYPES, NOT_ROOF for all else; `source` (n,) index into
+    SOURCES (roof, wall, ground, tree, clutter)."""
+
+    points: np.ndarray
+    label: np.ndarray
+    source: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def chosen(self, keep: np.ndarray) -> Scan:
+        return Scan(self.points[keep], self.label[keep], self.source[keep])
+
+    def moved(self, shift: np.ndarray) -> Scan:
+        return Scan(self.points + shift, self.label, self.source)
+
+
+def scan(building: SimBuilding, rng: np.random.Generator, settings: ScanSettings | None = None) -> Scan:
+    """One building as a scanner sees it, with what stands around it.
+
+    >>> from hiproof.simulate import random_building, scan
+    >>> rng = np.random.default_rng(0)
+    >>> cloud = scan(random_building(rng, "gable"), rng)
+    >>> cloud.points.shape[1], int(cloud.label.max())
+    (3, 10)
+    """
+    settings = checked(settings or ScanSettings())
+    scene = random_scene(rng, building, settings.defects)
+    outline = building.outline if settings.margin_m == 0 else building.outline.buffer(settings.margin_m, quad_segs=2)
+    z_roof = building.roof.parts[0].translation[2]
+    return scan_scene(scene, outline, z_roof, rng, settings).moved(building.roof.frame.origin)
+
+
+def scan_solids(
+    solids: list[Solid],
+    rng: np.random.Generator,
+    settings: ScanSettings | None = None,
+    types: list[str | None] | None = None,
+) -> Scan:
+    """Solids of any origin (all in one frame) as a scanner sees them together.
+
+    Their RoofSurfaces are labelled with `types` (names of ROOF_TYPES; None or an unknown name gives NOT_ROOF but
+    still the source "roof"). The terrain is level at the solids' lowest height. Of the defects only the scanner's own
+    happen (missing strips, swath edges, partial roofs, outliers). Raises InputError without solids.
+    """
+    settings = checked(settings or ScanSettings())
+    if not solids:
+        raise InputError("expected at least one solid to scan, got none; check the file that was read")
+    types = [None] * len(solids) if types is None else types
+    labels = [ROOF_TYPES.index(type) if type in ROOF_TYPES else NOT_ROOF for type in types]
+    vertices = np.concatenate([solid.vertices for solid in solids])
+    origin = np.append(np.round(vertices[:, :2].mean(axis=0)), vertices[:, 2].min())
+    scene = solids_scene([solid.moved(-origin) for solid in solids], labels)
+    corners = scene.triangles[:, :, :2]
+    plan = shapely.union_all(shapely.make_valid(shapely.polygons(corners)), grid_size=1e-4)
+    height = float(vertices[:, 2].max() - origin[2])
+    return scan_scene(scene, plan.buffer(settings.margin_m, quad_segs=2), height / 2, rng, settings).moved(origin)
+
+
+def scan_scene(
+    scene: Scene, area: shapely.Geometry, z_ref: float, rng: np.random.Generator, settings: ScanSettings
+) -> Scan:
+    """Beams over `area` (plan, the scene's frame), their returns with noise, and the cloud's defects."""
+    x_low, y_low, x_high, y_high = area.bounds
+    centre = np.array([(x_low + x_high) / 2, (y_low + y_high) / 2])
+    reach = math.hypot(x_high - x_low, y_high - y_low) / 2
+    tan_max = math.tan(math.radians(settings.max_scan_angle_deg))
+    defects = settings.defects
+    swaths = random_swaths(rng, settings.density, tan_max, settings.registration_m, defects.swath_edge, reach / 2)
+    radius = reach + tan_max * z_ref
+    beams = [beams_of(rng, swath, centre, radius, z_ref) for swath in swaths]
+    if rng.random() < defects.missing_strip:
+        beams[0] = without_strip(rng, beams[0], swaths[0].heading, centre, reach)
+    cloud = returns(scene, joined(beams), rng, settings)
+    cloud = cloud.chosen(shapely.contains_xy(area, cloud.points[:, 0], cloud.points[:, 1]))
+    if rng.random() < defects.partial and len(cloud):
+        cloud = without_corner(rng, cloud, centre, reach)
+    if defects.outliers > 0 and len(cloud):
+        cloud = with_outliers(rng, cloud, defects.outliers)
+    return cloud
+
+
+def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: ScanSettings) -> Scan:
+    """Points of all beams: a wide beam mixes the heights of two near surfaces and splits over two far ones; leaves
+    catch some of the light and let the rest through."""
+    z_hit, source, label = first_hits(scene, beams.xy0, beams.slope)
+    n = len(z_hit)
+    xy0, slope, shift = beams.xy0, beams.slope, beams.shift
+    if settings.beam_radius_m > 0:
+        aside = rng.normal(0.0, settings.beam_radius_m / 2, (n, 2))
+        z_aside, source_aside, label_aside = first_hits(scene, xy0 + aside, slope)
+        share = rng.uniform(0.5, 1.0, n)
+        near = np.abs(z_aside - z_hit) < MERGED_RETURNS_M
+        split = np.flatnonzero(~near & (rng.random(n) < 0.4))
+        z_hit = np.where(near, share * z_hit + (1 - share) * z_aside, z_hit)
+        z_hit, source, label = (
+            np.concatenate([first, second[split]])
+            for first, second in ((z_hit, z_aside), (source, source_aside), (label, label_aside))
+        )
+        xy0, slope, shift = (np.concatenate([values, values[split]]) for values in (xy0, slope, shift))
+    if len(scene.crowns):
+        z_hit, source, label, kept = caught_by_leaves(scene, xy0, slope, z_hit, source, label, rng)
+        xy0, slope, shift = xy0[kept], slope[kept], shift[kept]
+    noise = rng.standard_normal((len(z_hit), 3))
+    points = np.empty((len(z_hit), 3))
+    points[:, :2] = xy0 + slope * z_hit[:, None] + settings.horizontal_noise_m * noise[:, :2]
+    points[:, 2] = z_hit + settings.range_noise_m * noise[:, 2]
+    return Scan(points + shift, label, source)
+
+
+def first_hits(scene: Scene, xy0: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Height (n,), source and label (n,) of the first surface each beam meets; terrain where there is nothing else."""
+    a, b, c = scene.ground
+    z_hit = (xy0[:, 0] * a + xy0[:, 1] * b + c) / (1.0 - slope[:, 0] * a - slope[:, 1] * b)
+    source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
+    for cast, bodies, sources, labels in (
+        (cast_convex, (scene.halfspaces, scene.starts), scene.source, scene.label),
+        (cast_triangles, (scene.triangles,), scene.triangle_source, scene.triangle_label),
+    ):
+        if len(sources):
+            face = np.full(len(xy0), -1)
+            cast(xy0, slope, *bodies, z_hit, face)
+            hit = face >= 0
+            source[hit], label[hit] = sources[face[hit]], labels[face[hit]]
+    return z_hit, source, label
+
+
+def caught_by_leaves(scene, xy0, slope, z_hit, source, label, rng):
+    """The returns with those of leaves, and the beam index of each: a third of the beams caught return from below
+    too."""
+    z_crown = np.full(len(xy0), -np.inf)
+    cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
+    caught = z_crown > z_hit
+    below = ~caught | (rng.random(len(xy0)) < 0.33)
+    kept = np.concatenate([np.flatnonzero(caught), np.flatnonzero(below)])
+    leaves = int(caught.sum())
+    z, sources, labels = z_hit[kept], source[kept], label[kept]
+    z[:leaves], sources[:leaves], labels[:leaves] = z_crown[caught], SOURCE_TREE, NOT_ROOF
+    return z, sources, labels, kept
+
+
+def without_strip(rng: np.random.Generator, beams: Beams, heading: float, centre: np.ndarray, reach: float) -> Beams:
+    """Some scan lines lost: a band of 0.8 to 3 m across the flight."""
+    along = (beams.xy0 - centre) @ (math.cos(heading), math.sin(heading))
+    start, width = rng.uniform(-0.7, 0.7) * reach, rng.uniform(0.8, 3.0)
+    return beams.chosen((along < start) | (along > start + width))
+
+
+def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, reach: float) -> Scan:
+    """A part of the roof that gave no return (wet, dark, or hidden): all points of a disc about some place near the
+    edge."""
+    angle, radius = rng.uniform(-math.pi, math.pi), reach * rng.uniform(0.25, 0.6)
+    middle = centre + 0.8 * reach * np.array([math.cos(angle), math.sin(angle)])
+    keep = ((cloud.points[:, :2] - middle) ** 2).sum(axis=1) > radius**2
+    return cloud.chosen(keep) if keep.sum() > 0.4 * len(keep) else cloud
+
+
+def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
+    """A few returns from nothing: birds above, multiple reflections below."""
+    count = rng.poisson(share * len(cloud))
+    at = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(0.0, 1.0, (count, 3)) * (0.3, 0.3, 3.0)
+    points = np.concatenate([cloud.points, at])
+    label = np.concatenate([cloud.label, np.full(count, NOT_ROOF, np.int8)])
+    return Scan(points, label, np.concatenate([cloud.source, np.full(count, SOURCE_CLUTTER, np.int8)]))
+
+
+def uniform_points(building: SimBuilding, rng: np.random.Generator, density: float = 4.72, noise: float = 0.12):
+    """Points (n, 3) world metres drawn as in the paper's Table 3: uniform over the outline, on the roof, with vertical
+    errors whose size is uniform within 1 `noise` for 90 %, within 1-2 for 9 % and within 2-3 for 1 % of the points."""
+    outline = building.outline
+    x_low, y_low, x_high, y_high = outline.bounds
+    count = rng.poisson(density * (x_high - x_low) * (y_high - y_low))
+    xy = rng.uniform((x_low, y_low), (x_high, y_high), (count, 2))
+    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    band = rng.choice(3, size=len(xy), p=(0.90, 0.09, 0.01))
+    error = (band + rng.random(len(xy))) * noise * rng.choice((-1.0, 1.0), len(xy))
+    return np.column_stack([xy, building.roof.height_at(xy) + error]) + building.roof.frame.origin
+
+
+def bare_scene(building: SimBuilding) -> Scene:
+    """The building alone on level ground."""
+    return scene_of(building_bodies(building))
+
+
+def checked(settings: ScanSettings) -> ScanSettings:
+    """`settings`, or InputError where a scanner could not have them."""
+    if not 0.05 <= settings.density <= 1000:
+        raise InputError(f"expected a density of 0.05 to 1000 points/m2, got {settings.density}; 1 to 20 is usual")
+    if min(settings.range_noise_m, settings.horizontal_noise_m, settings.beam_radius_m, settings.margin_m) < 0:
+        raise InputError(f"expected noise, beam radius and margin of 0 m or more, got {settings}; 0 switches them off")
+    if not 0 <= settings.max_scan_angle_deg <= 45:
+        raise InputError(f"expected a scan angle of 0 to 45 degrees, got {settings.max_scan_angle_deg}; 20 is usual")
+    return settings

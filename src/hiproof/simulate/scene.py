@@ -1,0 +1,260 @@
+"""What the beams can hit: buildings, solids, trees and clutter as half-spaces, triangles and crowns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..model import ROOF, Piece, Solid
+from .roofs import SimBuilding, random_parameters
+from .shapes import ROOF_TYPES, make_part, placed, rectangle
+
+SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)
+SOURCES = ("roof", "wall", "ground", "tree", "clutter")
+NOT_ROOF = len(ROOF_TYPES)
+BELOW_GROUND_M = 30.0
+
+
+@dataclass(frozen=True)
+class Defects:
+    """How often a building's surroundings and cloud have each defect (probabilities), and the share of outliers."""
+
+    tree: float = 0.35
+    chimney: float = 0.4
+    dormer: float = 0.2
+    antenna: float = 0.15
+    neighbour: float = 0.35
+    missing_strip: float = 0.12
+    partial: float = 0.1
+    swath_edge: float = 0.2
+    outliers: float = 0.004
+
+    @classmethod
+    def none(cls) -> Defects:
+        """A bare building under a faultless scanner."""
+        return cls(*(0.0,) * 9)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Bodies in one local frame. `halfspaces` (k, 4) in bodies `starts` (b + 1), `source` and `label` (k,) of each
+    side; `triangles` (m, 3, 3) with their `triangle_source` and `triangle_label`; `crowns` (t, 5); `ground` (3,) is
+    the plane z = a x + b y + c."""
+
+    halfspaces: np.ndarray
+    starts: np.ndarray
+    source: np.ndarray
+    label: np.ndarray
+    crowns: np.ndarray = field(default_factory=lambda: np.empty((0, 5)))
+    ground: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    triangles: np.ndarray = field(default_factory=lambda: np.empty((0, 3, 3)))
+    triangle_source: np.ndarray = field(default_factory=lambda: np.empty(0, np.int8))
+    triangle_label: np.ndarray = field(default_factory=lambda: np.empty(0, np.int8))
+
+
+@dataclass(frozen=True)
+class Body:
+    """A convex body: the prism of a piece's outline under its planes, with what a hit on its top is."""
+
+    piece: Piece
+    top_source: int = SOURCE_ROOF
+    wall_source: int = SOURCE_WALL
+    label: int = NOT_ROOF
+
+
+def halfspaces_of(piece: Piece) -> np.ndarray:
+    """Outline edges, then planes, as rows (nx, ny, nz, d) with n . p <= d inside. Raises InputError when not convex."""
+    ring = shapely.get_coordinates(piece.outline.exterior)
+    if len(piece.outline.interiors):
+        raise InputError("expected convex roof pieces to scan, got a hole; split the outline or scan a solid instead")
+    edge = np.diff(ring, axis=0)
+    turn = edge[:, 0] * np.roll(edge[:, 1], -1) - edge[:, 1] * np.roll(edge[:, 0], -1)
+    sign = 1.0 if turn.sum() > 0 else -1.0
+    if (sign * turn < -1e-6).any():
+        raise InputError(
+            "expected convex roof pieces to scan, got a re-entrant corner; split it or scan a solid instead"
+        )
+    walls = np.zeros((len(edge), 4))
+    walls[:, 0], walls[:, 1] = sign * edge[:, 1], -sign * edge[:, 0]
+    walls[:, 3] = (walls[:, :2] * ring[:-1]).sum(axis=1)
+    roofs = np.ones((len(piece.planes), 4))
+    roofs[:, :2], roofs[:, 3] = -piece.planes[:, :2], piece.planes[:, 2]
+    return np.concatenate([walls, roofs])
+
+
+def scene_of(bodies: list[Body], crowns: np.ndarray | None = None, ground: np.ndarray | None = None) -> Scene:
+    """Bodies packed for the beams."""
+    sides = [halfspaces_of(body.piece) for body in bodies]
+    source, label = [], []
+    for body, rows in zip(bodies, sides, strict=True):
+        tops = len(body.piece.planes)
+        source += [body.wall_source] * (len(rows) - tops) + [body.top_source] * tops
+        label += [NOT_ROOF] * (len(rows) - tops) + [body.label] * tops
+    starts = np.cumsum([0] + [len(rows) for rows in sides])
+    return Scene(
+        np.concatenate(sides) if sides else np.empty((0, 4)),
+        starts,
+        np.array(source, np.int8),
+        np.array(label, np.int8),
+        np.empty((0, 5)) if crowns is None else crowns,
+        np.zeros(3) if ground is None else ground,
+    )
+
+
+def building_bodies(building: SimBuilding) -> list[Body]:
+    """The building's pieces, each roof labelled with its part's type."""
+    return [Body(piece, label=ROOF_TYPES.index(part.type)) for part in building.roof.parts for piece in part.pieces]
+
+
+def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> Scene:
+    """`building` with the clutter, neighbours, trees and sloping ground that `defects` allows, in its local frame."""
+    bodies = building_bodies(building)
+    chance = rng.random(5)
+    if chance[0] < defects.chimney:
+        bodies += [chimney(rng, building) for _ in range(1 + int(rng.random() < 0.3))]
+    if chance[1] < defects.dormer:
+        bodies += dormers(rng, building)
+    if chance[2] < defects.antenna:
+        bodies.append(antenna(rng, building))
+    if chance[3] < defects.neighbour:
+        bodies += neighbour(rng, building)
+    crowns = trees(rng, building) if chance[4] < defects.tree else None
+    ground = np.append(rng.normal(0.0, 0.03, 2), 0.0) if defects != Defects.none() else None
+    return scene_of(bodies, crowns, ground)
+
+
+def _on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarray, Piece]:
+    """A point of the plan at least 15 % away from a random piece's border, and that piece."""
+    pieces = building.roof.pieces
+    piece = pieces[rng.integers(len(pieces))]
+    corners = shapely.get_coordinates(piece.outline)[:-1]
+    centre = corners.mean(axis=0)
+    a, b = (corners[1] - corners[0]) / 2, (corners[-1] - corners[0]) / 2
+    s, t = rng.uniform(-0.7, 0.7, 2)
+    return centre + s * a + t * b, piece
+
+
+def _box(xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float) -> Piece:
+    return placed(rectangle(*size), np.zeros((1, 3)), kappa, np.array([xy[0], xy[1], z_top]))
+
+
+def chimney(rng: np.random.Generator, building: SimBuilding) -> Body:
+    xy, piece = _on_roof(rng, building)
+    z_top = piece.height_at(xy[None])[0] + rng.uniform(0.6, 1.8)
+    size = (rng.uniform(0.5, 1.1), rng.uniform(0.5, 1.0))
+    return Body(_box(xy, size, z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
+
+
+def antenna(rng: np.random.Generator, building: SimBuilding) -> Body:
+    xy, piece = _on_roof(rng, building)
+    z_top = piece.height_at(xy[None])[0] + rng.uniform(1.0, 3.5)
+    return Body(_box(xy, (0.25, 0.25), z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
+
+
+def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
+    """One to three boxes that come out of a slope and meet it at their back; none on a flat roof."""
+    bodies = []
+    for _ in range(1 + int(2.5 * rng.random() ** 2)):
+        xy, piece = _on_roof(rng, building)
+        planes = piece.planes
+        gradient = planes[np.argmin(planes[:, :2] @ xy + planes[:, 2]), :2]
+        steepness = math.hypot(*gradient)
+        if steepness < 0.35:
+            continue
+        uphill = gradient / steepness
+        depth, width = rng.uniform(1.2, 2.4), rng.uniform(1.2, 3.0)
+        z_back = piece.height_at((xy + uphill * depth / 2)[None])[0]
+        side = math.atan2(uphill[1], uphill[0])
+        if rng.random() < 0.5:
+            top = _box(xy, (depth, width), z_back, side)
+        else:
+            rise = width / 2 * rng.uniform(0.3, 0.7)
+            planes = np.array([(0.0, 2 * rise / width, 0.0), (0.0, -2 * rise / width, 0.0)])
+            top = placed(rectangle(depth, width), planes, side, np.array([*xy, z_back]))
+        bodies.append(Body(top, SOURCE_CLUTTER, SOURCE_CLUTTER))
+    return bodies
+
+
+def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
+    """A building beside this one, wall to wall or some metres off; its points are clutter here."""
+    part = max(building.roof.parts, key=lambda part: part.area)
+    type = ROOF_TYPES[rng.choice((0, 1, 2, 3))]
+    parameters = random_parameters(rng, type)
+    gap = 0.0 if rng.random() < 0.4 else rng.uniform(0.5, 4.0)
+    outline = shapely.transform(building.outline, lambda xy: _turned(xy, -part.kappa))
+    u_low, v_low, u_high, v_high = outline.bounds
+    sign = rng.choice((-1.0, 1.0))
+    if rng.random() < 0.6:
+        u = (u_high if sign > 0 else u_low) + sign * (gap + parameters["length"] / 2)
+        v = (v_low + v_high) / 2 + rng.normal(0.0, 1.0)
+    else:
+        u = (u_low + u_high) / 2 + rng.normal(0.0, 1.0)
+        v = (v_high if sign > 0 else v_low) + sign * (gap + parameters["width"] / 2)
+    x, y = _turned(np.array([[u, v]]), part.kappa)[0]
+    eave = max(2.2, part.translation[2] + rng.normal(0.0, 1.5))
+    body = make_part(type, parameters, part.kappa, np.array([x, y, eave]))
+    return [Body(piece, SOURCE_CLUTTER, SOURCE_CLUTTER) for piece in body.pieces]
+
+
+def _turned(xy: np.ndarray, angle: float) -> np.ndarray:
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return xy @ np.array([(cosine, sine), (-sine, cosine)])
+
+
+def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
+    """One to three crowns (t, 5) whose trunks stand outside, mostly near a corner, and lean over the roof."""
+    corners = shapely.get_coordinates(building.outline.exterior)[:-1]
+    centre = corners.mean(axis=0)
+    crowns = []
+    for _ in range(1 + int(rng.integers(3))):
+        at = rng.integers(len(corners))
+        share = 0.3 * rng.random()
+        foot = (1 - share) * corners[at] + share * corners[(at + 1) % len(corners)]
+        outward = (foot - centre) / max(math.hypot(*(foot - centre)), 1e-9)
+        radius, half_height = rng.uniform(1.2, 3.8), rng.uniform(1.5, 4.5)
+        foot = foot + outward * radius * rng.uniform(0.3, 1.1) + rng.normal(0.0, 0.5, 2)
+        crowns.append((*foot, rng.uniform(2.0, 6.0) + half_height, radius, half_height))
+    return np.array(crowns)
+
+
+def solids_scene(solids: list[Solid], labels: list[int], ground: np.ndarray | None = None) -> Scene:
+    """Any closed solids as triangles; their RoofSurfaces carry `labels` (indices of ROOF_TYPES or NOT_ROOF)."""
+    triangles, source, label = [np.empty((0, 3, 3))], [], []
+    for solid, roof_label in zip(solids, labels, strict=True):
+        for face in solid.faces:
+            pieces = triangulated(solid.vertices, face.rings)
+            is_roof = face.kind == ROOF
+            triangles.append(pieces)
+            source += [SOURCE_ROOF if is_roof else SOURCE_WALL] * len(pieces)
+            label += [roof_label if is_roof else NOT_ROOF] * len(pieces)
+    return replace(
+        scene_of([], None, ground),
+        triangles=np.concatenate(triangles),
+        triangle_source=np.array(source, np.int8),
+        triangle_label=np.array(label, np.int8),
+    )
+
+
+def triangulated(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np.ndarray:
+    """Triangles (m, 3, 3) of one planar polygon with holes, cut in the coordinate plane it faces most."""
+    outer = vertices[list(rings[0])]
+    if len(rings) == 1 and len(outer) == 3:
+        return outer[None]
+    normal = np.cross(outer, np.roll(outer, -1, axis=0)).sum(axis=0)
+    drop = int(np.argmax(np.abs(normal)))
+    kept = [axis for axis in range(3) if axis != drop]
+    flat = shapely.make_valid(shapely.Polygon(outer[:, kept], [vertices[list(ring)][:, kept] for ring in rings[1:]]))
+    if abs(normal[drop]) < 1e-9 or flat.area < 1e-9:
+        return np.empty((0, 3, 3))
+    cells = shapely.get_parts(shapely.constrained_delaunay_triangles(flat))
+    cells = cells[shapely.area(cells) > 0]
+    corners = shapely.get_coordinates(cells).reshape(-1, 4, 2)[:, :3]
+    out = np.empty((len(corners), 3, 3))
+    out[:, :, kept] = corners
+    offset = normal @ outer.mean(axis=0)
+    out[:, :, drop] = (offset - corners @ normal[kept]) / normal[drop]
+    return out

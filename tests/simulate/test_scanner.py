@@ -1,0 +1,194 @@
+"""The simulated scanner: points lie on the truth, in the number asked for, with the right labels."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.errors import InputError
+from hiproof.model import Solid
+from hiproof.simulate import (
+    NOT_ROOF,
+    ROOF_TYPES,
+    SOURCES,
+    Defects,
+    ScanSettings,
+    random_building,
+    scan,
+    scan_solids,
+    training_sample,
+    uniform_points,
+)
+from hiproof.simulate.flight import Swath, beams_of
+from hiproof.simulate.scanner import bare_scene, first_hits, returns
+
+ROOF, WALL, GROUND = (SOURCES.index(name) for name in ("roof", "wall", "ground"))
+EXACT = ScanSettings(
+    range_noise_m=0.0, horizontal_noise_m=0.0, beam_radius_m=0.0, registration_m=0.0, defects=Defects.none()
+)
+
+
+def slow_first_hit(building, xy0, slope, step=0.002):
+    """Walk each beam down in small steps until it is under the roof."""
+    heights = np.arange(25.0, 0.0, -step)
+    hits = np.zeros(len(xy0))
+    for i, (start, tilt) in enumerate(zip(xy0, slope, strict=True)):
+        roof = building.roof.height_at(start + heights[:, None] * tilt)
+        under = np.flatnonzero(heights <= np.nan_to_num(roof, nan=-1.0))
+        hits[i] = heights[under[0]] if len(under) else 0.0
+    return hits
+
+
+@pytest.mark.parametrize("type", ROOF_TYPES)
+def test_roof_points_lie_on_the_truth(type):
+    rng = np.random.default_rng(3)
+    building = random_building(rng, type, origin=(1000.0, 2000.0, 7.0))
+    cloud = scan(building, rng, EXACT)
+    roof = cloud.source == ROOF
+    local = building.roof.frame.to_local(cloud.points)
+    # The roof's height jumps at a shed's teeth, where a plan position has two right answers.
+    highest = building.roof.height_at(local[roof, :2])
+    on_a_piece = np.min([np.abs(p.height_at(local[roof, :2]) - local[roof, 2]) for p in building.roof.pieces], axis=0)
+    assert on_a_piece.max() < 1e-9
+    assert np.nanmax(local[roof, 2] - highest) < 1e-9
+    assert set(cloud.label[roof]) == {ROOF_TYPES.index(type)}
+    assert set(cloud.label[~roof]) <= {NOT_ROOF}
+    assert np.abs(cloud.points[cloud.source == GROUND, 2] - 7.0).max() < 1e-9
+
+
+def test_noise_is_as_large_as_asked():
+    rng = np.random.default_rng(5)
+    settings = dataclasses.replace(EXACT, range_noise_m=0.05, density=20.0)
+    building = random_building(rng, "flat")
+    cloud = scan(building, rng, settings)
+    error = cloud.points[cloud.source == ROOF, 2] - building.roof.parts[0].translation[2]
+    assert abs(error.std() - 0.05) < 0.006 and abs(error.mean()) < 0.006
+
+
+@pytest.mark.parametrize("density", [1.0, 5.0, 20.0])
+def test_density_is_as_asked(density):
+    rng = np.random.default_rng(11)
+    counts, areas = 0, 0.0
+    for _ in range(30):
+        building = random_building(rng, "flat")
+        cloud = scan(building, rng, dataclasses.replace(EXACT, density=density, margin_m=0.0))
+        counts, areas = counts + (cloud.source == ROOF).sum(), areas + building.outline.area
+    assert counts / areas == pytest.approx(density, rel=0.06)
+
+
+@pytest.mark.parametrize("type", ["gable", "half_hip", "shed", "gambrel"])
+def test_compiled_beams_equal_a_slow_walk(type):
+    rng = np.random.default_rng(7)
+    building = random_building(rng, type)
+    xy0 = rng.uniform(-9, 9, (60, 2))
+    slope = rng.uniform(-0.4, 0.4, (60, 2))
+    z_fast, _, _ = first_hits(bare_scene(building), xy0, slope)
+    assert np.abs(z_fast - slow_first_hit(building, xy0, slope)).max() < 0.003
+
+
+def test_heading_changes_no_label():
+    """Turning flight and building together gives the same labels; a nadir beam has no walls whatever the heading."""
+    for heading in (0.0, 1.0, 2.5):
+        building = random_building(np.random.default_rng(2), "hip", kappa=0.3 + heading)
+        beams = beams_of(np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.2), np.zeros(2), 12.0, 0.0)
+        cloud = returns(bare_scene(building), beams, np.random.default_rng(4), EXACT)
+        if heading == 0.0:
+            first = cloud
+        assert np.array_equal(cloud.label, first.label) and np.array_equal(cloud.source, first.source)
+        nadir = beams_of(np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.0), np.zeros(2), 12.0, 0.0)
+        assert WALL not in returns(bare_scene(building), nadir, np.random.default_rng(4), EXACT).source
+
+
+def test_walls_show_only_at_an_angle_and_lie_on_the_outline():
+    rng = np.random.default_rng(13)
+    building = random_building(rng, "gable")
+    cloud = scan(building, rng, dataclasses.replace(EXACT, density=10.0, max_scan_angle_deg=30.0))
+    walls = cloud.points[cloud.source == WALL]
+    assert len(walls)
+    assert shapely.distance(building.footprint.exterior, shapely.points(walls[:, :2])).max() < 1e-6
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_seeds_reproduce(seed):
+    clouds = []
+    for _ in range(2):
+        rng = np.random.default_rng(seed)
+        clouds.append(scan(random_building(rng), rng))
+    assert np.array_equal(clouds[0].points, clouds[1].points) and np.array_equal(clouds[0].label, clouds[1].label)
+
+
+def test_defects_all_happen_and_none_happens_without_them():
+    rng = np.random.default_rng(17)
+    everything = Defects(*(1.0,) * 8, outliers=0.02)
+    seen = set()
+    for _ in range(6):
+        seen |= set(scan(random_building(rng, "gable"), rng, ScanSettings(margin_m=2.0, defects=everything)).source)
+    assert seen == set(range(len(SOURCES)))
+    bare = scan(random_building(rng, "gable"), rng, ScanSettings(defects=Defects.none()))
+    assert set(bare.source) <= {ROOF, WALL, GROUND}
+
+
+def cube(size=10.0, height=6.0):
+    """A block as a Solid, world coordinates far from the origin."""
+    from hiproof.model import GROUND, WALL, Face
+    from hiproof.model import ROOF as ROOF_SURFACE
+
+    base = np.array([(0, 0), (size, 0), (size, size), (0, size)])
+    vertices = np.concatenate([np.column_stack([base, np.full(4, z)]) for z in (0.0, height)]) + (500.0, 900.0, 3.0)
+    sides = tuple(Face(((k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k),), WALL) for k in range(4))
+    return Solid(vertices, (Face(((3, 2, 1, 0),), GROUND), *sides, Face(((4, 5, 6, 7),), ROOF_SURFACE)))
+
+
+def test_solids_are_scanned_like_buildings():
+    cloud = scan_solids([cube()], np.random.default_rng(1), EXACT, ["flat"])
+    roof = cloud.source == ROOF
+    assert np.abs(cloud.points[roof, 2] - 9.0).max() < 1e-9 and set(cloud.label[roof]) == {0}
+    assert np.abs(cloud.points[cloud.source == GROUND, 2] - 3.0).max() < 1e-9
+    assert roof.sum() == pytest.approx(5.0 * 100.0, rel=0.12)
+    unknown = scan_solids([cube()], np.random.default_rng(1), EXACT, ["arch"])
+    assert set(unknown.label) == {NOT_ROOF} and ROOF in unknown.source
+
+
+def test_uniform_points_have_the_papers_noise():
+    rng = np.random.default_rng(0)
+    building = random_building(rng, "pyramid", origin=(100.0, 200.0, 5.0))
+    points = np.concatenate([uniform_points(building, rng) for _ in range(40)])
+    local = building.roof.frame.to_local(points)
+    error = np.abs(local[:, 2] - building.roof.height_at(local[:, :2])) / 0.12
+    assert (error < 1).mean() == pytest.approx(0.9, abs=0.02)
+    assert (error < 2).mean() == pytest.approx(0.99, abs=0.01)
+    assert error.max() < 3
+    assert len(points) / 40 / building.outline.area == pytest.approx(4.72, rel=0.05)
+
+
+def test_training_samples_keep_their_promises():
+    rng = np.random.default_rng(19)
+    types = ("pyramid", "gable", "hip")
+    seen = set()
+    for _ in range(40):
+        points, labels, type = training_sample(rng, types, n_points=(100, 400), density=(2.0, 8.0))
+        assert 100 <= len(points) <= 400 and len(labels) == len(points)
+        assert set(labels) <= {type, 3} and type in labels
+        assert np.abs(points.mean(axis=0)).max() < 1e-9
+        seen.add(type)
+    assert seen == {0, 1, 2}
+
+
+def test_bad_requests_are_refused_in_a_sentence():
+    rng = np.random.default_rng(0)
+    building = random_building(rng, "flat")
+    with pytest.raises(InputError, match="expected a density"):
+        scan(building, rng, ScanSettings(density=-1.0))
+    with pytest.raises(InputError, match="expected noise"):
+        scan(building, rng, ScanSettings(range_noise_m=-0.1))
+    with pytest.raises(InputError, match="scan angle"):
+        scan(building, rng, ScanSettings(max_scan_angle_deg=80.0))
+    with pytest.raises(InputError, match="at least one solid"):
+        scan_solids([], rng)
+    with pytest.raises(InputError, match="expected roof types"):
+        training_sample(rng, ("gable", "onion"))
+    with pytest.raises(InputError, match="expected point counts"):
+        training_sample(rng, n_points=(100_000, 200_000), density=(1.0, 1.0))
+    with pytest.raises(InputError, match="expected a roof type"):
+        random_building(rng, "onion")
