@@ -45,6 +45,16 @@ class FitSettings:
 
 
 @dataclass(frozen=True)
+class CompoundSettings:
+    """[compound] several parts chosen by evidence."""
+
+    detail: str = setting("full", "main leaves out dormers and small parts", choices=("full", "main"))
+    tolerance_m: float = setting(0.2, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
+    evidence_points: float = setting(1.2, "points that one unit of structure must explain at least", "", 0.1, 100.0)
+    evidence_area_m2: float = setting(0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0)
+
+
+@dataclass(frozen=True)
 class ComposeSettings:
     """[compose] from fitted roof to solid."""
 
@@ -70,6 +80,7 @@ class Settings:
 
     read: ReadSettings = field(default_factory=ReadSettings)
     fit: FitSettings = field(default_factory=FitSettings)
+    compound: CompoundSettings = field(default_factory=CompoundSettings)
     compose: ComposeSettings = field(default_factory=ComposeSettings)
     reconstruct: ReconstructSettings = field(default_factory=ReconstructSettings)
 

@@ -1,0 +1,77 @@
+"""Compound roofs: several parts chosen by evidence and fitted to all points of a building at once.
+
+    plan       the building's own frame, the points that count, grid, ghosts of unseen roof
+    kernels    compiled: planes and gables that explain rectangles of points, the exact partition by dynamic programming
+    layout     compiled: cuts, leaves and overlays as arrays; refine, overlay, polish
+    search     these in order: pool -> partition -> refine -> overlays -> polish
+    pieces     layout -> disjoint pieces over the outline
+
+Every decision lowers one objective: sum over points of min((dz / tau)^2, 1) plus `evidence` points a unit of complexity.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from ...errors import FitError
+from ...model import Part, Piece
+from ...settings import Settings
+from .layout import evaluate
+from .pieces import disjoint_pieces
+from .plan import lay_out_plan
+from .search import search_layout
+
+
+@dataclass(frozen=True)
+class CompoundFit:
+    """Outcome of `fit_building`, in the frame of the points given.
+
+    `roof_parts` are disjoint in plan and cover `outline`; `objective` is in points (see the package), `types` posterior
+    probabilities where one primitive explains the roof, `points_used` the points inside the outline that counted,
+    `unexplained` the share of them further than the tolerance from the roof.
+    """
+
+    roof_parts: tuple[Part, ...]
+    outline: shapely.Polygon
+    objective: float
+    points_used: int
+    unexplained: float
+    types: dict[str, float] = field(default_factory=dict)
+
+
+def fit_building(
+    points_local: np.ndarray,
+    outline: shapely.Polygon | None = None,
+    settings: Settings | None = None,
+    type_log_prior: dict[str, float] | None = None,
+    weights: np.ndarray | None = None,
+) -> CompoundFit:
+    """Fit the roof of one building to `points_local` (n, 3), in metres of a local frame, over `outline` (same frame).
+
+    Without points inside the outline there is nothing to fit: raises FitError. With fewer than four, the roof is flat at
+    their median height. `weights` (n,) are probabilities of being roof: points under one half do not count.
+    """
+    points_local = np.asarray(points_local, float).reshape(-1, 3)
+    points_local = points_local[np.isfinite(points_local).all(axis=1)] if weights is None else points_local[
+        np.isfinite(points_local).all(axis=1) & (np.asarray(weights) >= 0.5)
+    ]
+    settings = (settings or Settings()).compound
+    plan = lay_out_plan(points_local, outline)
+    if len(plan.cloud.u) == 0:
+        raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
+    layout, objective = search_layout(plan, settings)
+    pieces = disjoint_pieces(layout, plan, outline)
+    z, _, _ = evaluate(layout, plan.cloud.u, plan.cloud.v)
+    unexplained = float(np.mean(np.abs(plan.cloud.z - z) > settings.tolerance_m))
+    return CompoundFit(tuple(part_of(piece) for piece in pieces), outline, objective, len(z), unexplained)
+
+
+def part_of(piece: Piece) -> Part:
+    return Part("flat" if is_flat(piece) else "free", (piece,))
+
+
+def is_flat(piece: Piece) -> bool:
+    return len(piece.planes) == 1 and not piece.planes[0, :2].any()

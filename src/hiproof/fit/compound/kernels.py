@@ -1,0 +1,557 @@
+"""Compiled search for the planes of a roof and for the partition of its plan into rectangles.
+
+Everything runs in the building's frame: u, v (m) along its two main directions, z (m) about the median height. A plane is
+(a, b, c) with z = a u + b v + c. The cost of a point is min((dz / tau)^2, 1): evidence is counted in points, and a point
+that no plane explains costs one. Complexity is charged in the same currency, `evidence` points a unit.
+"""
+
+from __future__ import annotations
+
+from collections import namedtuple
+
+import numpy as np
+from numba import njit
+
+# Units of complexity: what a piece of structure must pay for in evidence.
+FLAT, AXIS_SLOPE, FREE_SLOPE = 1.0, 1.4, 1.9
+SYMMETRIC_GABLE_EXTRA = 0.5
+CUT, CUT_AT_VERTEX, OVERLAY, REUSED_PLANE = 1.0, 0.5, 1.0, 0.3
+KIND_COST = np.array([FLAT, AXIS_SLOPE, AXIS_SLOPE, FREE_SLOPE])
+
+MAX_SLOPE = 2.5
+MIN_AXIS_SLOPE = 0.05
+MAX_PLANES = 5  # of one part
+SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
+MIN_SIDE_M = 0.6
+NEIGHBOUR_RADIUS_M = 2.5
+
+Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
+Grid = namedtuple("Grid", "u v at_vertex_u at_vertex_v")  # grid lines, ascending, and which of them pass footprint vertices
+Ghosts = namedtuple("Ghosts", "u v weight i j low high")  # cell centres inside the outline; heights a roof may take there
+
+
+@njit(cache=True)
+def kind_of(plane):
+    """0 flat, 1 sloping along u, 2 along v, 3 free."""
+    return (1 if abs(plane[0]) > 1e-9 else 0) + (2 if abs(plane[1]) > 1e-9 else 0)
+
+
+@njit(cache=True)
+def truncated(residual, tau):
+    q = (residual / tau) ** 2
+    return q if q < 1.0 else 1.0
+
+
+@njit(cache=True)
+def lower_envelope(planes, count, u, v):
+    """Height of the min of the first `count` planes and which one is active."""
+    best, active = np.inf, 0
+    for k in range(count):
+        z = planes[k, 0] * u + planes[k, 1] * v + planes[k, 2]
+        if z < best:
+            best, active = z, k
+    return best, active
+
+
+@njit(cache=True)
+def solve_masked(matrix, right, mask):
+    """Solve the symmetric 3 x 3 system for the unknowns in `mask`, the others zero; False when it is singular."""
+    a, b, x = matrix.copy(), right.copy(), np.zeros(3)
+    for i in range(3):
+        if not mask[i]:
+            a[i, :] = 0.0
+            a[:, i] = 0.0
+            a[i, i] = 1.0
+            b[i] = 0.0
+    for i in range(3):
+        if abs(a[i, i]) < 1e-12:
+            return x, False
+        for k in range(i + 1, 3):
+            f = a[k, i] / a[i, i]
+            for j in range(i, 3):
+                a[k, j] -= f * a[i, j]
+            b[k] -= f * b[i]
+    for i in range(2, -1, -1):
+        s = b[i]
+        for j in range(i + 1, 3):
+            s -= a[i, j] * x[j]
+        x[i] = s / a[i, i]
+    return x, True
+
+
+@njit(cache=True)
+def plane_cost(cloud, members, plane, tau):
+    total = 0.0
+    for i in members:
+        total += truncated(cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2], tau)
+    return total
+
+
+@njit(cache=True)
+def biweight_step(cloud, members, plane, scale, mask, centre_u, centre_v):
+    """One re-weighted least-squares step of `plane` on `members`; False when too little weight is left."""
+    matrix, right = np.zeros((3, 3)), np.zeros(3)
+    for i in members:
+        r = (cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2]) / scale
+        w = 1.0 - r * r
+        if w <= 0.0:
+            continue
+        w *= w
+        x, y, z = cloud.u[i] - centre_u, cloud.v[i] - centre_v, cloud.z[i]
+        matrix[0, 0] += w * x * x
+        matrix[0, 1] += w * x * y
+        matrix[0, 2] += w * x
+        matrix[1, 1] += w * y * y
+        matrix[1, 2] += w * y
+        matrix[2, 2] += w
+        right[0] += w * x * z
+        right[1] += w * y * z
+        right[2] += w * z
+    weight = matrix[2, 2]
+    if weight < 0.5 * (1 + mask[0] + mask[1]) + 1.0:
+        return plane, False
+    matrix[1, 0], matrix[2, 0], matrix[2, 1] = matrix[0, 1], matrix[0, 2], matrix[1, 2]
+    matrix[0, 0] += SLOPE_RIDGE * weight
+    matrix[1, 1] += SLOPE_RIDGE * weight
+    x, ok = solve_masked(matrix, right, mask)
+    x[2] -= x[0] * centre_u + x[1] * centre_v
+    return x, ok
+
+
+@njit(cache=True)
+def fit_plane(cloud, members, start, tau, evidence):
+    """Best of flat, two axis slopes and a free plane near `start`, by truncated cost plus complexity."""
+    n = len(members)
+    centre_u, centre_v = 0.0, 0.0
+    for i in members:
+        centre_u += cloud.u[i] / n
+        centre_v += cloud.v[i] / n
+    start_kind = kind_of(start)
+    best = start.copy()
+    best_cost = plane_cost(cloud, members, start, tau) + evidence * KIND_COST[start_kind]
+    mask = np.ones(3, np.bool_)
+    for kind in range(4):
+        mask[0], mask[1] = kind == 1 or kind == 3, kind >= 2
+        plane, ok = start.copy(), True
+        for step in range(4):
+            scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
+            if step == 0 and kind != start_kind:
+                scale *= 2.0
+            plane, ok = biweight_step(cloud, members, plane, scale, mask, centre_u, centre_v)
+            if not ok:
+                break
+        if not ok or plane[0] ** 2 + plane[1] ** 2 > MAX_SLOPE**2:
+            continue
+        cost = plane_cost(cloud, members, plane, tau) + evidence * KIND_COST[kind]
+        if cost < best_cost:
+            best_cost, best = cost, plane
+    return best, best_cost
+
+
+@njit(cache=True)
+def is_symmetric_gable(planes, count):
+    """Two planes whose opposite slopes along one axis are the same."""
+    if count != 2:
+        return False
+    kind = kind_of(planes[0])
+    opposite = abs(planes[0, 0] + planes[1, 0]) + abs(planes[0, 1] + planes[1, 1]) < 1e-6
+    return (kind == 1 or kind == 2) and kind_of(planes[1]) == kind and opposite
+
+
+@njit(cache=True)
+def fit_symmetric_gable(cloud, members, planes, tau):
+    """Two planes with one shared slope along an axis near `planes` (2, 3); False when they are no gable."""
+    fitted = planes[:2].copy()
+    kind = kind_of(planes[0])
+    if (kind != 1 and kind != 2) or kind_of(planes[1]) != kind:
+        return fitted, False
+    k = kind - 1
+    if planes[0, k] * planes[1, k] >= 0.0:
+        return fitted, False
+    sign = 1.0 if planes[0, k] > 0.0 else -1.0
+    x = cloud.u if k == 0 else cloud.v
+    for step in range(4):
+        scale = tau * (2.0 if step == 0 else 1.5 if step == 1 else 1.0)
+        matrix, right = np.zeros((3, 3)), np.zeros(3)
+        for i in members:
+            z, side = lower_envelope(fitted, 2, cloud.u[i], cloud.v[i])
+            r = (cloud.z[i] - z) / scale
+            w = 1.0 - r * r
+            if w <= 0.0:
+                continue
+            w *= w
+            s = (sign if side == 0 else -sign) * x[i]
+            matrix[side, side] += w
+            matrix[side, 2] += w * s
+            matrix[2, 2] += w * s * s
+            right[side] += w * cloud.z[i]
+            right[2] += w * s * cloud.z[i]
+        if matrix[0, 0] < 1.0 or matrix[1, 1] < 1.0:
+            return fitted, False
+        matrix[2, 0], matrix[2, 1] = matrix[0, 2], matrix[1, 2]
+        for q in range(3):
+            matrix[q, q] += 1e-6
+        p, ok = solve_masked(matrix, right, np.ones(3, np.bool_))
+        if not ok or not MIN_AXIS_SLOPE < p[2] < MAX_SLOPE:
+            return fitted, False
+        fitted[:] = 0.0
+        fitted[0, k], fitted[0, 2], fitted[1, k], fitted[1, 2] = sign * p[2], p[0], -sign * p[2], p[1]
+    return fitted, True
+
+
+@njit(cache=True)
+def local_plane(cloud, nearest, count):
+    """Least-squares plane of the first `count` of `nearest`, once trimmed at twice the median residual."""
+    plane, limit, ok = np.zeros(3), np.inf, True
+    mask = np.ones(3, np.bool_)
+    u0, v0 = cloud.u[nearest[0]], cloud.v[nearest[0]]
+    residuals = np.empty(count)
+    for _ in range(2):
+        matrix, right, kept = np.zeros((3, 3)), np.zeros(3), 0
+        for q in range(count):
+            i = nearest[q]
+            x, y, z = cloud.u[i] - u0, cloud.v[i] - v0, cloud.z[i]
+            if abs(z - plane[0] * x - plane[1] * y - plane[2]) > limit:
+                continue
+            kept += 1
+            matrix[0, 0] += x * x
+            matrix[0, 1] += x * y
+            matrix[0, 2] += x
+            matrix[1, 1] += y * y
+            matrix[1, 2] += y
+            matrix[2, 2] += 1.0
+            right[0] += x * z
+            right[1] += y * z
+            right[2] += z
+        if kept < 4:
+            break
+        matrix[1, 0], matrix[2, 0], matrix[2, 1] = matrix[0, 1], matrix[0, 2], matrix[1, 2]
+        matrix[0, 0] += 1e-6
+        matrix[1, 1] += 1e-6
+        plane, ok = solve_masked(matrix, right, mask)
+        if not ok:
+            break
+        for q in range(count):
+            i = nearest[q]
+            residuals[q] = abs(cloud.z[i] - plane[0] * (cloud.u[i] - u0) - plane[1] * (cloud.v[i] - v0) - plane[2])
+        limit = 2.0 * np.median(residuals) + 1e-3
+    plane[2] -= plane[0] * u0 + plane[1] * v0
+    return plane, ok and plane[0] ** 2 + plane[1] ** 2 < MAX_SLOPE**2
+
+
+@njit(cache=True)
+def flat_hypotheses(z, out):
+    """A flat plane at every height (0.1 m apart) that some point has; returns how many."""
+    steps = np.unique(np.round(z / 0.1))
+    count = min(len(steps), len(out))
+    for q in range(count):
+        out[q, 2] = steps[q * len(steps) // count] * 0.1
+    return count
+
+
+@njit(cache=True)
+def hypotheses(cloud, seeds_wanted, pairs_per_seed):
+    """Candidate planes (m, 3): flats, local least-squares planes, and slopes along the axes through pairs of points.
+
+    Seeds and partners are spread evenly (golden-ratio sequence) over the sorted points, so nothing is drawn at random.
+    """
+    n = len(cloud.u)
+    flats = min(n, 200)
+    seeds = min(n, seeds_wanted)
+    out = np.zeros((flats + seeds * (2 + 2 * pairs_per_seed), 3))
+    m = flat_hypotheses(cloud.z, out[:flats])
+    distance2 = np.empty(n)
+    draw = 0.5
+    for s in range(seeds):
+        i = s * n // seeds
+        for q in range(n):
+            distance2[q] = (cloud.u[q] - cloud.u[i]) ** 2 + (cloud.v[q] - cloud.v[i]) ** 2
+        near = np.nonzero(distance2 < NEIGHBOUR_RADIUS_M**2)[0]
+        near = near[np.argsort(distance2[near], kind="mergesort")]
+        for count in (9, 17):
+            if min(len(near), count) >= 5:
+                plane, ok = local_plane(cloud, near, min(len(near), count))
+                if ok:
+                    out[m] = plane
+                    m += 1
+        for _ in range(pairs_per_seed):
+            draw = (draw + 0.6180339887498949) % 1.0
+            j = near[int(draw * len(near))]
+            m = pair_slopes(cloud, i, j, out, m)
+    return out[:m]
+
+
+@njit(cache=True)
+def pair_slopes(cloud, i, j, out, m):
+    """Append the slopes along u and along v that pass points i and j, where they are far enough apart."""
+    dz = cloud.z[j] - cloud.z[i]
+    for axis in range(2):
+        x = cloud.u if axis == 0 else cloud.v
+        dx = x[j] - x[i]
+        if abs(dx) > 0.7 and MIN_AXIS_SLOPE < abs(dz / dx) < MAX_SLOPE:
+            out[m, axis] = dz / dx
+            out[m, 2] = cloud.z[i] - dz / dx * x[i]
+            m += 1
+    return m
+
+
+@njit(cache=True)
+def best_rectangle(gain):
+    """Rectangle of cells with the largest sum of `gain` (nu, nv): (sum, i0, i1, j0, j1), half open (Kadane in 2D)."""
+    nu, nv = gain.shape
+    best, i0_best, i1_best, j0_best, j1_best = -np.inf, 0, 0, 0, 0
+    column = np.empty(nv)
+    for i0 in range(nu):
+        column[:] = 0.0
+        for i1 in range(i0, nu):
+            running, j0 = 0.0, 0
+            for j in range(nv):
+                column[j] += gain[i1, j]
+                if running <= 0.0:
+                    running, j0 = column[j], j
+                else:
+                    running += column[j]
+                if running > best:
+                    best, i0_best, i1_best, j0_best, j1_best = running, i0, i1 + 1, j0, j + 1
+    return best, i0_best, i1_best, j0_best, j1_best
+
+
+@njit(cache=True)
+def gain_by_cell(cloud, planes, count, current, tau, gain):
+    """Fill `gain` (nu, nv) with the drop of cost that the min of `planes` would bring; returns the sum over gaining points."""
+    gain[:] = 0.0
+    positive = 0.0
+    for q in range(len(cloud.u)):
+        z, _ = lower_envelope(planes, count, cloud.u[q], cloud.v[q])
+        g = current[q] - truncated(cloud.z[q] - z, tau)
+        gain[cloud.i[q], cloud.j[q]] += g
+        if g > 0.0:
+            positive += g
+    return positive
+
+
+@njit(cache=True)
+def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain):
+    """The candidate with the best rectangle, lazily: `bounds` are upper bounds of its gain, and costs only ever fall.
+
+    Returns (gain, candidate or -1, i0, i1, j0, j1) and tightens `bounds` (in place).
+    """
+    best, chosen, rectangle = least, -1, (0, 0, 0, 0)
+    for m in np.argsort(-bounds, kind="mergesort"):
+        if bounds[m] <= best:
+            break
+        positive = gain_by_cell(cloud, candidates[m], counts[m], current, tau, gain)
+        bounds[m] = positive
+        if positive <= best:
+            continue
+        score, i0, i1, j0, j1 = best_rectangle(gain)
+        bounds[m] = score
+        if score > best:
+            best, chosen, rectangle = score, m, (i0, i1, j0, j1)
+    return best, chosen, rectangle
+
+
+@njit(cache=True)
+def members_of(cloud, rectangle):
+    i0, i1, j0, j1 = rectangle
+    return np.nonzero((cloud.i >= i0) & (cloud.i < i1) & (cloud.j >= j0) & (cloud.j < j1))[0]
+
+
+@njit(cache=True)
+def lower_costs(cloud, members, planes, count, tau, current):
+    """Let `current` (n,) fall to the cost under the min of `planes` for `members`."""
+    for i in members:
+        z, _ = lower_envelope(planes, count, cloud.u[i], cloud.v[i])
+        current[i] = min(current[i], truncated(cloud.z[i] - z, tau))
+
+
+@njit(cache=True)
+def plane_pool(cloud, grid, candidates, tau, evidence, most):
+    """Greedy pool (k, 3): the hypothesis that explains its best rectangle best, refitted there, until little is gained."""
+    gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
+    current = np.ones(len(cloud.u))
+    bounds = np.full(len(candidates), np.inf)
+    stacked = candidates.reshape((len(candidates), 1, 3))
+    counts = np.ones(len(candidates), np.int64)
+    pool = np.zeros((most, 3))
+    for k in range(most):
+        _, m, rectangle = best_candidate(cloud, stacked, counts, bounds, current, tau, 1.5 * evidence, gain)
+        if m < 0:
+            return pool[:k]
+        members = members_of(cloud, rectangle)
+        plane, _ = fit_plane(cloud, members, candidates[m], tau, evidence)
+        pool[k] = plane
+        lower_costs(cloud, members, plane.reshape((1, 3)), 1, tau, current)
+        lower_costs(cloud, members, stacked[m], 1, tau, current)
+    return pool
+
+
+@njit(cache=True)
+def mirrored_gables(pool, grid):
+    """Every axis-sloped plane of the pool mirrored about ridges 0.25 m apart: candidates (m, 2, 3)."""
+    steps_u = int((grid.u[-1] - grid.u[0]) / 0.25) + 2
+    steps_v = int((grid.v[-1] - grid.v[0]) / 0.25) + 2
+    out = np.zeros((len(pool) * (steps_u + steps_v), 2, 3))
+    m = 0
+    for plane in pool:
+        kind = kind_of(plane)
+        if kind != 1 and kind != 2:
+            continue
+        lines = grid.u if kind == 1 else grid.v
+        slope = plane[kind - 1]
+        if abs(slope) < 0.15:
+            continue
+        ridge = lines[0] + 0.5
+        while ridge < lines[-1] - 0.4:
+            out[m, 0] = plane
+            out[m, 1, kind - 1] = -slope
+            out[m, 1, 2] = plane[2] + 2.0 * slope * ridge
+            ridge += 0.25
+            m += 1
+    return out[:m]
+
+
+@njit(cache=True)
+def gable_pool(cloud, grid, pool, tau, evidence, most):
+    """Greedy pool of symmetric gables (k, 2, 3), refitted with one shared slope each."""
+    gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
+    candidates = mirrored_gables(pool, grid)
+    counts = np.full(len(candidates), 2, np.int64)
+    bounds = np.full(len(candidates), np.inf)
+    current = np.ones(len(cloud.u))
+    gables = np.zeros((most, 2, 3))
+    for k in range(most):
+        _, m, rectangle = best_candidate(cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain)
+        if m < 0:
+            return gables[:k]
+        members = members_of(cloud, rectangle)
+        fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
+        gables[k] = fitted if ok else candidates[m]
+        lower_costs(cloud, members, candidates[m], 2, tau, current)
+    return gables
+
+
+@njit(cache=True)
+def without_twins(pool, cloud):
+    """The planes of `pool` that differ by more than 4 cm on average from every one kept before."""
+    kept = np.zeros((len(pool), 3))
+    n = 0
+    for plane in pool:
+        new = True
+        for q in range(n):
+            gap = 0.0
+            for i in range(len(cloud.u)):
+                gap += abs(
+                    (plane[0] - kept[q, 0]) * cloud.u[i] + (plane[1] - kept[q, 1]) * cloud.v[i] + plane[2] - kept[q, 2]
+                )
+            if gap <= 0.04 * len(cloud.u):
+                new = False
+                break
+        if new:
+            kept[n] = plane
+            n += 1
+    return kept[:n]
+
+
+@njit(cache=True)
+def primitives(pool, gables, cloud, evidence):
+    """Candidates for a rectangle: each plane, each crossing pair of planes as a min, each gable; with their penalty."""
+    n, g = len(pool), len(gables)
+    most = n + n * (n - 1) // 2 + g
+    planes, counts, penalty = np.zeros((most, 2, 3)), np.ones(most, np.int64), np.zeros(most)
+    m = 0
+    for i in range(n):
+        planes[m, 0] = pool[i]
+        penalty[m] = evidence * KIND_COST[kind_of(pool[i])]
+        m += 1
+    for i in range(n):
+        for j in range(i):
+            if (pool[i, 0] - pool[j, 0]) ** 2 + (pool[i, 1] - pool[j, 1]) ** 2 < 0.25**2:
+                continue
+            da, db, dc = pool[i, 0] - pool[j, 0], pool[i, 1] - pool[j, 1], pool[i, 2] - pool[j, 2]
+            below = 0
+            for q in range(len(cloud.u)):
+                below += da * cloud.u[q] + db * cloud.v[q] + dc < 0.0
+            if 0.06 * len(cloud.u) <= below <= 0.94 * len(cloud.u):
+                planes[m, 0], planes[m, 1], counts[m] = pool[i], pool[j], 2
+                penalty[m] = evidence * (KIND_COST[kind_of(pool[i])] + KIND_COST[kind_of(pool[j])])
+                m += 1
+    for k in range(g):
+        planes[m], counts[m] = gables[k], 2
+        penalty[m] = evidence * (KIND_COST[kind_of(gables[k, 0])] + SYMMETRIC_GABLE_EXTRA)
+        m += 1
+    return planes[:m], counts[:m], penalty[:m]
+
+
+@njit(cache=True)
+def cost_prefix(cloud, ghosts, grid, planes, counts, tau):
+    """Prefix sums (nu + 1, nv + 1, m) over cells of the cost of each primitive, points and ghosts together."""
+    m, nu, nv = len(counts), len(grid.u) - 1, len(grid.v) - 1
+    sums = np.zeros((nu + 1, nv + 1, m))
+    for q in range(len(cloud.u)):
+        row = sums[cloud.i[q] + 1, cloud.j[q] + 1]
+        for k in range(m):
+            z, _ = lower_envelope(planes[k], counts[k], cloud.u[q], cloud.v[q])
+            row[k] += truncated(cloud.z[q] - z, tau)
+    for q in range(len(ghosts.u)):
+        row = sums[ghosts.i[q] + 1, ghosts.j[q] + 1]
+        for k in range(m):
+            z, _ = lower_envelope(planes[k], counts[k], ghosts.u[q], ghosts.v[q])
+            if z < ghosts.low or z > ghosts.high:
+                row[k] += ghosts.weight[q]
+    for a in range(1, nu + 1):
+        running = np.zeros(m)
+        for c in range(1, nv + 1):
+            running += sums[a, c]
+            sums[a, c] = sums[a - 1, c] + running
+    return sums
+
+
+@njit(cache=True, fastmath=True)
+def leaf_costs(sums, penalty, grid):
+    """Cost (nu + 1, nu + 1, nv + 1, nv + 1) of the best primitive on every rectangle of cells [a, b) x [c, d)."""
+    nu, nv, m = sums.shape[0] - 1, sums.shape[1] - 1, sums.shape[2]
+    best_cost = np.empty((nu + 1, nu + 1, nv + 1, nv + 1))
+    strip = np.empty((nv + 1, m))
+    for a in range(nu):
+        for b in range(a + 1, nu + 1):
+            for d in range(nv + 1):
+                for k in range(m):
+                    strip[d, k] = sums[b, d, k] - sums[a, d, k]
+            for c in range(nv):
+                for d in range(c + 1, nv + 1):
+                    best = 1e30
+                    for k in range(m):
+                        cost = penalty[k] + strip[d, k] - strip[c, k]
+                        best = cost if cost < best else best
+                    if grid.u[b] - grid.u[a] < MIN_SIDE_M or grid.v[d] - grid.v[c] < MIN_SIDE_M:
+                        best += 1e3
+                    best_cost[a, b, c, d] = best
+    return best_cost
+
+
+@njit(cache=True)
+def guillotine(cost, cut_u, cut_v):
+    """Exact optimum over all guillotine partitions, by dynamic programming; `cost` becomes the optimum (in place).
+
+    Returns the choice for every rectangle: 0 keep it whole, k > 0 cut at grid line u = k, k < 0 at grid line v = -k.
+    """
+    nu, nv = cost.shape[0] - 1, cost.shape[2] - 1
+    choice = np.zeros(cost.shape, np.int16)
+    for width in range(1, nu + 1):
+        for height in range(1, nv + 1):
+            for a in range(nu - width + 1):
+                b = a + width
+                for c in range(nv - height + 1):
+                    d = c + height
+                    best, how = cost[a, b, c, d], 0
+                    for k in range(a + 1, b):
+                        t = cost[a, k, c, d] + cost[k, b, c, d] + cut_u[k]
+                        if t < best:
+                            best, how = t, k
+                    for k in range(c + 1, d):
+                        t = cost[a, b, c, k] + cost[a, b, k, d] + cut_v[k]
+                        if t < best:
+                            best, how = t, -k
+                    cost[a, b, c, d], choice[a, b, c, d] = best, how
+    return choice

@@ -1,0 +1,158 @@
+"""The plan of one building: its own frame, the points that count, the grid of cells, the ghosts of unseen roof."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+from numba import njit
+
+from .kernels import Cloud, Ghosts, Grid
+
+MIN_STRUCTURE_POINTS = 4
+BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this close to the border: facade returns
+COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
+MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 26
+GHOST_MARGIN_M = 0.3
+
+
+@dataclass(frozen=True)
+class PlanFrame:
+    """The building's frame: origin (3,) in local coordinates, `rotation` (2, 2) with uv = rotation @ (xy - origin)."""
+
+    origin: np.ndarray
+    rotation: np.ndarray
+
+    def to_plan(self, xyz_local: np.ndarray) -> np.ndarray:
+        """(n, 3) local coordinates to (n, 3) u, v, z."""
+        shifted = xyz_local - self.origin
+        return np.column_stack([shifted[:, :2] @ self.rotation.T, shifted[:, 2]])
+
+    def xy_local(self, uv: np.ndarray) -> np.ndarray:
+        """(n, 2) plan coordinates back to local x, y."""
+        return uv @ self.rotation + self.origin[:2]
+
+    def plane_local(self, planes: np.ndarray) -> np.ndarray:
+        """Planes (k, 3) over u, v as planes over local x, y."""
+        slopes = planes[:, :2] @ self.rotation
+        return np.column_stack([slopes, planes[:, 2] + self.origin[2] - slopes @ self.origin[:2]])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Everything the search needs of one building; `density` in points per square metre of covered outline."""
+
+    frame: PlanFrame
+    cloud: Cloud
+    grid: Grid
+    ghosts: Ghosts
+    density: float
+
+
+def main_direction(outline: shapely.Polygon) -> float:
+    """Angle (rad) of the outline's main direction modulo 90 degrees: the peak of its edges' lengths, then their mean.
+
+    >>> round(math.degrees(main_direction(shapely.box(0, 0, 4, 3))) % 90, 6)
+    0.0
+    """
+    edges = np.diff(shapely.get_coordinates(outline.exterior), axis=0)
+    length, angle = np.hypot(edges[:, 0], edges[:, 1]), np.arctan2(edges[:, 1], edges[:, 0])
+
+    def off(direction):
+        return np.angle(np.exp(4j * (angle - direction))) / 4.0
+
+    candidates = angle[length > 0.5] if (length > 0.5).any() else angle
+    if len(candidates) > 200:
+        candidates = np.radians(np.arange(0.0, 90.0, 0.5))
+    gaps = np.angle(np.exp(4j * (angle[None, :] - candidates[:, None]))) / 4.0
+    support = (length * np.exp(-0.5 * (gaps / math.radians(3.0)) ** 2)).sum(axis=1)
+    peak = candidates[np.argmax(support)]
+    weight = length * (np.abs(off(peak)) < math.radians(5.0))
+    return float(peak + (weight * off(peak)).sum() / max(weight.sum(), 1e-12))
+
+
+@njit(cache=True)
+def signed_depth(x, y, starts, ends):
+    """Distance (n,) of points to the nearest of the edges `starts`, `ends` (m, 2), negative outside (even-odd rule)."""
+    depth = np.empty(len(x))
+    for i in range(len(x)):
+        inside, nearest = False, np.inf
+        for e in range(len(starts)):
+            x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
+            dx, dy = x1 - x0, y1 - y0
+            if (y0 > y[i]) != (y1 > y[i]) and x[i] < x0 + (y[i] - y0) / dy * dx:
+                inside = not inside
+            t = ((x[i] - x0) * dx + (y[i] - y0) * dy) / max(dx * dx + dy * dy, 1e-18)
+            t = min(max(t, 0.0), 1.0)
+            nearest = min(nearest, (x0 + t * dx - x[i]) ** 2 + (y0 + t * dy - y[i]) ** 2)
+        depth[i] = math.sqrt(nearest) if inside else -math.sqrt(nearest)
+    return depth
+
+
+def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and ends (m, 2) of all edges of the outline, holes included."""
+    rings = [shapely.get_coordinates(ring) for ring in (outline.exterior, *outline.interiors)]
+    return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
+
+
+def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`; and which pass a vertex."""
+    kept = [low, high]
+    for x in np.sort(vertices):
+        if min(abs(x - y) for y in kept) > MERGE_LINES_M:
+            kept.append(float(x))
+        if len(kept) > MAX_CELLS:
+            break
+    kept.sort()
+    step = max(cell, (high - low) / MAX_CELLS)
+    lines, at_vertex = [], []
+    for a, b in zip(kept[:-1], kept[1:], strict=True):
+        count = max(1, round((b - a) / step))
+        lines += [a + (b - a) * q / count for q in range(count)]
+        at_vertex += [True] + [False] * (count - 1)
+    return np.array([*lines, high]), np.array([*at_vertex, True])
+
+
+def cells_of(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
+    return np.clip(np.searchsorted(lines, x, side="right") - 1, 0, len(lines) - 2)
+
+
+def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
+    """Frame, points, grid and ghosts for `points_local` (n, 3) and `outline`; points outside the outline do not count."""
+    angle = main_direction(outline)
+    rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
+    depth = signed_depth(points_local[:, 0].copy(), points_local[:, 1].copy(), *ring_edges(outline))
+    inside = points_local[depth >= 0.0]
+    if len(inside) >= BORDER_MIN_DENSITY * outline.area:
+        away = points_local[depth >= BORDER_M]
+        if len(away) >= max(8, 0.5 * len(inside)):
+            inside = away
+    centroid = shapely.get_coordinates(outline.centroid)[0]
+    frame = PlanFrame(np.array([*centroid, np.median(inside[:, 2]) if len(inside) else 0.0]), rotation)
+    uvz = frame.to_plan(inside)
+    uvz = uvz[np.lexsort(np.round(uvz.T, 6))]  # one order, whatever order the points came in
+    density = len(uvz) / max(COVERED_SHARE * outline.area, 1.0)
+    corners = (shapely.get_coordinates(outline.exterior)[:-1] - centroid) @ rotation.T
+    cell = max(CELL_M, CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
+    (low_u, low_v), (high_u, high_v) = corners.min(axis=0), corners.max(axis=0)
+    u_lines, u_vertex = grid_lines(low_u, high_u, corners[:, 0], cell)
+    v_lines, v_vertex = grid_lines(low_v, high_v, corners[:, 1], cell)
+    grid = Grid(u_lines, v_lines, u_vertex, v_vertex)
+    u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
+    cloud = Cloud(u, v, z, cells_of(u_lines, u), cells_of(v_lines, v))
+    return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density)
+
+
+def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon) -> Ghosts:
+    """A ghost at the centre of every cell inside the outline, weighing as many points as its area usually holds."""
+    centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in (grid.u, grid.v))
+    i, j = (index.ravel() for index in np.indices((len(centre_u), len(centre_v))))
+    u, v = centre_u[i], centre_v[j]
+    xy = frame.xy_local(np.column_stack([u, v]))
+    inside = signed_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline)) > 0.0
+    weight = (np.diff(grid.u)[i] * np.diff(grid.v)[j]) * len(cloud.u) / outline.area
+    low, high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
+    kept = [np.ascontiguousarray(column[inside]) for column in (u, v, weight, i, j)]
+    return Ghosts(*kept, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)

@@ -1,0 +1,126 @@
+"""From a plan to a layout: the planes, the partition and the overlays that the points pay for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .kernels import (
+    CUT,
+    CUT_AT_VERTEX,
+    Cloud,
+    cost_prefix,
+    gable_pool,
+    guillotine,
+    hypotheses,
+    is_symmetric_gable,
+    leaf_costs,
+    plane_pool,
+    primitives,
+    without_twins,
+)
+from .layout import (
+    HOLDERS,
+    OVERLAYS,
+    Layout,
+    add_overlay,
+    empty_layout,
+    evaluate,
+    grow_tree,
+    objective,
+    polish,
+    refine,
+    single_plane_layout,
+)
+from .plan import MIN_STRUCTURE_POINTS, Plan
+
+COARSE_TAU_M = 0.3
+POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
+POOL_POINTS = 1500  # the planes are looked for on at most so many points, evenly spread
+SEEDS, PAIRS_PER_SEED = 150, 4
+
+
+def evidence_per_unit(density: float, settings) -> float:
+    """Points that one unit of complexity must explain: a fixed area's worth, and never fewer than a floor."""
+    return max(settings.evidence_points, settings.evidence_area_m2 * density)
+
+
+def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
+    """Layout of the roof over `plan` and its objective (points)."""
+    evidence, tau = evidence_per_unit(plan.density, settings), settings.tolerance_m
+    cloud, grid, ghosts = plan.cloud, plan.grid, plan.ghosts
+    if len(cloud.u) < MIN_STRUCTURE_POINTS:
+        layout = single_plane_layout((0.0, 0.0, 0.0))
+        return layout, objective(layout, cloud, ghosts, tau, evidence)
+    pool, gables = propose(plan, evidence)
+    best, best_value = None, np.inf
+    for round_tau in (COARSE_TAU_M, tau):
+        pool = without_twins(pool, cloud)
+        layout = partition(plan, pool, gables, round_tau, evidence)
+        for last in (False, False, True):
+            refine(layout, cloud, grid, pool[:0] if last else pool, tau, evidence)
+        value = objective(layout, cloud, ghosts, tau, evidence)
+        if value < best_value:
+            best, best_value = layout, value
+        pool, gables = with_layout(layout, pool, gables)
+    cover_outliers(best, plan, tau, evidence)
+    polish(best, cloud, ghosts, tau, evidence)
+    return best, objective(best, cloud, ghosts, tau, evidence)
+
+
+def thinned(cloud: Cloud, most: int) -> Cloud:
+    """At most `most` points of `cloud`, evenly spread over their order."""
+    n = len(cloud.u)
+    if n <= most:
+        return cloud
+    kept = np.arange(most) * n // most
+    return Cloud(*(column[kept] for column in cloud))
+
+
+def propose(plan: Plan, evidence: float) -> tuple[np.ndarray, np.ndarray]:
+    """Pools of planes (k, 3) and of symmetric gables (g, 2, 3) that explain the points, best first."""
+    few = thinned(plan.cloud, POOL_POINTS)
+    evidence *= len(few.u) / len(plan.cloud.u)
+    candidates = hypotheses(few, SEEDS, PAIRS_PER_SEED)
+    pool = plane_pool(few, plan.grid, candidates, COARSE_TAU_M, evidence, POOL_PLANES)
+    pool = np.concatenate([pool, np.zeros((1, 3))])
+    gables = gable_pool(few, plan.grid, pool, COARSE_TAU_M, evidence, POOL_GABLES)
+    return pool, gables
+
+
+def partition(plan: Plan, pool: np.ndarray, gables: np.ndarray, tau: float, evidence: float) -> Layout:
+    """The guillotine partition of the plan into primitives of the pools that costs least."""
+    planes, counts, penalty = primitives(pool, gables, plan.cloud, evidence)
+    sums = cost_prefix(plan.cloud, plan.ghosts, plan.grid, planes, counts, tau)
+    cut_u, cut_v = (
+        evidence * np.where(at_vertex, CUT_AT_VERTEX, CUT) for at_vertex in (plan.grid.at_vertex_u, plan.grid.at_vertex_v)
+    )
+    choice = guillotine(leaf_costs(sums, penalty, plan.grid), cut_u, cut_v)
+    layout = empty_layout()
+    grow_tree(layout, choice, sums, penalty, planes, counts, plan.grid)
+    return layout
+
+
+def with_layout(layout: Layout, pool: np.ndarray, gables: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The pools with the planes and gables of `layout` put in front."""
+    planes, own_gables = [], []
+    for h in range(layout.count[HOLDERS]):
+        own = layout.table[layout.plane_of[h, : layout.planes_of[h]]]
+        planes.append(own)
+        if is_symmetric_gable(own, len(own)):
+            own_gables.append(own[None])
+    return np.concatenate([*planes, pool])[:KEPT_PLANES], np.concatenate([*own_gables, gables])
+
+
+def cover_outliers(layout: Layout, plan: Plan, tau: float, evidence: float) -> None:
+    """Add overlays (to `layout`) for the points it leaves unexplained, as long as they pay."""
+    cloud = plan.cloud
+    for _ in range(len(layout.overlays)):
+        z, _, _ = evaluate(layout, cloud.u, cloud.v)
+        outliers = np.abs(cloud.z - z) > 0.995 * tau
+        if outliers.sum() < MIN_STRUCTURE_POINTS:
+            return
+        few = thinned(Cloud(*(column[outliers] for column in cloud)), POOL_POINTS)
+        candidates = hypotheses(few, SEEDS, PAIRS_PER_SEED)
+        if not add_overlay(layout, cloud, plan.grid, candidates, tau, evidence):
+            return
+    assert layout.count[OVERLAYS] <= len(layout.overlays)
