@@ -19,6 +19,7 @@ import shapely
 from ...errors import FitError
 from ...model import Part, Piece
 from ...settings import Settings
+from ..outline import estimate_outline
 from .layout import evaluate
 from .pieces import disjoint_pieces
 from .plan import lay_out_plan
@@ -55,10 +56,13 @@ def fit_building(
     their median height. `weights` (n,) are probabilities of being roof: points under one half do not count.
     """
     points_local = np.asarray(points_local, float).reshape(-1, 3)
-    points_local = points_local[np.isfinite(points_local).all(axis=1)] if weights is None else points_local[
-        np.isfinite(points_local).all(axis=1) & (np.asarray(weights) >= 0.5)
-    ]
+    counts = np.isfinite(points_local).all(axis=1)
+    if weights is not None:
+        counts &= np.asarray(weights) >= 0.5
+    points_local = points_local[counts]
     settings = (settings or Settings()).compound
+    if outline is None:
+        outline = estimate_outline(points_local[:, :2])
     plan = lay_out_plan(points_local, outline)
     if len(plan.cloud.u) == 0:
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")

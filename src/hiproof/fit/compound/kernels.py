@@ -26,8 +26,12 @@ MIN_SIDE_M = 0.6
 NEIGHBOUR_RADIUS_M = 2.5
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
-Grid = namedtuple("Grid", "u v at_vertex_u at_vertex_v")  # grid lines, ascending, and which of them pass footprint vertices
-Ghosts = namedtuple("Ghosts", "u v weight i j low high")  # cell centres inside the outline; heights a roof may take there
+Grid = namedtuple(
+    "Grid", "u v at_vertex_u at_vertex_v"
+)  # grid lines, ascending, and which of them pass footprint vertices
+Ghosts = namedtuple(
+    "Ghosts", "u v weight i j low high"
+)  # cell centres inside the outline; heights a roof may take there
 
 
 @njit(cache=True)

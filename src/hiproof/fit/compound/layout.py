@@ -260,8 +260,12 @@ def move_cut(layout, node, cloud, members, grid, tau, evidence):
     below = np.zeros(len(x) + 1)  # cost of the first q points going below instead of above
     for q in range(len(order)):
         i = order[q]
-        low, _ = height_of(layout, descend(layout, layout.child[node, 0], cloud.u[i], cloud.v[i]), cloud.u[i], cloud.v[i])
-        high, _ = height_of(layout, descend(layout, layout.child[node, 1], cloud.u[i], cloud.v[i]), cloud.u[i], cloud.v[i])
+        low, _ = height_of(
+            layout, descend(layout, layout.child[node, 0], cloud.u[i], cloud.v[i]), cloud.u[i], cloud.v[i]
+        )
+        high, _ = height_of(
+            layout, descend(layout, layout.child[node, 1], cloud.u[i], cloud.v[i]), cloud.u[i], cloud.v[i]
+        )
         below[q + 1] = below[q] + truncated(cloud.z[i] - low, tau) - truncated(cloud.z[i] - high, tau)
     best, position = below[np.searchsorted(x, start)], start
     for q in range(len(x) + 1):

@@ -116,17 +116,24 @@ def within_heights(piece: Piece, low: float, high: float) -> list[Piece]:
     """`piece` with every height held between `low` and `high`: a flat cap above, flat pieces where it would fall below."""
     planes, polygon = piece.planes, piece.outline
     z = shapely.get_coordinates(polygon) @ planes[:, :2].T + planes[:, 2]
-    if z.max() > high:
+    if z.max() > high and not where_above(planes, high, polygon).is_empty:
         planes = active_planes(np.vstack([planes, [0.0, 0.0, high]]), polygon)
-        z = shapely.get_coordinates(polygon) @ planes[:, :2].T + planes[:, 2]
     if z.min() >= low:
         return [Piece(polygon, planes)]
-    above = polygon
-    for plane in planes:
-        above = shapely.intersection(above, half_plane(plane - [0.0, 0.0, low], polygon))
-    flat = np.array([[0.0, 0.0, low]])
+    above = where_above(planes, low, polygon)
     below = shapely.difference(polygon, above)
-    return [Piece(p, active_planes(planes, p)) for p in polygons_of(above)] + [Piece(p, flat) for p in polygons_of(below)]
+    flat = np.array([[0.0, 0.0, low]])
+    return [Piece(p, active_planes(planes, p)) for p in polygons_of(above)] + [
+        Piece(p, flat) for p in polygons_of(below)
+    ]
+
+
+def where_above(planes: np.ndarray, height: float, polygon: shapely.Polygon) -> shapely.Geometry:
+    """The region of `polygon` where the min of `planes` is above `height`."""
+    region = polygon
+    for plane in planes:
+        region = shapely.intersection(region, half_plane(plane - [0.0, 0.0, height], polygon))
+    return region
 
 
 def half_plane(line: np.ndarray, polygon: shapely.Polygon) -> shapely.Polygon:
@@ -142,4 +149,6 @@ def half_plane(line: np.ndarray, polygon: shapely.Polygon) -> shapely.Polygon:
     on_line = centre - normal * (centre @ [a, b] + c) / slope
     along = np.array([-normal[1], normal[0]]) * reach
     deep = normal * 2.0 * (reach + abs(centre @ [a, b] + c) / slope)
-    return shapely.intersection(box, shapely.Polygon([on_line - along, on_line + along, on_line + along + deep, on_line - along + deep]))
+    return shapely.intersection(
+        box, shapely.Polygon([on_line - along, on_line + along, on_line + along + deep, on_line - along + deep])
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 import shapely
@@ -108,7 +109,7 @@ def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> tu
     kept.sort()
     step = max(cell, (high - low) / MAX_CELLS)
     lines, at_vertex = [], []
-    for a, b in zip(kept[:-1], kept[1:], strict=True):
+    for a, b in pairwise(kept):
         count = max(1, round((b - a) / step))
         lines += [a + (b - a) * q / count for q in range(count)]
         at_vertex += [True] + [False] * (count - 1)

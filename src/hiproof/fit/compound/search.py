@@ -92,7 +92,8 @@ def partition(plan: Plan, pool: np.ndarray, gables: np.ndarray, tau: float, evid
     planes, counts, penalty = primitives(pool, gables, plan.cloud, evidence)
     sums = cost_prefix(plan.cloud, plan.ghosts, plan.grid, planes, counts, tau)
     cut_u, cut_v = (
-        evidence * np.where(at_vertex, CUT_AT_VERTEX, CUT) for at_vertex in (plan.grid.at_vertex_u, plan.grid.at_vertex_v)
+        evidence * np.where(at_vertex, CUT_AT_VERTEX, CUT)
+        for at_vertex in (plan.grid.at_vertex_u, plan.grid.at_vertex_v)
     )
     choice = guillotine(leaf_costs(sums, penalty, plan.grid), cut_u, cut_v)
     layout = empty_layout()
