@@ -1,0 +1,89 @@
+"""Sums of monomials in a primitive's shape parameters: a roof's planes written as formulas, usable as data.
+
+`q0 - q1 * V + q2 * U` builds a `Formula`, a sum of terms factor * V^a U^b q0^c q1^d q2^e q3^f with integer
+(also negative) exponents. The compiled fit reads the terms, so that one kernel evaluates the planes of every primitive,
+and their exact derivatives, without knowing any of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+SYMBOLS = ("V", "U", "q0", "q1", "q2", "q3")
+
+
+@dataclass(frozen=True)
+class Formula:
+    """A sum of monomials: `terms` maps exponents of SYMBOLS to the factor.
+
+    >>> (2 * V - q1 * V / q2)(V=3.0, U=0.0, q0=0.0, q1=1.0, q2=2.0, q3=0.0)
+    4.5
+    """
+
+    terms: tuple[tuple[float, tuple[int, ...]], ...]
+
+    def __call__(self, V: float, U: float, q0: float, q1: float, q2: float, q3: float) -> float:
+        """Value at the six shape parameters."""
+        values = (V, U, q0, q1, q2, q3)
+        return float(sum(factor * _monomial(values, powers) for factor, powers in self.terms))
+
+    def gradient(self, shape: np.ndarray) -> np.ndarray:
+        """Derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""
+        result = np.zeros(len(SYMBOLS))
+        for factor, powers in self.terms:
+            for k, power in enumerate(powers):
+                if power:
+                    lowered = powers[:k] + (power - 1,) + powers[k + 1 :]
+                    result[k] += factor * power * _monomial(shape, lowered)
+        return result
+
+    def __add__(self, other: Formula | float) -> Formula:
+        total: dict[tuple[int, ...], float] = {}
+        for factor, powers in self.terms + formula(other).terms:
+            total[powers] = total.get(powers, 0.0) + factor
+        return Formula(tuple((factor, powers) for powers, factor in total.items() if factor))
+
+    def __mul__(self, other: Formula | float) -> Formula:
+        product = Formula(())
+        for factor, powers in self.terms:
+            for other_factor, other_powers in formula(other).terms:
+                summed = tuple(a + b for a, b in zip(powers, other_powers, strict=True))
+                product = product + Formula(((factor * other_factor, summed),))
+        return product
+
+    def __truediv__(self, other: Formula | float) -> Formula:
+        """Division by one monomial; a sum in the denominator has no finite form and raises ValueError."""
+        (term,) = formula(other).terms
+        return self * Formula(((1 / term[0], tuple(-power for power in term[1])),))
+
+    def __neg__(self) -> Formula:
+        return self * -1.0
+
+    def __sub__(self, other: Formula | float) -> Formula:
+        return self + -formula(other)
+
+    def __rsub__(self, other: float) -> Formula:
+        return formula(other) - self
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+
+def formula(value: Formula | float) -> Formula:
+    """`value` as a Formula; a number becomes a constant."""
+    if isinstance(value, Formula):
+        return value
+    return Formula(((float(value), (0,) * len(SYMBOLS)),) if value else ())
+
+
+def _monomial(values, powers: tuple[int, ...]) -> float:
+    product = 1.0
+    for value, power in zip(values, powers, strict=True):
+        if power:
+            product *= float(value) ** power
+    return product
+
+
+V, U, q0, q1, q2, q3 = (Formula(((1.0, tuple(int(i == k) for i in range(len(SYMBOLS)))),)) for k in range(len(SYMBOLS)))

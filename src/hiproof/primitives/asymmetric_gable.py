@@ -1,0 +1,73 @@
+"""Asymmetric gable (saltbox): two planes of different slope from a ridge that need not lie in the middle."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .algebra import U, V, q0, q1, q2, q3
+from .contract import KAPPA, Q1, Q2, Q3, SLOPE_MAX, DerivedStart, Primitive
+from .gable import FACES
+
+RISE = q1 * V + q1 * q3 * V  # from the eave at -v, the lower one, to the ridge
+RISE_HIGH_SIDE = q2 * V - q2 * q3 * V
+
+
+def shape(p: Mapping[str, float]) -> tuple[float, ...]:
+    v, offset, h = p["width"] / 2, p["ridge_offset"], p["height"]
+    return v, p["length"] / 2, h, h / (v + offset), (h - p["eave_step"]) / (v - offset), offset / v
+
+
+def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
+    """As the gable's v1..v6, with the ridge v3 v4 moved by the offset and the eave v5 v6 raised by the step."""
+    u, v, h, offset, step = p["length"] / 2, p["width"] / 2, p["height"], p["ridge_offset"], p["eave_step"]
+    return [(u, -v, 0), (-u, -v, 0), (-u, offset, h), (u, offset, h), (u, v, step), (-u, v, step)]
+
+
+def canonical(theta: np.ndarray) -> np.ndarray:
+    """The lower eave lies at -v."""
+    if theta[Q1] * (1 + theta[Q3]) >= theta[Q2] * (1 - theta[Q3]):
+        return theta
+    turned = theta.copy()
+    turned[KAPPA] += np.pi
+    turned[[Q1, Q2]] = theta[[Q2, Q1]]
+    turned[Q3] = -theta[Q3]
+    return turned
+
+
+def typical(width: float, length: float, height: float) -> dict[str, float]:
+    """The ridge a tenth of the width off the middle, the higher eave at 30 % of the height."""
+    return {
+        "width": width,
+        "length": length,
+        "height": height,
+        "ridge_offset": 0.1 * width,
+        "eave_step": 0.3 * height,
+    }
+
+
+PRIMITIVE = Primitive(
+    name="asymmetric_gable",
+    citygml_code="1030",
+    adv_code="3100",
+    measures={
+        "width": 2 * V,
+        "length": 2 * U,
+        "height": RISE,
+        "ridge_offset": q3 * V,
+        "eave_step": RISE - RISE_HIGH_SIDE,
+    },
+    eave=q0 - RISE,
+    planes=((0, q1, q0 - q1 * q3 * V), (0, -q2, q0 + q2 * q3 * V)),
+    shape=shape,
+    corners=corners,
+    faces=FACES,
+    typical=typical,
+    bounds=((0.02, SLOPE_MAX), (0.02, SLOPE_MAX), (-0.85, 0.85)),
+    starts=(
+        DerivedStart("gable", (q0, q1, q1, 0.0)),
+        DerivedStart("monopitch", (q0 + 0.6 * q1 * V, q1, 0.2, 0.6)),
+    ),
+    canonical=canonical,
+    signed=("ridge_offset", "eave_step"),
+    half_turn_symmetric=False,
+)

@@ -1,0 +1,190 @@
+"""What a roof shape has to say about itself, and what follows from it for every shape alike.
+
+Two descriptions of the same surface meet here:
+
+* the paper's: S = f(theta_p) with theta_p in metres (width, length, height, ...), vertices and faces in the primitive
+  frame: plan centre at the origin, u along the ridge (length), v across (width), lowest eave at z = 0;
+* the fit's: theta = [cx, cy, kappa, V, U, q0, q1, q2, q3] with V, U the half extents across and along and q the
+  heights, slopes and fractions of the planes z = a u + b v + c; a, b, c are formulas (algebra.py) of V, U and q. Every
+  bound is a plain interval, and the roof is the minimum of its planes over the rectangle |u| <= U, |v| <= V.
+
+x = cx + u cos(kappa) - v sin(kappa), y = cy + u sin(kappa) + v cos(kappa); T_L = (cx, cy, eave height).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from ..errors import FitError
+from ..model import Part, Piece
+from .algebra import Formula, formula
+
+CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
+SLOPE_MIN, SLOPE_MAX = 0.04, 2.75  # 2 and 70 degrees: steeper planes swallow facade points
+
+Plane = tuple[Formula | float, Formula | float, Formula | float]
+Shape = tuple[float, float, float, float, float, float]
+
+
+@dataclass(frozen=True)
+class DerivedStart:
+    """Start values from the fit of a simpler type: `q` are formulas of the `source`'s V, U and q."""
+
+    source: str
+    q: tuple[Formula | float, ...]
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """One roof shape.
+
+    planes       formulas (a, b, c) in the order of `faces`; the roof is their minimum
+    measures     theta_p by name in metres as formulas of V, U, q; all are positive but those in `signed`
+    eave         formula of the lowest eave's height
+    shape        theta_p -> (V, U, q0, q1, q2, q3) with the lowest eave at 0: the inverse of `measures`
+    corners      theta_p -> vertices (n, 3) in the primitive frame: the paper's S = f(theta_p)
+    faces        vertex indices (from 0) of each roof surface, counter-clockwise from above
+    typical      (width, length, height) -> theta_p of an ordinary roof of that size
+    bounds       (low, high) of q1, q2, q3 as far as used
+    starts       where derived types start; empty for the types that start from a vote on the points
+    canonical    theta -> the one theta chosen among those of the same surface
+    strips       number of teeth: planes are then chosen by equal strips across instead of by the minimum
+    more         the same roof type with other strips
+    """
+
+    name: str
+    citygml_code: str
+    adv_code: str
+    measures: Mapping[str, Formula]
+    eave: Formula
+    planes: tuple[Plane, ...]
+    shape: Callable[[Mapping[str, float]], Shape]
+    corners: Callable[[Mapping[str, float]], np.ndarray]
+    faces: tuple[tuple[int, ...], ...]
+    typical: Callable[[float, float, float], dict[str, float]]
+    bounds: tuple[tuple[float, float], ...] = ()
+    starts: tuple[DerivedStart, ...] = ()
+    canonical: Callable[[np.ndarray], np.ndarray] = field(default=lambda theta: theta)
+    signed: tuple[str, ...] = ()
+    half_turn_symmetric: bool = True
+    strips: int = 1
+    more: tuple[Primitive, ...] = ()
+
+    @property
+    def parameters(self) -> tuple[str, ...]:
+        """Names of theta_p, all in metres (a saw-tooth's `teeth` is a count)."""
+        return tuple(self.measures)
+
+    @property
+    def variants(self) -> tuple[Primitive, ...]:
+        """This shape and its other tooth counts."""
+        return (self, *self.more)
+
+    @property
+    def theta_size(self) -> int:
+        """Used entries of theta: five for the plan, q0 and one for each bound."""
+        return 6 + len(self.bounds)
+
+    def variant(self, theta_p: Mapping[str, float]) -> Primitive:
+        """The variant with the tooth count of `theta_p`; itself where there is none."""
+        for variant in self.variants:
+            if variant.strips == theta_p.get("teeth", self.strips):
+                return variant
+        raise FitError(f"expected 2 to 6 teeth for a {self.name} roof, got {theta_p['teeth']}; choose one of these")
+
+    def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
+        """The paper's S = f(theta_p): vertices (n, 3) in the primitive frame. Raises FitError where one is missing."""
+        missing = [name for name in self.parameters if name not in theta_p]
+        if missing:
+            raise FitError(
+                f"expected the parameters {', '.join(self.parameters)} of a {self.name} roof, got none for "
+                f"{', '.join(missing)}; give every parameter in metres"
+            )
+        return np.asarray(self.variant(theta_p).corners(theta_p), float)
+
+    def to_theta(
+        self, theta_p: Mapping[str, float], kappa: float = 0.0, translation: np.ndarray = (0.0, 0.0, 0.0)
+    ) -> np.ndarray:
+        """theta (9,) of the roof with `theta_p`, turned by `kappa` and moved to `translation` T_L (3,)."""
+        theta = np.zeros(9)
+        theta[[CX, CY, KAPPA]] = translation[0], translation[1], kappa
+        theta[HALF_WIDTH:] = self.variant(theta_p).shape(theta_p)
+        theta[Q0] += translation[2]
+        return theta
+
+    def from_theta(self, theta: np.ndarray) -> tuple[dict[str, float], float, np.ndarray]:
+        """(theta_p by name, kappa, T_L (3,)) of `theta` (9,)."""
+        shape = np.asarray(theta, float)[HALF_WIDTH:]
+        theta_p = {name: measure(*shape) for name, measure in self.measures.items()}
+        return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], self.eave(*shape)])
+
+    def is_proper(self, theta: np.ndarray) -> bool:
+        """Whether every length is positive: no ridge or top of negative length."""
+        theta_p, _, _ = self.from_theta(theta)
+        return all(value > 0 for name, value in theta_p.items() if name not in self.signed)
+
+    def canonical_theta(self, theta: np.ndarray) -> np.ndarray:
+        """The same surface's one theta: axes in their fixed roles, kappa in (-pi/2, pi/2] or (-pi, pi]."""
+        theta = self.canonical(np.array(theta, float))
+        period = math.pi if self.half_turn_symmetric else 2 * math.pi
+        theta[KAPPA] -= period * math.ceil(theta[KAPPA] / period - 0.5)
+        return theta
+
+    def plane_values(self, theta: np.ndarray) -> np.ndarray:
+        """Planes (k, 3), z = a u + b v + c, at `theta` (9,), in the order of `faces`."""
+        shape = np.asarray(theta, float)[HALF_WIDTH:]
+        return np.array([[formula(coefficient)(*shape) for coefficient in plane] for plane in self.planes])
+
+    def height_at(self, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
+        """Height (n,) of the roof `theta` at `xy` (n, 2), continued beyond its plan rectangle."""
+        c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+        xy_centred = np.asarray(xy, float) - theta[:2]
+        u, v = xy_centred @ (c, s), xy_centred @ (-s, c)
+        heights = np.stack([u, v, np.ones_like(u)], axis=1) @ self.plane_values(theta).T
+        if self.strips == 1:
+            return heights.min(axis=1)
+        half_width = theta[HALF_WIDTH]
+        strip = np.clip(np.floor((v + half_width) * self.strips / (2 * half_width)), 0, self.strips - 1)
+        return heights[np.arange(len(u)), strip.astype(int)]
+
+    def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
+        """The roof part of `theta` (9,) in theta's own frame: plan rectangle (one a tooth) and planes over x, y."""
+        theta_p, kappa, translation = self.from_theta(theta)
+        c, s = math.cos(kappa), math.sin(kappa)
+        a, b, z = self.plane_values(theta).T
+        planes = np.stack([a * c - b * s, a * s + b * c, z], axis=1)
+        planes[:, 2] -= planes[:, :2] @ translation[:2]
+        half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
+        breaks = np.linspace(-half_width, half_width, self.strips + 1)
+        groups = [planes] if self.strips == 1 else [plane[None] for plane in planes]
+        pieces = []
+        for low, high, group in zip(breaks[:-1], breaks[1:], groups, strict=True):
+            uv = np.array([(-half_length, low), (half_length, low), (half_length, high), (-half_length, high)])
+            xy = translation[:2] + uv @ np.array([[c, s], [-s, c]])
+            pieces.append(Piece(shapely.Polygon(xy), group))
+        return Part(self.name, tuple(pieces), theta_p, kappa, translation, dict(sigma or {}))
+
+
+def placed(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:
+    """Vertices (n, 3) turned by `kappa` about Z and moved by `translation` (3,): R V + T_L, eq. 9."""
+    c, s = math.cos(kappa), math.sin(kappa)
+    return vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + translation
+
+
+def rectangle(theta_p: Mapping[str, float], low: float = 0.0, high: float = 0.0) -> list[tuple[float, float, float]]:
+    """Corners v1..v4 of the plan, clockwise from (+u, -v), at height `low` on the -v side and `high` on the +v side."""
+    u, v = theta_p["length"] / 2, theta_p["width"] / 2
+    return [(u, -v, low), (-u, -v, low), (-u, v, high), (u, v, high)]
+
+
+def quarter_turned(theta: np.ndarray) -> np.ndarray:
+    """Plan axes exchanged by a quarter turn; the caller exchanges the q that belong to them."""
+    theta = theta.copy()
+    theta[[HALF_WIDTH, HALF_LENGTH]] = theta[[HALF_LENGTH, HALF_WIDTH]]
+    theta[KAPPA] += math.pi / 2
+    return theta

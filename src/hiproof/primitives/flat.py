@@ -1,0 +1,26 @@
+"""Flat roof: one level plane."""
+
+import numpy as np
+
+from .algebra import U, V, q0
+from .contract import HALF_LENGTH, HALF_WIDTH, Primitive, quarter_turned, rectangle
+
+
+def canonical(theta: np.ndarray) -> np.ndarray:
+    """The longer side is the length."""
+    return quarter_turned(theta) if theta[HALF_WIDTH] > theta[HALF_LENGTH] else theta
+
+
+PRIMITIVE = Primitive(
+    name="flat",
+    citygml_code="1000",
+    adv_code="1000",
+    measures={"width": 2 * V, "length": 2 * U},
+    eave=q0,
+    planes=((0, 0, q0),),
+    shape=lambda p: (p["width"] / 2, p["length"] / 2, 0.0, 0.0, 0.0, 0.0),
+    corners=rectangle,
+    faces=((1, 0, 3, 2),),
+    typical=lambda width, length, height: {"width": width, "length": length},
+    canonical=canonical,
+)

@@ -1,0 +1,63 @@
+"""Gambrel (two-sided mansard): a gable whose slopes break into a steeper lower part."""
+
+from collections.abc import Mapping
+
+from .algebra import U, V, q0, q1, q2, q3
+from .contract import SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive
+from .gable import SLOPES
+
+LOWER_SLOPE = q1 + q2  # q2 is how much steeper the lower part is, q3 the share of the half width above the break
+BREAK_HEIGHT = LOWER_SLOPE * V * (1 - q3)
+HEIGHT = BREAK_HEIGHT + q1 * q3 * V
+LOWER_AT_RIDGE = q0 + q2 * q3 * V
+
+
+def shape(p: Mapping[str, float]) -> tuple[float, ...]:
+    half_break = p["break_width"] / 2
+    upper = (p["height"] - p["break_height"]) / half_break
+    lower = p["break_height"] / (p["width"] / 2 - half_break)
+    return p["width"] / 2, p["length"] / 2, p["height"], upper, lower - upper, p["break_width"] / p["width"]
+
+
+def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
+    """Pairs at +u and -u from the eave at -v over break, ridge and break to the eave at +v."""
+    u, v, b = p["length"] / 2, p["width"] / 2, p["break_width"] / 2
+    h, z = p["height"], p["break_height"]
+    lower_and_break = [(u, -v, 0), (-u, -v, 0), (-u, -b, z), (u, -b, z)]
+    return [*lower_and_break, (u, 0, h), (-u, 0, h), (u, b, z), (-u, b, z), (u, v, 0), (-u, v, 0)]
+
+
+def typical(width: float, length: float, height: float) -> dict[str, float]:
+    """The break at 60 % of the width and of the height."""
+    return {
+        "width": width,
+        "length": length,
+        "height": height,
+        "break_width": 0.6 * width,
+        "break_height": 0.6 * height,
+    }
+
+
+PRIMITIVE = Primitive(
+    name="gambrel",
+    citygml_code="1060",
+    adv_code="3400",
+    measures={
+        "width": 2 * V,
+        "length": 2 * U,
+        "height": HEIGHT,
+        "break_width": 2 * q3 * V,
+        "break_height": BREAK_HEIGHT,
+    },
+    eave=q0 - HEIGHT,
+    planes=(*SLOPES, (0, LOWER_SLOPE, LOWER_AT_RIDGE), (0, -LOWER_SLOPE, LOWER_AT_RIDGE)),
+    shape=shape,
+    corners=corners,
+    faces=((3, 4, 5, 2), (4, 6, 7, 5), (1, 0, 3, 2), (8, 9, 7, 6)),
+    typical=typical,
+    bounds=((SLOPE_MIN, SLOPE_MAX), (0.05, 3.6), (0.1, 0.9)),
+    starts=(
+        DerivedStart("gable", (q0 - 0.15 * q1 * V, 0.6 * q1, q1, 0.5)),
+        DerivedStart("gable", (q0, 0.9 * q1, 2.0, 0.8)),
+    ),
+)

@@ -1,0 +1,56 @@
+"""Hip: a gable whose two ends slope too, down to the same eave."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .algebra import U, V, q0, q1, q2
+from .contract import HALF_LENGTH, HALF_WIDTH, Q1, Q2, SLOPE_MAX, SLOPE_MIN, Primitive, quarter_turned
+from .gable import FACES, SLOPES
+
+EAVE = q0 - q1 * V
+
+
+def shape(p: Mapping[str, float]) -> tuple[float, ...]:
+    run = (p["length"] - p["ridge_length"]) / 2
+    return p["width"] / 2, p["length"] / 2, p["height"], 2 * p["height"] / p["width"], p["height"] / run, 0.0
+
+
+def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
+    """As the gable's v1..v6, with the ridge v3 v4 shortened."""
+    u, v, h, r = p["length"] / 2, p["width"] / 2, p["height"], p["ridge_length"] / 2
+    return [(u, -v, 0), (-u, -v, 0), (-r, 0, h), (r, 0, h), (u, v, 0), (-u, v, 0)]
+
+
+def canonical(theta: np.ndarray) -> np.ndarray:
+    """The ridge runs along u. Where the ends meet below the sides' ridge, the lowest planes form a ridge along v
+    instead and theta's q0 is above the roof: the same surface with the axes exchanged.
+    """
+    rise_across, rise_along = theta[Q1] * theta[HALF_WIDTH], theta[Q2] * theta[HALF_LENGTH]
+    if rise_across <= rise_along:
+        return theta
+    turned = quarter_turned(theta)
+    turned[5] += rise_along - rise_across
+    turned[[Q1, Q2]] = theta[[Q2, Q1]]
+    return turned
+
+
+def typical(width: float, length: float, height: float) -> dict[str, float]:
+    """Equal slopes all round where the length allows a ridge."""
+    return {"width": width, "length": length, "height": height, "ridge_length": max(length - width, 0.2 * length)}
+
+
+PRIMITIVE = Primitive(
+    name="hip",
+    citygml_code="1040",
+    adv_code="3200",
+    measures={"width": 2 * V, "length": 2 * U, "height": q1 * V, "ridge_length": 2 * U - 2 * q1 * V / q2},
+    eave=EAVE,
+    planes=(*SLOPES, (-q2, 0, EAVE + q2 * U), (q2, 0, EAVE + q2 * U)),
+    shape=shape,
+    corners=corners,
+    faces=(*FACES, (0, 4, 3), (5, 1, 2)),
+    typical=typical,
+    bounds=((SLOPE_MIN, SLOPE_MAX), (SLOPE_MIN, SLOPE_MAX)),
+    canonical=canonical,
+)

@@ -1,0 +1,86 @@
+"""Mansard with a level top: four slopes from the eave up to a flat rectangle."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from .algebra import U, V, q0, q1, q2, q3
+from .contract import (
+    HALF_LENGTH,
+    HALF_WIDTH,
+    Q1,
+    Q2,
+    Q3,
+    SLOPE_MAX,
+    DerivedStart,
+    Primitive,
+    quarter_turned,
+    rectangle,
+)
+
+RISE = q3 * q1 * V  # q3 is the share of the half width that the slope takes
+EAVE = q0 - RISE
+
+
+def shape(p: Mapping[str, float]) -> tuple[float, ...]:
+    run_across, run_along = (p["width"] - p["top_width"]) / 2, (p["length"] - p["top_length"]) / 2
+    slopes = p["height"] / run_across, p["height"] / run_along
+    return p["width"] / 2, p["length"] / 2, p["height"], *slopes, 2 * run_across / p["width"]
+
+
+def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
+    """The plan's v1..v4, then the top's v5..v8 above them."""
+    return [*rectangle(p), *rectangle({"width": p["top_width"], "length": p["top_length"]}, p["height"], p["height"])]
+
+
+def canonical(theta: np.ndarray) -> np.ndarray:
+    """The longer side is the length."""
+    if theta[HALF_WIDTH] <= theta[HALF_LENGTH]:
+        return theta
+    turned = quarter_turned(theta)
+    turned[[Q1, Q2]] = theta[[Q2, Q1]]
+    turned[Q3] = theta[Q3] * theta[Q1] * theta[HALF_WIDTH] / (theta[Q2] * theta[HALF_LENGTH])
+    return turned
+
+
+def typical(width: float, length: float, height: float) -> dict[str, float]:
+    """Slopes that take a quarter of the width on each side, and as much of the length."""
+    return {
+        "width": width,
+        "length": length,
+        "height": height,
+        "top_width": 0.5 * width,
+        "top_length": max(length - 0.5 * width, 0.3 * length),
+    }
+
+
+PRIMITIVE = Primitive(
+    name="mansard",
+    citygml_code="1060",
+    adv_code="3400",
+    measures={
+        "width": 2 * V,
+        "length": 2 * U,
+        "height": RISE,
+        "top_width": 2 * V - 2 * q3 * V,
+        "top_length": 2 * U - 2 * RISE / q2,
+    },
+    eave=EAVE,
+    planes=(
+        (0, q1, EAVE + q1 * V),
+        (0, -q1, EAVE + q1 * V),
+        (-q2, 0, EAVE + q2 * U),
+        (q2, 0, EAVE + q2 * U),
+        (0, 0, q0),
+    ),
+    shape=shape,
+    corners=corners,
+    faces=((1, 0, 4, 5), (3, 2, 6, 7), (0, 3, 7, 4), (2, 1, 5, 6), (5, 4, 7, 6)),
+    typical=typical,
+    bounds=((0.08, SLOPE_MAX), (0.08, SLOPE_MAX), (0.05, 0.95)),
+    starts=(
+        DerivedStart("hip", (q0 - 0.4 * q1 * V, q1, q2, 0.6)),
+        DerivedStart("flat", (q0, 1.0, 1.0, 0.25)),
+    ),
+    canonical=canonical,
+)

@@ -1,0 +1,39 @@
+"""Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches side by side, each rising towards +v to a vertical step."""
+
+from collections.abc import Mapping
+
+from .algebra import U, V, formula, q0, q1
+from .contract import SLOPE_MAX, Primitive, rectangle
+
+TEETH = range(2, 7)
+
+
+def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
+    """Four corners a tooth as a monopitch's v1..v4, from the tooth at -v to the one at +v."""
+    teeth = round(p["teeth"])
+    tooth = {"width": p["width"] / teeth, "length": p["length"]}
+    centres = [(2 * k + 1 - teeth) * tooth["width"] / 2 for k in range(teeth)]
+    return [(u, v + centre, z) for centre in centres for u, v, z in rectangle(tooth, high=p["height"])]
+
+
+def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
+    """The saw-tooth roof with `teeth` teeth; q0 is the height at each tooth's foot."""
+    return Primitive(
+        name="shed",
+        citygml_code="1100",
+        adv_code="3800",
+        measures={"width": 2 * V, "length": 2 * U, "height": (2 / teeth) * q1 * V, "teeth": formula(teeth)},
+        eave=q0,
+        planes=tuple((0, q1, q0 + q1 * V * (1 - 2 * k / teeth)) for k in range(teeth)),
+        shape=lambda p: (p["width"] / 2, p["length"] / 2, 0.0, teeth * p["height"] / p["width"], 0.0, 0.0),
+        corners=corners,
+        faces=tuple((4 * k + 1, 4 * k, 4 * k + 3, 4 * k + 2) for k in range(teeth)),
+        typical=lambda width, length, height: {"width": width, "length": length, "height": height, "teeth": teeth},
+        bounds=((0.08, SLOPE_MAX),),
+        half_turn_symmetric=False,
+        strips=teeth,
+        more=more,
+    )
+
+
+PRIMITIVE = saw_tooth(TEETH[0], tuple(saw_tooth(teeth) for teeth in TEETH[1:]))
