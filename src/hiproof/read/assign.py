@@ -1,0 +1,82 @@
+"""Which points belong to which footprint: points sorted once into grid cells, then looked up building by building."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import shapely
+
+from ..model import Footprint
+
+CELL_M = 4.0
+
+
+class PointGrid:
+    """Plan points sorted into square cells, row by row, so that any box is a few slices of one sorted array.
+
+    >>> grid = PointGrid(np.array([[0.5, 0.5], [9.0, 9.0], [1.5, 0.5]]))
+    >>> grid.inside(shapely.box(0, 0, 1, 1)).tolist()
+    [0]
+    >>> grid.within(shapely.box(0, 0, 1, 1), 1.0).tolist()
+    [0, 2]
+    """
+
+    def __init__(self, xy: np.ndarray, cell_m: float = CELL_M):
+        """Index `xy` (n, 2 or more; further columns are ignored), world or local metres, all finite."""
+        self.xy = np.ascontiguousarray(np.asarray(xy, float)[:, :2])
+        self.cell_m = cell_m
+        self.origin = np.floor(self.xy.min(axis=0) / cell_m) if len(self.xy) else np.zeros(2)
+        cells = (np.floor(self.xy / cell_m) - self.origin).astype(np.int64)
+        self.columns = int(cells[:, 0].max()) + 1 if len(cells) else 1
+        self.rows = int(cells[:, 1].max()) + 1 if len(cells) else 1
+        keys = cells[:, 1] * self.columns + cells[:, 0]
+        self.order = np.argsort(keys, kind="stable")
+        self.keys = keys[self.order]
+
+    def candidates(self, bounds: Sequence[float]) -> np.ndarray:
+        """Indices of the points in the cells that the box (xmin, ymin, xmax, ymax) meets."""
+        first, last = self.cell_range(bounds[0], bounds[2], 0), self.cell_range(bounds[1], bounds[3], 1)
+        rows = np.arange(max(last[0], 0), min(last[1], self.rows - 1) + 1)
+        left, right = max(first[0], 0), min(first[1], self.columns - 1)
+        if left > right or not len(rows):
+            return np.empty(0, np.int64)
+        starts = np.searchsorted(self.keys, rows * self.columns + left)
+        stops = np.searchsorted(self.keys, rows * self.columns + right, side="right")
+        return np.concatenate([self.order[start:stop] for start, stop in zip(starts, stops, strict=True)])
+
+    def cell_range(self, low: float, high: float, axis: int) -> tuple[int, int]:
+        return tuple(int(np.floor(value / self.cell_m) - self.origin[axis]) for value in (low, high))
+
+    def inside(self, polygon: shapely.Polygon) -> np.ndarray:
+        """Ascending indices of the points inside `polygon` or on its border."""
+        if polygon.is_empty:
+            return np.empty(0, np.int64)
+        found = self.candidates(polygon.bounds)
+        shapely.prepare(polygon)
+        xy = self.xy[found]
+        return np.sort(found[shapely.intersects_xy(polygon, xy[:, 0], xy[:, 1])])
+
+    def within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
+        """Ascending indices of the points at most `distance_m` from `polygon` or inside it."""
+        if polygon.is_empty:
+            return np.empty(0, np.int64)
+        return self.inside(shapely.buffer(polygon, distance_m, quad_segs=4))
+
+
+def points_of_footprints(cloud_xyz: np.ndarray, footprints: Iterable[Footprint]) -> list[np.ndarray]:
+    """For each footprint the ascending indices into `cloud_xyz` (n, 2 or 3) of the points inside or on its border.
+
+    Pass the building-class points only. A point in the overlap of two footprints belongs to both: what a building gets
+    never depends on its neighbours.
+    """
+    grid = PointGrid(cloud_xyz)
+    return [grid.inside(footprint.polygon) for footprint in footprints]
+
+
+def points_near_footprints(
+    cloud_xyz: np.ndarray, footprints: Iterable[Footprint], distance_m: float
+) -> list[np.ndarray]:
+    """As `points_of_footprints`, for the points at most `distance_m` away: the ground around each building."""
+    grid = PointGrid(cloud_xyz)
+    return [grid.within(footprint.polygon, distance_m) for footprint in footprints]

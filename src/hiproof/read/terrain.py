@@ -1,0 +1,318 @@
+"""How high is the ground: a terrain model, else a TIN of the ground points, else the lowest points around the building.
+
+All three answer `height_at` and name their `source`; a `TerrainChain` asks the next where one does not know.
+"""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from collections.abc import Sequence
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..errors import InputError
+from .crs import parse_crs, same_horizontal
+from .thin import rank_in_cells, thin_to_grid
+
+THIN_M = 1.0
+REACH_M = 50.0
+LOWEST_RADIUS_M = 10.0
+TILE_PX = 512
+TILES_KEPT = 8
+
+
+class Terrain(Protocol):
+    """Heights of the ground in world coordinates; `source` is the text a building's output names it by."""
+
+    source: str
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_world` (n, 2), NaN where unknown."""
+        ...
+
+
+class RasterTerrain:
+    """A raster terrain model, interpolated bilinearly between its pixel centres; it may be in another CRS than the cloud.
+
+    Pixels are read in tiles when asked for, a few of which are kept: memory does not grow with the raster. Cells without
+    data take no part: between them and cells with data the latter's weighted mean is given, amid them NaN.
+    """
+
+    def __init__(self, path: str | Path, crs: Any = None):
+        """Open `path`; `crs` is that of the coordinates asked for, None for the raster's own. Raises InputError."""
+        self.path, self.source = str(path), f"terrain model {Path(path).name}"
+        self.crs = parse_crs(crs)
+        self.tiles: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
+        if self.dataset.crs is None and self.dataset.transform.is_identity:
+            raise InputError(
+                f"expected a georeferenced raster of heights at {path}, got an image without position; name a GeoTIFF"
+            )
+        self.transformer = self.make_transformer()
+
+    @cached_property
+    def dataset(self):
+        import rasterio
+        from rasterio.errors import RasterioError
+
+        try:
+            return rasterio.open(self.path)
+        except (RasterioError, OSError) as error:
+            raise InputError(
+                f"expected a raster that GDAL reads (GeoTIFF, ...) at {self.path}, got: {error}; check the file"
+            ) from error
+
+    def __getstate__(self) -> dict:
+        """Without the open file and the tiles, so that a worker process opens its own."""
+        return {**{k: v for k, v in vars(self).items() if k not in ("dataset", "transformer")}, "tiles": OrderedDict()}
+
+    def __setstate__(self, state: dict) -> None:
+        vars(self).update(state)
+        self.transformer = self.make_transformer()
+
+    def make_transformer(self):
+        """From the coordinates asked for to the raster's; None where they are the same in plan, or one is unknown."""
+        own = parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
+        if self.crs is None or own is None or same_horizontal(self.crs, own):
+            return None
+        from pyproj import Transformer
+
+        return Transformer.from_crs(self.crs, own, always_xy=True)
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Extent (xmin, ymin, xmax, ymax) in the raster's own CRS."""
+        return tuple(self.dataset.bounds)
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_world` (n, 2), NaN outside the raster and where it has no data."""
+        xy = np.asarray(xy_world, float)[:, :2]
+        if self.transformer is not None:
+            xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
+        heights = np.full(len(xy), np.nan)
+        to_pixel = ~self.dataset.transform
+        column = to_pixel.a * xy[:, 0] + to_pixel.b * xy[:, 1] + to_pixel.c
+        row = to_pixel.d * xy[:, 0] + to_pixel.e * xy[:, 1] + to_pixel.f
+        inside = (column >= 0) & (row >= 0) & (column <= self.dataset.width) & (row <= self.dataset.height)
+        # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its centre's value.
+        column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
+        row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
+        heights[inside] = self.interpolate(row, column)
+        return heights
+
+    def interpolate(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+        """Heights (n,) at fractional pixel-centre positions inside the raster, tile by tile."""
+        heights = np.full(len(row), np.nan)
+        tile_rows, tile_columns = (row // TILE_PX).astype(int), (column // TILE_PX).astype(int)
+        for tile_row, tile_column in np.unique(np.column_stack([tile_rows, tile_columns]), axis=0):
+            here = (tile_rows == tile_row) & (tile_columns == tile_column)
+            pixels = self.tile(int(tile_row), int(tile_column))
+            heights[here] = bilinear(pixels, row[here] - tile_row * TILE_PX, column[here] - tile_column * TILE_PX)
+        return heights
+
+    def tile(self, row: int, column: int) -> np.ndarray:
+        """Pixels of a tile and one more row and column (where the raster has them), float64, NaN without data."""
+        from rasterio.errors import RasterioError
+        from rasterio.windows import Window
+
+        key = (row, column)
+        if key not in self.tiles:
+            height = min(TILE_PX + 1, self.dataset.height - row * TILE_PX)
+            width = min(TILE_PX + 1, self.dataset.width - column * TILE_PX)
+            window = Window(column * TILE_PX, row * TILE_PX, width, height)
+            try:
+                pixels = self.dataset.read(1, window=window, masked=True).astype(float).filled(np.nan)
+            except RasterioError as error:
+                raise InputError(
+                    f"expected a complete raster at {self.path}, got: {error}; copy or download it again"
+                ) from error
+            self.tiles[key] = np.where(np.isfinite(pixels), pixels, np.nan)
+        self.tiles.move_to_end(key)
+        if len(self.tiles) > TILES_KEPT:
+            self.tiles.popitem(last=False)
+        return self.tiles[key]
+
+
+def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """Weighted mean (n,) of the four pixels around each position, those that are NaN left out; NaN where all are."""
+    row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
+    row1, column1 = np.minimum(row0 + 1, pixels.shape[0] - 1), np.minimum(column0 + 1, pixels.shape[1] - 1)
+    down, right = row - row0, column - column0
+    values = np.stack([pixels[row0, column0], pixels[row0, column1], pixels[row1, column0], pixels[row1, column1]])
+    weights = np.stack([(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right])
+    weights = np.where(np.isnan(values), 0.0, weights)
+    total = weights.sum(axis=0)
+    known = total > 1e-9
+    return np.where(known, (weights * np.nan_to_num(values)).sum(axis=0) / np.where(known, total, 1.0), np.nan)
+
+
+class TinTerrain:
+    """Linear interpolation in the Delaunay triangulation of thinned ground points; the nearest point beyond their hull.
+
+    Unknown (NaN) farther than `reach_m` from every point. Thinned by cells of the world's own grid, so that a tile and
+    its neighbour agree where both hold the same points.
+    """
+
+    source = "ground points"
+
+    def __init__(self, xyz_ground: np.ndarray, thin_m: float = THIN_M, reach_m: float = REACH_M):
+        self.reach_m = reach_m
+        self.xyz = thin_to_grid(np.asarray(xyz_ground, float), thin_m)
+
+    @cached_property
+    def xy(self) -> np.ndarray:
+        """Plan positions (n, 2) about a whole-metre origin, as Delaunay's predicates want small numbers."""
+        return self.xyz[:, :2] - self.origin
+
+    @cached_property
+    def origin(self) -> np.ndarray:
+        return np.floor(self.xyz[:, :2].mean(axis=0))
+
+    @cached_property
+    def nearest(self):
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.xy)
+
+    @cached_property
+    def triangulation(self):
+        """SciPy's Delaunay triangulation, or None where the points span no triangle."""
+        from scipy.spatial import Delaunay, QhullError
+
+        try:
+            return Delaunay(self.xy) if len(self.xy) > 2 else None
+        except QhullError:
+            return None
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_world` (n, 2), NaN beyond reach."""
+        xy = np.asarray(xy_world, float)[:, :2]
+        heights = np.full(len(xy), np.nan)
+        if not len(self.xyz) or not len(xy):
+            return heights
+        distance, nearest = self.nearest.query(xy - self.origin, distance_upper_bound=self.reach_m)
+        known = np.isfinite(distance)
+        heights[known] = self.interpolate(xy[known] - self.origin, nearest[known])
+        return heights
+
+    def interpolate(self, xy: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy` about the origin, whose nearest points are `nearest` (n,)."""
+        heights = self.xyz[nearest, 2].copy()
+        if self.triangulation is None:
+            return heights
+        triangle, weights = find_triangles(self.triangulation, xy, self.triangulation.vertex_to_simplex[nearest])
+        inside = triangle >= 0
+        corners = self.triangulation.simplices[triangle[inside]]
+        heights[inside] = (weights[inside] * self.xyz[corners, 2]).sum(axis=1)
+        return heights
+
+
+def find_triangles(triangulation, xy: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The triangle (n,) that holds each of `xy` (n, 2), -1 outside the hull, and the barycentric weights (n, 3) there.
+
+    All positions walk at once from their triangles `start`, each step across the edge that the position lies farthest
+    beyond: this ends in any Delaunay triangulation (Devillers et al., Walking in a triangulation, 2002). From the
+    nearest point's triangle it takes a few steps, while SciPy's own search tries every triangle outside the hull.
+    """
+    triangle, weights = start.astype(np.int64), np.zeros((len(xy), 3))
+    walking = np.flatnonzero(triangle >= 0)
+    for _ in range(len(triangulation.simplices)):
+        if not len(walking):
+            break
+        here = triangle[walking]
+        weights[walking] = barycentric(triangulation.points[triangulation.simplices[here]], xy[walking])
+        beyond = weights[walking].argmin(axis=1)
+        leaves = weights[walking, beyond] < -1e-9
+        walking, here, beyond = walking[leaves], here[leaves], beyond[leaves]
+        triangle[walking] = triangulation.neighbors[here, beyond]
+        walking = walking[triangle[walking] >= 0]
+    return triangle, weights
+
+
+def barycentric(corners: np.ndarray, xy: np.ndarray) -> np.ndarray:
+    """Weights (n, 3) of the `corners` (n, 3, 2) of a triangle at `xy` (n, 2); a third each in one without area."""
+    to_corner = corners - xy[:, None]
+    following, last = np.roll(to_corner, -1, axis=1), np.roll(to_corner, -2, axis=1)
+    areas = following[..., 0] * last[..., 1] - following[..., 1] * last[..., 0]
+    total = areas.sum(axis=1, keepdims=True)
+    return np.where(total == 0, 1 / 3, areas / np.where(total == 0, 1.0, total))
+
+
+class LowestPointsTerrain:
+    """The lowest point within `radius_m` of each position, whatever its class: the last resort.
+
+    One low point is taken for noise, two for ground, where a cell of 2 m holds ten points or more.
+    """
+
+    source = "lowest points around the building"
+    cell_m = 2.0
+
+    def __init__(self, xyz: np.ndarray, radius_m: float = LOWEST_RADIUS_M):
+        self.radius_m = radius_m
+        self.points = np.asarray(xyz, float)
+
+    @cached_property
+    def xyz(self) -> np.ndarray:
+        """One low point (m, 3) a cell; found when first asked for, as a fallback seldom is."""
+        return rank_in_cells(self.points, self.cell_m, lambda counts: (counts >= 10).astype(np.int64))
+
+    @cached_property
+    def tree(self):
+        from scipy.spatial import cKDTree
+
+        return cKDTree(self.xyz[:, :2])
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_world` (n, 2), NaN where no point is within the radius."""
+        xy = np.asarray(xy_world, float)[:, :2]
+        if not len(self.xyz):
+            return np.full(len(xy), np.nan)
+        around = self.tree.query_ball_point(xy, self.radius_m)
+        return np.array([self.xyz[found, 2].min() if found else np.nan for found in around], float)
+
+
+class TerrainChain:
+    """Several terrains by preference: each position is answered by the first that knows it."""
+
+    def __init__(self, terrains: Sequence[Terrain]):
+        self.terrains = tuple(terrain for terrain in terrains if terrain is not None)
+
+    @property
+    def source(self) -> str:
+        return ", else ".join(terrain.source for terrain in self.terrains)
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_world` (n, 2), NaN where none knows."""
+        return self.heights_and_sources(xy_world)[0]
+
+    def heights_and_sources(self, xy_world: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+        """Heights (n,) and the sources that answered at least once, by preference: what a building's output names."""
+        xy = np.asarray(xy_world, float)[:, :2]
+        heights, sources = np.full(len(xy), np.nan), []
+        for terrain in self.terrains:
+            unknown = np.flatnonzero(np.isnan(heights))
+            if not len(unknown):
+                break
+            heights[unknown] = terrain.height_at(xy[unknown])
+            if not np.isnan(heights[unknown]).all():
+                sources.append(terrain.source)
+        return heights, tuple(sources)
+
+
+def read_terrain(path: str | Path, crs: Any = None) -> RasterTerrain:
+    """The terrain model at `path`, to be asked in coordinates of `crs` (the cloud's). Raises InputError."""
+    if "://" not in str(path) and not str(path).startswith("/vsi") and not Path(path).is_file():
+        raise InputError(f"expected a terrain model at {path}, got no such file; check the path")
+    return RasterTerrain(path, crs)
+
+
+def terrain_from_points(xyz_ground: np.ndarray, thin_m: float = THIN_M, reach_m: float = REACH_M) -> TinTerrain:
+    """The ground surface through `xyz_ground` (n, 3), world metres."""
+    return TinTerrain(xyz_ground, thin_m, reach_m)
+
+
+def lowest_points(xyz: np.ndarray, radius_m: float = LOWEST_RADIUS_M) -> LowestPointsTerrain:
+    """The fallback: the lowest of all points `xyz` (n, 3) around each position."""
+    return LowestPointsTerrain(xyz, radius_m)

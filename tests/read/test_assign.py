@@ -1,0 +1,50 @@
+"""Points found through the grid are exactly those a point-by-point test finds."""
+
+import doctest
+
+import numpy as np
+import pytest
+import shapely
+
+import hiproof.read.assign
+from hiproof.model import Footprint
+from hiproof.read.assign import PointGrid, points_near_footprints, points_of_footprints
+
+
+def some_footprints(seed, count=12):
+    rng = np.random.default_rng(seed)
+    hulls = [shapely.MultiPoint(rng.uniform(0, 9, (7, 2)) + rng.uniform(-10, 80, 2)).convex_hull for _ in range(count)]
+    holed = shapely.difference(shapely.box(20, 20, 50, 45), shapely.box(30, 30, 40, 40))
+    return [Footprint(str(i), polygon) for i, polygon in enumerate([*hulls, holed, shapely.Polygon()])]
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("offset", [0.0, 1e7])
+def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
+    footprints = some_footprints(seed)
+    xyz = np.random.default_rng(seed).uniform([0, 0, 0], [70, 60, 9], (3000, 3)) + [offset, offset, 0]
+    footprints = [Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints]
+    for footprint, found in zip(footprints, points_of_footprints(xyz, footprints), strict=True):
+        assert np.array_equal(found, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1])))
+    for footprint, found in zip(footprints, points_near_footprints(xyz, footprints, 3.0), strict=True):
+        distance = shapely.distance(footprint.polygon, shapely.points(xyz[:, :2]))
+        near = np.zeros(len(xyz), bool)
+        near[found] = True
+        assert near[distance < 2.9].all() and not near[distance > 3.0].any()
+
+
+def test_neighbours_do_not_take_points_from_each_other():
+    xy = np.array([[0.5, 0.5], [1.5, 0.5]])
+    both = [Footprint("a", shapely.box(0, 0, 2, 1)), Footprint("b", shapely.box(1, 0, 3, 1))]
+    assert [found.tolist() for found in points_of_footprints(xy, both)] == [[0, 1], [1]]
+
+
+def test_no_points_and_no_polygon_find_nothing():
+    footprints = [Footprint("a", shapely.box(0, 0, 1, 1)), Footprint("b", shapely.Polygon())]
+    assert [len(found) for found in points_of_footprints(np.empty((0, 3)), footprints)] == [0, 0]
+    assert [len(found) for found in points_of_footprints(np.ones((4, 3)) * 0.5, footprints)] == [4, 0]
+    assert len(PointGrid(np.ones((4, 2))).inside(shapely.box(1e6, 1e6, 1e6 + 1, 1e6 + 1))) == 0
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(hiproof.read.assign).failed == 0

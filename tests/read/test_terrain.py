@@ -1,0 +1,196 @@
+"""Every terrain gives back the plane it was made from, says NaN where it does not know, and names its source."""
+
+import doctest
+import pickle
+
+import numpy as np
+import pytest
+import rasterio
+from pyproj import Transformer
+from rasterio.transform import from_origin
+from scipy.interpolate import LinearNDInterpolator
+from scipy.spatial import Delaunay
+
+import hiproof.read.thin
+from hiproof.errors import InputError
+from hiproof.read import terrain
+from hiproof.read.terrain import TerrainChain, lowest_points, read_terrain, terrain_from_points
+from hiproof.read.thin import thin_to_grid
+
+WEST, NORTH = 85000.0, 446200.0
+
+
+def plane(xy):
+    return 3.0 + 0.05 * (xy[:, 0] - WEST) - 0.02 * (xy[:, 1] - NORTH)
+
+
+def write_raster(path, width=120, height=80, step=0.5, crs="EPSG:28992", hole=None, heights=None):
+    transform = from_origin(WEST, NORTH, step, step)
+    columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    x, y = WEST + step * columns.ravel(), NORTH - step * rows.ravel()
+    z = plane(np.column_stack([x, y])).reshape(height, width) if heights is None else heights
+    if hole is not None:
+        z[hole] = -9999
+    options = {"driver": "GTiff", "width": width, "height": height, "count": 1, "dtype": "float64", "nodata": -9999}
+    with rasterio.open(path, "w", crs=crs, transform=transform, **options) as file:
+        file.write(z, 1)
+    return path
+
+
+def inside(count=200, seed=1, margin=1.0):
+    return np.random.default_rng(seed).uniform(
+        [WEST + margin, NORTH - 40 + margin], [WEST + 60 - margin, NORTH - margin], (count, 2)
+    )
+
+
+def ground(count=4000, seed=2):
+    xy = np.random.default_rng(seed).uniform([WEST, NORTH - 40], [WEST + 60, NORTH], (count, 2))
+    return np.column_stack([xy, plane(xy)])
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(hiproof.read.thin).failed == 0
+
+
+def test_a_raster_is_interpolated_between_pixel_centres(tmp_path):
+    model = read_terrain(write_raster(tmp_path / "dtm.tif"))
+    assert np.allclose(model.height_at(inside()), plane(inside()), atol=1e-9)
+    assert model.source == "terrain model dtm.tif"
+
+
+def test_tiles_change_nothing(tmp_path, monkeypatch):
+    rough = np.random.default_rng(0).normal(size=(80, 120))
+    path = write_raster(tmp_path / "dtm.tif", heights=rough)
+    whole = read_terrain(path).height_at(inside(2000, margin=0))
+    monkeypatch.setattr(terrain, "TILE_PX", 16)
+    tiled = read_terrain(path)
+    assert np.array_equal(tiled.height_at(inside(2000, margin=0)), whole)
+    assert len(tiled.tiles) <= terrain.TILES_KEPT
+
+
+def test_a_raster_in_another_crs_is_asked_there(tmp_path):
+    model = read_terrain(write_raster(tmp_path / "dtm.tif"), crs="EPSG:25831")
+    there = Transformer.from_crs(28992, 25831, always_xy=True)
+    assert np.allclose(model.height_at(np.column_stack(there.transform(*inside().T))), plane(inside()), atol=1e-4)
+    assert read_terrain(tmp_path / "dtm.tif", crs="EPSG:7415").transformer is None
+
+
+def test_a_raster_survives_the_way_to_another_process(tmp_path):
+    model = read_terrain(write_raster(tmp_path / "dtm.tif"), crs="EPSG:25831")
+    there = np.column_stack(Transformer.from_crs(28992, 25831, always_xy=True).transform(*inside().T))
+    assert np.array_equal(pickle.loads(pickle.dumps(model)).height_at(there), model.height_at(there))
+
+
+def test_outside_and_without_data_is_unknown(tmp_path):
+    model = read_terrain(write_raster(tmp_path / "dtm.tif", hole=(slice(20, 40), slice(20, 40))))
+    outside = [[WEST - 1, NORTH - 5], [WEST + 61, NORTH - 5], [WEST + 5, NORTH + 1], [WEST + 5, NORTH - 41]]
+    assert np.isnan(model.height_at(np.array(outside))).all()
+    assert np.isnan(model.height_at(np.array([[WEST + 15, NORTH - 15]]))).all()
+    edge = np.array([[WEST + 9.9, NORTH - 15.0], [WEST, NORTH], [WEST + 60, NORTH - 40]])
+    assert np.allclose(model.height_at(edge), plane(edge), atol=0.03)
+
+
+def test_a_tin_gives_back_the_plane_and_the_nearest_height_beyond_it():
+    tin = terrain_from_points(ground(), thin_m=1.0)
+    assert np.abs(tin.height_at(inside()) - plane(inside())).max() < 0.06
+    assert terrain_from_points(ground(400), thin_m=0.001).height_at(inside(50, margin=5)) == pytest.approx(
+        plane(inside(50, margin=5)), abs=2e-4
+    )
+    beyond = np.array([[WEST - 20, NORTH - 20], [WEST - 100, NORTH - 20]])
+    heights = tin.height_at(beyond)
+    assert heights[0] == pytest.approx(plane(np.array([[WEST, NORTH - 20]]))[0], abs=0.1) and np.isnan(heights[1])
+    assert tin.source == "ground points"
+
+
+def test_the_walk_agrees_with_scipys_search():
+    rng = np.random.default_rng(3)
+    xy, z, asked = rng.uniform(0, 50, (300, 2)), rng.normal(size=300), rng.uniform(-5, 55, (2000, 2))
+    triangulation = Delaunay(xy)
+    triangle, weights = terrain.find_triangles(
+        triangulation, asked, rng.integers(0, len(triangulation.simplices), 2000)
+    )
+    slow = LinearNDInterpolator(xy, z)(asked)
+    assert np.array_equal(triangle < 0, np.isnan(slow))
+    found = triangle >= 0
+    heights = (weights[found] * z[triangulation.simplices[triangle[found]]]).sum(axis=1)
+    assert np.allclose(heights, slow[found], atol=1e-9)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5])
+def test_ground_points_that_span_no_triangle_still_answer_nearby(count):
+    on_a_line = np.column_stack([WEST + 5.0 * np.arange(count), np.full(count, NORTH), np.full(count, -2.5)])
+    heights = terrain_from_points(on_a_line).height_at(np.array([[WEST + 1, NORTH + 1], [WEST + 500, NORTH]]))
+    assert np.isnan(heights[1]) and (heights[0] == -2.5 if count else np.isnan(heights[0]))
+
+
+def test_thinning_depends_neither_on_order_nor_on_tiles():
+    points = ground(3000)
+    shuffled = points[np.random.default_rng(4).permutation(len(points))]
+    whole = thin_to_grid(points, 1.0)
+    assert np.array_equal(whole, thin_to_grid(shuffled, 1.0))
+    west, east = points[points[:, 0] < WEST + 30], points[points[:, 0] >= WEST + 30]
+    tiles = np.concatenate([thin_to_grid(west, 1.0), thin_to_grid(east, 1.0)])
+    assert np.allclose(np.sort(tiles, axis=0), np.sort(whole, axis=0), atol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_thinning_equals_a_plain_loop_over_cells(seed):
+    points = np.round(np.random.default_rng(seed).uniform(-20, 20, (400, 3)), 4)
+    slow = []
+    for cell in np.unique(np.floor(points[:, [1, 0]] / 3.0), axis=0):
+        own = points[(np.floor(points[:, [1, 0]] / 3.0) == cell).all(axis=1)]
+        slow.append([*own[:, :2].mean(axis=0), np.sort(own[:, 2])[(len(own) - 1) // 2]])
+    assert np.allclose(thin_to_grid(points, 3.0), slow, atol=1e-9)
+
+
+def test_lowest_points_find_the_street_and_not_the_well():
+    street = ground()
+    roof = street + [0, 0, 8]
+    well = np.array([[WEST + 30, NORTH - 20, -50.0]])
+    terrain = lowest_points(np.concatenate([roof, street, well]))
+    heights = terrain.height_at(np.array([[WEST + 30, NORTH - 20], [WEST + 300, NORTH]]))
+    around = plane(np.array([[WEST + 30, NORTH - 20]]))[0]
+    assert around - 0.7 < heights[0] < around and np.isnan(heights[1])
+    assert np.isnan(lowest_points(np.empty((0, 3))).height_at(np.zeros((2, 2)))).all()
+
+
+def test_a_chain_asks_the_next_where_one_does_not_know(tmp_path):
+    model = read_terrain(write_raster(tmp_path / "dtm.tif", width=20, height=20))
+    chain = TerrainChain([model, None, terrain_from_points(ground() + [0, 0, 1])])
+    here, there, nowhere = [WEST + 5, NORTH - 5], [WEST + 40, NORTH - 20], [WEST + 900, NORTH]
+    heights, sources = chain.heights_and_sources(np.array([here, there, nowhere]))
+    assert heights[0] == pytest.approx(plane(np.array([here]))[0])
+    assert heights[1] == pytest.approx(plane(np.array([there]))[0] + 1, abs=0.1)
+    assert np.isnan(heights[2]) and sources == ("terrain model dtm.tif", "ground points")
+    assert chain.heights_and_sources(np.array([there]))[1] == ("ground points",)
+    assert np.array_equal(chain.height_at(np.array([here])), heights[:1])
+
+
+@pytest.mark.parametrize(
+    "kind, words",
+    [
+        ("missing", "no such file"),
+        ("text", "that GDAL reads"),
+        ("empty", "that GDAL reads"),
+        ("unplaced", "without position"),
+    ],
+)
+@pytest.mark.filterwarnings("ignore::rasterio.errors.NotGeoreferencedWarning")
+def test_what_is_no_terrain_model_gets_one_full_sentence(tmp_path, kind, words):
+    path = tmp_path / "dtm.tif"
+    if kind == "text":
+        path.write_text("1 2 3\n")
+    elif kind == "empty":
+        path.write_bytes(b"")
+    elif kind == "unplaced":
+        with rasterio.open(path, "w", driver="GTiff", width=4, height=4, count=1, dtype="float32") as file:
+            file.write(np.zeros((4, 4), "float32"), 1)
+    with pytest.raises(InputError, match=words):
+        read_terrain(path)
+
+
+def test_a_truncated_raster_says_so_when_it_is_read(tmp_path):
+    path = write_raster(tmp_path / "dtm.tif", heights=np.random.default_rng(0).normal(size=(80, 120)))
+    path.write_bytes(path.read_bytes()[:30000])
+    with pytest.raises(InputError, match="raster"):
+        read_terrain(path).height_at(inside())
