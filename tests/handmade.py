@@ -81,4 +81,4 @@ def modelled(
 
 def unmodelled(id: str = "lost", **changes) -> Building:
     """A building asked for that got no model."""
-    return Building(id, Status.NO_POINTS, attributes={"bouwjaar": None}, **changes)
+    return Building(id, Status.NO_POINTS, **({"attributes": {"bouwjaar": None}} | changes))

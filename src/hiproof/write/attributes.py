@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import os
 import pickle
+import warnings
 from collections.abc import Iterable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from typing import Any
 
 import numpy as np
@@ -86,29 +87,40 @@ class AttributesWriter(BuildingWriter):
         from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
         columns = [column([row.get(name) for _, row in rows], kind) for name, kind in kinds.items()]
-        geometry = np.array([wkb for wkb, _ in rows] + [None], dtype=object)[:-1]
-        before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
-        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": FIXED_DATE})
         try:
-            pyogrio.raw.write(
-                self.hidden,
-                geometry,
-                [values for values, _ in columns],
-                column_names(kinds),
-                [mask for _, mask in columns],
-                layer=LAYER,
-                driver="GPKG",
-                geometry_type="MultiPolygon",
-                promote_to_multi=True,
-                crs=plan_crs(self.crs),
-                append=append,
-            )
+            with fixed_date():
+                pyogrio.raw.write(
+                    self.hidden,
+                    objects([wkb for wkb, _ in rows]),
+                    [values for values, _ in columns],
+                    column_names(kinds),
+                    [mask for _, mask in columns],
+                    layer=LAYER,
+                    driver="GPKG",
+                    geometry_type="MultiPolygon",
+                    promote_to_multi=True,
+                    crs=plan_crs(self.crs),
+                    append=append,
+                )
         except (DataSourceError, DataLayerError, FeatureError, RuntimeError, OSError) as error:
             raise OutputError(
                 f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions and the space left"
             ) from error
-        finally:
-            pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})
+
+
+@contextmanager
+def fixed_date() -> Iterator[None]:
+    """GDAL writes FIXED_DATE as the date of change, and an unknown CRS is no warning."""
+    import pyogrio
+
+    before = pyogrio.get_gdal_config_option("OGR_CURRENT_DATE")
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": FIXED_DATE})
+    try:
+        with warnings.catch_warnings():
+            warnings.filterwarnings("ignore", "'crs' was not provided")
+            yield
+    finally:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})
 
 
 def plan_outline(building: Building) -> shapely.Geometry | None:
@@ -150,9 +162,16 @@ def column(values: list[Any], kind: type) -> tuple[np.ndarray, np.ndarray]:
     """Values (n,) of one type, and where they are unknown (n,)."""
     mask = np.array([value is None for value in values], dtype=bool)
     if kind is str:
-        return np.array([*(None if v is None else str(v) for v in values), None], dtype=object)[:-1], mask
+        return objects([None if v is None else str(v) for v in values]), mask
     dtype = {bool: np.bool_, int: np.int64, float: np.float64}[kind]
     return np.array([kind(0) if v is None else kind(v) for v in values], dtype=dtype), mask
+
+
+def objects(values: list[Any]) -> np.ndarray:
+    """An array (n,) of the values themselves, whatever their types and lengths."""
+    array = np.empty(len(values), dtype=object)
+    array[:] = values
+    return array
 
 
 def column_names(names: Iterable[str]) -> list[str]:

@@ -1,0 +1,140 @@
+"""CityGML against its own schema, and what stands in it against the buildings."""
+
+import datetime
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
+from hiproof.write.citygml import NAMESPACES, CityGMLWriter, write_citygml
+from hiproof.write.naming import gml_name
+
+SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml2" / "CityGML.xsd"
+GML_ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"
+
+
+def street():
+    return [
+        unmodelled(),
+        modelled(gable_house(), "0503100000012345"),
+        modelled(courtyard(), "a b/ä", ("flat", "hip")),
+        modelled(box(), "same"),
+        modelled(box(), "same", terrain_intersection=()),
+        modelled(box(), "same-1", quality=replace(modelled(box()).quality, psd_mean=float("inf"))),
+    ]
+
+
+def written(tmp_path, buildings, crs="EPSG:7415", **options):
+    write_citygml(tmp_path / "a.gml", buildings, crs, **options)
+    return etree.parse(tmp_path / "a.gml").getroot()
+
+
+def found(root, path):
+    return root.xpath(path, namespaces=NAMESPACES)
+
+
+@pytest.fixture(scope="module")
+def schema():
+    if not SCHEMA.exists():
+        pytest.skip(f"needs the CityGML 2.0 schema at {SCHEMA}")
+    return etree.XMLSchema(etree.parse(SCHEMA))
+
+
+@pytest.mark.parametrize("crs", ["EPSG:7415", "EPSG:28992", None])
+@pytest.mark.parametrize("buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"])
+def test_valid_by_the_schema(tmp_path, schema, buildings, crs):
+    schema.assertValid(written(tmp_path, buildings, crs, creation_date=datetime.date(2020, 2, 3)).getroottree())
+
+
+def test_strange_attributes_are_valid(tmp_path, schema):
+    strange = {
+        "\x00": "\x01ok\ud800",
+        "<": 10**30,
+        "flag": True,
+        "when": datetime.date(2020, 1, 2),
+        "list": [1],
+        "": 0.5,
+    }
+    root = written(tmp_path, [modelled(box(), "\x02", attributes=strange)])
+    schema.assertValid(root.getroottree())
+    assert found(root, "//gen:stringAttribute[@name='flag']/gen:value/text()") == ["true"]
+
+
+def test_every_building_is_there(tmp_path):
+    root = written(tmp_path, street())
+    assert found(root, "//bldg:Building/gml:name/text()") == [b.id for b in street()]
+    assert len(found(root, "//bldg:lod2Solid")) == 5
+
+
+def test_ids_are_unique_and_links_lead_somewhere(tmp_path):
+    root = written(tmp_path, street())
+    ids = [element.get(GML_ID) for element in root.iter() if element.get(GML_ID)]
+    assert len(ids) == len(set(ids))
+    links = {element.get(HREF)[1:] for element in root.iter() if element.get(HREF)}
+    assert links == set(found(root, "//gml:Polygon/@gml:id"))
+    assert found(root, "//bldg:Building/@gml:id")[-3:] == ["bldg-same", "bldg-same..2", "bldg-same-1"]
+
+
+@pytest.mark.parametrize(
+    "kinds, code", [(("hip",), "1040"), (("hip", "hip"), "1040"), (("hip", "flat"), "1130"), (("free",), "1130")]
+)
+def test_roof_type(tmp_path, kinds, code):
+    (element,) = found(written(tmp_path, [modelled(box(), kinds=kinds)]), "//bldg:roofType")
+    assert element.text == code
+    assert element.get("codeSpace").endswith("_AbstractBuilding_roofType.xml")
+
+
+def test_heights_attributes_and_date(tmp_path):
+    root = written(tmp_path, [modelled(gable_house())], creation_date=datetime.date(2020, 2, 3))
+    assert found(root, "//bldg:measuredHeight[@uom='m']/text()") == ["7.0000"]
+    assert found(root, "//core:creationDate/text()") == ["2020-02-03"]
+    assert found(root, "//gen:doubleAttribute[@name='rf_h_roof_ridge']/gen:value/text()") == ["7.0"]
+    assert found(root, "//gen:stringAttribute[@name='naam']/gen:value/text()") == ["Café <&>"]
+    assert found(root, "//bldg:RoofSurface/gen:doubleAttribute[@name='azimuth']/gen:value/text()") == ["270.0", "90.0"]
+
+
+def test_polygons_are_the_solid(tmp_path):
+    solid = courtyard()
+    root = written(tmp_path, [modelled(solid)])
+    polygons = found(root, "//gml:Polygon")
+    assert len(polygons) == len(solid.faces)
+    for polygon, face in zip(polygons, solid.faces, strict=True):
+        rings = [np.array(text.split(), float).reshape(-1, 3) for text in found(polygon, ".//gml:posList/text()")]
+        assert len(rings) == len(face.rings) == len(found(polygon, "gml:exterior|gml:interior"))
+        for ring, indices in zip(rings, face.rings, strict=True):
+            np.testing.assert_allclose(ring, solid.vertices[[*indices, indices[0]]] + RD_ORIGIN, atol=1e-9)
+
+
+def test_envelope_holds_everything(tmp_path):
+    root = written(tmp_path, street())
+    (box_,) = found(root, "/core:CityModel/gml:boundedBy/gml:Envelope")
+    assert box_.get("srsName") == "urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709"
+    assert box_.get("srsDimension") == "3"
+    low, high = (np.array(corner.text.split(), float) for corner in box_)
+    xyz = np.concatenate([np.array(t.split(), float).reshape(-1, 3) for t in found(root, "//gml:posList/text()")])
+    np.testing.assert_allclose([low, high], [xyz.min(axis=0), xyz.max(axis=0)])
+
+
+@pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-1e7, 12345678.9, 8848.0)])
+def test_far_away_and_under_water(tmp_path, schema, origin):
+    root = written(tmp_path, [modelled(box(), origin=np.array(origin))])
+    schema.assertValid(root.getroottree())
+    assert found(root, "//bldg:measuredHeight/text()") == ["3.0000"]
+
+
+def test_incremental_equals_whole(tmp_path):
+    write_citygml(tmp_path / "whole.gml", street(), "EPSG:7415")
+    with CityGMLWriter(tmp_path / "steps.gml", "EPSG:7415") as writer:
+        for building in street():
+            writer.add(building)
+    assert (tmp_path / "whole.gml").read_bytes() == (tmp_path / "steps.gml").read_bytes()
+
+
+@pytest.mark.parametrize("id", ["a", "ä", "1", " ", "", "<&>", "x" * 300, "a:b", "\n"])
+def test_any_id_becomes_a_name(id):
+    name = "bldg-" + gml_name(id)
+    assert etree.fromstring(f"<a xmlns:xml='http://www.w3.org/XML/1998/namespace' xml:id='{name}'/>") is not None
+    assert all(c.isascii() and (c.isalnum() or c in "_.-") for c in name)

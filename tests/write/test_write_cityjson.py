@@ -1,0 +1,201 @@
+"""CityJSON against its own schema, read back, and through the eyes of a tool that measures models."""
+
+import importlib.util
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
+from hiproof.model import GROUND, ROOF
+from hiproof.write.cityjson import CityJSONWriter, write_cityjson
+
+SHARED = Path(__file__).parents[3] / "shared"
+FOOTPRINT = shapely.Polygon([(85000, 446000), (85000, 446009), (85009, 446009), (85009, 446000)])
+
+
+def street():
+    return [
+        unmodelled("first"),
+        unmodelled("drawn", footprint=FOOTPRINT, z_ground=1.5),
+        modelled(gable_house(), "0503/1 ä"),
+        modelled(courtyard(), "yard", ("flat", "hip")),
+        modelled(box(), "yard"),
+    ]
+
+
+def sequence(tmp_path, buildings, crs="EPSG:7415", **options):
+    write_cityjson(tmp_path / "a.city.jsonl", buildings, crs, **options)
+    return [json.loads(line) for line in (tmp_path / "a.city.jsonl").read_text("utf-8").splitlines()]
+
+
+def document(tmp_path, buildings, crs="EPSG:7415", **options):
+    write_cityjson(tmp_path / "a.city.json", buildings, crs, **options)
+    return json.loads((tmp_path / "a.city.json").read_text("utf-8"))
+
+
+def validator(name):
+    path = SHARED / "schemas" / "cityjson" / name
+    if not path.exists():
+        pytest.skip(f"needs the CityJSON 2.0 schema at {path}")
+    jsonschema = pytest.importorskip("jsonschema")
+    return jsonschema.Draft7Validator(json.loads(path.read_text()))
+
+
+@pytest.mark.parametrize("buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"])
+@pytest.mark.parametrize("crs", ["EPSG:7415", None])
+def test_valid_by_the_schema(tmp_path, buildings, crs):
+    whole, feature = validator("cityjson.min.schema.json"), validator("cityjsonfeature.min.schema.json")
+    head, *features = sequence(tmp_path, buildings, crs)
+    whole.validate(head)
+    for one in features:
+        feature.validate(one)
+    whole.validate(document(tmp_path, buildings, crs))
+
+
+def solid_of(city_object):
+    return next(g for g in city_object["geometry"] if g["type"] == "Solid")
+
+
+def test_the_solid_comes_back(tmp_path):
+    head, *_, feature = sequence(tmp_path, [unmodelled(), modelled(courtyard())])
+    transform = head["transform"]
+    xyz = np.array(feature["vertices"]) * transform["scale"] + transform["translate"]
+    assert len(np.unique(xyz, axis=0)) == len(xyz)
+    want = courtyard().moved(RD_ORIGIN)
+    geometry = solid_of(feature["CityObjects"]["a"])
+    kinds = [geometry["semantics"]["surfaces"][v]["type"] for v in geometry["semantics"]["values"][0]]
+    assert kinds == [face.kind for face in want.faces]
+    for rings, face in zip(geometry["boundaries"][0], want.faces, strict=True):
+        for ring, indices in zip(rings, face.rings, strict=True):
+            np.testing.assert_allclose(xyz[ring], want.vertices[list(indices)], atol=5e-5)
+
+
+def test_document_and_sequence_hold_the_same(tmp_path):
+    head, *features = sequence(tmp_path, street())
+    whole = document(tmp_path, street())
+    assert whole["transform"] == head["transform"]
+    assert whole["metadata"] == head["metadata"]
+    vertices = np.array(whole["vertices"])
+    for feature in features:
+        ((name, one),) = feature["CityObjects"].items()
+        other = whole["CityObjects"][name]
+        assert other["attributes"] == one["attributes"]
+        for here, there in zip(one.get("geometry", []), other.get("geometry", []), strict=True):
+            own = np.array(feature["vertices"])
+            assert own[flat(here["boundaries"])].tolist() == vertices[flat(there["boundaries"])].tolist()
+
+
+def flat(nested):
+    return [nested] if isinstance(nested, int) else [index for inner in nested for index in flat(inner)]
+
+
+def test_metadata(tmp_path):
+    head, *features = sequence(tmp_path, street())
+    assert head["metadata"]["referenceSystem"] == "https://www.opengis.net/def/crs/EPSG/0/7415"
+    assert head["metadata"]["geographicalExtent"] == [85000, 446000, 0, 85010, 446012, 7]
+    assert max(head["transform"]["scale"]) <= 0.0001
+    assert head["transform"]["translate"] == [85000, 446000, 0]
+    assert [list(f["CityObjects"]) for f in features[-2:]] == [["yard"], ["yard..2"]]
+
+
+def test_attributes_under_roofers_names(tmp_path):
+    _, feature = sequence(tmp_path, [modelled(gable_house())])
+    attributes = feature["CityObjects"]["a"]["attributes"]
+    expected = {
+        "rf_h_ground": 0,
+        "rf_h_roof_min": 3,
+        "rf_h_roof_50p": 5,
+        "rf_h_roof_70p": 5.8,
+        "rf_h_roof_max": 7,
+        "rf_h_roof_ridge": 7,
+        "rf_roof_type": "slanted",
+        "rf_rmse_lod22": 0.06,
+        "rf_val3dity_lod22": "[]",
+        "rf_volume_lod22": 480,
+        "rf_pt_density": 4.5,
+        "rf_nodata_frac": None,
+        "hiproof_status": "modelled",
+        "hiproof_roof_type": "gable",
+        "hiproof_share_within_20cm": 0.99,
+        "bouwjaar": 1930,
+        "naam": "Café <&>",
+    }
+    assert {name: attributes[name] for name in expected} == expected
+
+
+def test_the_prefix_is_the_callers(tmp_path):
+    _, feature = sequence(tmp_path, [modelled(gable_house())], prefix="b3_")
+    city_object = feature["CityObjects"]["a"]
+    assert city_object["attributes"]["b3_volume_lod22"] == 480
+    roofs = [s for s in solid_of(city_object)["semantics"]["surfaces"] if s["type"] == ROOF]
+    assert [(s["b3_slope"], s["b3_azimuth"]) for s in roofs] == [(45, 270), (45, 90)]
+
+
+def test_footprint_looks_up(tmp_path):
+    _, drawn, yard = sequence(tmp_path, [street()[1], street()[3]])
+    for feature in (drawn, yard):
+        (city_object,) = feature["CityObjects"].values()
+        footprint = city_object["geometry"][0]
+        assert (footprint["type"], footprint["lod"]) == ("MultiSurface", "0")
+        outer, *holes = (np.array(feature["vertices"])[ring] for ring in footprint["boundaries"][0])
+        assert shapely.LinearRing(outer[:, :2]).is_ccw
+        assert not any(shapely.LinearRing(hole[:, :2]).is_ccw for hole in holes)
+    assert drawn["vertices"][0][2] == 15000
+    assert len(holes) == 1
+
+
+def test_a_building_without_model_has_its_status(tmp_path):
+    _, feature = sequence(tmp_path, [unmodelled()])
+    assert "geometry" not in feature["CityObjects"]["lost"]
+    assert feature["CityObjects"]["lost"]["attributes"]["hiproof_status"] == "no_points"
+
+
+def test_not_a_number_never_reaches_the_file(tmp_path):
+    strange = {"a": float("nan"), "b": np.float64("inf"), "c": np.datetime64("NaT"), "d": {1: 2}, "e": b"\xff"}
+    _, feature = sequence(tmp_path, [modelled(box(), attributes=strange, z_ground=float("nan"))])
+    attributes = feature["CityObjects"]["a"]["attributes"]
+    assert [attributes[name] for name in "abcde"] == [None, None, None, "{1: 2}", "\ufffd"]
+    assert attributes["rf_h_ground"] == 0.0
+
+
+@pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-12345678.9, 1e7, 8848.0)])
+def test_far_away_and_under_water(tmp_path, origin):
+    head, feature = sequence(tmp_path, [modelled(box(), origin=np.array(origin))])
+    xyz = np.array(feature["vertices"]) * head["transform"]["scale"] + head["transform"]["translate"]
+    np.testing.assert_allclose(xyz.min(axis=0), origin, atol=1e-4)
+
+
+def test_an_added_building_leaves_the_others_as_they_were(tmp_path):
+    before = sequence(tmp_path, street()[2:])
+    after = sequence(tmp_path, [*street()[2:], modelled(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))])
+    assert after[1:-1] == before[1:]
+
+
+def test_incremental_equals_whole(tmp_path):
+    sequence(tmp_path, street())
+    with CityJSONWriter(tmp_path / "b.city.jsonl", "EPSG:7415") as writer:
+        for building in street():
+            writer.add(building)
+    assert (tmp_path / "a.city.jsonl").read_bytes() == (tmp_path / "b.city.jsonl").read_bytes()
+
+
+def test_a_measuring_tool_reads_it(tmp_path):
+    path = SHARED / "tools" / "roof_residuals.py"
+    if not path.exists():
+        pytest.skip(f"needs {path}")
+    spec = importlib.util.spec_from_file_location("roof_residuals", path)
+    tool = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(tool)
+    sequence(tmp_path, street())
+    roofs = list(tool.read_roofs(tmp_path / "a.city.jsonl"))
+    assert len(roofs) == sum(len(b.solid.of_kind(ROOF)) for b in street() if b.solid is not None)
+    assert sum(polygon.area for polygon, *_ in roofs) == pytest.approx(96 + 84 + 20, rel=1e-6)
+
+
+def test_every_solid_has_its_ground(tmp_path):
+    for feature in sequence(tmp_path, street())[3:]:
+        (city_object,) = feature["CityObjects"].values()
+        assert GROUND in [s["type"] for s in solid_of(city_object)["semantics"]["surfaces"]]

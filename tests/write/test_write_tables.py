@@ -1,0 +1,138 @@
+"""parameters.jsonl and buildings.gpkg: what goes in comes out, whatever the input's attributes are."""
+
+import json
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+
+from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
+from hiproof.errors import InputError
+from hiproof.write import attributes, read_parameters, write_attributes, write_parameters
+
+
+def table(tmp_path, buildings, crs="EPSG:7415"):
+    """Columns by name, and geometries, of the GeoPackage written."""
+    write_attributes(tmp_path / "a.gpkg", buildings, crs)
+    meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "a.gpkg")
+    return dict(zip(meta["fields"], columns, strict=True)), shapely.from_wkb(wkb), meta
+
+
+def test_parameters_come_back(tmp_path):
+    building = modelled(gable_house(), kinds=("gable", "flat"), objective=-12.3456789)
+    write_parameters(tmp_path / "p.jsonl", [unmodelled(), building])
+    lost, record = read_parameters(tmp_path / "p.jsonl")
+    assert (lost["id"], lost["status"], lost["type"], lost["parts"]) == ("lost", "no_points", None, [])
+    assert record["theta_p"] == {"width": 8.0, "height": 4.0}
+    assert record["T_G"] == RD_ORIGIN.tolist()
+    assert record["T_L"] == [0.1, -0.2, 3.0]
+    assert record["kappa"] == 0.25
+    assert record["objective"] == -12.345679
+    assert record["residuals"]["psd_mean"] == 0.05
+    assert record["residuals"]["psd_std"] is None
+    assert [part["type"] for part in record["parts"]] == ["gable", "flat"]
+    assert record["parts"][0]["pieces"][0]["planes"] == [[1.0, 0.0, 3.0], [-1.0, 0.0, 11.0]]
+
+
+def test_a_roof_can_be_built_again_from_its_record(tmp_path):
+    building = modelled(courtyard())
+    write_parameters(tmp_path / "p.jsonl", [building])
+    (record,) = read_parameters(tmp_path / "p.jsonl")
+    (piece,) = record["parts"][0]["pieces"]
+    outer, *holes = piece["outline"]
+    assert shapely.Polygon(outer, holes).equals(building.parts[0].pieces[0].outline)
+
+
+def test_parameters_are_strict_json(tmp_path):
+    part = replace(
+        modelled(box()).parts[0], parameters={"width": float("nan")}, translation=np.array([0, -0.0, np.inf])
+    )
+    building = modelled(box(), objective=float("nan"))
+    building = replace(building, roof=replace(building.roof, parts=(part,)))
+    write_parameters(tmp_path / "p.jsonl", [building])
+    text = (tmp_path / "p.jsonl").read_text()
+    record = json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert record["theta_p"] == {"width": None}
+    assert record["T_L"] == [0.0, 0.0, None]
+    assert "-0.0" not in text
+
+
+@pytest.mark.parametrize("content", ["{", "[1]\n", '{"id": 1}\n', "\x00\x01"])
+def test_a_file_that_is_no_parameters_file(tmp_path, content):
+    (tmp_path / "p.jsonl").write_text(content)
+    with pytest.raises(InputError, match=r"line 1 of .*p\.jsonl"):
+        read_parameters(tmp_path / "p.jsonl")
+
+
+def test_a_parameters_file_that_is_not_there(tmp_path):
+    with pytest.raises(InputError, match="check the path"):
+        read_parameters(tmp_path / "p.jsonl")
+
+
+def test_the_table_has_every_building(tmp_path):
+    square = shapely.box(85000, 446000, 85001, 446001)
+    buildings = [unmodelled(), unmodelled("asked", footprint=square), modelled(gable_house()), modelled(courtyard())]
+    columns, outlines, meta = table(tmp_path, buildings)
+    assert columns["id"].tolist() == ["lost", "asked", "a", "a"]
+    assert columns["hiproof_status"].tolist() == ["no_points", "no_points", "modelled", "modelled"]
+    assert columns["rf_volume_lod22"][2:].tolist() == [480.0, 420.0]
+    assert outlines[0] is None
+    assert [outline.area for outline in outlines[1:]] == [1.0, 96.0, 100.0]
+    assert (meta["crs"], meta["geometry_type"]) == ("EPSG:28992", "MultiPolygon")
+
+
+def test_without_a_roof_the_ground_is_the_outline(tmp_path):
+    _, outlines, _ = table(tmp_path, [replace(modelled(courtyard()), roof=None)])
+    assert outlines[0].area == pytest.approx(84)
+
+
+@pytest.mark.parametrize(
+    "values, dtype, want",
+    [
+        ([1, 2, None], "float64", [1, 2, np.nan]),
+        ([1, 2, 3], "int64", [1, 2, 3]),
+        ([1, 2.5, True], "float64", [1, 2.5, 1]),
+        ([True, 2, 3], "int64", [1, 2, 3]),
+        ([True, False, True], "bool", [True, False, True]),
+        ([1, "x", None], "object", ["1", "x", None]),
+        ([None, None, None], "object", [None, None, None]),
+        ([2**70, 1, 2], "object", [str(2**70), "1", "2"]),
+        ([float("nan"), 1, np.int32(2)], "float64", [np.nan, 1, 2]),
+    ],
+)
+def test_a_column_has_one_type(tmp_path, values, dtype, want):
+    columns, _, _ = table(tmp_path, [unmodelled(attributes={"v": value}) for value in values])
+    assert columns["v"].dtype == dtype
+    np.testing.assert_array_equal(columns["v"], np.array(want, dtype=columns["v"].dtype))
+
+
+def test_unknown_figures_stay_numbers(tmp_path):
+    _, _, meta = table(tmp_path, [unmodelled()])
+    kinds = dict(zip(meta["fields"], meta["dtypes"], strict=True))
+    assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["rf_val3dity_lod22"]) == ("float64",) * 2 + (
+        "object",
+    )
+
+
+def test_names_that_clash(tmp_path):
+    clashing = {"fid": 7, "geom": "x", "ID": 3, "Name": 1, "name": 2, "hiproof_status": "theirs"}
+    columns, _, _ = table(tmp_path, [modelled(box(), attributes=clashing)])
+    assert columns["id"].tolist() == ["a"]
+    assert columns["hiproof_status"].tolist() == ["modelled"]
+    assert (columns["fid_2"][0], columns["geom_2"][0], columns["name_2"][0], columns["ID_input"][0]) == (7, "x", 2, 3)
+
+
+def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):
+    monkeypatch.setattr(attributes, "ROWS_AT_ONCE", 4)
+    columns, _, _ = table(tmp_path, [unmodelled(str(n), attributes={"n": n}) for n in range(11)])
+    assert columns["n"].tolist() == list(range(11))
+
+
+def test_nothing_is_said_where_no_crs_is_known(tmp_path):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        _, _, meta = table(tmp_path, [modelled(box())], crs=None)
+    assert meta["fields"][0] == "id"
