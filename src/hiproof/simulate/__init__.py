@@ -6,6 +6,7 @@ cloud = scan(building, rng, ScanSettings())     labelled points (flight -> rayca
 points, labels, type = training_sample(rng)     the same for a network (training)
 """
 
+from .compounds import COMPOUND_KINDS, random_compound
 from .roofs import SimBuilding, random_building
 from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
 from .scene import NOT_ROOF, SOURCES, Defects
@@ -13,6 +14,7 @@ from .shapes import ROOF_TYPES
 from .training import training_sample
 
 __all__ = [
+    "COMPOUND_KINDS",
     "NOT_ROOF",
     "ROOF_TYPES",
     "SOURCES",
@@ -21,6 +23,7 @@ __all__ = [
     "ScanSettings",
     "SimBuilding",
     "random_building",
+    "random_compound",
     "scan",
     "scan_solids",
     "training_sample",

@@ -171,10 +171,11 @@ def _asymmetric_gable(rng: np.random.Generator, width: float) -> dict[str, float
     height = width / 2 * _slope(rng, 22, 46)
     offset = width * float(rng.uniform(0.1, 0.28)) * float(rng.choice((-1.0, 1.0)))
     same_slope = rng.random() < 0.4
-    # With one slope on both sides the eaves differ (a catslide); otherwise the slopes do.
-    eave = height * (1 - (width / 2 - offset) / (width / 2 + offset)) if same_slope else 0.0
-    if eave < 0:
-        offset, eave = -offset, height * (1 - (width / 2 + offset) / (width / 2 - offset))
+    eave = 0.0
+    if rng.random() < 0.4:
+        # One slope on both sides and eaves at different heights: a catslide roof.
+        offset = abs(offset)
+        eave = height * (1 - (width / 2 - offset) / (width / 2 + offset))
     return _plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_difference": eave}
 
 

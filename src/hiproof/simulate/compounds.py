@@ -1,0 +1,142 @@
+"""Compound buildings: wings, annexes, steps and rows, as the maximum of their parts' roofs.
+
+Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under the main roof as far as
+its ridge, so that the maximum of both makes the valley.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..errors import InputError
+from ..model import Part
+from .roofs import SimBuilding, assemble, random_eave, random_parameters
+from .shapes import make_part
+
+COMPOUND_KINDS = ("L", "T", "U", "cross", "extension", "two_level", "saw_tooth_hall", "row")
+
+
+class _Layout:
+    """The building's axes: parts are placed by their centre (u, v) and a number of quarter turns."""
+
+    def __init__(self, kappa: float):
+        self.kappa = kappa
+
+    def part(self, type: str, parameters: dict[str, float], u: float, v: float, z: float, quarters: int = 0) -> Part:
+        cosine, sine = math.cos(self.kappa), math.sin(self.kappa)
+        translation = np.array([cosine * u - sine * v, sine * u + cosine * v, z])
+        return make_part(type, parameters, self.kappa + quarters * math.pi / 2, translation)
+
+
+def random_compound(
+    rng: np.random.Generator,
+    kind: str | None = None,
+    origin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
+    kappa: float | None = None,
+) -> SimBuilding:
+    """A compound of `kind` (one of COMPOUND_KINDS; drawn when None) on the ground at `origin` (world).
+
+    L, T, cross, extension, two_level and saw_tooth_hall have two parts, U three, a row three to six. Raises InputError for
+    an unknown kind.
+
+    >>> len(random_compound(np.random.default_rng(0), "U").roof.parts)
+    3
+    """
+    kind = COMPOUND_KINDS[rng.integers(len(COMPOUND_KINDS))] if kind is None else kind
+    if kind not in COMPOUND_KINDS:
+        raise InputError(f"expected a kind of compound ({', '.join(COMPOUND_KINDS)}), got {kind!r}")
+    layout = _Layout(rng.uniform(-math.pi, math.pi) if kappa is None else kappa)
+    if kind in ("L", "T", "U", "cross"):
+        parts = _winged(rng, layout, kind)
+    else:
+        parts = {"extension": _extended, "two_level": _two_level, "saw_tooth_hall": _hall, "row": _row}[kind](rng, layout)
+    return assemble(tuple(parts), kind, origin)
+
+
+def _winged(rng: np.random.Generator, layout: _Layout, kind: str) -> list[Part]:
+    """A main body with one or two wings at right angles, all gables, all hips or all flat."""
+    type = str(rng.choice(("gable", "hip", "flat"), p=(0.6, 0.2, 0.2)))
+    width, eave = rng.uniform(6.5, 11.0), random_eave(rng)
+    slope = math.tan(math.radians(rng.uniform(20, 50)))
+    wing_width = width * rng.uniform(0.6, 0.95)
+    room = (2.3 if kind == "U" else 1.0) * wing_width
+    length = room + width * rng.uniform(0.5, 1.3)
+    main = layout.part(type, _regular(type, length, width, slope), 0.0, 0.0, eave)
+    wings = {"L": (1,), "T": (0,), "U": (-1, 1), "cross": (0,)}[kind]
+    reach = width * rng.uniform(0.4, 1.0)
+    step = rng.uniform(0.8, 2.5) if type == "flat" or rng.random() < 0.3 else 0.0
+    parts = [main]
+    for side in wings:
+        # A hip's inner end slopes down, so hipped wings cross the whole main body; gables stop under its ridge.
+        inner = -width / 2 - (reach if kind == "cross" else 0.0) if kind == "cross" or type == "hip" else 0.0
+        outer = width / 2 + reach
+        parameters = _regular(type, outer - inner, wing_width, slope)
+        u = side * (length - wing_width) / 2 + (rng.uniform(-0.15, 0.15) * (length - wing_width) if side == 0 else 0.0)
+        parts.append(layout.part(type, parameters, u, (inner + outer) / 2, max(2.2, eave - step), quarters=1))
+    return parts
+
+
+def _regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
+    """A gable, hip (all four slopes equal) or flat roof of given plan and slope."""
+    parameters = {"length": float(length), "width": float(width)}
+    if type != "flat":
+        parameters["height"] = float(width / 2 * slope)
+    if type == "hip":
+        parameters["hip_run"] = float(min(width, length) / 2 * 0.999)
+    return parameters
+
+
+def _extended(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """A house with a lower annex along its eave: a flat roof, or a lean-to that rises towards the house."""
+    type = str(rng.choice(("gable", "hip", "half_hip", "mansard", "asymmetric_gable", "gambrel")))
+    house, eave = random_parameters(rng, type), random_eave(rng) + 2.0
+    depth, span = rng.uniform(2.5, 5.0), house["length"] * rng.uniform(0.4, 1.0)
+    lean_to = rng.random() < 0.5
+    rise = depth * math.tan(math.radians(rng.uniform(8, 25))) if lean_to else 0.0
+    z = max(2.0, eave - rise - rng.uniform(0.3, 1.5))
+    annex = {"length": float(span), "width": float(depth)} | ({"height": float(rise)} if lean_to else {})
+    u = rng.uniform(-0.5, 0.5) * (house["length"] - span)
+    v = -(house["width"] + depth) / 2
+    return [
+        layout.part(type, house, 0.0, 0.0, eave),
+        layout.part("monopitch" if lean_to else "flat", annex, u, v, z),
+    ]
+
+
+def _two_level(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """Two flat blocks side by side, a storey or more apart."""
+    low, high = random_parameters(rng, "flat"), random_parameters(rng, "flat")
+    high = high | {"width": low["width"] * float(rng.uniform(0.6, 1.0))}
+    eave = random_eave(rng)
+    v = (low["width"] - high["width"]) / 2
+    return [
+        layout.part("flat", low, 0.0, 0.0, eave),
+        layout.part("flat", high, (low["length"] + high["length"]) / 2, v, eave + rng.uniform(1.2, 6.0)),
+    ]
+
+
+def _hall(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """A saw-tooth hall with a flat-roofed office along one end."""
+    hall, eave = random_parameters(rng, "shed"), rng.uniform(4.5, 7.0)
+    office = {"length": float(rng.uniform(5.0, 9.0)), "width": hall["width"]}
+    u = -(hall["length"] + office["length"]) / 2
+    return [
+        layout.part("shed", hall, 0.0, 0.0, eave),
+        layout.part("flat", office, u, 0.0, max(2.6, eave + rng.uniform(-1.8, -0.5))),
+    ]
+
+
+def _row(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """Terraced houses: slices of one depth whose ridges run along the row, some stepped, now and then a flat one."""
+    count, depth = int(rng.integers(3, 7)), rng.uniform(7.5, 11.0)
+    slope, eave, u = math.tan(math.radians(rng.uniform(28, 50))), random_eave(rng) + 1.0, 0.0
+    parts = []
+    for _ in range(count):
+        span = rng.uniform(4.8, 7.0)
+        type = "flat" if rng.random() < 0.12 else "gable"
+        z = max(2.2, eave + (rng.normal(0.0, 0.8) if rng.random() < 0.5 else 0.0))
+        parts.append(layout.part(type, _regular(type, span, depth, slope), u + span / 2, 0.0, z))
+        u += span
+    return parts
