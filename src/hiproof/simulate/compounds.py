@@ -1,7 +1,7 @@
 """Compound buildings: wings, annexes, steps and rows, as the maximum of their parts' roofs.
 
-Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under the main roof as far as
-its ridge, so that the maximum of both makes the valley.
+Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under the main roof as
+far as its ridge, so that the maximum of both makes the valley.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ def random_compound(
 ) -> SimBuilding:
     """A compound of `kind` (one of COMPOUND_KINDS; drawn when None) on the ground at `origin` (world).
 
-    L, T, cross, extension, two_level and saw_tooth_hall have two parts, U three, a row three to six. Raises InputError for
-    an unknown kind.
+    L, T, cross, extension, two_level and saw_tooth_hall have two parts, U three, a row three to six. Raises
+    InputError for an unknown kind.
 
     >>> len(random_compound(np.random.default_rng(0), "U").roof.parts)
     3
@@ -51,7 +51,9 @@ def random_compound(
     if kind in ("L", "T", "U", "cross"):
         parts = _winged(rng, layout, kind)
     else:
-        parts = {"extension": _extended, "two_level": _two_level, "saw_tooth_hall": _hall, "row": _row}[kind](rng, layout)
+        parts = {"extension": _extended, "two_level": _two_level, "saw_tooth_hall": _hall, "row": _row}[kind](
+            rng, layout
+        )
     return assemble(tuple(parts), kind, origin)
 
 
@@ -79,12 +81,12 @@ def _winged(rng: np.random.Generator, layout: _Layout, kind: str) -> list[Part]:
 
 
 def _regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
-    """A gable, hip (all four slopes equal) or flat roof of given plan and slope."""
+    """A gable, hip (all four slopes equal, longer than wide) or flat roof of given plan and slope."""
     parameters = {"length": float(length), "width": float(width)}
     if type != "flat":
         parameters["height"] = float(width / 2 * slope)
     if type == "hip":
-        parameters["hip_run"] = float(min(width, length) / 2 * 0.999)
+        parameters["ridge_length"] = float(length - width)
     return parameters
 
 
@@ -118,13 +120,13 @@ def _two_level(rng: np.random.Generator, layout: _Layout) -> list[Part]:
 
 
 def _hall(rng: np.random.Generator, layout: _Layout) -> list[Part]:
-    """A saw-tooth hall with a flat-roofed office along one end."""
+    """A saw-tooth hall with a flat-roofed office along the foot of its first tooth."""
     hall, eave = random_parameters(rng, "shed"), rng.uniform(4.5, 7.0)
-    office = {"length": float(rng.uniform(5.0, 9.0)), "width": hall["width"]}
-    u = -(hall["length"] + office["length"]) / 2
+    office = {"length": hall["length"], "width": float(rng.uniform(5.0, 9.0))}
+    v = -(hall["width"] + office["width"]) / 2
     return [
         layout.part("shed", hall, 0.0, 0.0, eave),
-        layout.part("flat", office, u, 0.0, max(2.6, eave + rng.uniform(-1.8, -0.5))),
+        layout.part("flat", office, 0.0, v, max(2.6, eave + rng.uniform(-1.8, -0.5))),
     ]
 
 

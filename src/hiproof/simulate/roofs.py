@@ -11,7 +11,7 @@ import shapely
 
 from ..errors import InputError
 from ..frames import LocalFrame
-from ..model import Roof
+from ..model import Part, Roof
 from .shapes import ROOF_TYPES, make_part
 
 
@@ -89,12 +89,26 @@ def random_building(
     return assemble((part,), "single", origin)
 
 
-def assemble(parts: tuple, kind: str, origin: np.ndarray | tuple[float, float, float]) -> SimBuilding:
+def assemble(parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[float, float, float]) -> SimBuilding:
     """`parts` as a building on the ground at `origin`; the outline is the union of their pieces."""
-    outlines = [piece.outline for part in parts for piece in part.pieces]
-    outline = outlines[0] if len(outlines) == 1 else shapely.union_all(outlines, grid_size=1e-6)
-    roof = Roof(parts, outline, LocalFrame(np.asarray(origin, float)))
+    roof = Roof(parts, united_outline(parts), LocalFrame(np.asarray(origin, float)))
     return SimBuilding(roof.type, kind, roof, float(origin[2]))
+
+
+def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
+    """Union of all pieces, joined in the axes of the first part, where common edges are exactly on one line."""
+    outlines = [piece.outline for part in parts for piece in part.pieces]
+    if len(outlines) == 1:
+        return outlines[0]
+    aligned = [shapely.transform(outline, lambda xy: turned(xy, -parts[0].kappa)) for outline in outlines]
+    union = shapely.union_all(aligned, grid_size=1e-6).normalize().reverse()
+    return shapely.transform(union.simplify(0.0), lambda xy: turned(xy, parts[0].kappa))
+
+
+def turned(xy: np.ndarray, angle: float) -> np.ndarray:
+    """Plan points (n, 2) turned by `angle` (rad) about the origin."""
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return xy @ np.array([(cosine, sine), (-sine, cosine)])
 
 
 def random_eave(rng: np.random.Generator) -> float:
@@ -133,22 +147,17 @@ def _gable(rng: np.random.Generator, width: float) -> dict[str, float]:
 
 
 def _hip(rng: np.random.Generator, width: float) -> dict[str, float]:
-    hip_run = width / 2 * float(rng.uniform(0.6, 1.15))
-    ridge = width * float(rng.uniform(0.25, 1.3))
-    return {
-        "width": width,
-        "length": 2 * hip_run + ridge,
-        "height": width / 2 * _slope(rng, 18, 48),
-        "hip_run": hip_run,
-    }
+    run, ridge = width / 2 * float(rng.uniform(0.6, 1.15)), width * float(rng.uniform(0.25, 1.3))
+    plan = {"width": width, "length": 2 * run + ridge}
+    return plan | {"height": width / 2 * _slope(rng, 18, 48), "ridge_length": ridge}
 
 
 def _half_hip(rng: np.random.Generator, width: float) -> dict[str, float]:
     height = width / 2 * _slope(rng, 30, 54)
-    hip_height = height * float(rng.uniform(0.3, 0.65))
-    hip_run = (height - hip_height) / _slope(rng, 35, 60)
-    length = 2 * hip_run + width * float(rng.uniform(0.35, 1.4))
-    return {"width": width, "length": length, "height": height, "hip_height": hip_height, "hip_run": hip_run}
+    hip_height = height * float(rng.uniform(0.35, 0.7))
+    ridge = width * float(rng.uniform(0.35, 1.4))
+    plan = {"width": width, "length": ridge + 2 * hip_height / _slope(rng, 35, 60)}
+    return plan | {"height": height, "ridge_length": ridge, "hip_height": hip_height}
 
 
 def _pyramid(rng: np.random.Generator, width: float) -> dict[str, float]:
@@ -157,33 +166,31 @@ def _pyramid(rng: np.random.Generator, width: float) -> dict[str, float]:
 
 def _mansard(rng: np.random.Generator, width: float) -> dict[str, float]:
     inset = width * float(rng.uniform(0.12, 0.26))
-    return _plan(rng, width, 1.0, 1.9) | {"height": inset * _slope(rng, 45, 70), "inset": inset}
+    plan = _plan(rng, width, 1.0, 1.9)
+    top = {"top_width": plan["width"] - 2 * inset, "top_length": plan["length"] - 2 * inset}
+    return plan | {"height": inset * _slope(rng, 45, 68)} | top
 
 
 def _shed(rng: np.random.Generator, width: float) -> dict[str, float]:
-    teeth = int(rng.integers(3, 7))
-    tooth = float(rng.uniform(3.5, 7.0))
-    width = max(width, 7.0) * float(rng.uniform(1.0, 1.6))
-    return {"width": width, "length": teeth * tooth, "height": tooth * _slope(rng, 14, 34), "teeth": float(teeth)}
+    teeth, tooth = int(rng.integers(3, 7)), float(rng.uniform(3.5, 7.0))
+    length = max(width, 7.0) * float(rng.uniform(1.0, 2.0))
+    return {"width": teeth * tooth, "length": length, "height": tooth * _slope(rng, 14, 34), "teeth": float(teeth)}
 
 
 def _asymmetric_gable(rng: np.random.Generator, width: float) -> dict[str, float]:
     height = width / 2 * _slope(rng, 22, 46)
-    offset = width * float(rng.uniform(0.1, 0.28)) * float(rng.choice((-1.0, 1.0)))
-    same_slope = rng.random() < 0.4
-    eave = 0.0
+    offset, step = width * float(rng.uniform(0.1, 0.28)), 0.0
     if rng.random() < 0.4:
         # One slope on both sides and eaves at different heights: a catslide roof.
-        offset = abs(offset)
-        eave = height * (1 - (width / 2 - offset) / (width / 2 + offset))
-    return _plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_difference": eave}
+        step = height * (1 - (width / 2 - offset) / (width / 2 + offset))
+    return _plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_step": step}
 
 
 def _gambrel(rng: np.random.Generator, width: float) -> dict[str, float]:
     run = width / 2 * float(rng.uniform(0.22, 0.45))
-    knee = run * _slope(rng, 54, 70)
-    upper = (width / 2 - run) * _slope(rng, 15, 34)
-    return _plan(rng, width, 0.9, 2.0) | {"height": knee + upper, "knee_run": run, "knee_height": knee}
+    lower, upper = run * _slope(rng, 54, 69), (width / 2 - run) * _slope(rng, 15, 34)
+    breaks = {"break_width": width - 2 * run, "break_height": lower}
+    return _plan(rng, width, 0.9, 2.0) | {"height": lower + upper} | breaks
 
 
 _DRAWS: dict[str, Callable[[np.random.Generator, float], dict[str, float]]] = {

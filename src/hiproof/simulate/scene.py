@@ -10,8 +10,8 @@ import shapely
 
 from ..errors import InputError
 from ..model import ROOF, Piece, Solid
-from .roofs import SimBuilding, random_parameters
-from .shapes import ROOF_TYPES, make_part, placed, rectangle
+from .roofs import SimBuilding, random_parameters, turned
+from .shapes import ROOF_TYPES, box, make_part
 
 SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)
 SOURCES = ("roof", "wall", "ground", "tree", "clutter")
@@ -138,21 +138,17 @@ def _on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarra
     return centre + s * a + t * b, piece
 
 
-def _box(xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float) -> Piece:
-    return placed(rectangle(*size), np.zeros((1, 3)), kappa, np.array([xy[0], xy[1], z_top]))
-
-
 def chimney(rng: np.random.Generator, building: SimBuilding) -> Body:
     xy, piece = _on_roof(rng, building)
     z_top = piece.height_at(xy[None])[0] + rng.uniform(0.6, 1.8)
     size = (rng.uniform(0.5, 1.1), rng.uniform(0.5, 1.0))
-    return Body(_box(xy, size, z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
+    return Body(box(xy, size, z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
 
 
 def antenna(rng: np.random.Generator, building: SimBuilding) -> Body:
     xy, piece = _on_roof(rng, building)
     z_top = piece.height_at(xy[None])[0] + rng.uniform(1.0, 3.5)
-    return Body(_box(xy, (0.25, 0.25), z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
+    return Body(box(xy, (0.25, 0.25), z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
 
 
 def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
@@ -166,15 +162,11 @@ def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
         if steepness < 0.35:
             continue
         uphill = gradient / steepness
-        depth, width = rng.uniform(1.2, 2.4), rng.uniform(1.2, 3.0)
+        depth, width = np.minimum(rng.uniform((1.2, 1.2), (2.4, 3.0)), 0.3 * math.sqrt(piece.outline.area))
         z_back = piece.height_at((xy + uphill * depth / 2)[None])[0]
         side = math.atan2(uphill[1], uphill[0])
-        if rng.random() < 0.5:
-            top = _box(xy, (depth, width), z_back, side)
-        else:
-            rise = width / 2 * rng.uniform(0.3, 0.7)
-            planes = np.array([(0.0, 2 * rise / width, 0.0), (0.0, -2 * rise / width, 0.0)])
-            top = placed(rectangle(depth, width), planes, side, np.array([*xy, z_back]))
+        rise = width / 2 * rng.uniform(0.3, 0.7) if rng.random() < 0.5 else 0.0
+        top = box(xy, (depth, width), z_back, side, rise)
         bodies.append(Body(top, SOURCE_CLUTTER, SOURCE_CLUTTER))
     return bodies
 
@@ -185,7 +177,7 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
     type = ROOF_TYPES[rng.choice((0, 1, 2, 3))]
     parameters = random_parameters(rng, type)
     gap = 0.0 if rng.random() < 0.4 else rng.uniform(0.5, 4.0)
-    outline = shapely.transform(building.outline, lambda xy: _turned(xy, -part.kappa))
+    outline = shapely.transform(building.outline, lambda xy: turned(xy, -part.kappa))
     u_low, v_low, u_high, v_high = outline.bounds
     sign = rng.choice((-1.0, 1.0))
     if rng.random() < 0.6:
@@ -194,15 +186,10 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
     else:
         u = (u_low + u_high) / 2 + rng.normal(0.0, 1.0)
         v = (v_high if sign > 0 else v_low) + sign * (gap + parameters["width"] / 2)
-    x, y = _turned(np.array([[u, v]]), part.kappa)[0]
+    x, y = turned(np.array([[u, v]]), part.kappa)[0]
     eave = max(2.2, part.translation[2] + rng.normal(0.0, 1.5))
     body = make_part(type, parameters, part.kappa, np.array([x, y, eave]))
     return [Body(piece, SOURCE_CLUTTER, SOURCE_CLUTTER) for piece in body.pieces]
-
-
-def _turned(xy: np.ndarray, angle: float) -> np.ndarray:
-    cosine, sine = math.cos(angle), math.sin(angle)
-    return xy @ np.array([(cosine, sine), (-sine, cosine)])
 
 
 def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:

@@ -1,0 +1,116 @@
+"""Generated roofs have the plan and the heights of their type; compounds have the parts they claim."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.errors import InputError
+from hiproof.primitives import CATALOGUE
+from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, random_building, random_compound
+from hiproof.simulate.shapes import box, make_part
+
+SEEDS = range(12)
+PARTS = {"L": {2}, "T": {2}, "U": {3}, "cross": {2}, "extension": {2}, "two_level": {2}, "saw_tooth_hall": {2}}
+
+
+def profile(building, u, v):
+    """Roof heights over its eave at (u, v), fractions -1..1 of the half length and half width."""
+    part = building.roof.parts[0]
+    p, kappa = part.parameters, part.kappa
+    uv = np.array([u * p["length"] / 2, v * p["width"] / 2])
+    c, s = math.cos(kappa), math.sin(kappa)
+    xy = np.array([[c * uv[0] - s * uv[1], s * uv[0] + c * uv[1]]]) + part.translation[:2]
+    return building.roof.height_at(xy)[0] - part.translation[2]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_each_type_has_its_heights(seed):
+    rng = np.random.default_rng(seed)
+    near = 1 - 1e-9
+    for type in ROOF_TYPES:
+        building = random_building(rng, type)
+        p = building.parameters
+        corners = [profile(building, u, v) for u in (-near, near) for v in (-near, near)]
+        middle, end = profile(building, 0.0, 1e-9), profile(building, near, 1e-9)
+        h = p.get("height", 0.0)
+        assert building.type == type and min(corners) == pytest.approx(0.0, abs=1e-6)
+        if type == "flat":
+            assert max(corners) == pytest.approx(0.0, abs=1e-6)
+        elif type in ("monopitch", "shed"):
+            assert max(corners) == pytest.approx(h, abs=1e-6)
+        elif type == "asymmetric_gable":
+            assert profile(building, near, p["ridge_offset"] * 2 / p["width"]) == pytest.approx(h, abs=1e-6)
+            assert max(corners) == pytest.approx(p["eave_step"], abs=1e-6)
+        else:
+            low_end = {"gable": h, "gambrel": h, "half_hip": h - p.get("hip_height", 0.0)}.get(type, 0.0)
+            assert middle == pytest.approx(h, abs=1e-6) and end == pytest.approx(low_end, abs=1e-6)
+            assert max(corners) == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_plan_and_slopes_are_those_of_houses(seed):
+    rng = np.random.default_rng(seed)
+    for type in ROOF_TYPES:
+        building = random_building(rng, type, origin=(10.0, 20.0, 3.0))
+        p = building.parameters
+        slopes = np.concatenate([np.hypot(*piece.planes[:, :2].T) for piece in building.roof.pieces])
+        assert slopes.max() < math.tan(math.radians(70.0))
+        assert 20 < building.outline.area < 3000 and building.outline.area == pytest.approx(p["length"] * p["width"])
+        assert building.z_ground == 3.0 and building.footprint.centroid.distance(shapely.Point(10, 20)) < 1e-6
+        assert CATALOGUE[type].variant(p).vertices(p)[:, 2].min() == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize("kind", COMPOUND_KINDS)
+def test_compounds_have_their_parts_in_one_outline(kind):
+    for seed in SEEDS:
+        building = random_compound(np.random.default_rng(seed), kind)
+        assert len(building.roof.parts) in PARTS.get(kind, {3, 4, 5, 6})
+        assert building.kind == kind and building.outline.geom_type == "Polygon" and building.outline.is_valid
+        covered = shapely.union_all([piece.outline for piece in building.roof.pieces])
+        assert covered.symmetric_difference(building.outline).area < 1e-3
+        assert len(building.truth()["parts"]) == len(building.roof.parts)
+
+
+@pytest.mark.parametrize("kind", ["L", "T", "U", "cross"])
+def test_wings_change_the_outline_and_show_above_it(kind):
+    for seed in SEEDS:
+        building = random_compound(np.random.default_rng(seed), kind)
+        box_around = building.outline.minimum_rotated_rectangle
+        assert building.outline.area < 0.95 * box_around.area
+        for part in building.roof.parts:
+            inside = shapely.get_coordinates(part.pieces[0].outline)[:-1].mean(axis=0)
+            assert np.isfinite(building.roof.height_at(inside[None])).all()
+
+
+def test_kappa_turns_the_building_and_nothing_else():
+    first = random_building(np.random.default_rng(4), "hip", kappa=0.2)
+    turned = random_building(np.random.default_rng(4), "hip", kappa=1.2)
+    assert turned.parameters == pytest.approx(first.parameters)
+    assert math.remainder(turned.kappa - first.kappa - 1.0, math.pi) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_truth_rebuilds_the_roof():
+    building = random_compound(np.random.default_rng(8), "extension", origin=(5.0, 6.0, 7.0))
+    parts = building.truth()["parts"]
+    again = [make_part(p["type"], p["parameters"], p["kappa"], np.array(p["translation"])) for p in parts]
+    for part, rebuilt in zip(building.roof.parts, again, strict=True):
+        assert np.allclose(part.pieces[0].planes, rebuilt.pieces[0].planes)
+        assert part.pieces[0].outline.equals_exact(rebuilt.pieces[0].outline, 1e-9)
+
+
+def test_boxes_stand_where_they_are_put():
+    gabled = box(np.array([3.0, 4.0]), (2.0, 1.0), 9.0, 0.7, rise=0.5)
+    corners = shapely.get_coordinates(gabled.outline)[:-1]
+    assert gabled.height_at(np.array([[3.0, 4.0]]))[0] == pytest.approx(9.0)
+    assert gabled.height_at(corners) == pytest.approx(8.5)
+    assert gabled.outline.area == pytest.approx(2.0)
+
+
+def test_unknown_types_and_kinds_are_refused():
+    rng = np.random.default_rng(0)
+    with pytest.raises(InputError, match="expected a roof type"):
+        random_building(rng, "thatched")
+    with pytest.raises(InputError, match="kind of compound"):
+        random_compound(rng, "Z")
