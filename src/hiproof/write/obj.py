@@ -1,0 +1,71 @@
+"""Wavefront OBJ with its material library: one object a building, groups that name the roof type and kind of surface.
+
+OBJ has no attributes: the building's id is the object's name, its roof type the group's and the material's. Coordinates
+are about an origin that the first lines name, because viewers compute in float32. z points up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model import ROOF, Face, Solid
+from .colours import GROUND_COLOUR, TYPE_COLOURS, WALL_COLOUR, srgb
+from .triangles import face_triangles
+
+
+def write_obj(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None) -> int:
+    """Write `buildings` (id, roof type, solid in world metres, attributes) to `path` with its `.mtl`; returns how many.
+
+    Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file cannot be written.
+    """
+    from .files import atomic
+
+    path = Path(path)
+    library = path.with_suffix(".mtl")
+    with atomic(library) as file:
+        file.write(material_library().encode())
+    count, first, origin = 0, 1, None
+    with atomic(path) as file:
+        for id, roof_type, solid, _ in buildings:
+            if origin is None:
+                origin = np.floor(solid.vertices.min(axis=0))
+                file.write(header(library.name, origin, crs).encode())
+            file.write(building_text(id, roof_type, solid, origin, first).encode())
+            first += len(solid.vertices)
+            count += 1
+    return count
+
+
+def header(library: str, origin: np.ndarray, crs: str | None) -> str:
+    where = " ".join(f"{value:.0f}" for value in origin)
+    return f"# hiproof; add the origin {where} to every vertex for world metres\n# crs: {crs}\nmtllib {library}\n"
+
+
+def building_text(id: str, roof_type: str, solid: Solid, origin: np.ndarray, first: int) -> str:
+    """One building's lines; `first` is the number of its first vertex in the file."""
+    name = "_".join(id.split()) or "_"
+    lines = [f"o {name}"]
+    lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in solid.vertices - origin]
+    for kind in dict.fromkeys(face.kind for face in solid.faces):
+        material = f"roof_{roof_type if roof_type in TYPE_COLOURS else 'unknown'}" if kind == ROOF else kind
+        lines += [f"g {name} {kind} roof_type={roof_type}", f"usemtl {material}"]
+        for face in solid.of_kind(kind):
+            lines += ["f " + " ".join(str(first + index) for index in polygon) for polygon in polygons(solid, face)]
+    return "\n".join(lines) + "\n"
+
+
+def polygons(solid: Solid, face: Face) -> Iterable[Iterable[int]]:
+    """The face itself, or its triangles where it has holes, which OBJ has no way to write."""
+    return face.rings if len(face.rings) == 1 else face_triangles(solid.vertices, face)
+
+
+def material_library() -> str:
+    """Every material a model may name."""
+    colours = {f"roof_{name}": colour for name, colour in TYPE_COLOURS.items()}
+    colours |= {"WallSurface": WALL_COLOUR, "GroundSurface": GROUND_COLOUR}
+    entries = ["newmtl {}\nKd {:.3f} {:.3f} {:.3f}\n".format(name, *srgb(colour)) for name, colour in colours.items()]
+    return "\n".join(entries)

@@ -1,0 +1,108 @@
+"""glTF and OBJ files read back by a few lines of their own, and their triangles weighed."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+import typer
+
+from hiproof.cli.convert import convert
+from hiproof.errors import HiproofError
+from hiproof.write.gltf import write_glb
+from hiproof.write.obj import write_obj
+from hiproof.write.triangles import face_triangles, ring_normal
+from sample_models import SOLIDS, courtyard_solid, gable_solid, write_sample_run
+
+BUILDINGS = [(id, kind, solid, {"height": 3.5}) for id, (kind, solid) in SOLIDS.items()]
+
+
+def parse_glb(path):
+    data = path.read_bytes()
+    magic, version, length = struct.unpack("<III", data[:12])
+    assert (magic, version, length) == (0x46546C67, 2, len(data))
+    size, kind = struct.unpack("<II", data[12:20])
+    assert kind == 0x4E4F534A and size % 4 == 0
+    return json.loads(data[20 : 20 + size]), data[28 + size :]
+
+
+def glb_positions(document, binary, mesh):
+    parts = []
+    for primitive in document["meshes"][mesh]["primitives"]:
+        accessor = document["accessors"][primitive["attributes"]["POSITION"]]
+        count = accessor["count"]
+        values = np.frombuffer(binary, "<f4", count * 3, accessor["byteOffset"]).reshape(-1, 3)
+        assert values.min(axis=0).tolist() == accessor["min"] and values.max(axis=0).tolist() == accessor["max"]
+        parts.append(values)
+    return np.concatenate(parts).reshape(-1, 3, 3)
+
+
+def volume(triangles):
+    return np.einsum("ij,ij->", triangles[:, 0], np.cross(triangles[:, 1], triangles[:, 2])) / 6
+
+
+@pytest.mark.parametrize("solid", [gable_solid(), courtyard_solid()], ids=["gable", "courtyard"])
+def test_triangles_tile_every_face_and_keep_its_side(solid):
+    for face in solid.faces:
+        triangles = face_triangles(solid.vertices, face)
+        expected = sum(ring_normal(solid.vertices[list(ring)]) for ring in face.rings)
+        found = sum(ring_normal(solid.vertices[t]) for t in triangles)
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        areas = [np.linalg.norm(ring_normal(solid.vertices[t])) for t in triangles]
+        assert sum(areas) == pytest.approx(np.linalg.norm(expected))
+
+
+def test_glb_holds_every_building_with_its_properties(tmp_path):
+    assert write_glb(tmp_path / "a.glb", BUILDINGS, crs="EPSG:7415") == 2
+    document, binary = parse_glb(tmp_path / "a.glb")
+    assert [node["extras"] for node in document["nodes"]] == [
+        {"id": "house-1", "roof_type": "gable", "height": 3.5},
+        {"id": "block 2", "roof_type": "flat", "height": 3.5},
+    ]
+    assert document["buffers"][0]["byteLength"] == len(binary)
+    assert document["asset"]["extras"]["crs"] == "EPSG:7415"
+    for mesh, expected in enumerate([8 * 12 * 5.5, (400 - 64) * 9.0]):
+        assert volume(glb_positions(document, binary, mesh)) == pytest.approx(expected, rel=1e-5)
+
+
+def test_obj_holds_every_building_closed(tmp_path):
+    assert write_obj(tmp_path / "a.obj", BUILDINGS) == 2
+    lines = (tmp_path / "a.obj").read_text().splitlines()
+    assert [line for line in lines if line.startswith("o ")] == ["o house-1", "o block_2"]
+    materials = {line[7:] for line in (tmp_path / "a.mtl").read_text().splitlines() if line.startswith("newmtl")}
+    assert {line[7:] for line in lines if line.startswith("usemtl")} <= materials
+    vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
+    faces = [[int(i) - 1 for i in line.split()[1:]] for line in lines if line.startswith("f ")]
+    fans = np.array([(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)])
+    assert volume(vertices[fans]) == pytest.approx(8 * 12 * 5.5 + (400 - 64) * 9.0)
+
+
+def test_an_unheard_of_roof_type_gets_a_material_that_exists(tmp_path):
+    write_obj(tmp_path / "a.obj", [("x", "onion", gable_solid(), {})])
+    assert "usemtl roof_unknown" in (tmp_path / "a.obj").read_text()
+
+
+def test_no_buildings_make_a_valid_empty_file(tmp_path):
+    write_glb(tmp_path / "a.glb", [])
+    document, binary = parse_glb(tmp_path / "a.glb")
+    assert document["scenes"] == [{}] and not binary and "meshes" not in document
+
+
+@pytest.mark.parametrize("format", ["glb", "obj"])
+def test_the_command_converts_a_run(tmp_path, format):
+    write_sample_run(tmp_path)
+    app = typer.Typer()
+    app.command()(convert)
+    app([str(tmp_path), "--format", format], standalone_mode=False)
+    assert (tmp_path / f"buildings.{format}").stat().st_size > 500
+
+
+def test_a_folder_without_models_is_refused(tmp_path):
+    with pytest.raises(HiproofError, match="hiproof reconstruct"):
+        convert(tmp_path)
+
+
+def test_a_place_that_cannot_be_written_is_refused(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(HiproofError, match="expected to write"):
+        write_glb(tmp_path / "file" / "a.glb", BUILDINGS)
