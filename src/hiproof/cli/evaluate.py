@@ -1,0 +1,44 @@
+"""`hiproof evaluate`: how well the models of a run stand for points, footprints and a reference model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+SHOWN = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "share_within_20cm_inner", "outline_iou")
+
+
+def evaluate(
+    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    clouds: Annotated[list[str], typer.Argument(help="point files to measure against")],
+    footprints: Annotated[str | None, typer.Option(help="building polygons; else the models' own outlines")] = None,
+    reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
+    out: Annotated[Path | None, typer.Option(help="folder for evaluation.csv and .json [default: the run's]")] = None,
+) -> None:
+    """Measure the models of a run: distances of points, shares, IoU and volume per building, per type and overall."""
+    from ..evaluate.evaluation import summarise, to_csv, to_json
+    from ..evaluate.run import evaluate_run
+    from ..write.files import atomic
+
+    run = evaluate_run(folder, clouds, footprints, reference)
+    place = Path(out or folder)
+    for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
+        with atomic(place / name) as file:
+            file.write(text.encode())
+    print_summary(summarise(run.figures), reference is not None)
+    typer.echo(f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {len(run.figures)} buildings")
+
+
+def print_summary(summary: dict, has_reference: bool) -> None:
+    """A line a roof type, means of the figures over its buildings."""
+    from rich.console import Console
+    from rich.table import Table
+
+    columns = SHOWN + (("ref_ridge_height_m", "ref_slope_deg", "ref_volume_relative") if has_reference else ())
+    table = Table("type", "buildings", *columns, title="mean over buildings")
+    for kind, figures in summary.items():
+        means = [figures[name]["mean"] if name in figures else None for name in columns]
+        table.add_row(kind, str(figures["buildings"]), *("" if mean is None else f"{mean:.3f}" for mean in means))
+    Console(soft_wrap=True).print(table)

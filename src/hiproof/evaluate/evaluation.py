@@ -1,0 +1,203 @@
+"""The figures of finished models against points, footprints and a reference model: a row a building, and summaries.
+
+A building's points are those of the building classes inside its footprint; without footprints, inside the plan outline
+of its own roof (which then cannot show points that the outline left out, and the IoU is with their alpha shape).
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, fields
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..frames import LocalFrame
+from ..model import ROOF, Quality, Solid
+from .distance import vertical_distances
+from .metrics import NEAR_M, iou, plan_outline, quality, roof_polygons
+
+FACADE_M = 0.3
+"""Points this close to the outline may be facade returns; the inner share leaves them out."""
+
+MIN_INNER_POINTS = 10
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A model minus its reference: metres, degrees and cubic metres, NaN where either has no such figure."""
+
+    reference_id: str
+    ridge_height_m: float = float("nan")
+    slope_deg: float = float("nan")
+    azimuth_deg: float = float("nan")
+    volume_m3: float = float("nan")
+    volume_relative: float = float("nan")
+    plan_iou: float = float("nan")
+
+
+@dataclass(frozen=True)
+class BuildingFigures:
+    """All figures of one building. `share_within_20cm_inner` counts only points 0.3 m inside the outline (no facades)."""
+
+    id: str
+    type: str
+    status: str
+    quality: Quality = field(default_factory=Quality)
+    share_within_20cm_inner: float = float("nan")
+    volume_m3: float = float("nan")
+    comparison: Comparison | None = None
+
+    def row(self) -> dict[str, Any]:
+        """One flat record, the comparison's columns prefixed with `ref_`."""
+        row = {"id": self.id, "type": self.type, "status": self.status, **asdict(self.quality)}
+        row |= {"share_within_20cm_inner": self.share_within_20cm_inner, "volume_m3": self.volume_m3}
+        if self.comparison is not None:
+            row |= {f"ref_{name.removeprefix('reference_')}": v for name, v in asdict(self.comparison).items()}
+        return row
+
+
+def evaluate_building(
+    model: Any, points: np.ndarray, footprint: shapely.Polygon | None = None, reference: Any = None
+) -> BuildingFigures:
+    """Figures of one `BuildingModel` against its `points` (n, 3) in world metres."""
+    if model.solid is None:
+        share = 0.0 if len(points) else float("nan")
+        return BuildingFigures(model.id, model.roof_type, model.status, Quality(points=len(points)), share)
+    from ..write.roof_figures import roof_figures
+
+    frame = LocalFrame.around(model.solid.vertices)
+    solid = model.solid.moved(-frame.origin)
+    local = frame.to_local(points).reshape(-1, 3)
+    outline = None if footprint is None else shapely.transform(footprint, frame.to_local)
+    return BuildingFigures(
+        model.id,
+        model.roof_type,
+        model.status,
+        quality(solid, local, outline),
+        inner_share(solid, local, outline if outline is not None else plan_outline(solid)),
+        roof_figures(solid).volume_m3 if solid.of_kind(ROOF) else float("nan"),
+        None if reference is None else compare(model.solid, reference.id, reference.solid),
+    )
+
+
+def inner_share(solid: Solid, points: np.ndarray, outline: shapely.Geometry) -> float:
+    """Share of the points at least 0.3 m inside `outline` that lie within 0.2 m vertically; NaN for fewer than ten."""
+    inner = shapely.buffer(outline, -FACADE_M)
+    shapely.prepare(inner)
+    points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    if len(points) < MIN_INNER_POINTS:
+        return float("nan")
+    return float(np.mean(vertical_distances(points, roof_polygons(solid)) < NEAR_M))
+
+
+def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
+    """Differences of two solids in one frame; the azimuth's is the smaller angle, signed."""
+    from ..write.roof_figures import roof_figures
+
+    if not (solid.of_kind(ROOF) and reference.of_kind(ROOF)):
+        return Comparison(reference_id)
+    ours, theirs = roof_figures(solid), roof_figures(reference)
+    turn = (ours.azimuth_deg - theirs.azimuth_deg + 180) % 360 - 180
+    volume = ours.volume_m3 - theirs.volume_m3
+    return Comparison(
+        reference_id,
+        ours.h_ridge - theirs.h_ridge,
+        ours.slope_deg - theirs.slope_deg,
+        turn,
+        volume,
+        volume / theirs.volume_m3 if theirs.volume_m3 > 0 else float("nan"),
+        iou(plan_outline(solid), plan_outline(reference)),
+    )
+
+
+def points_by_outline(points: np.ndarray, outlines: Sequence[shapely.Geometry | None]) -> list[np.ndarray]:
+    """For each outline (None is empty) the points (m, 3) inside it, in the order of `points` (n, 3)."""
+    areas = np.array([outline if outline is not None else shapely.Polygon() for outline in outlines], dtype=object)
+    if not len(areas):
+        return []
+    tree = shapely.STRtree(areas)
+    point_of, area_of = tree.query(shapely.points(points[:, :2]), predicate="intersects")
+    order = np.lexsort((point_of, area_of))
+    bounds = np.searchsorted(area_of[order], np.arange(len(areas) + 1))
+    return [points[point_of[order[a:b]]] for a, b in pairwise(bounds)]
+
+
+def match_by_id_or_overlap(models: Sequence[Any], others: Sequence[tuple[str, shapely.Geometry]]) -> list[int | None]:
+    """Index of the other area that stands for each model: the one of the same id, else the largest overlap in plan."""
+    by_id = {id: i for i, (id, _) in enumerate(others)}
+    tree = shapely.STRtree([area for _, area in others]) if others else None
+    found: list[int | None] = []
+    for model in models:
+        match = by_id.get(model.id)
+        if match is None and tree is not None and model.solid is not None:
+            outline = plan_outline(model.solid)
+            candidates = np.sort(tree.query(outline, predicate="intersects"))
+            overlaps = [shapely.intersection(outline, others[i][1]).area for i in candidates]
+            match = int(candidates[np.argmax(overlaps)]) if len(candidates) and max(overlaps) > 0 else None
+        found.append(match)
+    return found
+
+
+def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
+    """Overall and per roof type: number of buildings, and mean, median and 90th percentile of every figure."""
+    groups = {"all": list(figures)}
+    for kind in sorted({f.type for f in figures}):
+        groups[kind] = [f for f in figures if f.type == kind]
+    return {name: {"buildings": len(group), **column_summaries(group)} for name, group in groups.items()}
+
+
+def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, float | None]]:
+    rows = [f.row() for f in figures]
+    summaries = {}
+    for name in figure_names(rows):
+        values = np.array([row.get(name, np.nan) for row in rows], float)
+        values = values[np.isfinite(values)]
+        if len(values):
+            middle, high = np.percentile(values, (50, 90))
+            summaries[name] = {"mean": rounded(values.mean()), "median": rounded(middle), "p90": rounded(high)}
+    return summaries
+
+
+def figure_names(rows: Sequence[dict[str, Any]]) -> list[str]:
+    """Numeric columns, in the order of the fullest row."""
+    names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
+    return [name for name in names if name not in ("id", "type", "status", "ref_id")]
+
+
+def rounded(value: float) -> float:
+    return round(float(value), 6)
+
+
+def to_csv(figures: Sequence[BuildingFigures]) -> str:
+    """A header and a line a building; empty where there is no figure."""
+    rows = [f.row() for f in figures]
+    columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
+    if not columns:
+        columns = dict.fromkeys(["id", "type", "status", *(f.name for f in fields(Quality))])
+    text = io.StringIO()
+    writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
+    writer.writeheader()
+    writer.writerows({name: plain(value) for name, value in row.items()} for row in rows)
+    return text.getvalue()
+
+
+def to_json(figures: Sequence[BuildingFigures]) -> str:
+    """The summary and every row; null where there is no figure."""
+    rows = [{name: none_for_empty(plain(value)) for name, value in f.row().items()} for f in figures]
+    return json.dumps({"summary": summarise(figures), "buildings": rows}, indent=1, allow_nan=False) + "\n"
+
+
+def plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return rounded(value) if np.isfinite(value) else ""
+    return value
+
+
+def none_for_empty(value: Any) -> Any:
+    return None if value == "" else value

@@ -1,0 +1,108 @@
+"""A finished run with its points: what `hiproof evaluate` and `hiproof report` both start from."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..settings import Settings
+from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
+from .metrics import plan_outline
+from .models import BuildingModel, read_models, run_models
+
+
+@dataclass(frozen=True)
+class EvaluatedRun:
+    """Models in the run's order, the points (n, 3) of each in world metres, and their figures; `record` is run.json."""
+
+    models: tuple[BuildingModel, ...]
+    points: tuple[np.ndarray, ...]
+    figures: tuple[BuildingFigures, ...]
+    record: dict[str, Any]
+
+
+def evaluate_run(
+    folder: Path, clouds: Sequence[str] = (), footprints: str | None = None, reference: str | None = None
+) -> EvaluatedRun:
+    """Read the models of `folder` and measure them against `clouds`; without clouds no residual figures come out.
+
+    The building classes are those the run was made with. Raises InputError for what cannot be read.
+    """
+    models = tuple(read_models(run_models(folder)))
+    record = run_record(folder)
+    outlines = footprint_of_each(models, footprints, record)
+    areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
+    if clouds:
+        points = points_by_outline(building_points(clouds, record, areas), areas)
+    else:
+        points = [np.empty((0, 3))] * len(models)
+    references = reference_of_each(models, reference)
+    figures = [evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)]
+    return EvaluatedRun(models, tuple(points), tuple(figures), record)
+
+
+def run_record(folder: Path) -> dict[str, Any]:
+    """Content of run.json, empty where the folder has none."""
+    path = Path(folder) / "run.json"
+    try:
+        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"expected the record of a run in {path}, got: {error}; run `hiproof reconstruct` again"
+        ) from error
+
+
+def run_settings(record: dict[str, Any]) -> Settings:
+    """The settings a run was made with, as far as this version knows them."""
+    classes = record.get("settings", {}).get("read", {}).get("building_classes")
+    return Settings.from_dict({"read": {"building_classes": classes}}) if classes else Settings()
+
+
+def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]) -> np.ndarray:
+    """Points (n, 3) of the building classes around `areas`; all points of clouds without classes."""
+    from ..read.pointcloud import read_points
+
+    settings = run_settings(record)
+    box = shapely.total_bounds(np.array([area for area in areas if area is not None], dtype=object))
+    cloud = read_points(*clouds, settings=settings, box=tuple(box) if np.isfinite(box).all() else None)
+    if cloud.classification is None or not cloud.classification.any():
+        return cloud.xyz
+    return cloud.xyz[np.isin(cloud.classification, settings.read.building_classes)]
+
+
+def footprint_of_each(models: Sequence[BuildingModel], path: str | None, record: dict[str, Any]) -> list[Any]:
+    """The footprint polygon of each model, None without one."""
+    if path is None:
+        return [None] * len(models)
+    from ..read.footprints import read_footprints
+
+    footprints = read_footprints(path, target_crs=run_crs(record))
+    areas = [(f.id, shapely.make_valid(f.polygon)) for f in footprints]
+    matches = match_by_id_or_overlap(models, areas)
+    return [None if match is None else areas[match][1] for match in matches]
+
+
+def run_crs(record: dict[str, Any]) -> Any:
+    from pyproj import CRS
+
+    return CRS.from_user_input(record["crs"]) if record.get("crs") else None
+
+
+def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:
+    """The building of the reference file that stands for each model."""
+    if path is None:
+        return [None] * len(models)
+    others = [model for model in read_models(path) if model.solid is not None]
+    matches = match_by_id_or_overlap(models, [(other.id, plan_outline(other.solid)) for other in others])
+    return [None if match is None else others[match] for match in matches]
+
+
+def own_outline(model: BuildingModel) -> shapely.Geometry | None:
+    return None if model.solid is None else plan_outline(model.solid)

@@ -1,0 +1,129 @@
+"""A whole run measured against points, footprints and a reference whose figures are known by hand."""
+
+import csv
+import json
+import math
+
+import numpy as np
+import pytest
+import shapely
+import typer
+
+from hiproof.cli.evaluate import evaluate
+from hiproof.errors import HiproofError
+from hiproof.evaluate.evaluation import compare, evaluate_building, points_by_outline, summarise, to_csv, to_json
+from hiproof.evaluate.models import BuildingModel
+from hiproof.evaluate.run import evaluate_run
+from sample_models import ORIGIN, gable_solid, sample_points, write_sample_run
+
+
+@pytest.fixture(scope="module")
+def run_folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    write_sample_run(folder)
+    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def run(run_folder):
+    return evaluate_run(
+        run_folder, [str(run_folder / "points.xyz")], reference=str(run_folder / "buildings.city.jsonl")
+    )
+
+
+def test_figures_are_those_the_points_were_made_with(run):
+    gable, block, bare = run.figures
+    assert gable.quality.points == 384 and block.quality.points > 1200
+    assert gable.quality.rmse == pytest.approx(0.02 * math.cos(math.atan(0.75)), rel=0.2)
+    assert block.quality.rmse == pytest.approx(0.02, rel=0.1)
+    assert gable.share_within_20cm_inner == gable.quality.share_within_20cm == 1
+    assert gable.volume_m3 == pytest.approx(8 * 12 * 5.5) and block.volume_m3 == pytest.approx(336 * 9)
+    assert bare.status == "no_points" and bare.quality.points == 0
+
+
+def test_a_model_equals_itself(run):
+    own = run.figures[0].comparison
+    assert own.reference_id == "house-1" and own.plan_iou == pytest.approx(1)
+    assert (own.ridge_height_m, own.slope_deg, own.azimuth_deg, own.volume_m3) == (0, 0, 0, 0)
+
+
+def test_differences_have_the_sign_of_ours_minus_theirs():
+    ours, theirs = gable_solid(ridge=7.5), gable_solid(ridge=7.0)
+    found = compare(ours, "x", theirs)
+    assert found.ridge_height_m == pytest.approx(0.5)
+    assert found.slope_deg == pytest.approx(math.degrees(math.atan(3.5 / 4) - math.atan(3 / 4)))
+    assert found.volume_m3 == pytest.approx(8 * 12 * 0.25)
+
+
+def test_a_reference_without_roof_surfaces_gives_no_figures():
+    solid = gable_solid()
+    walls = type(solid)(solid.vertices, tuple(type(f)(f.rings, "WallSurface") for f in solid.faces))
+    assert math.isnan(compare(solid, "x", walls).ridge_height_m)
+
+
+def test_footprints_bring_points_beyond_the_roof(tmp_path, run_folder):
+    path = tmp_path / "areas.geojson"
+    west, south = ORIGIN[:2]
+    ring = [[west - 4, south], [west + 8, south], [west + 8, south + 12], [west - 4, south + 12], [west - 4, south]]
+    geometry = {"type": "Polygon", "coordinates": [ring]}
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
+    feature = {"type": "Feature", "properties": {}, "geometry": geometry}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
+    run = evaluate_run(run_folder, [str(run_folder / "points.xyz")], footprints=str(path))
+    assert run.figures[0].quality.outline_iou == pytest.approx(8 / 12)
+
+
+def test_points_go_to_every_outline_that_holds_them():
+    points = np.array([[0.5, 0.5, 0], [1.5, 0.5, 0], [9, 9, 0]])
+    outlines = [shapely.box(0, 0, 1, 1), None, shapely.box(0, 0, 2, 1)]
+    assert [len(part) for part in points_by_outline(points, outlines)] == [1, 0, 2]
+    assert points_by_outline(points, []) == []
+
+
+def test_rows_survive_csv_and_json(run):
+    rows = list(csv.DictReader(to_csv(run.figures).splitlines()))
+    assert [row["id"] for row in rows] == ["house-1", "block 2", "bare"]
+    assert float(rows[0]["rmse"]) == pytest.approx(run.figures[0].quality.rmse, abs=1e-6)
+    assert rows[2]["rmse"] == "" and rows[0]["ref_id"] == "house-1"
+    document = json.loads(to_json(run.figures))
+    assert document["buildings"][2]["rmse"] is None
+    assert document["summary"]["gable"]["buildings"] == 1
+    assert document["summary"]["all"]["rmse"]["mean"] == pytest.approx(
+        (run.figures[0].quality.rmse + run.figures[1].quality.rmse) / 2, abs=1e-6
+    )
+
+
+def test_nothing_to_summarise():
+    assert summarise([]) == {"all": {"buildings": 0}}
+    assert to_csv([]).startswith("id,type,status,points")
+
+
+def test_a_building_without_a_model_misses_all_its_points():
+    figures = evaluate_building(BuildingModel("a"), np.zeros((20, 3)))
+    assert figures.share_within_20cm_inner == 0 and figures.quality.points == 20 and figures.status == "no_model"
+
+
+def test_the_command_writes_both_tables(run_folder, tmp_path):
+    app = typer.Typer()
+    app.command()(evaluate)
+    app([str(run_folder), str(run_folder / "points.xyz"), "--out", str(tmp_path)], standalone_mode=False)
+    assert len((tmp_path / "evaluation.csv").read_text().splitlines()) == 4
+    assert json.loads((tmp_path / "evaluation.json").read_text())["summary"]["all"]["buildings"] == 3
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(HiproofError, match="hiproof reconstruct"):
+        evaluate_run(tmp_path)
+
+
+def test_a_missing_cloud_is_refused(run_folder):
+    with pytest.raises(HiproofError, match="expected a point cloud"):
+        evaluate_run(run_folder, ["nowhere.laz"])
+
+
+def test_a_broken_run_record_is_refused(tmp_path):
+    write_sample_run(tmp_path)
+    (tmp_path / "run.json").write_text("{")
+    with pytest.raises(HiproofError, match="record of a run"):
+        evaluate_run(tmp_path)
