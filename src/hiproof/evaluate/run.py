@@ -20,12 +20,16 @@ from .models import BuildingModel, read_models, run_models
 
 @dataclass(frozen=True)
 class EvaluatedRun:
-    """Models in the run's order, the points (n, 3) of each in world metres, and their figures; `record` is run.json."""
+    """Models in the run's order, the points (n, 3) of each in world metres, and their figures; `record` is run.json.
+
+    `footprints` are plan polygons in world metres, None where a building has none.
+    """
 
     models: tuple[BuildingModel, ...]
     points: tuple[np.ndarray, ...]
     figures: tuple[BuildingFigures, ...]
     record: dict[str, Any]
+    footprints: tuple[shapely.Geometry | None, ...] = ()
 
 
 def evaluate_run(
@@ -45,7 +49,7 @@ def evaluate_run(
         points = [np.empty((0, 3))] * len(models)
     references = reference_of_each(models, reference)
     figures = [evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)]
-    return EvaluatedRun(models, tuple(points), tuple(figures), record)
+    return EvaluatedRun(models, tuple(points), tuple(figures), record, tuple(outlines))
 
 
 def run_record(folder: Path) -> dict[str, Any]:
@@ -57,6 +61,14 @@ def run_record(folder: Path) -> dict[str, Any]:
         raise InputError(
             f"expected the record of a run in {path}, got: {error}; run `hiproof reconstruct` again"
         ) from error
+
+
+def run_inputs(folder: Path) -> tuple[list[str], str | None]:
+    """Clouds and footprints a run was made from, as far as they are still where they were."""
+    inputs = run_record(folder).get("inputs", {})
+    clouds = [path for path in inputs.get("clouds") or [] if Path(path).exists()]
+    footprints = inputs.get("footprints")
+    return clouds, footprints if footprints and Path(footprints).exists() else None
 
 
 def run_settings(record: dict[str, Any]) -> Settings:

@@ -1,0 +1,27 @@
+"""`hiproof report`: one self-contained HTML page about a run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def report(
+    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    clouds: Annotated[
+        list[str] | None, typer.Argument(help="point files [default: those of the run, if still there]")
+    ] = None,
+    footprints: Annotated[str | None, typer.Option(help="building polygons [default: those of the run]")] = None,
+    out: Annotated[Path | None, typer.Option(help="file to write [default: report.html in the folder]")] = None,
+) -> None:
+    """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings, settings."""
+    from ..evaluate.report import write_report
+    from ..evaluate.run import evaluate_run, run_inputs
+
+    path = out or Path(folder) / "report.html"
+    known_clouds, known_footprints = run_inputs(folder)
+    run = evaluate_run(folder, clouds or known_clouds, footprints or known_footprints)
+    write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
+    typer.echo(f"{path}: {len(run.models)} buildings, {path.stat().st_size / 1e6:.1f} MB")

@@ -1,0 +1,176 @@
+"use strict";
+// A small WebGL view of triangles, lines and points: orbit, pan, zoom and picking, all data in typed arrays.
+
+const VERTEX = `
+attribute vec3 place; attribute vec4 colour; uniform mat4 matrix; uniform float size; varying vec4 tint;
+void main() { gl_Position = matrix * vec4(place, 1.0); gl_PointSize = size; tint = colour; }`;
+const FRAGMENT = `precision mediump float; varying vec4 tint; void main() { gl_FragColor = tint; }`;
+
+class Viewer {
+  // corners: Float32Array of triangle corners; owner: building of each triangle; z is up.
+  constructor(canvas, corners, owner) {
+    this.canvas = canvas; this.corners = corners; this.owner = owner;
+    this.gl = canvas.getContext("webgl", { antialias: true });
+    this.layers = []; this.onpick = () => {}; this.frame = 0;
+    this.home();
+    if (!this.gl) return;
+    this.program = link(this.gl);
+    this.listen();
+    new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  home() {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+    for (let i = 0; i < this.corners.length; i++) {
+      low[i % 3] = Math.min(low[i % 3], this.corners[i]); high[i % 3] = Math.max(high[i % 3], this.corners[i]);
+    }
+    const empty = !isFinite(low[0]);
+    this.target = empty ? [0, 0, 0] : low.map((v, k) => (v + high[k]) / 2);
+    this.distance = empty ? 10 : Math.max(8, 0.75 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
+    this.azimuth = -0.6; this.elevation = 0.75;
+  }
+
+  // kind: "TRIANGLES", "LINES" or "POINTS"; colours: Uint8Array, four a vertex; the layer returned can be recoloured.
+  addLayer(kind, places, colours) {
+    const layer = { kind, count: places.length / 3, visible: true };
+    if (this.gl) { layer.places = buffer(this.gl, places); layer.colours = buffer(this.gl, colours); }
+    this.layers.push(layer);
+    return layer;
+  }
+
+  recolour(layer, colours) {
+    if (!this.gl) return;
+    this.gl.bindBuffer(this.gl.ARRAY_BUFFER, layer.colours);
+    this.gl.bufferData(this.gl.ARRAY_BUFFER, colours, this.gl.STATIC_DRAW);
+    this.draw();
+  }
+
+  lookAt(place, distance) { this.target = place.slice(); this.distance = distance; this.draw(); }
+
+  axes() {
+    const ce = Math.cos(this.elevation), se = Math.sin(this.elevation), ca = Math.cos(this.azimuth), sa = Math.sin(this.azimuth);
+    return { back: [sa * ce, -ca * ce, se], right: [ca, sa, 0], up: [-sa * se, ca * se, ce] };
+  }
+
+  matrix() {
+    const { back, right, up } = this.axes(), eye = this.target.map((t, k) => t + this.distance * back[k]);
+    const near = this.distance / 50, far = this.distance * 60, f = 1 / Math.tan(0.4);
+    const aspect = this.canvas.width / Math.max(1, this.canvas.height);
+    const rows = [right.map(v => v * f / aspect), up.map(v => v * f), back];
+    const shift = rows.map(row => -(row[0] * eye[0] + row[1] * eye[1] + row[2] * eye[2]));
+    const a = (far + near) / (near - far), b = 2 * far * near / (near - far);
+    const depth = back.map(v => v * a), m = new Float32Array(16);
+    for (let k = 0; k < 3; k++) { m[4 * k] = rows[0][k]; m[4 * k + 1] = rows[1][k]; m[4 * k + 2] = depth[k]; m[4 * k + 3] = -back[k]; }
+    m[12] = shift[0]; m[13] = shift[1]; m[14] = shift[2] * a + b; m[15] = -shift[2];
+    return m;
+  }
+
+  draw() {
+    if (!this.gl || this.frame) return;
+    this.frame = requestAnimationFrame(() => { this.frame = 0; this.paint(); });
+  }
+
+  paint() {
+    const gl = this.gl, ratio = window.devicePixelRatio || 1;
+    const width = Math.round(this.canvas.clientWidth * ratio), height = Math.round(this.canvas.clientHeight * ratio);
+    if (this.canvas.width !== width || this.canvas.height !== height) { this.canvas.width = width; this.canvas.height = height; }
+    gl.viewport(0, 0, width, height);
+    gl.clearColor(0.93, 0.945, 0.957, 1); gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.enable(gl.DEPTH_TEST); gl.useProgram(this.program);
+    // Faces are pushed back a little so that their own edges and points stay visible.
+    gl.enable(gl.POLYGON_OFFSET_FILL); gl.polygonOffset(1, 2);
+    gl.uniformMatrix4fv(gl.getUniformLocation(this.program, "matrix"), false, this.matrix());
+    gl.uniform1f(gl.getUniformLocation(this.program, "size"), Math.max(2, Math.min(6, 160 / this.distance)) * ratio);
+    for (const layer of this.layers) {
+      if (!layer.visible || !layer.count) continue;
+      attribute(gl, this.program, "place", layer.places, 3, gl.FLOAT, false);
+      attribute(gl, this.program, "colour", layer.colours, 4, gl.UNSIGNED_BYTE, true);
+      gl.drawArrays(gl[layer.kind], 0, layer.count);
+    }
+  }
+
+  listen() {
+    const canvas = this.canvas;
+    let held = null, moved = 0;
+    canvas.addEventListener("contextmenu", event => event.preventDefault());
+    canvas.addEventListener("pointerdown", event => {
+      held = event.button === 2 || event.shiftKey ? "pan" : "turn"; moved = 0; canvas.setPointerCapture(event.pointerId);
+    });
+    canvas.addEventListener("pointermove", event => {
+      if (!held) return;
+      moved += Math.abs(event.movementX) + Math.abs(event.movementY);
+      if (held === "turn") {
+        this.azimuth -= event.movementX * 0.008;
+        this.elevation = Math.min(1.55, Math.max(-0.1, this.elevation + event.movementY * 0.008));
+      } else {
+        const { right, up } = this.axes(), step = this.distance * 0.85 / canvas.clientHeight;
+        this.target = this.target.map((t, k) => t - step * (event.movementX * right[k] - event.movementY * up[k]));
+      }
+      this.draw();
+    });
+    canvas.addEventListener("pointerup", event => {
+      if (held && moved < 5) { const found = this.pick(event.offsetX, event.offsetY); if (found >= 0) this.onpick(found); }
+      held = null;
+    });
+    canvas.addEventListener("wheel", event => {
+      event.preventDefault(); this.distance *= Math.exp(event.deltaY * 0.001); this.draw();
+    }, { passive: false });
+  }
+
+  // Building under a place of the canvas (CSS pixels), -1 for none: the ray against every triangle (Moller and Trumbore).
+  pick(x, y) {
+    const { back, right, up } = this.axes(), half = Math.tan(0.4);
+    const u = (2 * x / this.canvas.clientWidth - 1) * half * this.canvas.clientWidth / this.canvas.clientHeight;
+    const v = (1 - 2 * y / this.canvas.clientHeight) * half;
+    const eye = this.target.map((t, k) => t + this.distance * back[k]);
+    const ray = back.map((b, k) => -b + u * right[k] + v * up[k]);
+    const c = this.corners;
+    let nearest = Infinity, found = -1;
+    for (let t = 0, i = 0; t < this.owner.length; t++, i += 9) {
+      const ax = c[i + 3] - c[i], ay = c[i + 4] - c[i + 1], az = c[i + 5] - c[i + 2];
+      const bx = c[i + 6] - c[i], by = c[i + 7] - c[i + 1], bz = c[i + 8] - c[i + 2];
+      const px = ray[1] * bz - ray[2] * by, py = ray[2] * bx - ray[0] * bz, pz = ray[0] * by - ray[1] * bx;
+      const det = ax * px + ay * py + az * pz;
+      if (Math.abs(det) < 1e-12) continue;
+      const sx = eye[0] - c[i], sy = eye[1] - c[i + 1], sz = eye[2] - c[i + 2];
+      const s = (sx * px + sy * py + sz * pz) / det;
+      if (s < 0 || s > 1) continue;
+      const qx = sy * az - sz * ay, qy = sz * ax - sx * az, qz = sx * ay - sy * ax;
+      const r = (ray[0] * qx + ray[1] * qy + ray[2] * qz) / det;
+      if (r < 0 || s + r > 1) continue;
+      const far = (bx * qx + by * qy + bz * qz) / det;
+      if (far > 0 && far < nearest) { nearest = far; found = this.owner[t]; }
+    }
+    return found;
+  }
+
+  // Where a place of the scene falls on the canvas, CSS pixels.
+  project(place) {
+    const m = this.matrix(), at = k => m[k] * place[0] + m[4 + k] * place[1] + m[8 + k] * place[2] + m[12 + k];
+    return [(at(0) / at(3) + 1) / 2 * this.canvas.clientWidth, (1 - at(1) / at(3)) / 2 * this.canvas.clientHeight];
+  }
+}
+
+function link(gl) {
+  const program = gl.createProgram();
+  for (const [kind, source] of [[gl.VERTEX_SHADER, VERTEX], [gl.FRAGMENT_SHADER, FRAGMENT]]) {
+    const shader = gl.createShader(kind);
+    gl.shaderSource(shader, source); gl.compileShader(shader);
+    if (!gl.getShaderParameter(shader, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(shader));
+    gl.attachShader(program, shader);
+  }
+  gl.linkProgram(program);
+  return program;
+}
+
+function buffer(gl, values) {
+  const made = gl.createBuffer();
+  gl.bindBuffer(gl.ARRAY_BUFFER, made); gl.bufferData(gl.ARRAY_BUFFER, values, gl.STATIC_DRAW);
+  return made;
+}
+
+function attribute(gl, program, name, source, size, kind, normalised) {
+  const place = gl.getAttribLocation(program, name);
+  gl.bindBuffer(gl.ARRAY_BUFFER, source); gl.enableVertexAttribArray(place);
+  gl.vertexAttribPointer(place, size, kind, normalised, 0, 0);
+}

@@ -1,0 +1,129 @@
+"""One self-contained HTML page about a run: map, 3D view, distributions, the worst buildings, settings.
+
+The page opens from the file system and asks nothing of the network: styles, scripts and data are in it.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..status import Status
+from .evaluation import summarise
+from .metrics import psd
+from .report_data import places_on_map, report_data
+from .report_pictures import building_pictures, histogram
+from .run import EvaluatedRun
+
+WORST = 20
+DISTRIBUTIONS = (
+    ("psd_mean", "mean distance of a building's points", "m"),
+    ("p95", "95th percentile of the distances", "m"),
+    ("share_within_20cm", "share of points within 0.2 m", ""),
+    ("outline_iou", "outline IoU", ""),
+    ("density", "points per square metre", ""),
+    ("volume_m3", "volume", "m³"),
+)
+TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "share_within_20cm_inner", "outline_iou")
+
+
+def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof") -> None:
+    """Write the page to `path`. Raises OutputError when the file cannot be written."""
+    from ..write.files import atomic
+
+    page = report_html(run, title)
+    with atomic(path) as file:
+        file.write(page.encode())
+
+
+def report_html(run: EvaluatedRun, title: str = "hiproof") -> str:
+    """The page as text."""
+    sections = {
+        "title": escape(title),
+        "style": asset("report.css"),
+        "lead": lead(run),
+        "statuses": status_table(run),
+        "figures": figure_table(run),
+        "distributions": distributions(run),
+        "worst": worst_buildings(run),
+        "record": f"<pre>{escape(json.dumps(run.record, indent=1, ensure_ascii=False))}</pre>",
+        "data": embedded(report_data(run, places_on_map(run))),
+        "script": asset("viewer.js") + asset("report.js"),
+    }
+    page = asset("report.html")
+    for name, content in sections.items():
+        page = page.replace(f"<!--{name}-->", content)
+    return page
+
+
+def asset(name: str) -> str:
+    return (files("hiproof.evaluate") / "assets" / name).read_text(encoding="utf-8")
+
+
+def embedded(data: Any) -> str:
+    """JSON that may stand inside a script element."""
+    return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def lead(run: EvaluatedRun) -> str:
+    """The sentence at the top."""
+    version = run.record.get("hiproof") or run.record.get("version") or __version__
+    modelled = sum(model.solid is not None for model in run.models)
+    points = sum(map(len, run.points))
+    measured = f"measured against {points:,} points" if points else "no points given: residuals are those of the run"
+    return (
+        f"{len(run.models):,} buildings, {modelled:,} with a model, {measured}. Made by hiproof {escape(str(version))}."
+    )
+
+
+def status_table(run: EvaluatedRun) -> str:
+    counts = Counter(model.status for model in run.models)
+    rows = "".join(
+        f"<tr><td>{count}</td><td>{escape(sentence(code))}</td></tr>" for code, count in counts.most_common()
+    )
+    return f"<table><tr><th>buildings</th><th>outcome</th></tr>{rows}</table>"
+
+
+def sentence(code: str) -> str:
+    status = Status.__members__.get(code.upper())
+    return status.value if status else code
+
+
+def figure_table(run: EvaluatedRun) -> str:
+    """Mean figures by roof type."""
+    head = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in TABLE)
+    rows = ""
+    for kind, figures in summarise(run.figures).items():
+        cells = "".join(f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>" for name in TABLE)
+        rows += f"<tr><td>{escape(kind)}</td><td>{figures['buildings']}</td>{cells}</tr>"
+    return f"<table><tr><th>type</th><th>buildings</th>{head}</tr>{rows}</table>"
+
+
+def distributions(run: EvaluatedRun) -> str:
+    rows = [figures.row() for figures in run.figures]
+    return "".join(histogram(np.array([row[name] for row in rows]), title, unit) for name, title, unit in DISTRIBUTIONS)
+
+
+def worst_buildings(run: EvaluatedRun) -> str:
+    """The twenty models farthest from their points by RMSE, each with its pictures."""
+    rmse = np.array([figures.quality.rmse for figures in run.figures], float)
+    ranked = [int(i) for i in np.argsort(-rmse, kind="stable") if np.isfinite(rmse[i])][:WORST]
+    return "".join(worst_card(run, i) for i in ranked) or "<p>No points were given, so there are no residuals.</p>"
+
+
+def worst_card(run: EvaluatedRun, index: int) -> str:
+    model, points, quality = run.models[index], run.points[index], run.figures[index].quality
+    origin = model.solid.vertices.min(axis=0)
+    pictures = building_pictures(model.solid.moved(-origin), points - origin, psd(model.solid, points), model.roof_type)
+    text = (
+        f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, RMSE {quality.rmse:.2f} m, "
+        f"{100 * quality.share_within_20cm:.0f} % of {quality.points} points within 0.2 m"
+    )
+    return f'<figure class="worst" data-select="{index}">{pictures}<figcaption>{text}</figcaption></figure>'

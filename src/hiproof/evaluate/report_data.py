@@ -1,0 +1,147 @@
+"""What the report's page draws, as plain values and packed float32 arrays about a local origin."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..model import ROOF, WALL
+from ..status import Status
+from ..write.colours import TYPE_COLOURS
+from ..write.triangles import face_triangles
+from .metrics import plan_outline, psd
+from .report_pictures import RESIDUAL_STOPS
+from .run import EvaluatedRun
+
+POINTS_PER_BUILDING = 150
+MOST_POINTS = 600_000
+STATUS_COLOURS = {
+    "modelled": "#2a9d5c",
+    "sparse": "#93c54b",
+    "poor_fit": "#f08a4b",
+    "simplified": "#e6b800",
+    "flat_fallback": "#7b3fa0",
+    "internal_error": "#000000",
+}
+NO_MODEL_COLOUR = "#b5b5b5"
+
+
+def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
+    """JSON-ready content of the page. `outlines` are plan polygons (world), None where nothing is known of the place."""
+    origin = scene_origin(run, outlines)
+    buildings = [building_data(run, i, outlines[i], origin) for i in range(len(run.models))]
+    types = sorted({model.roof_type for model in run.models})
+    statuses = sorted({model.status for model in run.models})
+    return {
+        "buildings": buildings,
+        "colours": {
+            "type": {name: TYPE_COLOURS.get(name, TYPE_COLOURS["unknown"]) for name in types},
+            "status": {name: STATUS_COLOURS.get(name, NO_MODEL_COLOUR) for name in statuses},
+            "residual": [list(stop) for stop in RESIDUAL_STOPS],
+        },
+        "mesh": mesh_data(run, origin),
+        "points": point_data(run, origin),
+    }
+
+
+def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> np.ndarray:
+    """Whole-metre corner (3,) below everything, so that float32 keeps millimetres over a city."""
+    corners = [model.solid.vertices.min(axis=0) for model in run.models if model.solid is not None]
+    corners += [np.array([*outline.bounds[:2], np.inf]) for outline in outlines if outline is not None]
+    low = np.min(corners, axis=0) if corners else np.zeros(3)
+    return np.where(np.isfinite(low), np.floor(low), 0.0)
+
+
+def building_data(
+    run: EvaluatedRun, index: int, outline: shapely.Geometry | None, origin: np.ndarray
+) -> dict[str, Any]:
+    """What the map and the panel show of one building; the residual is from the points given, else as the model says."""
+    model, figures = run.models[index], run.figures[index]
+    status = Status.__members__.get(model.status.upper())
+    residual = figures.quality.psd_mean
+    if not np.isfinite(residual):
+        residual = model.attributes.get("hiproof_psd_mean")
+    measured = {name: value for name, value in figures.row().items() if name not in ("id", "type", "status")}
+    return {
+        "id": model.id,
+        "type": model.roof_type,
+        "status": model.status,
+        "outcome": status.value if status else model.status,
+        "residual": finite(residual),
+        "measured": {name: finite(value) for name, value in measured.items() if finite(value) is not None},
+        "attributes": {name: finite(value) for name, value in model.attributes.items() if value is not None},
+        "rings": outline_rings(outline, origin),
+    }
+
+
+def finite(value: Any) -> Any:
+    """`value` as JSON can hold it: rounded numbers, None for NaN, text for what is neither number nor text."""
+    if isinstance(value, (bool, str, int)) or value is None:
+        return value
+    if isinstance(value, (float, np.floating)):
+        return round(float(value), 4) if np.isfinite(value) else None
+    return str(value)
+
+
+def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[list[float]]:
+    """Rings of a polygon or multipolygon as flat x, y lists in centimetres' precision about the origin."""
+    if outline is None:
+        return []
+    rings = [ring for polygon in shapely.get_parts(outline) for ring in (polygon.exterior, *polygon.interiors)]
+    return [np.round(shapely.get_coordinates(ring) - origin[:2], 2).ravel().tolist() for ring in rings]
+
+
+def mesh_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
+    """Triangles of roofs and walls: corners (t, 3, 3), building (t,), whether roof (t,); roof edges (e, 2, 3)."""
+    corners, owner, is_roof, edges = [np.empty((0, 3, 3))], [], [], [np.empty((0, 2, 3))]
+    for index, model in enumerate(run.models):
+        if model.solid is None:
+            continue
+        xyz = model.solid.vertices - origin
+        for face in model.solid.faces:
+            if face.kind not in (ROOF, WALL):
+                continue
+            triangles = face_triangles(model.solid.vertices, face)
+            corners.append(xyz[triangles])
+            owner += [index] * len(triangles)
+            is_roof += [face.kind == ROOF] * len(triangles)
+            if face.kind == ROOF:
+                edges += [
+                    np.stack([xyz[list(ring)], np.roll(xyz[list(ring)], -1, axis=0)], axis=1) for ring in face.rings
+                ]
+    return {
+        "corners": packed(np.concatenate(corners), "<f4"),
+        "owner": packed(np.array(owner), "<u4"),
+        "roof": packed(np.array(is_roof), "u1"),
+        "edges": packed(np.concatenate(edges), "<f4"),
+    }
+
+
+def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
+    """Points (n, 3) thinned to every k-th of each building, with their distances to the roof in metres (n,)."""
+    most = max(1, min(POINTS_PER_BUILDING, MOST_POINTS // max(len(run.models), 1)))
+    places, distances = [np.empty((0, 3))], [np.empty(0)]
+    for model, points in zip(run.models, run.points, strict=True):
+        points = points[:: max(1, -(-len(points) // most))]
+        places.append(points - origin)
+        distances.append(psd(model.solid, points) if model.solid is not None else np.full(len(points), np.inf))
+    nearness = np.nan_to_num(np.concatenate(distances), posinf=9.0)
+    return {"places": packed(np.concatenate(places), "<f4"), "distances": packed(nearness, "<f4")}
+
+
+def packed(values: np.ndarray, kind: str) -> str:
+    """Base64 of the array's little-endian bytes."""
+    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")
+
+
+def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:
+    """The plan outline of every model; of a building without a model its footprint, None where it has neither."""
+    footprints = run.footprints or (None,) * len(run.models)
+    return [
+        plan_outline(model.solid) if model.solid is not None else footprint
+        for model, footprint in zip(run.models, footprints, strict=True)
+    ]

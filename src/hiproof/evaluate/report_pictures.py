@@ -1,0 +1,116 @@
+"""Small SVG pictures for the report: histograms, and one building's model with its points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+
+import numpy as np
+
+from ..model import GROUND, ROOF, Solid
+from ..write.colours import TYPE_COLOURS, WALL_COLOUR
+
+RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "#fdae61"), (0.4, "#d7191c"))
+"""Colour from each distance in metres upwards, blue near and red far; the same on map, models and points."""
+
+MOST_POINTS = 400
+WIDTH, HEIGHT = 300, 210
+
+
+def residual_bins(distances: np.ndarray) -> np.ndarray:
+    """Index (n,) of the residual colour of each distance in metres."""
+    return np.searchsorted([stop for stop, _ in RESIDUAL_STOPS[1:]], distances, side="right")
+
+
+def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
+    """A histogram of the finite `values`, the last bar holding all above the 98th percentile."""
+    values = np.asarray(values, float)
+    values = values[np.isfinite(values)]
+    heading = f"{title} ({unit})" if unit else title
+    if not len(values):
+        return f"<figure><figcaption>{escape(heading)}: no figures</figcaption></figure>"
+    low, high = float(values.min()), float(np.percentile(values, 98))
+    high = high if high > low else low + 1e-3
+    counts, edges = np.histogram(np.clip(values, low, high), bins=bins, range=(low, high))
+    step, top = WIDTH / bins, HEIGHT - 40
+    bars = "".join(
+        f'<rect x="{i * step:.1f}" y="{top - top * n / counts.max():.1f}" width="{step - 1:.1f}" '
+        f'height="{top * n / counts.max():.1f}"><title>{edges[i]:.3f} to {edges[i + 1]:.3f}: {n}</title></rect>'
+        for i, n in enumerate(counts)
+        if n
+    )
+    middle = float(np.median(values))
+    x = WIDTH * (np.clip(middle, low, high) - low) / (high - low)
+    axis = (
+        f'<text x="0" y="{top + 16}">{low:.3g}</text><text x="{WIDTH}" y="{top + 16}" text-anchor="end">{high:.3g}</text>'
+        f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{top}" class="median"/>'
+        f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {middle:.3g}, mean {values.mean():.3g}</text>'
+    )
+    body = f'<svg viewBox="0 -4 {WIDTH} {HEIGHT}" class="histogram" role="img">{bars}{axis}</svg>'
+    return f"<figure>{body}<figcaption>{escape(heading)}</figcaption></figure>"
+
+
+def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, roof_type: str) -> str:
+    """The model with its points (n, 3), coloured by their distances (n,): from above at an angle, and from the side.
+
+    The side view looks along the level direction of the largest roof face, so that slopes show as lines.
+    """
+    if len(points) > MOST_POINTS:
+        keep = np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)
+        points, distances = points[keep], distances[keep]
+    across = slope_direction(solid)
+    along = np.array([-across[1], across[0], 0.0])
+    colour = TYPE_COLOURS.get(roof_type, TYPE_COLOURS["unknown"])
+    above = (0.8 * across + 0.6 * along, 0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)])
+    side = (across, np.array([0.0, 0.0, 1.0]))
+    return "".join(projection(solid, points, distances, colour, *view) for view in (above, side))
+
+
+def slope_direction(solid: Solid) -> np.ndarray:
+    """Level unit vector (3,) in which the largest sloped roof face falls; east where all are level."""
+    from ..write.triangles import ring_normal
+
+    normals = np.array([ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.of_kind(ROOF)])
+    if not len(normals):
+        return np.array([1.0, 0.0, 0.0])
+    level = normals * [1.0, 1.0, 0.0]
+    strongest = level[np.argmax(np.linalg.norm(level, axis=1))]
+    length = np.linalg.norm(strongest)
+    return strongest / length if length > 1e-6 else np.array([1.0, 0.0, 0.0])
+
+
+def projection(
+    solid: Solid, points: np.ndarray, distances: np.ndarray, colour: str, right: np.ndarray, up: np.ndarray
+) -> str:
+    """An SVG of faces and points seen along one direction, `right` and `up` (3,) being the picture's axes."""
+    axes = np.column_stack([right, -up])
+    corners, dots = solid.vertices @ axes, points @ axes
+    everything = np.concatenate([corners, dots])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    scale = min((WIDTH - 16) / max(high[0] - low[0], 1e-6), (HEIGHT - 16) / max(high[1] - low[1], 1e-6))
+
+    def place(xy: np.ndarray) -> np.ndarray:
+        return (xy - (low + high) / 2) * scale + [WIDTH / 2, HEIGHT / 2]
+
+    towards = np.cross(right, up)
+    faces = sorted(
+        (face for face in solid.faces if face.kind != GROUND),
+        key=lambda face: float((solid.vertices[list(face.rings[0])] @ towards).mean()),
+    )
+    shapes = "".join(
+        f'<path d="{ring_paths(place(corners), face.rings)}" fill="{colour if face.kind == ROOF else WALL_COLOUR}"/>'
+        for face in faces
+    )
+    cloud = "".join(
+        f'<path d="{"".join(f"M{x:.1f} {y:.1f}h0" for x, y in place(dots[residual_bins(distances) == i]))}" stroke="{stop}"/>'
+        for i, (_, stop) in enumerate(RESIDUAL_STOPS)
+    )
+    return (
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" class="model" role="img"><g class="faces">{shapes}</g>'
+        f'<g class="dots">{cloud}</g></svg>'
+    )
+
+
+def ring_paths(xy: np.ndarray, rings: Sequence[Sequence[int]]) -> str:
+    """SVG path data of a face."""
+    return "".join("M" + "L".join(f"{xy[i, 0]:.1f} {xy[i, 1]:.1f}" for i in ring) + "Z" for ring in rings)
