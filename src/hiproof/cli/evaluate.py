@@ -20,12 +20,12 @@ def evaluate(
     """Measure the models of a run: distances of points, shares, IoU and volume per building, per type and overall."""
     from ..evaluate.evaluation import summarise, to_csv, to_json
     from ..evaluate.run import evaluate_run
-    from ..write.files import atomic
+    from ..write.files import atomic_file
 
     run = evaluate_run(folder, clouds, footprints, reference)
     place = Path(out or folder)
     for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
-        with atomic(place / name) as file:
+        with atomic_file(place / name) as file:
             file.write(text.encode())
     print_summary(summarise(run.figures), reference is not None)
     typer.echo(f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {len(run.figures)} buildings")

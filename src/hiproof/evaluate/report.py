@@ -36,10 +36,10 @@ TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "share_withi
 
 def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof") -> None:
     """Write the page to `path`. Raises OutputError when the file cannot be written."""
-    from ..write.files import atomic
+    from ..write.files import atomic_file
 
     page = report_html(run, title)
-    with atomic(path) as file:
+    with atomic_file(path) as file:
         file.write(page.encode())
 
 

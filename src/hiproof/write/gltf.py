@@ -26,12 +26,12 @@ def write_glb(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, A
 
     `crs` is kept as text beside the origin. Raises OutputError when the file cannot be written.
     """
-    from .files import atomic
+    from .files import atomic_file
 
     content = GlbContent()
     for id, roof_type, solid, attributes in buildings:
         content.add(id, roof_type, solid, attributes)
-    with atomic(path) as file:
+    with atomic_file(path) as file:
         file.write(content.to_bytes(crs))
     return len(content.nodes)
 

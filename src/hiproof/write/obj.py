@@ -22,14 +22,14 @@ def write_obj(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, A
 
     Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file cannot be written.
     """
-    from .files import atomic
+    from .files import atomic_file
 
     path = Path(path)
     library = path.with_suffix(".mtl")
-    with atomic(library) as file:
+    with atomic_file(library) as file:
         file.write(material_library().encode())
     count, first, origin = 0, 1, None
-    with atomic(path) as file:
+    with atomic_file(path) as file:
         for id, roof_type, solid, _ in buildings:
             if origin is None:
                 origin = np.floor(solid.vertices.min(axis=0))
