@@ -138,3 +138,10 @@ def test_any_id_becomes_a_name(id):
     name = "bldg-" + gml_name(id)
     assert etree.fromstring(f"<a xmlns:xml='http://www.w3.org/XML/1998/namespace' xml:id='{name}'/>") is not None
     assert all(c.isascii() and (c.isalnum() or c in "_.-") for c in name)
+
+
+@pytest.mark.parametrize("line", [np.zeros((0, 3)), np.zeros((1, 3)), np.full((4, 3), np.nan)])
+def test_a_terrain_intersection_that_is_no_line_is_left_out(tmp_path, schema, line):
+    root = written(tmp_path, [modelled(box(), terrain_intersection=(line,))])
+    schema.assertValid(root.getroottree())
+    assert found(root, "//bldg:lod2TerrainIntersection") == []

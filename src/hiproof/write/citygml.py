@@ -32,6 +32,8 @@ NAMESPACES = {
 }
 CORE, BLDG, GEN, GML, XLINK = (f"{{{uri}}}" for uri in NAMESPACES.values())
 ROOF_TYPE_CODES = "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml"
+GENERIC = {int: f"{GEN}intAttribute", float: f"{GEN}doubleAttribute", str: f"{GEN}stringAttribute"}
+GENERIC_VALUE = f"{GEN}value"
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 WIDEST = -123456789.1234
 
@@ -85,7 +87,7 @@ class CityGMLWriter(BuildingWriter):
         if figures is not None:
             self.low = np.minimum(self.low, building.solid.vertices.min(axis=0))
             self.high = np.maximum(self.high, building.solid.vertices.max(axis=0))
-        for line in building.terrain_intersection:
+        for line in terrain_lines(building):
             self.low, self.high = np.minimum(self.low, line.min(axis=0)), np.maximum(self.high, line.max(axis=0))
         attributes = building_attributes(building, figures, self.prefix)
         name = self.names.take(gml_name(building.id))
@@ -127,13 +129,13 @@ def city_object_member(
         add_generic_attribute(element, key, value)
     code = roof_type_code(building)
     if code is not None:
-        etree.SubElement(element, f"{BLDG}roofType", codeSpace=ROOF_TYPE_CODES).text = str(code)
+        etree.SubElement(element, f"{BLDG}roofType", codeSpace=ROOF_TYPE_CODES).text = code
     if figures is not None:
         height = figures.h_max - min(ground_height(building, figures), figures.h_base)
         etree.SubElement(element, f"{BLDG}measuredHeight", uom="m").text = f"{height:.4f}"
         polygon_ids = surface_ids(building.solid.faces, name)
         add_solid(element, polygon_ids, name)
-    add_terrain_intersection(element, building.terrain_intersection)
+    add_terrain_intersection(element, terrain_lines(building))
     if figures is not None:
         add_boundary_surfaces(element, building, figures, polygon_ids)
     return member
@@ -143,12 +145,9 @@ def add_generic_attribute(element: etree._Element, name: str, value: Any) -> Non
     """A gen:*Attribute of the value's kind; None is left out."""
     if value is None:
         return
-    kind = "string"
-    if not isinstance(value, bool):
-        kind = {int: "int", float: "double"}.get(type(value), "string")
     text = str(value).lower() if isinstance(value, bool) else xml_text(value)
-    attribute = etree.SubElement(element, f"{GEN}{kind}Attribute", name=xml_text(name))
-    etree.SubElement(attribute, f"{GEN}value").text = text
+    attribute = etree.SubElement(element, GENERIC.get(type(value), GENERIC[str]), name=xml_text(name))
+    etree.SubElement(attribute, GENERIC_VALUE).text = text
 
 
 def surface_ids(faces: tuple[Face, ...], name: str) -> list[str]:
@@ -171,7 +170,12 @@ def add_solid(element: etree._Element, polygon_ids: list[str], name: str) -> Non
         etree.SubElement(shell, f"{GML}surfaceMember", {f"{XLINK}href": f"#poly-{polygon_id}"})
 
 
-def add_terrain_intersection(element: etree._Element, lines: tuple[np.ndarray, ...]) -> None:
+def terrain_lines(building: Building) -> list[np.ndarray]:
+    """The terrain intersection's lines (m, 3) that are lines: two points at least, all known."""
+    return [line for line in building.terrain_intersection if len(line) > 1 and np.isfinite(line).all()]
+
+
+def add_terrain_intersection(element: etree._Element, lines: list[np.ndarray]) -> None:
     """The lines (m, 3) along which the building meets the terrain."""
     if not lines:
         return

@@ -20,7 +20,8 @@ def gml_name(building_id: str) -> str:
 
 def xml_text(value: Any) -> str:
     """`value` as text without the control characters XML cannot hold."""
-    return NOT_IN_XML.sub("\ufffd", str(value))
+    text = str(value)
+    return text if text.isascii() and text.isprintable() else NOT_IN_XML.sub("\ufffd", text)
 
 
 class UniqueNames:

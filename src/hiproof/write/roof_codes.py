@@ -1,27 +1,16 @@
-"""The roof type of a building as CityGML's and AdV's code lists name it."""
+"""The roof type of a building as CityGML's code list names it."""
 
 from __future__ import annotations
 
 from ..model import Building
+from ..primitives.catalogue import CATALOGUE
 
-COMBINATION, ADV_MIXED = 1130, 5000
-CITYGML_CODES = {
-    "flat": 1000,
-    "monopitch": 1010,
-    "gable": 1030,
-    "asymmetric_gable": 1030,
-    "hip": 1040,
-    "half_hip": 1050,
-    "mansard": 1060,
-    "gambrel": 1060,
-    "pyramid": 1070,
-    "shed": 1100,
-}
+COMBINATION = "1130"
 
 
-def roof_type_code(building: Building) -> int | None:
-    """SIG3D code of the roof type: the part's own, "combination" for parts of several types; None without a model."""
-    kinds = {part.type for part in building.parts}
-    if not kinds:
+def roof_type_code(building: Building) -> str | None:
+    """SIG3D code of the roof: its parts' own if all have one, else "combination of roof forms"; None without a model."""
+    if building.solid is None or not building.parts:
         return None
-    return CITYGML_CODES.get(kinds.pop(), COMBINATION) if len(kinds) == 1 else COMBINATION
+    codes = {CATALOGUE[part.type].citygml_code if part.type in CATALOGUE else COMBINATION for part in building.parts}
+    return codes.pop() if len(codes) == 1 else COMBINATION
