@@ -4,12 +4,15 @@ import errno
 import os
 import resource
 import signal
+from dataclasses import replace
 
+import numpy as np
 import pytest
 
 import hiproof.write as write
 from handmade import gable_house, modelled, unmodelled
 from hiproof.errors import OutputError
+from hiproof.model import ROOF
 from hiproof.write.files import atomic, atomic_file, scratch
 
 WRITERS = {
@@ -24,6 +27,18 @@ each_format = pytest.mark.parametrize("name", WRITERS)
 
 def street(count=3):
     return [modelled(gable_house(), f"house {n}") for n in range(count)] + [unmodelled()]
+
+
+def no_roof(solid):
+    return replace(solid, faces=tuple(face for face in solid.faces if face.kind != ROOF))
+
+
+def no_number(solid):
+    return solid.moved(np.array([0.0, 0.0, np.nan]))
+
+
+def no_vertex(solid):
+    return replace(solid, vertices=solid.vertices[:5])
 
 
 def names_in(folder):
@@ -124,6 +139,15 @@ def test_a_run_writes_its_files_together_or_not_at_all(tmp_path):
     with pytest.raises(AttributeError):
         write.write_all(tmp_path / "bad", iter([*street(), "no building"]))
     assert names_in(tmp_path / "bad") == []
+
+
+@pytest.mark.parametrize("break_it", [no_roof, no_number, no_vertex])
+def test_a_broken_solid_does_not_stop_the_others(tmp_path, break_it):
+    buildings = [*street(), modelled(break_it(gable_house()), "broken"), *street()]
+    assert write.write_all(tmp_path, buildings) == ["broken"]
+    records = write.read_parameters(tmp_path / "parameters.jsonl")
+    assert [r["status"] for r in records if r["id"] == "broken"] == ["internal_error"]
+    assert len(records) == 9
 
 
 def test_errors_of_the_caller_pass_unchanged(tmp_path):

@@ -24,7 +24,7 @@ from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
 LAYER = "buildings"
-ROWS_AT_ONCE = 5000
+ROWS_AT_ONCE = 1000
 RESERVED = ("fid", "geom")
 TEXT = (f"{OWN}roof_type", f"{OWN}ground_source")
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.

@@ -53,7 +53,9 @@ class RoofFigures:
 
 
 def roof_figures(solid: Solid) -> RoofFigures:
-    """Figures of `solid` (vertices in world metres, faces oriented outwards, at least one RoofSurface).
+    """Figures of `solid` (vertices in world metres, faces oriented outwards).
+
+    Raises ValueError when no face is a RoofSurface.
 
     >>> from hiproof.model import Face
     >>> xyz = np.array([[x, y, z] for z in (0, 3) for x, y in ((0, 0), (4, 0), (4, 5), (0, 5))], float)
@@ -63,6 +65,8 @@ def roof_figures(solid: Solid) -> RoofFigures:
     >>> figures.volume_m3, figures.h_70p, figures.roofer_type
     (60.0, 3.0, 'horizontal')
     """
+    if not solid.of_kind(ROOF):
+        raise ValueError("its solid has no RoofSurface")
     fan, face_of = face_fans(solid)
     origin = solid.vertices.mean(axis=0)
     corners = solid.vertices[fan] - origin  # (t, 3 corners, 3)
