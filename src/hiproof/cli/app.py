@@ -107,3 +107,15 @@ def status(folder: Annotated[Path, typer.Argument(help="output folder of a run")
     from .status import run
 
     raise typer.Exit(run(folder))
+
+
+@app.command()
+def load(
+    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    database: Annotated[str, typer.Argument(help="postgresql://user@host/database")],
+    prefix: Annotated[str, typer.Option(help="first part of the table names")] = "hiproof",
+) -> None:
+    """Load the models of a run into PostGIS tables; loading again replaces them."""
+    from .load import run
+
+    raise typer.Exit(run(folder, database, prefix))

@@ -1,0 +1,97 @@
+"""Footprints from PostGIS: `postgresql://user:password@host/database?table=schema.name[&geometry=column][&where=condition]`.
+
+GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg and their geometries as WKB.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import parse_qs, urlencode, urlsplit, urlunsplit
+
+import shapely
+
+from ..errors import InputError
+
+SCHEMES = ("postgresql", "postgres")
+
+
+def is_database(source: Any) -> bool:
+    """Whether a footprint source names a database rather than a file."""
+    return isinstance(source, str) and urlsplit(source).scheme in SCHEMES
+
+
+def read_table(source: str) -> tuple[list[tuple[shapely.Geometry, dict[str, Any]]], int | None]:
+    """All (geometry, attributes) rows of the table a source names, in primary-key-free but stable order, and its SRID.
+
+    Raises InputError in a full sentence when the database, the table or the geometry column cannot be used.
+    """
+    dsn, table, geometry, where = parse_source(source)
+    psycopg = import_psycopg()
+    try:
+        with psycopg.connect(dsn, connect_timeout=10) as connection, connection.cursor() as cursor:
+            geometry = geometry or geometry_column(cursor, table, source)
+            rows = list(fetch(psycopg, cursor, table, geometry, where))
+    except psycopg.Error as error:
+        reason = str(error).strip().splitlines()[0]
+        raise InputError(
+            f"expected a PostGIS table at {hide_password(source)}, got: {reason}; check address and table"
+        ) from error
+    srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None} - {0}
+    if len(srids) > 1:
+        raise InputError(
+            f"expected one reference system in {table}, got SRIDs {sorted(srids)}; choose rows with &where="
+        )
+    return rows, srids.pop() if srids else None
+
+
+def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
+    """(dsn, table, geometry column or None, condition or None) of a source."""
+    url = urlsplit(source)
+    query = parse_qs(url.query)
+    own = {name: query.pop(name, [None])[0] for name in ("table", "geometry", "where")}
+    if not own["table"]:
+        raise InputError(
+            f"expected a table in {hide_password(source)}, got none; add ?table=schema.name to the address"
+        )
+    dsn = urlunsplit(url._replace(query=urlencode(query, doseq=True)))
+    return dsn, own["table"], own["geometry"], own["where"]
+
+
+def geometry_column(cursor: Any, table: str, source: str) -> str:
+    schema, _, name = table.rpartition(".")
+    sql = "select f_geometry_column from geometry_columns where f_table_name = %s and (%s = '' or f_table_schema = %s)"
+    cursor.execute(sql, (name, schema, schema))
+    found = [column for (column,) in cursor.fetchall()]
+    if len(found) != 1:
+        got = ", ".join(found) or "none"
+        raise InputError(f"expected one geometry column in {table}, got {got}; name it with &geometry=")
+    return found[0]
+
+
+def fetch(psycopg: Any, cursor: Any, table: str, geometry: str, where: str | None) -> Iterator[tuple]:
+    """Rows ordered by their own content, so that the same table gives the same order whatever its storage."""
+    sql = psycopg.sql
+    name = sql.Identifier(*table.split("."))
+    query = sql.SQL(
+        "select ST_AsEWKB({g}) as ewkb, to_jsonb(t) - {n} as attributes from {t} t {w} order by 2, 1"
+    ).format(g=sql.Identifier(geometry), n=sql.Literal(geometry), t=name, w=sql.SQL(f"where {where}" if where else ""))
+    cursor.execute(query)
+    for ewkb, attributes in cursor:
+        yield (shapely.from_wkb(bytes(ewkb)) if ewkb is not None else None), attributes
+
+
+def import_psycopg() -> Any:
+    try:
+        import psycopg
+        import psycopg.sql
+    except ImportError as error:
+        raise InputError("expected the extra `postgis` for databases; try: pip install 'hiproof[postgis]'") from error
+    return psycopg
+
+
+def hide_password(source: str) -> str:
+    url = urlsplit(source)
+    if url.password is None:
+        return source
+    return source.replace(f":{url.password}@", ":...@", 1)

@@ -1,0 +1,62 @@
+"""Laws of the settings: declared once, checked everywhere, the same after a trip through TOML."""
+
+import dataclasses
+
+import pytest
+
+from hiproof.errors import SettingsError
+from hiproof.settings import Settings
+
+ALL = [(s.name, f) for s in dataclasses.fields(Settings) for f in dataclasses.fields(getattr(Settings(), s.name))]
+
+
+@pytest.mark.parametrize(("section", "declared"), ALL, ids=[f"{s}.{f.name}" for s, f in ALL])
+def test_every_setting_has_help_and_a_default_within_its_own_bounds(section, declared):
+    assert declared.metadata["help"]
+    default = getattr(getattr(Settings(), section), declared.name)
+    assert Settings.from_dict({section: {declared.name: default}}) == Settings()
+
+
+def test_toml_comes_back_the_same(tmp_path):
+    changed = Settings.from_dict({"read": {"building_classes": [6, 67]}, "fit": {"objective": "paper"}})
+    path = tmp_path / "settings.toml"
+    path.write_text(changed.to_toml())
+    assert Settings.from_toml(path) == changed
+    assert Settings.from_dict(changed.to_dict()) == changed
+
+
+def test_toml_explains_every_setting():
+    text = Settings().to_toml()
+    for section, declared in ALL:
+        assert f"[{section}]" in text
+        assert declared.metadata["help"] in text
+
+
+@pytest.mark.parametrize(
+    ("values", "expected"),
+    [
+        ({"fitt": {}}, "fitt"),
+        ({"fit": {"objektive": "paper"}}, "objektive"),
+        ({"fit": {"objective": "pretty"}}, "likelihood, paper"),
+        ({"compose": {"snap_m": 5.0}}, "between"),
+        ({"compose": {"snap_m": "wide"}}, "compose.snap_m"),
+        ({"compose": {"snap_m": float("nan")}}, "between"),
+        ({"read": 3}, "read"),
+    ],
+)
+def test_a_wrong_setting_gets_a_sentence(values, expected):
+    with pytest.raises(SettingsError, match=expected):
+        Settings.from_dict(values)
+
+
+@pytest.mark.parametrize("text", ["fit = [", "\x00"])
+def test_a_broken_toml_file_gets_a_sentence(tmp_path, text):
+    path = tmp_path / "broken.toml"
+    path.write_text(text)
+    with pytest.raises(SettingsError, match="hiproof settings"):
+        Settings.from_toml(path)
+
+
+def test_a_missing_toml_file_gets_a_sentence(tmp_path):
+    with pytest.raises(SettingsError, match="missing.toml"):
+        Settings.from_toml(tmp_path / "missing.toml")
