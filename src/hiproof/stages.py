@@ -112,12 +112,30 @@ def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recogni
     """Roof parts that explain the points: one primitive (the paper's case) or as many as the evidence pays for."""
     if len(points) < FEWEST_POINTS:
         return flat(points, outline, Status.FLAT_FALLBACK)
+    road = fit_one if settings.fit.parts == "one" or settings.fit.objective == "paper" else fit_several
     try:
-        return fit_one(points, outline, recognised, settings)
+        return road(points, outline, recognised, settings)
     except FitError as error:
         if outline is None:
             return Fitted((), shapely.Polygon(), status=Status.NO_ROOF, detail=str(error))
         return flat(points, outline, Status.FLAT_FALLBACK, str(error))
+
+
+def fit_several(
+    points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
+) -> Fitted:
+    """As many parts as the evidence pays for, all fitted to all points together."""
+    from .fit.compound import fit_building
+
+    found = fit_building(points, outline, settings, log_prior(recognised), recognised.weights)
+    return Fitted(found.roof_parts, found.outline, found.objective, found.types)
+
+
+def log_prior(recognised: Recognised) -> dict[str, float] | None:
+    """Log probabilities by type from the network, None without it."""
+    if not recognised.types:
+        return None
+    return {name: math.log(max(probability, 1e-6)) for name, probability in recognised.types.items()}
 
 
 def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:

@@ -41,6 +41,12 @@ class Plan:
     settings: Settings
     fingerprint: str
 
+    def crs(self) -> Any:
+        """The output's reference system, None where no input names one."""
+        from pyproj import CRS
+
+        return CRS.from_wkt(self.crs_wkt) if self.crs_wkt else None
+
     def save(self, path: Path) -> None:
         path.write_bytes(pickle.dumps(self, protocol=5))
 

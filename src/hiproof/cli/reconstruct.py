@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import glob
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
 from ..city.run import Request, Summary, reconstruct_area
-from ..errors import InputError
+from ..read.pointcloud import expand_paths
 from ..settings import Settings
 from ..status import Status
-
-POINT_FILES = (".las", ".laz", ".xyz", ".csv", ".txt", ".pts", ".ply")
 
 
 def run(
@@ -31,7 +28,7 @@ def run(
     given = {s: {k: v for k, v in changes.items() if v is not None} for s, changes in options.items()}
     settings = (Settings.from_toml(config) if config else Settings()).replace({s: c for s, c in given.items() if c})
     request = Request(
-        clouds=point_files(clouds),
+        clouds=tuple(map(str, expand_paths(tuple(clouds)))),
         out=out,
         footprints=footprints,
         terrain=terrain,
@@ -49,28 +46,6 @@ def run_request(request: Request) -> int:
         summary = reconstruct_area(request, bar.update)
     print_summary(summary)
     return summary.exit_code
-
-
-def point_files(names: list[str]) -> tuple[str, ...]:
-    """Files, folders and wildcards as a sorted tuple of files without repeats."""
-    files: set[str] = set()
-    for name in names:
-        path = Path(name)
-        if path.is_dir():
-            inside = sorted(str(p) for p in path.iterdir() if p.suffix.lower() in POINT_FILES)
-            if not inside:
-                raise InputError(
-                    f"expected point files ({', '.join(POINT_FILES)}) in {path}, got none; check the folder"
-                )
-            files.update(inside)
-        elif not path.exists() and "://" not in name:
-            found = glob.glob(name)
-            if not found:
-                raise InputError(f"expected a point file or folder, got {name}, which does not exist; check the path")
-            files.update(found)
-        else:
-            files.add(name)
-    return tuple(sorted(files))
 
 
 class Bar:
