@@ -10,8 +10,7 @@ import shapely
 from hiproof.city.executors import InProcess, Processes, WorkerLost
 from hiproof.city.ledger import Ledger
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
-from hiproof.city.solve import cell_medians
-from hiproof.city.sort import in_any_box
+from hiproof.city.sort import in_any_box, lowest_in_cells
 
 
 def jobs_at(xy):
@@ -40,16 +39,20 @@ def test_points_in_boxes_equal_the_plain_test():
     assert np.array_equal(in_any_box(xy, boxes), plain)
 
 
-def test_cell_medians_do_not_depend_on_order_and_equal_the_plain_loop():
+def test_lowest_points_do_not_depend_on_how_they_are_cut():
     rng = np.random.default_rng(2)
     points = rng.uniform(-5, 5, (500, 3))
-    got = cell_medians(points)
-    assert np.array_equal(got, cell_medians(rng.permutation(points)))
+    whole = lowest_in_cells(points)
+    pieces = lowest_in_cells(
+        np.concatenate([lowest_in_cells(part) for part in np.array_split(rng.permutation(points), 7)])
+    )
+    assert np.array_equal(whole, pieces)
     cells = {}
     for x, y, z in points:
-        cells.setdefault((np.floor(x), np.floor(y)), []).append(z)
-    plain = {cell: sorted(z)[(len(z) - 1) // 2] for cell, z in cells.items()}
-    assert {(x - 0.5, y - 0.5): z for x, y, z in got} == plain
+        cell = (np.floor(x) + 0.5, np.floor(y) + 0.5)
+        cells[cell] = min(z, cells.get(cell, np.inf))
+    assert {(x, y) for x, y, _ in whole} == set(cells)
+    assert all(abs(cells[x, y] - z) < 1e-4 for x, y, z in whole)
 
 
 def test_the_ledger_remembers_after_being_closed(tmp_path):

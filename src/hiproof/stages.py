@@ -180,12 +180,20 @@ def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame,
     lowest_roof = float(points[:, 2].min())
     if terrain is not None:
         corners = np.concatenate([np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)])
-        heights = terrain.height_at(frame.to_world(corners)) - frame.origin[2]
+        heights, source = asked(terrain, frame.to_world(corners))
         if np.isfinite(heights).any():
-            z = float(np.nanmin(heights))
+            z = float(np.nanmin(heights)) - float(frame.origin[2])
             lines = terrain_intersection(outline, lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2], z)
-            return Ground(z, terrain.source, tuple(frame.to_world(line) for line in lines))
+            return Ground(z, source, tuple(frame.to_world(line) for line in lines))
     return Ground(lowest_roof - ASSUMED_WALL_M, f"assumed {ASSUMED_WALL_M:g} m below the lowest point")
+
+
+def asked(terrain: Any, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
+    """Terrain heights (n,) at `xy_world` (n, 2), and the source that answered first."""
+    if hasattr(terrain, "heights_and_sources"):
+        heights, sources = terrain.heights_and_sources(xy_world)
+        return heights, sources[0] if sources else terrain.source
+    return terrain.height_at(xy_world), terrain.source
 
 
 def solid_or_simpler(

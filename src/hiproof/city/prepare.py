@@ -13,7 +13,10 @@ MOST_BUILDINGS_A_TILE = 100
 
 def make_plan(request, mark: str) -> Plan:
     """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
+    from ..read.crs import parse_crs
+
     headers, crs = read_headers(request.clouds)
+    crs = parse_crs(request.settings.read.crs) or crs
     if request.footprints:
         jobs = jobs_from_footprints(request, headers, crs)
     else:
@@ -31,7 +34,7 @@ def make_plan(request, mark: str) -> Plan:
 
 def read_headers(clouds: tuple[str, ...]) -> tuple[list, object]:
     """Headers of the readable point files, and the first CRS among them; one unreadable file does not end the run."""
-    from ..read import read_header
+    from ..read.pointcloud import read_header
 
     headers, errors = [], []
     for name in clouds:
@@ -45,7 +48,7 @@ def read_headers(clouds: tuple[str, ...]) -> tuple[list, object]:
 
 
 def jobs_from_footprints(request, headers: list, crs) -> tuple[Job, ...]:
-    from ..read import check_overlap, read_footprints
+    from ..read.footprints import check_overlap, read_footprints
 
     footprints = read_footprints(request.footprints, id_attribute=request.id_attribute, target_crs=crs)
     bounds = [h.bounds for h in headers if h.bounds is not None]
@@ -56,7 +59,8 @@ def jobs_from_footprints(request, headers: list, crs) -> tuple[Job, ...]:
 
 def jobs_from_cloud(request) -> tuple[Job, ...]:
     """Without footprints, the connected groups of roof points are the buildings."""
-    from ..read import read_points, split_buildings
+    from ..read.pointcloud import read_points
+    from ..read.split import split_buildings
 
     groups = split_buildings(read_points(*request.clouds, settings=request.settings), request.settings)
     areas = [(group.id, shapely.make_valid(group.area)) for group in groups]

@@ -11,19 +11,19 @@ from pathlib import Path
 import numpy as np
 
 from ..model import Building
-from ..read.terrain import read_terrain, terrain_from_points
+from ..read.terrain import Terrain, TerrainChain, lowest_points, read_terrain, terrain_from_points
 from ..reconstruct import reconstruct
 from ..status import Status
-from ..write.files import atomic
+from ..write.files import atomic_file
 from .plan import Job, Plan, neighbourhood
 from .sort import GROUND_REACH_M, load_points
 
 
 @functools.lru_cache(maxsize=2)
-def shared(folder: str, stamp: int) -> tuple[Plan, object]:
+def shared(folder: str, stamp: int) -> tuple[Plan, Terrain | None]:
     """The plan and its terrain model, once a process (`stamp` is the plan file's time)."""
     plan = Plan.load(Path(folder) / "plan.pickle")
-    return plan, read_terrain(plan.terrain) if plan.terrain else None
+    return plan, read_terrain(plan.terrain, plan.crs()) if plan.terrain else None
 
 
 def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tuple]:
@@ -34,53 +34,43 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
     """
     root = Path(folder)
     plan, terrain = shared(folder, (root / "plan.pickle").stat().st_mtime_ns)
-    owner, roof, ground = load_points(root, tile)
+    points = load_points(root, tile)
+    owner = points["roof"][:, 3]
     buildings, rows = [], []
     for index in plan.tiles[tile]:
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
             building = Building(job.id, Status.INTERNAL_ERROR, "the process died while it worked on this building")
         else:
-            building = solve_one(plan, job, roof[owner == index], ground, terrain)
+            building = solve_one(plan, job, points["roof"][owner == index, :3], points, terrain)
         buildings.append(building)
         rows.append(ledger_row(index, building, time.perf_counter() - start))
-    with atomic(root / "tiles" / f"{tile}.pickle") as beside:
-        Path(beside).write_bytes(pickle.dumps(buildings, protocol=5))
+    with atomic_file(root / "tiles" / f"{tile}.pickle") as file:
+        pickle.dump(buildings, file, protocol=5)
     return rows
 
 
-def solve_one(plan: Plan, job: Job, points: np.ndarray, ground: np.ndarray, terrain: object) -> Building:
+def solve_one(plan: Plan, job: Job, roof: np.ndarray, around: dict[str, np.ndarray], model: Terrain | None) -> Building:
     """One building, whatever happens: an exception becomes its status."""
     try:
-        if terrain is None and not job.area.is_empty:
-            terrain = terrain_around(job, ground)
-        return reconstruct(points, job.footprint, terrain, plan.settings, id=job.id)
+        terrain = None if job.area.is_empty else terrain_around(job, around, model)
+        return reconstruct(roof, job.footprint, terrain, plan.settings, id=job.id)
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         detail = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
         attributes = job.footprint.attributes if job.footprint else {}
-        return Building(job.id, Status.INTERNAL_ERROR, detail, attributes=attributes)
+        return Building(job.id, Status.INTERNAL_ERROR, detail, footprint=job.area, attributes=attributes)
 
 
-def terrain_around(job: Job, ground: np.ndarray) -> object | None:
-    """Terrain from the ground points in the box around a building: the median height of each whole-metre cell."""
+def terrain_around(job: Job, around: dict[str, np.ndarray], model: Terrain | None) -> TerrainChain:
+    """The terrain model, else the ground points in the whole-metre box around the building, else the lowest points."""
     xmin, ymin, xmax, ymax = neighbourhood(job, GROUND_REACH_M)
-    x, y = ground[:, 0], ground[:, 1]
-    near = ground[(x >= xmin) & (x < xmax) & (y >= ymin) & (y < ymax)]
-    return terrain_from_points(cell_medians(near)) if len(near) else None
-
-
-def cell_medians(points: np.ndarray, cell_m: float = 1.0) -> np.ndarray:
-    """One point a world-aligned cell: its centre with the lower median height of the points (n, 3) in it.
-
-    The answer does not depend on the order of the points.
-    """
-    cell = np.floor(points[:, :2] / cell_m)
-    order = np.lexsort((points[:, 2], cell[:, 1], cell[:, 0]))
-    cell, z = cell[order], points[order, 2]
-    first = np.flatnonzero(np.r_[True, np.any(np.diff(cell, axis=0) != 0, axis=1)])
-    last = np.r_[first[1:], len(z)] - 1
-    return np.column_stack([(cell[first] + 0.5) * cell_m, z[(first + last) // 2]])
+    ground, low = (
+        p[(p[:, :2] >= (xmin, ymin)).all(1) & (p[:, :2] < (xmax, ymax)).all(1)]
+        for p in map(around.get, ("ground", "low"))
+    )
+    found = [model, terrain_from_points(ground) if len(ground) else None, lowest_points(low) if len(low) else None]
+    return TerrainChain(found)
 
 
 def ledger_row(position: int, building: Building, seconds: float) -> tuple:
