@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import shapely
 
 from ..errors import InputError
@@ -51,9 +52,9 @@ def jobs_from_footprints(request, headers: list, crs) -> tuple[Job, ...]:
     from ..read.footprints import check_overlap, read_footprints
 
     footprints = read_footprints(request.footprints, id_attribute=request.id_attribute, target_crs=crs)
-    bounds = [h.bounds for h in headers if h.bounds is not None]
-    if bounds:
-        check_overlap(footprints, bounds)
+    bounds = np.array([header.bounds for header in headers])
+    box = (*bounds[:, :2].min(axis=0), *bounds[:, 3:5].max(axis=0))
+    check_overlap(footprints, box, cloud_crs=crs)
     return jobs_of_footprints(footprints)
 
 

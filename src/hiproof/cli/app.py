@@ -8,6 +8,9 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from .convert import convert
+from .evaluate import evaluate
+from .report import report
 
 app = typer.Typer(
     name="hiproof",
@@ -119,3 +122,7 @@ def load(
     from .load import run
 
     raise typer.Exit(run(folder, database, prefix))
+
+
+for command in (evaluate, report, convert):
+    app.command()(command)
