@@ -9,6 +9,7 @@ from collections.abc import Iterator
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit, urlunsplit
 
+import numpy as np
 import shapely
 
 from ..errors import InputError
@@ -21,8 +22,8 @@ def is_database(source: Any) -> bool:
     return isinstance(source, str) and urlsplit(source).scheme in SCHEMES
 
 
-def read_table(source: str) -> tuple[list[tuple[shapely.Geometry, dict[str, Any]]], int | None]:
-    """All (geometry, attributes) rows of the table a source names, in primary-key-free but stable order, and its SRID.
+def read_table(source: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
+    """The table a source names, in the shape pyogrio gives files: metadata (fields, crs), row numbers, geometries, columns.
 
     Raises InputError in a full sentence when the database, the table or the geometry column cannot be used.
     """
@@ -37,12 +38,18 @@ def read_table(source: str) -> tuple[list[tuple[shapely.Geometry, dict[str, Any]
         raise InputError(
             f"expected a PostGIS table at {hide_password(source)}, got: {reason}; check address and table"
         ) from error
+    if not rows:
+        raise InputError(f"expected footprints in {table}, got a table without rows; name another, or relax &where=")
     srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None} - {0}
     if len(srids) > 1:
         raise InputError(
             f"expected one reference system in {table}, got SRIDs {sorted(srids)}; choose rows with &where="
         )
-    return rows, srids.pop() if srids else None
+    names = sorted({name for _, attributes in rows for name in attributes})
+    columns = [np.array([attributes.get(name) for _, attributes in rows], object) for name in names]
+    geometries = np.empty(len(rows), object)
+    geometries[:] = [shape for shape, _ in rows]
+    return {"fields": names, "crs": f"EPSG:{srids.pop()}" if srids else None}, np.arange(len(rows)), geometries, columns
 
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:

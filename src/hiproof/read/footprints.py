@@ -17,6 +17,7 @@ from ..errors import InputError, InputWarning
 from ..model import Footprint
 from ..settings import Settings
 from .crs import parse_crs, require_metres, same_horizontal
+from .database import is_database, read_table
 from .las import is_url
 from .polygons import simple_polygons
 
@@ -55,6 +56,8 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
 
 def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
     """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and attribute columns."""
+    if is_database(path):
+        return read_table(path)
     if not is_url(path) and "://" not in str(path) and not str(path).startswith(("/vsi", "PG:")):
         if not Path(path).exists():
             raise InputError(f"expected footprints at {path}, got no such file; check the path")

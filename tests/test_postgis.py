@@ -1,0 +1,115 @@
+"""Footprints out of, and models into, a real PostGIS."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.errors import InputError, OutputError
+from hiproof.read.database import hide_password
+from hiproof.read.footprints import read_footprints
+from hiproof.write.postgis import lie_of, load_postgis
+from postgis_server import running, why_not
+from sample_models import write_sample_run
+
+psycopg = pytest.importorskip("psycopg", reason="the extra `postgis` is not installed")
+
+
+@pytest.fixture(scope="module")
+def database():
+    if why_not():
+        pytest.skip(why_not())
+    with running() as dsn:
+        with psycopg.connect(dsn) as connection:
+            connection.execute("create extension postgis")
+        yield dsn
+
+
+@pytest.fixture(scope="module")
+def table(database):
+    """Three rows: a square, two squares with one name, and one without geometry."""
+    square, pair = (
+        shapely.box(0, 0, 10, 10),
+        shapely.MultiPolygon([shapely.box(20, 0, 30, 10), shapely.box(40, 0, 50, 10)]),
+    )
+    with psycopg.connect(database) as connection:
+        connection.execute("create table houses (id text, storeys int, geom geometry(Geometry, 28992), extra geometry)")
+        for id, storeys, shape in (("a", 2, square), ("b", 3, pair), ("c", None, None)):
+            wkb = shapely.to_wkb(shape) if shape is not None else None
+            connection.execute(
+                "insert into houses values (%s, %s, ST_SetSRID(%s::geometry, 28992))", (id, storeys, wkb)
+            )
+    return f"{database}&table=houses&geometry=geom"
+
+
+def test_a_table_gives_the_footprints_a_file_would(table):
+    footprints = read_footprints(table)
+    assert [f.id for f in footprints] == ["a", "b-1", "b-2", "c"]
+    assert footprints[0].attributes["storeys"] == 2
+    assert footprints[0].polygon.equals(shapely.box(0, 0, 10, 10))
+    assert footprints[-1].polygon.is_empty
+    assert [f.id for f in read_footprints(table + "&where=storeys=2")] == ["a"]
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        (lambda t: t.replace("houses", "castles"), "castles"),
+        (lambda t: t.replace("&geometry=geom", ""), "one geometry column in houses, got extra, geom|geom, extra"),
+        (lambda t: t.replace("&table=houses", ""), "table=schema.name"),
+        (lambda t: t + "&where=storeys=99", "without rows"),
+        (lambda t: t + "&where=nonsense=1", "nonsense"),
+    ],
+)
+def test_a_wrong_address_gets_a_sentence(table, change, expected):
+    with pytest.raises(InputError, match=expected):
+        read_footprints(change(table))
+
+
+def test_no_server_gets_a_sentence_and_hides_the_password(tmp_path):
+    address = f"postgresql://me:secret@/postgres?host={tmp_path}&table=houses"
+    assert "secret" not in hide_password(address)
+    with pytest.raises(InputError, match="check address and table") as caught:
+        read_footprints(address)
+    assert "secret" not in str(caught.value)
+
+
+def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
+    write_sample_run(tmp_path / "run")
+    lines = (tmp_path / "run" / "buildings.city.jsonl").read_text().splitlines()[1:]
+    for _ in range(2):
+        assert load_postgis(tmp_path / "run", database) == len(lines)
+    with psycopg.connect(database) as connection:
+        ids = [row[0] for row in connection.execute("select id from hiproof_buildings order by id")]
+        assert ids == sorted(json.loads(line)["id"] for line in lines)
+        sql = "select count(*), count(distinct building_id) from hiproof_roofs"
+        roofs, with_roofs = connection.execute(sql).fetchone()
+        assert roofs > with_roofs == 2
+        kinds = connection.execute(
+            "select distinct GeometryType(geom) from hiproof_buildings where geom is not null"
+        ).fetchall()
+        assert kinds == [("POLYHEDRALSURFACE",)]
+        slopes = connection.execute(
+            "select slope_deg, azimuth_deg from hiproof_roofs where building_id like 'house%'"
+        ).fetchall()
+        assert sorted(round(azimuth) for _, azimuth in slopes) == [90, 270]
+        assert all(abs(slope - 36.87) < 0.01 for slope, _ in slopes)
+
+
+def test_loading_needs_a_run_and_a_database(database, tmp_path):
+    with pytest.raises(InputError, match=r"buildings\.city\.jsonl"):
+        load_postgis(tmp_path, database)
+    write_sample_run(tmp_path / "run")
+    with pytest.raises(OutputError, match="PostGIS database"):
+        load_postgis(tmp_path / "run", f"postgresql://me@/postgres?host={tmp_path}")
+    with pytest.raises(InputError, match="prefix"):
+        load_postgis(tmp_path / "run", database, prefix="a; drop table")
+
+
+def test_slope_and_azimuth_of_a_plane_falling_north_east():
+    ring = [(0, 0, 2), (1, 0, 1), (1, 1, 0), (0, 1, 1)]
+    slope, azimuth, area = lie_of([np.array(ring, float)])
+    assert azimuth == pytest.approx(45)
+    assert slope == pytest.approx(54.7356, abs=1e-3)
+    assert area == pytest.approx(3**0.5)
