@@ -11,7 +11,7 @@ import pytest
 
 import hiproof.write as write
 from handmade import gable_house, modelled, unmodelled
-from hiproof.errors import OutputError
+from hiproof.errors import InputError, OutputError
 from hiproof.model import ROOF
 from hiproof.write.files import atomic, atomic_file, scratch
 
@@ -170,4 +170,11 @@ def test_a_scratch_file_is_gone_afterwards(tmp_path):
         file.write(b"abc")
         file.seek(0)
         assert file.read() == b"abc"
+    assert names_in(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", [name for name in WRITERS if name != "parameters.jsonl"])
+def test_a_crs_that_is_none(tmp_path, name):
+    with pytest.raises(InputError, match="expected a coordinate reference system"):
+        WRITERS[name](tmp_path / name, street(), "EPSG:nonsense")
     assert names_in(tmp_path) == []

@@ -20,6 +20,7 @@ from ..errors import OutputError
 from ..model import GROUND, Building
 from .building_attributes import OWN, PREFIX, building_attributes, figures_of
 from .files import atomic, scratch
+from .naming import plan_wkt
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
@@ -49,7 +50,7 @@ class AttributesWriter(BuildingWriter):
 
     def __init__(self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX) -> None:
         super().__init__(path)
-        self.crs, self.prefix = crs, prefix
+        self.plan_wkt, self.prefix = plan_wkt(crs), prefix
         self.kinds: dict[str, set[type]] = {}
         self.count = 0
 
@@ -99,7 +100,7 @@ class AttributesWriter(BuildingWriter):
                     driver="GPKG",
                     geometry_type="MultiPolygon",
                     promote_to_multi=True,
-                    crs=plan_crs(self.crs),
+                    crs=self.plan_wkt,
                     append=append,
                 )
         except (DataSourceError, DataLayerError, FeatureError, RuntimeError, OSError) as error:
@@ -131,16 +132,6 @@ def plan_outline(building: Building) -> shapely.Geometry | None:
         rings = [[building.solid.vertices[list(r), :2] for r in f.rings] for f in building.solid.of_kind(GROUND)]
         return shapely.union_all([shapely.Polygon(outer, inner) for outer, *inner in rings])
     return building.footprint
-
-
-def plan_crs(crs: Any) -> str | None:
-    """WKT of the horizontal part of `crs`: outlines have no height."""
-    if crs is None:
-        return None
-    from pyproj import CRS
-
-    crs = CRS.from_user_input(crs)
-    return (crs.sub_crs_list[0] if crs.is_compound else crs).to_wkt()
 
 
 def kind_of(value: Any) -> type:

@@ -44,49 +44,43 @@ class UniqueNames:
         return unique
 
 
-def epsg_codes(crs: Any) -> tuple[int, ...]:
-    """EPSG codes of `crs` (pyproj CRS, anything pyproj understands, or None): one, two for a compound, () if unknown.
-
-    >>> epsg_codes("EPSG:7415"), epsg_codes("EPSG:28992"), epsg_codes(None)
-    ((28992, 5709), (28992,), ())
-    """
-    if crs is None:
-        return ()
-    from pyproj import CRS
-
-    crs = CRS.from_user_input(crs)
-    parts = crs.sub_crs_list if crs.is_compound else [crs]
-    codes = [part.to_epsg() for part in parts]
-    if codes and codes[0] is not None:
-        return tuple(code for code in codes if code is not None)
-    whole = crs.to_epsg()
-    return () if whole is None else (whole,)
-
-
 def srs_name(crs: Any) -> str | None:
-    """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN; None when the CRS has no code.
+    """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN; None when `crs` is unknown or has no code.
 
     >>> srs_name("EPSG:7415")
     'urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709'
     >>> srs_name("EPSG:26918")
     'urn:ogc:def:crs:EPSG::26918'
     """
-    codes = epsg_codes(crs)
-    if len(codes) < 2:
-        return f"urn:ogc:def:crs:EPSG::{codes[0]}" if codes else None
-    return "urn:ogc:def:crs," + ",".join(f"crs:EPSG::{code}" for code in codes)
+    from ..read.crs import epsg_code, horizontal_crs, parse_crs, vertical_crs
+
+    crs = parse_crs(crs)
+    if crs is None:
+        return None
+    height = vertical_crs(crs)
+    codes = (None, None) if height is None else (epsg_code(horizontal_crs(crs)), epsg_code(height))
+    if None not in codes:
+        return "urn:ogc:def:crs," + ",".join(f"crs:EPSG::{code}" for code in codes)
+    code = epsg_code(crs) or epsg_code(horizontal_crs(crs))
+    return None if code is None else f"urn:ogc:def:crs:EPSG::{code}"
 
 
 def reference_system(crs: Any) -> str | None:
     """The `referenceSystem` of CityJSON, which holds one code: the compound's own where it has one, else the plan's.
 
-    >>> reference_system("EPSG:28992+5709")
-    'https://www.opengis.net/def/crs/EPSG/0/7415'
+    >>> reference_system("EPSG:28992+5709"), reference_system("EPSG:25832+5709"), reference_system(None)
+    ('https://www.opengis.net/def/crs/EPSG/0/7415', 'https://www.opengis.net/def/crs/EPSG/0/25832', None)
     """
-    if crs is None:
-        return None
-    from pyproj import CRS
+    from ..read.crs import epsg_code, horizontal_crs, parse_crs
 
-    codes = epsg_codes(crs)
-    code = CRS.from_user_input(crs).to_epsg() or (codes[0] if codes else None)
+    crs = parse_crs(crs)
+    code = None if crs is None else epsg_code(crs) or epsg_code(horizontal_crs(crs))
     return None if code is None else f"https://www.opengis.net/def/crs/EPSG/0/{code}"
+
+
+def plan_wkt(crs: Any) -> str | None:
+    """WKT of the plan component of `crs`, for layers without heights; None when `crs` is."""
+    from ..read.crs import horizontal_crs, parse_crs
+
+    crs = parse_crs(crs)
+    return None if crs is None else horizontal_crs(crs).to_wkt()
