@@ -156,6 +156,7 @@ def test_coordinates_that_are_no_numbers_enclose_no_area():
 def test_overlap_is_checked_and_both_boxes_are_named():
     footprints = (Footprint("a", SQUARE), Footprint("empty", shapely.Polygon()))
     check_overlap(footprints, (84990, 445990, 85001, 446001))
+    check_overlap(footprints, [(0, 0, 0, 1, 1, 9), (84990, 445990, -3, 85001, 446001, 9)])
     check_overlap(footprints[1:], (0, 0, 1, 1))
     with pytest.raises(InputError, match=r"x 4\.0 to 5\.0.*Amersfoort / RD New.*x 85000\.0 to 85010\.0.*no CRS named"):
         check_overlap(footprints, (4.0, 51.0, 5.0, 52.0), None, CRS.from_epsg(28992))

@@ -21,8 +21,8 @@ def default_radius(xy: np.ndarray) -> float:
     return SPACINGS * float(np.sqrt(hull_area / max(len(xy), 1)))
 
 
-def alpha_shape(xy: np.ndarray, radius: float | None = None) -> shapely.Polygon:
-    """Outline of `xy` (n, 2): the largest component of the alpha shape of `radius` metres, its holes filled.
+def alpha_shape(xy: np.ndarray, radius: float | None = None, holes: bool = False) -> shapely.Polygon:
+    """Outline of `xy` (n, 2): the largest component of the alpha shape of `radius` metres, its holes filled or kept.
 
     Raises FitError for points that span no area.
 
@@ -46,4 +46,4 @@ def alpha_shape(xy: np.ndarray, radius: float | None = None) -> shapely.Polygon:
         raise FitError(f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger one")
     shape = shapely.coverage_union_all(shapely.polygons(kept))
     largest = max(shapely.get_parts(shape), key=lambda polygon: polygon.area)
-    return shapely.Polygon(largest.exterior)
+    return largest if holes else shapely.Polygon(largest.exterior)

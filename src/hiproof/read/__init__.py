@@ -1,6 +1,32 @@
 """From files to values: point clouds, footprints, terrain, RoofN3D, and the split of a cloud into buildings.
 
-`pointcloud.read_points` and `footprints.read_footprints` give what a run starts from; `assign` brings the two together,
-`split` and `outline` stand in for footprints where there are none, `terrain` answers how high the ground is. Everything
-unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by `errors.InputWarning`.
+`read_points` and `read_footprints` give what a run starts from; `points_of_footprints` brings the two together,
+`split_buildings` and `estimate_outline` stand in for footprints where there are none, a terrain answers how high the
+ground is. Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by
+`errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a third of a second.
 """
+
+from importlib import import_module
+from typing import Any
+
+_HOME = {
+    **dict.fromkeys(("read_points", "iter_points", "read_header", "PointFileHeader"), "pointcloud"),
+    **dict.fromkeys(("read_footprints", "footprint_crs", "check_overlap"), "footprints"),
+    **dict.fromkeys(("points_of_footprints", "points_near_footprints", "PointGrid"), "assign"),
+    **dict.fromkeys(("read_terrain", "terrain_from_points", "lowest_points", "Terrain", "TerrainChain"), "terrain"),
+    **dict.fromkeys(("split_buildings", "FoundBuilding", "adapted_gap"), "split"),
+    **dict.fromkeys(("estimate_outline", "plan_density"), "outline"),
+    **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
+    **dict.fromkeys(("srs_name", "same_horizontal", "combine", "parse_crs"), "crs"),
+}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f".{_HOME[name]}", __name__), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -64,19 +64,23 @@ class PointGrid:
         return self.inside(shapely.buffer(polygon, distance_m, quad_segs=4))
 
 
-def points_of_footprints(cloud_xyz: np.ndarray, footprints: Iterable[Footprint]) -> list[np.ndarray]:
+def points_of_footprints(cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]) -> list[np.ndarray]:
     """For each footprint the ascending indices into `cloud_xyz` (n, 2 or 3) of the points inside or on its border.
 
     Pass the building-class points only. A point in the overlap of two footprints belongs to both: what a building gets
     never depends on its neighbours.
     """
     grid = PointGrid(cloud_xyz)
-    return [grid.inside(footprint.polygon) for footprint in footprints]
+    return [grid.inside(plan_of(footprint)) for footprint in footprints]
 
 
 def points_near_footprints(
-    cloud_xyz: np.ndarray, footprints: Iterable[Footprint], distance_m: float
+    cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon], distance_m: float
 ) -> list[np.ndarray]:
     """As `points_of_footprints`, for the points at most `distance_m` away: the ground around each building."""
     grid = PointGrid(cloud_xyz)
-    return [grid.within(footprint.polygon, distance_m) for footprint in footprints]
+    return [grid.within(plan_of(footprint), distance_m) for footprint in footprints]
+
+
+def plan_of(footprint: Footprint | shapely.Polygon) -> shapely.Polygon:
+    return footprint.polygon if isinstance(footprint, Footprint) else footprint

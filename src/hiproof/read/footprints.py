@@ -211,26 +211,29 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
 
 def check_overlap(
     footprints: Sequence[Footprint],
-    bounds: Sequence[float],
+    bounds: Sequence[float] | Sequence[Sequence[float]],
     footprints_crs: CRS | None = None,
     cloud_crs: CRS | None = None,
 ) -> None:
-    """Raise InputError when no footprint meets the cloud's plan `bounds` (xmin, ymin, xmax, ymax).
+    """Raise InputError when no footprint meets the cloud's `bounds`, of one file or of several.
 
-    The CRSs only name in the message what the two sides were read as.
+    Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax, ymax, zmax). The CRSs
+    only name in the message what the two sides were read as.
     """
     boxes = shapely.bounds([footprint.polygon for footprint in footprints if not footprint.polygon.is_empty])
-    if not len(boxes):
+    files = np.atleast_2d(np.asarray(bounds, float))
+    files = files[:, [0, 1, 3, 4]] if files.shape[1] == 6 else files
+    if not len(boxes) or len(shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*files.T))[0]):
         return
-    low, high = boxes[:, :2], boxes[:, 2:]
-    if ((low <= np.asarray(bounds[2:])) & (high >= np.asarray(bounds[:2]))).all(axis=1).any():
-        return
-    around = (*low.min(axis=0), *high.max(axis=0))
     raise InputError(
-        f"expected footprints that overlap the cloud in x {bounds[0]:.1f} to {bounds[2]:.1f}, y {bounds[1]:.1f} to "
-        f"{bounds[3]:.1f} ({name_of(cloud_crs)}), got x {around[0]:.1f} to {around[2]:.1f}, y {around[1]:.1f} to "
-        f"{around[3]:.1f} ({name_of(footprints_crs)}); check the CRS each file names, or set [read] crs"
+        f"expected footprints that overlap the cloud in {extent(files)} ({name_of(cloud_crs)}), got footprints in "
+        f"{extent(boxes)} ({name_of(footprints_crs)}); check the CRS each file names, or set [read] crs"
     )
+
+
+def extent(boxes: np.ndarray) -> str:
+    (xmin, ymin), (xmax, ymax) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
+    return f"x {xmin:.1f} to {xmax:.1f}, y {ymin:.1f} to {ymax:.1f}"
 
 
 def name_of(crs: CRS | None) -> str:

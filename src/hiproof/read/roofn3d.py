@@ -1,0 +1,156 @@
+"""RoofN3D (Wichmann et al. 2018): `roofn3d_buildings.csv` and the labels in `roofn3d_surfacegrowing.csv`, streamed.
+
+The points' WKT has no inner parentheses and fields run to megabytes, so coordinates are parsed as one run of numbers.
+"""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from ..errors import InputError, InputWarning
+
+TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
+"""Our catalogue's name of each RoofN3D class."""
+
+FIELD_LIMIT = 1 << 30
+UNASSIGNED = -1
+UNITS_PER_M = 1000
+
+
+@dataclass(frozen=True)
+class RoofN3DRecord:
+    """One building: `type` a name of our catalogue (None for a class we do not know, in `class_name`), `points` (n, 3)
+    in metres of EPSG:26918, `outline` its plan polygon, empty where the file has none."""
+
+    id: str
+    type: str | None
+    class_name: str
+    points: np.ndarray
+    outline: shapely.Polygon
+
+
+def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
+    """Yield the buildings of `roofn3d_buildings.csv`, each id once (the first row counts), one row in memory at a time.
+
+    Raises InputError for a file of another layout and for coordinates that are no numbers, naming the row.
+    """
+    seen: set[str] = set()
+    repeated = 0
+    for number, row in rows(path, ("id", "class", "points", "outline")):
+        if row["id"] in seen:
+            repeated += 1
+            continue
+        seen.add(row["id"])
+        with naming_row(path, number):
+            points, outline = coordinates(row["points"]), polygon(row["outline"])
+        class_name = (row["class"] or "").strip()
+        yield RoofN3DRecord(row["id"], TYPES.get(class_name.lower()), class_name, points, outline)
+    if repeated:
+        warnings.warn(f"{path}: {repeated} rows repeat the id of an earlier one and were left out", InputWarning)
+
+
+def read_roofn3d_labels(
+    path: str | Path, records: Iterator[RoofN3DRecord]
+) -> Iterator[tuple[RoofN3DRecord, np.ndarray]]:
+    """Yield each record with its points' labels (n,): the surface (0, 1, ...) of each, -1 where no surface has it.
+
+    `path` is `roofn3d_surfacegrowing.csv`; it has no label per point, so points are matched by their coordinates, to the
+    millimetre. Surfaces count in the order of the file. Only where the surfaces lie in the file is kept in memory.
+    """
+    offsets = surface_offsets(path)
+    with open(path, "rb") as file:
+        header = next(csv.reader([file.readline().decode("utf-8-sig")]))
+        for record in records:
+            labels = np.full(len(record.points), UNASSIGNED)
+            for label, offset in enumerate(offsets.get(record.id, ())):
+                file.seek(offset)
+                values = next(csv.reader([file.readline().decode()]))
+                surface = coordinates(dict(zip(header, values, strict=False))["points"])
+                labels[np.isin(point_keys(record.points), point_keys(surface))] = label
+            yield record, labels
+
+
+def surface_offsets(path: str | Path) -> dict[str, list[int]]:
+    """Where in the file (bytes) the rows of each building start; a row is a line, as no field holds a line break."""
+    next(rows(path, ("points", "fk_buildings")), None)  # refuses another layout before the pass over the whole file
+    offsets: dict[str, list[int]] = {}
+    with open(path, "rb") as file:
+        header = next(csv.reader([file.readline().decode("utf-8-sig")]))
+        column = header.index("fk_buildings")
+        start = file.tell()
+        for line in iter(file.readline, b""):
+            values = next(csv.reader([line.decode()]), [])
+            if len(values) > column:
+                offsets.setdefault(values[column].strip(), []).append(start)
+            start = file.tell()
+    return offsets
+
+
+def rows(path: str | Path, needed: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
+    """Number (the header is 1) and fields by name of each row. Raises InputError when a needed column is missing."""
+    csv.field_size_limit(FIELD_LIMIT)
+    try:
+        with open(path, newline="", encoding="utf-8-sig") as file:
+            reader = csv.DictReader(file)
+            missing = [name for name in needed if name not in (reader.fieldnames or [])]
+            if missing:
+                got = ", ".join(name[:30] for name in (reader.fieldnames or [])[:8]) or "an empty file"
+                raise InputError(
+                    f"expected RoofN3D's columns {', '.join(needed)} in {path}, got {got}; "
+                    "name roofn3d_buildings.csv or roofn3d_surfacegrowing.csv as downloaded"
+                )
+            for number, row in enumerate(reader, start=2):
+                yield number, {name: (value or "") for name, value in row.items() if name}
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise InputError(f"expected a CSV file of RoofN3D at {path}, got: {error}; check the file") from error
+
+
+@contextmanager
+def naming_row(path: str | Path, number: int) -> Iterator[None]:
+    try:
+        yield
+    except (ValueError, shapely.errors.ShapelyError) as error:
+        raise InputError(
+            f"expected WKT coordinates in row {number} of {path}, got: {error}; the file may be cut off: download it again"
+        ) from error
+
+
+def coordinates(wkt: str) -> np.ndarray:
+    """Points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`, with or without inner parentheses; (0, 3) of an empty field.
+
+    >>> coordinates("MULTIPOINT Z (1 2 3,4 5 6.5)").tolist()
+    [[1.0, 2.0, 3.0], [4.0, 5.0, 6.5]]
+    """
+    start, end = wkt.find("("), wkt.rfind(")")
+    if start < 0 or end < start:
+        if not wkt.strip() or wkt.strip().upper().endswith("EMPTY"):
+            return np.empty((0, 3))
+        raise ValueError(f"{wkt[:40]!r}...{wkt[-20:]!r}")
+    numbers = wkt[start + 1 : end].replace(",", " ").replace("(", " ").replace(")", " ").split()
+    values = np.array(numbers, dtype=float)
+    if len(values) % 3:
+        raise ValueError(f"{len(values)} numbers, which is no whole number of x y z")
+    return values.reshape(-1, 3)
+
+
+def polygon(wkt: str) -> shapely.Polygon:
+    """The largest polygon of a WKT field; empty for an empty field."""
+    if not wkt.strip():
+        return shapely.Polygon()
+    from .polygons import simple_polygons
+
+    return max(simple_polygons(shapely.from_wkt(wkt)), key=lambda part: part.area)
+
+
+def point_keys(points: np.ndarray) -> np.ndarray:
+    """Coordinates (n, 3) as one comparable value (n,) each, to the millimetre."""
+    units = np.ascontiguousarray(np.rint(points * UNITS_PER_M).astype(np.int64))
+    return units.view([("", np.int64)] * 3).ravel()

@@ -1,0 +1,158 @@
+"""A cloud without footprints becomes buildings: roof points connected in plan, each group with a rough outline."""
+
+from __future__ import annotations
+
+import warnings
+from collections import Counter
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..errors import InputError, InputWarning
+from ..model import PointCloud
+from ..settings import Settings
+from .outline import estimate_outline, plan_density
+
+GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
+SPACINGS_PER_GAP = 2.5
+SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 20_000, 0.9
+NEVER_CLASSIFIED = (0, 1)
+NOISE = (7, 18)
+MIN_AREA_M2 = 4.0
+
+
+@dataclass(frozen=True)
+class FoundBuilding:
+    """A group of points taken for one building: ascending `index` (n,) into the cloud, plan geometry in world metres.
+
+    `area` is the union of the cells that hold the group's points: all of them lie in it, and none of another group.
+    `outline` is a rough outline of the roof, straightened, from which a fit may start.
+    """
+
+    id: str
+    index: np.ndarray
+    area: shapely.Geometry
+    outline: shapely.Polygon
+
+
+def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
+    """The buildings of `cloud`, from its building-class points; a small file without classes is one building.
+
+    Groups with fewer than `settings.read.split_min_points` points or less than 4 m2 are left out with an InputWarning.
+    Buildings that touch stay together. Ids name the metre that holds the group's middle, not its number, so that they
+    do not depend on what else was read. Raises InputError when no point has the building classes.
+    """
+    read = (settings or Settings()).read
+    roof = building_points(cloud, read.building_classes)
+    if roof is None:
+        roof = single_building(cloud)
+        if roof is None:
+            raise InputError(without_building_class(cloud, read.building_classes))
+        return named([roof], cloud.xyz, adapted_gap(cloud.xyz[roof]))
+    xy = cloud.xyz[roof, :2]
+    gap_m = read.split_gap_m or adapted_gap(xy)
+    groups = [roof[group] for group in connected_groups(xy, gap_m)]
+    large = [group for group in groups if len(group) >= read.split_min_points]
+    found = [building for building in named(large, cloud.xyz, gap_m) if building.outline.area >= MIN_AREA_M2]
+    left_out = len(groups) - len(found)
+    if left_out:
+        warnings.warn(
+            f"{left_out} groups of building points were left out as too small (fewer than {read.split_min_points} points "
+            f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
+            InputWarning,
+        )
+    return found
+
+
+def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray | None:
+    """Ascending indices of the points of the building classes, None where there are none."""
+    if cloud.classification is None:
+        return None
+    index = np.flatnonzero(np.isin(cloud.classification, classes))
+    return index if len(index) else None
+
+
+def single_building(cloud: PointCloud) -> np.ndarray | None:
+    """All points that are no noise, where an unclassified cloud is small enough to be one building; else None.
+
+    Small is at most 60 m wide and 20,000 points, nine tenths of them connected. This is the paper's case.
+    """
+    classes = np.zeros(len(cloud), np.uint8) if cloud.classification is None else cloud.classification
+    if not np.isin(classes, NEVER_CLASSIFIED + NOISE).all():
+        return None
+    index = np.flatnonzero(~np.isin(classes, NOISE))
+    if not 0 < len(index) <= SINGLE_POINTS:
+        return None
+    xy = cloud.xyz[index, :2]
+    if np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
+        return None
+    largest = max(map(len, connected_groups(xy, 2 * adapted_gap(xy))))
+    return index if largest >= SINGLE_SHARE * len(index) else None
+
+
+def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
+    wanted_text = " or ".join(map(str, wanted))
+    if cloud.classification is None:
+        got = f"{len(cloud)} points without classes, too many or too scattered for a single building"
+    else:
+        counts = sorted(Counter(cloud.classification.tolist()).items())
+        got = "classes " + ", ".join(f"{number} ({count} points)" for number, count in counts)
+    return (
+        f"expected points of class {wanted_text} (building), got {got}; name the class that holds the roofs with "
+        "--building-class, give --footprints, or classify the cloud first"
+    )
+
+
+def adapted_gap(xy: np.ndarray) -> float:
+    """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points are sparse."""
+    needed = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
+    return next((gap for gap in GAPS_M if gap >= needed), GAPS_M[-1])
+
+
+def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
+    """Ascending indices of each group of `xy` (n, 2) that is connected across gaps up to about `gap_m`.
+
+    Occupied cells of half the gap, on the world's own grid, are connected where their centres are at most the gap apart;
+    groups come in the order of their first cell, by rows.
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    cell_m = gap_m / 2
+    cells = np.floor(np.asarray(xy, float)[:, :2] / cell_m).astype(np.int64)
+    cells -= cells.min(axis=0) - 2
+    columns = int(cells[:, 0].max()) + 3
+    occupied, cell_of = np.unique(cells[:, 1] * columns + cells[:, 0], return_inverse=True)
+    links = []
+    for right, up in ((1, 0), (2, 0), (-1, 1), (0, 1), (1, 1), (0, 2)):
+        wanted = occupied + up * columns + right
+        at = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
+        first = np.flatnonzero(occupied[at] == wanted)
+        links.append(np.column_stack([first, at[first]]))
+    rows, others = np.concatenate(links).T
+    graph = coo_array((np.ones(len(rows), np.int8), (rows, others)), shape=(len(occupied),) * 2)
+    count, label = connected_components(graph, directed=False)
+    group_of = label[cell_of]
+    order = np.argsort(group_of, kind="stable")
+    return np.split(order, np.cumsum(np.bincount(group_of, minlength=count))[:-1])
+
+
+def named(groups: list[np.ndarray], xyz: np.ndarray, gap_m: float) -> list[FoundBuilding]:
+    """Give each group its geometry and the id B_<x>_<y> of the metre that holds the middle of its box."""
+    used: Counter[str] = Counter()
+    found = []
+    for index in groups:
+        xy = xyz[index, :2]
+        x, y = np.floor((xy.min(axis=0) + xy.max(axis=0)) / 2).astype(int)
+        id = f"B_{x}_{y}"
+        used[id] += 1
+        id = id if used[id] == 1 else f"{id}_{used[id]}"
+        found.append(FoundBuilding(id, index, cell_area(xy, gap_m / 2), estimate_outline(xy)))
+    return found
+
+
+def cell_area(xy: np.ndarray, cell_m: float) -> shapely.Geometry:
+    """Union of the cells of the world's grid that hold points of `xy` (n, 2)."""
+    low = np.unique(np.floor(xy / cell_m), axis=0)
+    return shapely.coverage_union_all(shapely.box(*(low * cell_m).T, *((low + 1) * cell_m).T))

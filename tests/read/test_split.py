@@ -1,0 +1,178 @@
+"""Clouds without footprints: as many buildings as were put there, each with all its points and about its outline."""
+
+import doctest
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+
+import hiproof.read
+import hiproof.read.outline
+from hiproof.errors import InputError, InputWarning
+from hiproof.model import PointCloud
+from hiproof.read.outline import estimate_outline, plan_density
+from hiproof.read.split import connected_groups, split_buildings
+from hiproof.settings import Settings
+
+CTVIEW = Path(__file__).parents[3] / "shared" / "data" / "ctview"
+L_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 8), (9, 8), (9, 18), (0, 18)])
+COURTYARD = shapely.difference(shapely.box(0, 0, 30, 24), shapely.box(9, 8, 21, 16))
+SHAPES = {"box": shapely.box(0, 0, 14, 9), "L": L_SHAPE, "courtyard": COURTYARD}
+
+
+def turned(polygon, degrees, at=(85000.0, 446000.0)):
+    return shapely.affinity.translate(shapely.affinity.rotate(polygon, degrees, origin=(0, 0)), *at)
+
+
+def points_in(polygon, density, seed=0, z=8.0):
+    rng = np.random.default_rng(seed)
+    xmin, ymin, xmax, ymax = polygon.bounds
+    xy = rng.uniform([xmin, ymin], [xmax, ymax], (int(density * (xmax - xmin) * (ymax - ymin)), 2))
+    xy = xy[shapely.contains_xy(polygon, *xy.T)]
+    return np.column_stack([xy, np.full(len(xy), z)])
+
+
+def iou(a, b):
+    return a.intersection(b).area / a.union(b).area
+
+
+def street(density=8.0):
+    """Five houses, the second and third sharing a wall, on ground of class 2."""
+    houses = [turned(shapely.box(x, 0, x + w, 9), 20) for x, w in ((0, 8), (11, 8), (19, 8), (30, 8), (41, 8))]
+    roofs = [points_in(house, density, seed, 8.0 + seed) for seed, house in enumerate(houses)]
+    ground = points_in(turned(shapely.box(-5, -15, 55, -2), 20), 4, 9, 1.0)
+    xyz = np.concatenate([*roofs, ground])
+    return PointCloud(xyz, np.repeat([6, 2], [len(xyz) - len(ground), len(ground)]).astype(np.uint8)), houses
+
+
+@pytest.mark.parametrize("density", [4.0, 8.0, 25.0])
+def test_houses_apart_are_told_apart_and_houses_that_touch_stay_together(density):
+    cloud, houses = street(density)
+    found = sorted(split_buildings(cloud), key=lambda building: building.index[0])
+    wanted = [houses[0], houses[1].union(houses[2]), houses[3], houses[4]]
+    assert len(found) == 4
+    for building, house in zip(found, wanted, strict=True):
+        assert iou(building.outline, house) > 0.9
+        assert shapely.intersects_xy(building.area, *cloud.xyz[building.index, :2].T).all()
+    assert np.array_equal(np.sort(np.concatenate([b.index for b in found])), np.flatnonzero(cloud.classification == 6))
+
+
+def test_ids_and_outlines_depend_neither_on_order_nor_on_the_other_houses():
+    cloud, _ = street()
+    order = np.random.default_rng(5).permutation(len(cloud))
+    settings = Settings.from_dict({"read": {"split_gap_m": 1.0}})
+    whole = {b.id: b.outline for b in split_buildings(cloud, settings)}
+    shuffled = split_buildings(PointCloud(cloud.xyz[order], cloud.classification[order]), settings)
+    assert {b.id for b in shuffled} == set(whole)
+    assert all(b.outline.equals_exact(whole[b.id], 1e-9) for b in shuffled)
+    east = cloud.xyz[:, 0] > cloud.xyz[:, 0].min() + 28
+    part = {b.id for b in split_buildings(PointCloud(cloud.xyz[east], cloud.classification[east]), settings)}
+    assert len(part & set(whole)) >= 2
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+@pytest.mark.parametrize("degrees", [0, 17, 63])
+@pytest.mark.parametrize("density", [2.0, 5.0, 20.0])
+def test_outlines_are_close_to_the_truth_and_have_few_corners(shape, degrees, density):
+    truth = turned(SHAPES[shape], degrees)
+    outline = estimate_outline(points_in(truth, density, int(density) + degrees))
+    assert outline.is_valid and iou(outline, truth) > (0.8 if density < 5 else 0.88)
+    assert len(outline.interiors) == len(truth.interiors)
+    assert abs(outline.area / truth.area - 1) < 0.12
+    assert len(outline.exterior.coords) <= (30 if shape == "courtyard" else 20)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_groups_are_those_of_a_plain_search_over_all_pairs(seed):
+    xy = np.random.default_rng(seed).uniform(0, 30, (120, 2))
+    groups = connected_groups(xy, 2.0)
+    assert np.array_equal(np.sort(np.concatenate(groups)), np.arange(120))
+    group_of = np.empty(120, int)
+    for number, group in enumerate(groups):
+        group_of[group] = number
+    distance = np.hypot(*(xy[:, None] - xy[None]).transpose(2, 0, 1))
+    assert (group_of[:, None] == group_of[None])[distance < 0.5].all()  # surely within two cells
+    for group in groups:
+        others = np.setdiff1d(np.arange(120), group)
+        assert not len(others) or distance[np.ix_(group, others)].min() > 0.5
+
+
+@pytest.mark.parametrize("classes", [None, 0, 1])
+def test_a_small_cloud_without_classes_is_one_building(classes):
+    points = points_in(turned(L_SHAPE, 30), 5)
+    classification = None if classes is None else np.full(len(points), classes, np.uint8)
+    (building,) = split_buildings(PointCloud(points, classification))
+    assert len(building.index) == len(points) and building.outline.area > 200
+
+
+def test_noise_is_no_part_of_the_one_building():
+    points = points_in(L_SHAPE, 5)
+    classification = np.where(np.arange(len(points)) < 7, 7, 1).astype(np.uint8)
+    (building,) = split_buildings(PointCloud(points, classification))
+    assert building.index.tolist() == list(range(7, len(points)))
+
+
+@pytest.mark.parametrize("what", ["two houses", "wide", "many", "without classes"])
+def test_larger_clouds_without_building_class_are_refused(what):
+    box = shapely.box(0, 0, 90, 20) if what == "wide" else shapely.box(0, 0, 14, 9)
+    points = points_in(box, 200 if what == "many" else 6)
+    if what == "two houses":
+        points = np.concatenate([points, points + [30, 0, 0]])
+    classification = None if what == "without classes" else np.ones(len(points), np.uint8)
+    if what == "without classes":
+        points = np.concatenate([points, points + [30, 0, 0]])
+    with pytest.raises(
+        InputError, match="without classes" if classification is None else r"got classes 1 \(\d+ points\)"
+    ):
+        split_buildings(PointCloud(points, classification))
+
+
+def test_the_classes_there_are_named_and_another_may_be_chosen():
+    cloud, _ = street()
+    other = PointCloud(cloud.xyz, np.where(cloud.classification == 6, 67, 2).astype(np.uint8))
+    with pytest.raises(
+        InputError, match=r"class 6 .*got classes 2 \(\d+ points\), 67 \(\d+ points\).*--building-class"
+    ):
+        split_buildings(other)
+    assert len(split_buildings(other, Settings.from_dict({"read": {"building_classes": [67]}}))) == 4
+
+
+def test_groups_too_small_are_left_out_with_a_warning():
+    cloud, _ = street()
+    crumbs = np.array([[86000.0, 446000.0, 5.0], [86000.1, 446000.0, 5.0]])
+    cloud = PointCloud(np.concatenate([cloud.xyz, crumbs]), np.append(cloud.classification, [6, 6]).astype(np.uint8))
+    with pytest.warns(InputWarning, match="1 groups of building points were left out"):
+        assert len(split_buildings(cloud)) == 4
+
+
+@pytest.mark.parametrize(
+    "points", [np.zeros((0, 3)), np.zeros((1, 3)), np.zeros((50, 3)), np.column_stack([np.arange(9.0)] * 3)]
+)
+def test_points_that_span_no_area_have_an_empty_outline(points):
+    assert estimate_outline(points).is_empty
+
+
+def test_density_is_that_of_the_roof_not_of_its_box():
+    assert plan_density(points_in(turned(L_SHAPE, 45), 12.0)) == pytest.approx(12, rel=0.15)
+    assert plan_density(points_in(turned(L_SHAPE, 45), 1.0)) == pytest.approx(1, rel=0.3)
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(hiproof.read.outline).failed == 0
+
+
+def test_every_exported_name_exists():
+    for name in hiproof.read.__all__:
+        assert getattr(hiproof.read, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'read_minds'"):
+        hiproof.read.read_minds  # noqa: B018
+
+
+@pytest.mark.skipif(not CTVIEW.is_dir(), reason="needs the shared data folder ctview")
+def test_the_ign_tiles_split_into_their_buildings():
+    cloud = hiproof.read.read_points(CTVIEW)
+    found = split_buildings(cloud)
+    assert cloud.crs.to_epsg() == 2154 and 9 <= len(found) <= 12
+    large = [b for b in found if b.outline.area > 300]
+    assert len(large) == 5 and all(b.outline.is_valid for b in found)
