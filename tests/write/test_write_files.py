@@ -150,6 +150,23 @@ def test_a_broken_solid_does_not_stop_the_others(tmp_path, break_it):
     assert len(records) == 9
 
 
+@each_format
+def test_strange_ids_and_attributes_go_through(tmp_path, name):
+    strange = {
+        "": 1,
+        "\0": "\0",
+        "\ud800": "a\ud800",
+        "x" * 300: 2,
+        5: [1],
+        '"; drop table': object,
+        "geom": 1,
+        "a:b": 1,
+    }
+    buildings = [modelled(gable_house(), id, attributes=strange) for id in ("\0", "", "\ud800", "<&>", "x" * 300, "é")]
+    WRITERS[name](tmp_path / name, buildings)
+    assert names_in(tmp_path) == [name]
+
+
 def test_errors_of_the_caller_pass_unchanged(tmp_path):
     with pytest.raises(FileNotFoundError), atomic_file(tmp_path / "a"):
         open(tmp_path / "missing" / "input.laz").close()

@@ -18,7 +18,7 @@ import shapely
 
 from ..errors import OutputError
 from ..model import GROUND, Building
-from .building_attributes import OWN, PREFIX, building_attributes, figures_of
+from .building_attributes import OWN, PREFIX, building_attributes, figures_of, plain_text
 from .files import atomic, scratch
 from .naming import plan_wkt
 from .roof_figures import RoofFigures
@@ -60,7 +60,10 @@ class AttributesWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         values = building_attributes(building, figures or figures_of(building), self.prefix)
-        row = {"id": str(building.id), **{f"{n}_input" if n.lower() == "id" else n: v for n, v in values.items()}}
+        row = {
+            "id": plain_text(building.id),
+            **{f"{n}_input" if n.lower() == "id" else n: v for n, v in values.items()},
+        }
         for name, value in row.items():
             self.kinds.setdefault(name, set()).add(kind_of(value))
         outline = plan_outline(building)

@@ -29,7 +29,7 @@ def building_attributes(building: Building, figures: RoofFigures | None = None, 
     Lengths are metres, `volume` m3, `pt_density` points/m2, `val3dity_lod22` "[]" because only valid solids are
     written.
     """
-    own = {name: plain(value) for name, value in building.attributes.items()}
+    own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
     computed |= {OWN + name: value for name, value in hiproof_attributes(building).items()}
     return own | {name: plain(value) for name, value in computed.items()}
@@ -111,8 +111,10 @@ def plain(value: Any) -> Any:
     >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2), b"x", [1, 2])]
     [3, None, True, '2020-01-02', 'x', '[1, 2]']
     """
-    if value is None or isinstance(value, (bool, str, int)):
+    if value is None or isinstance(value, (bool, int)):
         return value
+    if isinstance(value, str):
+        return plain_text(value)
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, np.generic) and not isinstance(value, (np.datetime64, np.timedelta64)):
@@ -122,5 +124,14 @@ def plain(value: Any) -> Any:
     if isinstance(value, (datetime.date, datetime.time)):
         return value.isoformat()
     if isinstance(value, bytes):
-        return value.decode("utf-8", "replace")
-    return str(value)
+        return plain_text(value.decode("utf-8", "replace"))
+    return plain_text(value)
+
+
+def plain_text(value: Any) -> str:
+    """`value` as text that every format can hold.
+
+    Halves of surrogate pairs, from files read in a wrong encoding, fit none, and a NUL ends a database's text.
+    """
+    text = str(value)
+    return text if text.isprintable() else text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..model import Building
-from .building_attributes import PREFIX, building_attributes, figures_of, metres
+from .building_attributes import PREFIX, building_attributes, figures_of, metres, plain_text
 from .cityjson_geometry import Vertices, building_geometry, first_corner
 from .files import scratch
 from .json_text import dump
@@ -69,7 +69,7 @@ class CityJSONWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        name = self.ids.take(str(building.id))
+        name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale_m)
         geometry = building_geometry(building, figures, vertices, self.prefix)
         city_object: dict[str, Any] = {"type": "Building"}

@@ -135,7 +135,7 @@ def opened(hidden: Path, path: Path) -> Iterator[BinaryIO]:
 
 def hidden_name(path: Path) -> Path:
     """A free name beside `path` that listings do not show, with its suffix."""
-    return path.with_name(f".{path.name[:60]}-{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
+    return path.with_name(f".{path.name[:40]}-{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")
 
 
 def sync(path: Path) -> None:

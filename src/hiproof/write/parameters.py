@@ -14,7 +14,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Building, Part, Piece
-from .building_attributes import rounded
+from .building_attributes import plain_text, rounded
 from .json_text import dump
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
@@ -78,7 +78,7 @@ def building_record(building: Building) -> dict[str, Any]:
     largest = max(building.parts, key=lambda part: part.area, default=None)
     primitive = primitive_record(largest) if largest else dict.fromkeys(("type", "theta_p", "kappa", "T_L", "sigma"))
     return {
-        "id": str(building.id),
+        "id": plain_text(building.id),
         "status": building.status.code,
         "detail": building.detail or building.status.value,
         **primitive,
