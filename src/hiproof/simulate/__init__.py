@@ -7,6 +7,7 @@ points, labels, type = training_sample(rng)     the same for a network (training
 """
 
 from .compounds import COMPOUND_KINDS, random_compound
+from .neighbourhood import demo_files
 from .roofs import SimBuilding, random_building
 from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
 from .scene import NOT_ROOF, SOURCES, Defects
@@ -22,6 +23,7 @@ __all__ = [
     "Scan",
     "ScanSettings",
     "SimBuilding",
+    "demo_files",
     "random_building",
     "random_compound",
     "scan",

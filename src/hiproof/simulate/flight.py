@@ -32,8 +32,8 @@ class Beams:
 @dataclass(frozen=True)
 class Swath:
     """One pass: flight `heading` (rad), spacings (m) of lines and of points on a line, tangent of the scan angle over
-    the centre and its growth a metre across track (1 / flying height), `pairing` 0-1 of an oscillating mirror, `edge`
-    (m across track, relative to the centre) where the swath ends, `shift` (3,) registration error."""
+    the centre and its growth a metre across track (1 / flying height), `pairing` 0-1 of an oscillating mirror, `edges`
+    (m across track, relative to the centre) between which the swath lies, `shift` (3,) registration error."""
 
     heading: float
     line_spacing: float
@@ -41,7 +41,7 @@ class Swath:
     tan_angle: float
     tan_growth: float = 0.0
     pairing: float = 0.0
-    edge: float = math.inf
+    edges: tuple[float, float] = (-math.inf, math.inf)
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
@@ -70,7 +70,7 @@ def random_swaths(
                 point_spacing=spacing / stretch,
                 tan_angle=tan_max * (2 * angle - 1),
                 pairing=max(0.0, 1.6 * pairing - 0.8),
-                edge=(2 * edge - 1) * reach if k and ends < edge_probability else math.inf,
+                edges=(-math.inf, (2 * edge - 1) * reach if k and ends < edge_probability else math.inf),
                 shift=tuple(rng.normal(0.0, registration_m, 3) * (1.0, 1.0, 0.5)) if count > 1 else (0.0, 0.0, 0.0),
             )
         )
@@ -89,7 +89,7 @@ def beams_of(rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius:
     phase = rng.random((lines, 1)) * swath.point_spacing
     along = (along_lines[:, None] + swath.line_spacing * jitter[0]).ravel()
     across = (across_steps + phase + swath.point_spacing * jitter[1]).ravel()
-    keep = (along**2 + across**2 < radius**2) & (across < swath.edge)
+    keep = (along**2 + across**2 < radius**2) & (across >= swath.edges[0]) & (across < swath.edges[1])
     along, across = along[keep], across[keep]
     xy_ref = np.column_stack([cosine * along - sine * across, sine * along + cosine * across]) + centre
     tan = swath.tan_angle + swath.tan_growth * across

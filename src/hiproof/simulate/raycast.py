@@ -13,15 +13,20 @@ from numba import njit
 
 
 @njit(cache=True)
-def cast_convex(xy0, slope, halfspaces, starts, z_hit, face):
+def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
     """Lower `z_hit` (n,) is raised to the entry height wherever a convex body lies above it; `face` (n,) gets its side.
 
     Beams are `xy0` (n, 2) at z = 0 and `slope` (n, 2) = (dx/dz, dy/dz). Body b has the rows starts[b]:starts[b+1] of
-    `halfspaces` (k, 4) = (nx, ny, nz, d). Both outputs are changed in place; `face` is a row of `halfspaces`.
+    `halfspaces` (k, 4) = (nx, ny, nz, d), and no beam hits it that passes by its disc, `discs` (b, 4) = (x, y, z,
+    radius). Both outputs are changed in place; `face` is a row of `halfspaces`.
     """
     for i in range(len(xy0)):
         x0, y0, sx, sy = xy0[i, 0], xy0[i, 1], slope[i, 0], slope[i, 1]
         for b in range(len(starts) - 1):
+            aside_x = x0 + sx * discs[b, 2] - discs[b, 0]
+            aside_y = y0 + sy * discs[b, 2] - discs[b, 1]
+            if aside_x * aside_x + aside_y * aside_y > discs[b, 3] * discs[b, 3]:
+                continue
             z_in, z_out, side = np.inf, -np.inf, -1
             for k in range(starts[b], starts[b + 1]):
                 climb = halfspaces[k, 0] * sx + halfspaces[k, 1] * sy + halfspaces[k, 2]

@@ -95,6 +95,15 @@ def assemble(parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[floa
     return SimBuilding(roof.type, kind, roof, float(origin[2]))
 
 
+def turned_building(building: SimBuilding, angle: float) -> SimBuilding:
+    """The building turned by `angle` (rad) about its frame's origin."""
+    parts = []
+    for part in building.roof.parts:
+        translation = np.append(turned(part.translation[None, :2], angle)[0], part.translation[2])
+        parts.append(make_part(part.type, part.parameters, part.kappa + angle, translation))
+    return assemble(tuple(parts), building.kind, building.roof.frame.origin)
+
+
 def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
     """Union of all pieces, joined in the axes of the first part, where common edges are exactly on one line."""
     outlines = [piece.outline for part in parts for piece in part.pieces]

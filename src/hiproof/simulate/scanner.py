@@ -161,11 +161,10 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
 
 def first_hits(scene: Scene, xy0: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Height (n,), source and label (n,) of the first surface each beam meets; terrain where there is nothing else."""
-    a, b, c = scene.ground
-    z_hit = (xy0[:, 0] * a + xy0[:, 1] * b + c) / (1.0 - slope[:, 0] * a - slope[:, 1] * b)
+    z_hit = scene.terrain.hit(xy0, slope)
     source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
     for cast, bodies, sources, labels in (
-        (cast_convex, (scene.halfspaces, scene.starts), scene.source, scene.label),
+        (cast_convex, (scene.halfspaces, scene.starts, scene.discs), scene.source, scene.label),
         (cast_triangles, (scene.triangles,), scene.triangle_source, scene.triangle_label),
     ):
         if len(sources):

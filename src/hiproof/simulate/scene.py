@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,13 +11,14 @@ import shapely
 
 from ..errors import InputError
 from ..model import ROOF, Piece, Solid
+from .relief import Plane, Relief
 from .roofs import SimBuilding, random_parameters, turned
 from .shapes import ROOF_TYPES, box, make_part
 
 SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)
 SOURCES = ("roof", "wall", "ground", "tree", "clutter")
 NOT_ROOF = len(ROOF_TYPES)
-BELOW_GROUND_M = 30.0
+DISC_SLACK_M = 3.0  # a building's walls may go this far down below its own ground
 
 
 @dataclass(frozen=True)
@@ -41,16 +43,17 @@ class Defects:
 
 @dataclass(frozen=True)
 class Scene:
-    """Bodies in one local frame. `halfspaces` (k, 4) in bodies `starts` (b + 1), `source` and `label` (k,) of each
-    side; `triangles` (m, 3, 3) with their `triangle_source` and `triangle_label`; `crowns` (t, 5); `ground` (3,) is
-    the plane z = a x + b y + c."""
+    """Bodies in one local frame. `halfspaces` (k, 4) in bodies `starts` (b + 1) within `discs` (b, 4), `source` and
+    `label` (k,) of each side; `triangles` (m, 3, 3) with their `triangle_source` and `triangle_label`; `crowns` (t, 5);
+    `terrain` the ground below all."""
 
     halfspaces: np.ndarray
     starts: np.ndarray
+    discs: np.ndarray
     source: np.ndarray
     label: np.ndarray
     crowns: np.ndarray = field(default_factory=lambda: np.empty((0, 5)))
-    ground: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    terrain: Plane | Relief = field(default_factory=Plane)
     triangles: np.ndarray = field(default_factory=lambda: np.empty((0, 3, 3)))
     triangle_source: np.ndarray = field(default_factory=lambda: np.empty(0, np.int8))
     triangle_label: np.ndarray = field(default_factory=lambda: np.empty(0, np.int8))
@@ -58,12 +61,14 @@ class Scene:
 
 @dataclass(frozen=True)
 class Body:
-    """A convex body: the prism of a piece's outline under its planes, with what a hit on its top is."""
+    """A convex body: the prism of a piece's outline under its planes, with what a hit on its top is; the piece's
+    frame is that of the scene less `shift` (3,)."""
 
     piece: Piece
     top_source: int = SOURCE_ROOF
     wall_source: int = SOURCE_WALL
     label: int = NOT_ROOF
+    shift: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
 
 def halfspaces_of(piece: Piece) -> np.ndarray:
@@ -86,22 +91,37 @@ def halfspaces_of(piece: Piece) -> np.ndarray:
     return np.concatenate([walls, roofs])
 
 
-def scene_of(bodies: list[Body], crowns: np.ndarray | None = None, ground: np.ndarray | None = None) -> Scene:
-    """Bodies packed for the beams."""
-    sides = [halfspaces_of(body.piece) for body in bodies]
-    source, label = [], []
-    for body, rows in zip(bodies, sides, strict=True):
+def disc_of(body: Body) -> tuple[float, float, float, float]:
+    """(x, y, z, radius): beams up to 45 degrees off the vertical that hit the body above ground pass this disc at z."""
+    corners = shapely.get_coordinates(body.piece.outline)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    x, y = (low + high) / 2 + body.shift[:2]
+    radius = math.hypot(*(high - low)) / 2
+    planes = body.piece.planes
+    peak = (corners @ planes[:, :2].T + planes[:, 2]).max(axis=0).min()
+    half_height = peak / 2
+    return x, y, half_height + body.shift[2], radius + half_height + DISC_SLACK_M
+
+
+def scene_of(bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: Plane | Relief | None = None) -> Scene:
+    """Bodies packed for the beams; `crowns` and `terrain` are in the scene's frame."""
+    sides, discs, source, label = [np.empty((0, 4))], [], [], []
+    for body in bodies:
+        rows = halfspaces_of(body.piece)
+        rows[:, 3] += rows[:, :3] @ body.shift
         tops = len(body.piece.planes)
+        sides.append(rows)
+        discs.append(disc_of(body))
         source += [body.wall_source] * (len(rows) - tops) + [body.top_source] * tops
         label += [NOT_ROOF] * (len(rows) - tops) + [body.label] * tops
-    starts = np.cumsum([0] + [len(rows) for rows in sides])
     return Scene(
-        np.concatenate(sides) if sides else np.empty((0, 4)),
-        starts,
+        np.concatenate(sides),
+        np.cumsum([len(rows) for rows in sides]),
+        np.array(discs).reshape(-1, 4),
         np.array(source, np.int8),
         np.array(label, np.int8),
         np.empty((0, 5)) if crowns is None else crowns,
-        np.zeros(3) if ground is None else ground,
+        Plane() if terrain is None else terrain,
     )
 
 
@@ -112,19 +132,26 @@ def building_bodies(building: SimBuilding) -> list[Body]:
 
 def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> Scene:
     """`building` with the clutter, neighbours, trees and sloping ground that `defects` allows, in its local frame."""
-    bodies = building_bodies(building)
-    chance = rng.random(5)
-    if chance[0] < defects.chimney:
-        bodies += [chimney(rng, building) for _ in range(1 + int(rng.random() < 0.3))]
-    if chance[1] < defects.dormer:
-        bodies += dormers(rng, building)
-    if chance[2] < defects.antenna:
-        bodies.append(antenna(rng, building))
-    if chance[3] < defects.neighbour:
+    bodies = building_bodies(building) + superstructures(rng, building, defects)
+    has_neighbour, has_tree = rng.random(2) < (defects.neighbour, defects.tree)
+    if has_neighbour:
         bodies += neighbour(rng, building)
-    crowns = trees(rng, building) if chance[4] < defects.tree else None
-    ground = np.append(rng.normal(0.0, 0.03, 2), 0.0) if defects != Defects.none() else None
-    return scene_of(bodies, crowns, ground)
+    crowns = trees(rng, building) if has_tree else None
+    terrain = Plane(*rng.normal(0.0, 0.03, 2)) if defects != Defects.none() else None
+    return scene_of(bodies, crowns, terrain)
+
+
+def superstructures(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> list[Body]:
+    """Chimneys, dormers and antennas that stand on the building's roof."""
+    bodies = []
+    has_chimney, has_dormer, has_antenna = rng.random(3) < (defects.chimney, defects.dormer, defects.antenna)
+    if has_chimney:
+        bodies += [chimney(rng, building) for _ in range(1 + int(rng.random() < 0.3))]
+    if has_dormer:
+        bodies += dormers(rng, building)
+    if has_antenna:
+        bodies.append(antenna(rng, building))
+    return bodies
 
 
 def _on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarray, Piece]:
@@ -208,7 +235,7 @@ def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
     return np.array(crowns)
 
 
-def solids_scene(solids: list[Solid], labels: list[int], ground: np.ndarray | None = None) -> Scene:
+def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
     """Any closed solids as triangles; their RoofSurfaces carry `labels` (indices of ROOF_TYPES or NOT_ROOF)."""
     triangles, source, label = [np.empty((0, 3, 3))], [], []
     for solid, roof_label in zip(solids, labels, strict=True):
@@ -219,7 +246,7 @@ def solids_scene(solids: list[Solid], labels: list[int], ground: np.ndarray | No
             source += [SOURCE_ROOF if is_roof else SOURCE_WALL] * len(pieces)
             label += [roof_label if is_roof else NOT_ROOF] * len(pieces)
     return replace(
-        scene_of([], None, ground),
+        scene_of([]),
         triangles=np.concatenate(triangles),
         triangle_source=np.array(source, np.int8),
         triangle_label=np.array(label, np.int8),

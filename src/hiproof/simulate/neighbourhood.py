@@ -1,0 +1,78 @@
+"""The demo: a small neighbourhood with every roof type and several compounds, on a slope, with trees."""
+
+from __future__ import annotations
+
+import json
+import math
+from importlib import resources
+from pathlib import Path
+
+import numpy as np
+
+from .relief import Relief
+from .roofs import SimBuilding, turned
+from .scanner import ScanSettings
+from .survey import CRS, Flight, survey, write_footprints, write_laz, write_terrain
+from .town import Lot, furnished, street_side
+
+DEMO_SEED = 5
+ORIGIN_XY = np.array([92000.0, 451000.0])
+GROUND_M = 4.0
+STREETS = (
+    ("gable", "hip", "half_hip", "pyramid", "L", "gambrel"),
+    ("flat", "extension", "mansard", "gable", "asymmetric_gable", "cross"),
+    ("row", "monopitch", "T", "hip", "two_level"),
+    ("shed", "U", "pyramid", "half_hip"),
+    ("saw_tooth_hall", "monopitch", "asymmetric_gable", "mansard", "gambrel"),
+)
+STREET_WIDTH_M = 9.0
+BORDER_M = 8.0
+FILES = ("cloud.laz", "footprints.gpkg", "terrain.tif", "truth.json")
+SCAN = ScanSettings(density=8.0, range_noise_m=0.02, horizontal_noise_m=0.04, beam_radius_m=0.1)
+
+
+def demo_files() -> dict[str, Path]:
+    """Paths of the bundled neighbourhood: "cloud", "footprints", "terrain", "truth".
+
+    >>> sorted(demo_files())
+    ['cloud', 'footprints', 'terrain', 'truth']
+    """
+    folder = resources.files("hiproof") / "data" / "demo"
+    return {Path(name).stem: Path(str(folder / name)) for name in FILES}
+
+
+def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
+    """Lots and terrain of the neighbourhood; each name of STREETS stands once."""
+    rng = np.random.default_rng([seed, 1])
+    terrain = Relief.random(rng, GROUND_M, ORIGIN_XY)
+    heading, start = math.radians(14.0), ORIGIN_XY.copy()
+    buildings: list[SimBuilding] = []
+    for names in STREETS:
+        side = street_side(rng, names, start, heading, math.inf, math.inf, terrain)
+        top = max(_across(building, start, heading) for building in side)
+        start = start + turned(np.array([[0.0, top + STREET_WIDTH_M]]), heading)[0]
+        buildings += side
+    return [furnished(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)], terrain
+
+
+def _across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
+    corners = np.array(building.footprint.exterior.coords) - start
+    return float(turned(corners, -heading)[:, 1].max())
+
+
+def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
+    """Write the neighbourhood's FILES to `folder`; counts of buildings and points. Made by
+    `python -m hiproof.simulate neighbourhood FOLDER`."""
+    lots, terrain = neighbourhood(seed)
+    corners = np.array([lot.building.footprint.bounds for lot in lots])
+    low, high = np.floor(corners[:, :2].min(axis=0)) - BORDER_M, np.ceil(corners[:, 2:].max(axis=0)) + BORDER_M
+    bounds = (*low, *high)
+    flight = Flight(heading=math.radians(70.0), origin=ORIGIN_XY - 250.0)
+    folder.mkdir(parents=True, exist_ok=True)
+    clouds = survey(bounds, lots, terrain, flight, seed, SCAN)
+    points = write_laz(folder / "cloud.laz", clouds, np.array([*low, 0.0]))
+    write_footprints(folder / "footprints.gpkg", lots)
+    write_terrain(folder / "terrain.tif", bounds, terrain)
+    truth = {"crs": CRS, "seed": seed, "buildings": [{"id": lot.id, **lot.building.truth()} for lot in lots]}
+    (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
+    return {"buildings": len(lots), "points": points}

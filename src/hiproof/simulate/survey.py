@@ -1,0 +1,182 @@
+"""A survey flight over a town, and its files: a classified LAZ, a terrain model, footprints."""
+
+from __future__ import annotations
+
+import datetime
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import OutputError
+from .flight import Beams, Swath, beams_of, joined
+from .relief import Relief
+from .scanner import Scan, ScanSettings, returns, with_outliers
+from .scene import SOURCE_GROUND, SOURCE_TREE
+from .town import Lot, town_scene
+
+CRS = "EPSG:7415"
+PATCH_M = 100.0
+OUTLIER_SHARE = 2e-4
+EPOCH = datetime.date(2020, 1, 1)
+CLASS_GROUND, CLASS_TREE, CLASS_BUILDING = 2, 5, 6
+
+Bounds = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Flight:
+    """Parallel flight lines over a town: `heading` (rad) through `origin` (2,), flying height, half the field of view
+    (deg), the distance between lines, and `registration` (m), one sigma of a line's offset."""
+
+    heading: float
+    origin: np.ndarray
+    altitude_m: float = 1200.0
+    half_view_deg: float = 20.0
+    line_distance_m: float = 620.0
+    registration_m: float = 0.02
+
+    def swaths_over(self, seed: int, centre: np.ndarray, radius: float, density: float) -> list[Swath]:
+        """Swaths of all flight lines that see the disc of `radius` about `centre`; together they have `density` in
+        the mean."""
+        half_width = self.altitude_m * math.tan(math.radians(self.half_view_deg))
+        spacing = math.sqrt(2 * half_width / self.line_distance_m / density)
+        across = float((centre - self.origin) @ (-math.sin(self.heading), math.cos(self.heading)))
+        first = math.ceil((across - radius - half_width) / self.line_distance_m)
+        last = math.floor((across + radius + half_width) / self.line_distance_m)
+        swaths = []
+        for line in range(first, last + 1):
+            from_line = across - line * self.line_distance_m
+            rng = np.random.default_rng([seed, 7, line % 2**32])
+            swaths.append(
+                Swath(
+                    heading=self.heading,
+                    line_spacing=spacing * 1.15,
+                    point_spacing=spacing / 1.15,
+                    tan_angle=from_line / self.altitude_m,
+                    tan_growth=1.0 / self.altitude_m,
+                    pairing=0.3,
+                    edges=(-half_width - from_line, half_width - from_line),
+                    shift=tuple(rng.normal(0.0, self.registration_m, 3)),
+                )
+            )
+        return swaths
+
+
+def survey(
+    bounds: Bounds, lots: list[Lot], terrain: Relief, flight: Flight, seed: int, settings: ScanSettings
+) -> Iterator[Scan]:
+    """Points (world) within `bounds`, patch by patch; the same whatever else of the town is surveyed.
+
+    `lots` must hold every lot that reaches into `bounds`.
+    """
+    x_low, y_low, x_high, y_high = bounds
+    lot_bounds = np.array([lot.bounds for lot in lots]).reshape(-1, 4)
+    for i in range(math.ceil((x_high - x_low) / PATCH_M)):
+        for j in range(math.ceil((y_high - y_low) / PATCH_M)):
+            low = np.array([x_low + i * PATCH_M, y_low + j * PATCH_M])
+            high = np.minimum(low + PATCH_M, (x_high, y_high))
+            # Shadows and leaning trees of the next patch reach this far.
+            near = (lot_bounds[:, :2] < high + 20.0).all(axis=1) & (lot_bounds[:, 2:] > low - 20.0).all(axis=1)
+            patch_lots = [lot for lot, is_near in zip(lots, near, strict=True) if is_near]
+            yield surveyed_patch(low, high, patch_lots, terrain, flight, seed, settings)
+
+
+def surveyed_patch(
+    low: np.ndarray,
+    high: np.ndarray,
+    lots: list[Lot],
+    terrain: Relief,
+    flight: Flight,
+    seed: int,
+    settings: ScanSettings,
+) -> Scan:
+    """Points of one patch between its corners `low` and `high` (2,), drawn from a seed of its place."""
+    xy_centre = (low + high) / 2
+    centre = np.array([*xy_centre, float(terrain.height_at(xy_centre[None])[0])])
+    rng = np.random.default_rng([seed, 3, *(np.round(xy_centre * 100).astype(np.int64) % 2**32)])
+    reach = math.hypot(*(high - low)) / 2
+    swaths = flight.swaths_over(seed, xy_centre, reach, settings.density)
+    beams = joined([beams_of(rng, swath, np.zeros(2), reach + 8.0, 4.0) for swath in swaths])
+    cloud = returns(town_scene(lots, terrain, centre), within(beams, high - xy_centre + 12.0), rng, settings)
+    cloud = with_outliers(rng, cloud, OUTLIER_SHARE).moved(centre)
+    inside = ((cloud.points[:, :2] >= low) & (cloud.points[:, :2] < high)).all(axis=1)
+    return cloud.chosen(inside)
+
+
+def within(beams: Beams, half_size: np.ndarray) -> Beams:
+    """Beams that meet the ground within the rectangle of `half_size` (2,) about the origin."""
+    return beams.chosen((np.abs(beams.xy0) < half_size).all(axis=1))
+
+
+def classes_of(cloud: Scan) -> np.ndarray:
+    """ASPRS classes: ground 2, trees 5, all that is built 6, as producers deliver them."""
+    classes = np.full(len(cloud), CLASS_BUILDING, np.uint8)
+    classes[cloud.source == SOURCE_GROUND] = CLASS_GROUND
+    classes[cloud.source == SOURCE_TREE] = CLASS_TREE
+    return classes
+
+
+def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: float = 0.01) -> int:
+    """Clouds in one LAZ 1.4 file, streamed; the number of points. Raises OutputError where it cannot be written."""
+    import laspy
+    from pyproj import CRS as ProjCRS
+
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.add_crs(ProjCRS(CRS))
+    header.scales, header.offsets = np.full(3, scale_m), np.floor(origin)
+    header.creation_date, header.generating_software = EPOCH, "hiproof simulate"
+    count = 0
+    try:
+        with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
+            for cloud in clouds:
+                record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
+                record.x, record.y, record.z = cloud.points.T
+                record.classification = classes_of(cloud)
+                record.return_number[:] = record.number_of_returns[:] = 1
+                writer.write_points(record)
+                count += len(cloud)
+    except OSError as error:
+        raise OutputError(f"expected to write {path}, got: {error}; choose a folder that can be written") from error
+    return count
+
+
+def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 1.0) -> None:
+    """Terrain heights at the pixel centres as a GeoTIFF."""
+    import rasterio
+    from rasterio.transform import from_origin
+
+    x_low, y_low, x_high, y_high = bounds
+    x = np.arange(x_low + pixel_m / 2, x_high, pixel_m)
+    y = np.arange(y_high - pixel_m / 2, y_low, -pixel_m)
+    grid = np.stack(np.meshgrid(x, y), axis=-1)
+    heights = np.round(terrain.height_at(grid.reshape(-1, 2)).reshape(grid.shape[:2]), 3).astype(np.float32)
+    profile = {"driver": "GTiff", "count": 1, "dtype": "float32", "compress": "deflate", "predictor": 3}
+    shape = {"height": len(y), "width": len(x), "crs": CRS, "transform": from_origin(x_low, y_high, pixel_m, pixel_m)}
+    with rasterio.open(path, "w", **profile, **shape) as file:
+        file.write(heights, 1)
+
+
+def write_footprints(path: Path, lots: list[Lot], append: bool = False) -> None:
+    """Outlines of `lots` as the layer "footprints" of a GeoPackage, with their `id`."""
+    import pyogrio
+    import shapely
+
+    # The file's time stamps would make every copy differ.
+    pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": "2020-01-01T00:00:00.000Z"})
+    try:
+        pyogrio.raw.write(
+            path,
+            geometry=shapely.to_wkb([lot.building.footprint for lot in lots]),
+            field_data=[np.array([lot.id for lot in lots], dtype=object)],
+            fields=["id"],
+            geometry_type="Polygon",
+            crs="EPSG:28992",
+            layer="footprints",
+            driver="GPKG",
+            append=append,
+        )
+    finally:
+        pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": None})

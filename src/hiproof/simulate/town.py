@@ -1,0 +1,122 @@
+"""Buildings along streets on hilly ground: the stock of which neighbourhoods and cities are made.
+
+A lot is a building where it stands, with its chimneys, dormers and trees; a street side is a line of lots. Everything
+is drawn from the generator given, so that one seed a block makes any part of a city again without the rest.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from ..frames import LocalFrame
+from ..model import Roof
+from .compounds import COMPOUND_KINDS, random_compound
+from .relief import Relief
+from .roofs import SimBuilding, random_building, turned, turned_building
+from .scene import Body, Defects, Scene, building_bodies, scene_of, superstructures, trees
+
+TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, antenna=0.1)
+
+
+@dataclass(frozen=True)
+class Lot:
+    """One building where it stands, `id` its name, `bodies` all that is built in the building's frame and `crowns`
+    (t, 5) the trees around it in world coordinates."""
+
+    id: str
+    building: SimBuilding
+    bodies: tuple[Body, ...]
+    crowns: np.ndarray
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """Plan bounds in the world, trees included."""
+        low, high = np.array(self.building.footprint.bounds).reshape(2, 2)
+        if len(self.crowns):
+            low = np.minimum(low, (self.crowns[:, :2] - self.crowns[:, 3:4]).min(axis=0))
+            high = np.maximum(high, (self.crowns[:, :2] + self.crowns[:, 3:4]).max(axis=0))
+        return (*low, *high)
+
+
+def make(rng: np.random.Generator, name: str, kappa: float) -> SimBuilding:
+    """A building whose `name` is a roof type or a kind of compound, its frame at the origin."""
+    if name in COMPOUND_KINDS:
+        return random_compound(rng, name, kappa=kappa)
+    return random_building(rng, name, kappa=kappa)
+
+
+def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBuilding:
+    """The building moved so that its frame's origin is at `xy` (world), on the lowest ground under its outline."""
+    corners = shapely.get_coordinates(building.outline) + xy
+    z_ground = round(float(terrain.height_at(corners).min()), 3)
+    frame = LocalFrame(np.array([*np.round(xy, 3), z_ground]))
+    return replace(building, roof=replace(building.roof, frame=frame), z_ground=z_ground)
+
+
+def houses_of(row: SimBuilding) -> list[SimBuilding]:
+    """A row of houses as single buildings with common walls, all in the row's frame."""
+    roofs = [Roof((part,), part.pieces[0].outline, row.roof.frame) for part in row.roof.parts]
+    return [SimBuilding(roof.type, "terraced", roof, row.z_ground) for roof in roofs]
+
+
+def furnished(rng: np.random.Generator, id: str, building: SimBuilding) -> Lot:
+    """The lot of `building` with what stands on it and beside it."""
+    bodies = building_bodies(building) + superstructures(rng, building, TOWN_DEFECTS)
+    crowns = np.empty((0, 5))
+    if rng.random() < TOWN_DEFECTS.tree:
+        crowns = trees(rng, building)
+        crowns[:, :3] += building.roof.frame.origin
+    return Lot(id, building, tuple(bodies), crowns)
+
+
+def street_side(
+    rng: np.random.Generator,
+    names: Iterable[str],
+    start: np.ndarray,
+    heading: float,
+    length: float,
+    depth: float,
+    terrain: Relief,
+) -> list[SimBuilding]:
+    """Buildings side by side along `heading` (rad) from `start` (2,), to its left, within `length` by `depth` metres.
+
+    `names` are taken one after the other until the side is full; a building deeper than the plot is turned, and left
+    out where that does not help. Terraced rows come back as their houses half of the time.
+    """
+    along, placed = 0.0, []
+    for name in names:
+        building = make(rng, name, heading + rng.normal(0.0, 0.015))
+        low, high = extent(building, heading)
+        if high[1] - low[1] > depth:
+            building = turned_building(building, math.pi / 2)
+            low, high = extent(building, heading)
+        if high[1] - low[1] > depth:
+            continue
+        if along + high[0] - low[0] > length:
+            break
+        setback = min(rng.uniform(0.0, 4.0), depth - (high[1] - low[1]))
+        offset = np.array([[along - low[0], setback - low[1]]])
+        building = standing_at(building, start + turned(offset, heading)[0], terrain)
+        is_terrace = building.kind == "row" and rng.random() < 0.5
+        placed += houses_of(building) if is_terrace else [building]
+        along += high[0] - low[0] + rng.uniform(2.5, 7.0)
+    return placed
+
+
+def extent(building: SimBuilding, heading: float) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest corner (2,) of the outline in axes turned by `heading`."""
+    corners = turned(shapely.get_coordinates(building.outline), -heading)
+    return corners.min(axis=0), corners.max(axis=0)
+
+
+def town_scene(lots: list[Lot], terrain: Relief, centre: np.ndarray) -> Scene:
+    """All `lots` in the frame whose origin is `centre` (3,) (world)."""
+    bodies = [replace(body, shift=lot.building.roof.frame.origin - centre) for lot in lots for body in lot.bodies]
+    crowns = np.concatenate([np.empty((0, 5)), *(lot.crowns for lot in lots)])
+    crowns[:, :3] -= centre
+    return scene_of(bodies, crowns, terrain.moved(-centre))
