@@ -1,0 +1,601 @@
+"""The planar arrangement behind a solid: compiled, on an integer grid, so that every orientation test is exact.
+
+Plan coordinates are int64 in units of `GRID_M` (0.1 mm), which is also how CityJSON rounds: what is valid here stays
+valid when written. Segments are noded with a *reach*: afterwards no two vertices are closer than it, no vertex is
+closer than it to an edge it does not end, and no two edges cross. That well-separated arrangement is what the rest
+can rely on.
+
+Half-edges are numbered 2 e (edge e from its first to its second vertex) and 2 e + 1 (back), so the twin of h is h ^ 1.
+Polygons are soups of edges (x0, y0, x1, y1) in any order; inside is by parity.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+GRID_M = 1e-4
+OUTSIDE, UNCOVERED = -1, -2
+COLLINEAR_UNITS = 2.0
+
+
+@njit(cache=True)
+def grown(array):
+    """A copy of `array` with twice the rows."""
+    larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
+    larger[: len(array)] = array
+    return larger
+
+
+@njit(cache=True)
+def vertex_at(xy, count, x, y, reach):
+    """Index of the vertex nearest to (x, y) within `reach`, -1 if there is none."""
+    best, best_d2 = -1, reach * reach
+    for v in range(count):
+        dx, dy = xy[v, 0] - x, xy[v, 1] - y
+        if abs(dx) < reach and abs(dy) < reach and dx * dx + dy * dy < best_d2:
+            best, best_d2 = v, dx * dx + dy * dy
+    return best
+
+
+@njit(cache=True)
+def is_beside(p, a, b, reach):
+    """Whether `p` lies beside the inner part of segment ab, closer than `reach`."""
+    abx, aby, apx, apy = b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1]
+    along, length2 = abx * apx + aby * apy, abx * abx + aby * aby
+    if along <= 0 or along >= length2:
+        return False
+    across = float(abx * apy - aby * apx)
+    return across * across < reach * reach * float(length2)
+
+
+@njit(cache=True)
+def first_vertex_beside(xy, count, a, b, reach):
+    """The vertex beside segment ab (other than its ends) nearest to a, -1 if there is none."""
+    r = np.int64(reach) + 1
+    x_low, x_high = min(xy[a, 0], xy[b, 0]) - r, max(xy[a, 0], xy[b, 0]) + r
+    y_low, y_high = min(xy[a, 1], xy[b, 1]) - r, max(xy[a, 1], xy[b, 1]) + r
+    best, best_along = -1, np.int64(0)
+    for v in range(count):
+        x, y = xy[v, 0], xy[v, 1]
+        if x < x_low or x > x_high or y < y_low or y > y_high or v == a or v == b:
+            continue
+        if is_beside(xy[v], xy[a], xy[b], reach):
+            along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
+            if best < 0 or along < best_along:
+                best, best_along = v, along
+    return best
+
+
+@njit(cache=True)
+def turn(a, b, c):
+    """Twice the signed area of triangle abc: positive when c lies left of ab. Exact for integers."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+@njit(cache=True)
+def first_crossing(xy, edges, count, a, b):
+    """The first live edge that properly crosses segment ab, -1 if there is none."""
+    x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
+    y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
+    for e in range(count):
+        c, d = edges[e, 0], edges[e, 1]
+        if c < 0 or c == a or c == b or d == a or d == b:
+            continue
+        if max(xy[c, 0], xy[d, 0]) < x_low or min(xy[c, 0], xy[d, 0]) > x_high:
+            continue
+        if max(xy[c, 1], xy[d, 1]) < y_low or min(xy[c, 1], xy[d, 1]) > y_high:
+            continue
+        left, right = turn(xy[a], xy[b], xy[c]), turn(xy[a], xy[b], xy[d])
+        if (left > 0) == (right > 0) or left == 0 or right == 0:
+            continue
+        left, right = turn(xy[c], xy[d], xy[a]), turn(xy[c], xy[d], xy[b])
+        if (left > 0) != (right > 0) and left != 0 and right != 0:
+            return e
+    return -1
+
+
+@njit(cache=True)
+def crossing_point(a, b, c, d):
+    """Grid point nearest to the crossing of ab and cd."""
+    left, right = float(turn(c, d, a)), float(turn(c, d, b))
+    t = left / (left - right)
+    return np.int64(np.rint(a[0] + t * (b[0] - a[0]))), np.int64(np.rint(a[1] + t * (b[1] - a[1])))
+
+
+@njit(cache=True)
+def node(segments, reach):
+    """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by `reach` grid units.
+
+    Earlier segments have the right of way: their end points stay, later ones within reach move onto them. Returns no
+    edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a run).
+    """
+    xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    stack, top = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    ends = np.empty((len(segments), 2), np.int64)
+    for s in range(len(segments)):
+        for end in range(2):
+            x, y = segments[s, 2 * end], segments[s, 2 * end + 1]
+            v = vertex_at(xy, count, x, y, reach)
+            if v < 0:
+                v, xy[count, 0], xy[count, 1] = count, x, y
+                count += 1
+            ends[s, end] = v
+    for s in range(len(segments) - 1, -1, -1):
+        stack[top] = ends[s]
+        top += 1
+    steps = 0
+    while top > 0:
+        steps += 1
+        if steps > 100 * len(segments) + 10000:
+            return xy[:0], edges[:0]
+        top -= 1
+        a, b = stack[top, 0], stack[top, 1]
+        if a == b:
+            continue
+        while top + 4 + edge_count > len(stack):
+            stack = grown(stack)
+        v = first_vertex_beside(xy, count, a, b, reach)
+        if v >= 0:
+            stack[top, 0], stack[top, 1] = v, b
+            stack[top + 1, 0], stack[top + 1, 1] = a, v
+            top += 2
+            continue
+        twin = False
+        for e in range(edge_count):
+            c, d = edges[e, 0], edges[e, 1]
+            if (c == a and d == b) or (c == b and d == a):
+                twin = True
+                break
+        if twin:
+            continue
+        e = first_crossing(xy, edges, edge_count, a, b)
+        if e < 0:
+            if edge_count == len(edges):
+                edges = grown(edges)
+            edges[edge_count, 0], edges[edge_count, 1] = a, b
+            edge_count += 1
+            continue
+        x, y = crossing_point(xy[a], xy[b], xy[edges[e, 0]], xy[edges[e, 1]])
+        if count == len(xy):
+            xy = grown(xy)
+        xy[count, 0], xy[count, 1] = x, y
+        count += 1
+        stack[top, 0], stack[top, 1] = a, b
+        top += 1
+        for other in range(edge_count):  # every live edge beside the new vertex goes through it
+            c = edges[other, 0]
+            if c >= 0 and (other == e or is_beside(xy[count - 1], xy[c], xy[edges[other, 1]], reach)):
+                stack[top] = edges[other]
+                edges[other, 0] = edges[other, 1] = -1
+                top += 1
+    kept = 0
+    for e in range(edge_count):
+        if edges[e, 0] >= 0:
+            edges[kept] = edges[e]
+            kept += 1
+    return xy[:count].copy(), edges[:kept].copy()
+
+
+@njit(cache=True)
+def half_edge_order(xy, edges):
+    """Half-edges sorted by origin, then counter-clockwise: (order (2e,), start (n + 1,) of each vertex's run in it)."""
+    size = 2 * len(edges)
+    angle = np.empty(size)
+    start = np.zeros(len(xy) + 1, np.int64)
+    for h in range(size):
+        a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
+        angle[h] = np.arctan2(float(xy[b, 1] - xy[a, 1]), float(xy[b, 0] - xy[a, 0]))
+        start[a + 1] += 1
+    start = np.cumsum(start)
+    order = np.empty(size, np.int64)
+    fill = start.copy()
+    for h in np.argsort(angle, kind="mergesort"):
+        a = edges[h >> 1, h & 1]
+        order[fill[a]] = h
+        fill[a] += 1
+    return order, start
+
+
+@njit(cache=True)
+def next_half_edges(edges, order, start):
+    """The half-edge that follows each around the face on its left."""
+    follow = np.empty(len(order), np.int64)
+    for v in range(len(start) - 1):
+        for k in range(start[v], start[v + 1]):
+            before = k - 1 if k > start[v] else start[v + 1] - 1
+            follow[order[k] ^ 1] = order[before]
+    return follow
+
+
+@njit(cache=True)
+def face_left_of(xy, edges, x, y):
+    """Half-edge first hit by the ray from (x, y) towards -x, with that point on its left; -1 if none. y is no integer."""
+    best, best_x = -1, -np.inf
+    for e in range(len(edges)):
+        a, b = edges[e, 0], edges[e, 1]
+        if (xy[a, 1] > y) == (xy[b, 1] > y):
+            continue
+        t = (y - xy[a, 1]) / (xy[b, 1] - xy[a, 1])
+        at_x = xy[a, 0] + t * (xy[b, 0] - xy[a, 0])
+        if at_x < x and at_x > best_x:
+            best_x = at_x
+            best = 2 * e if xy[a, 1] > xy[b, 1] else 2 * e + 1
+    return best
+
+
+@njit(cache=True)
+def trace_faces(xy, edges, follow):
+    """Face on the left of each half-edge (2e,), and each face's area (f,) in square grid units; face 0 is unbounded.
+
+    Holes belong to the face around them: the outer walk of every island is handed to the face found by a ray from its
+    leftmost vertex.
+    """
+    size = len(follow)
+    walk = np.full(size, -1, np.int64)
+    walk_area, lowest = np.zeros(size + 1), np.zeros(size + 1, np.int64)
+    walks = 0
+    for first in range(size):
+        if walk[first] >= 0:
+            continue
+        h, area2, low = first, 0.0, edges[first >> 1, first & 1]
+        x0, y0 = xy[low, 0], xy[low, 1]
+        while walk[h] < 0:
+            walk[h] = walks
+            a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
+            area2 += float(xy[a, 0] - x0) * (xy[b, 1] - y0) - float(xy[b, 0] - x0) * (xy[a, 1] - y0)
+            if xy[a, 0] < xy[low, 0] or (xy[a, 0] == xy[low, 0] and xy[a, 1] < xy[low, 1]):
+                low = a
+            h = follow[h]
+        walk_area[walks], lowest[walks] = 0.5 * area2, low
+        walks += 1
+    face_of_walk = np.zeros(walks, np.int64)
+    area = np.zeros(walks + 1)
+    faces = 1
+    for w in range(walks):
+        if walk_area[w] > 0:
+            face_of_walk[w], area[faces] = faces, walk_area[w]
+            faces += 1
+    for w in np.argsort(xy[lowest[:walks], 0], kind="mergesort"):
+        if walk_area[w] <= 0:
+            low = lowest[w]
+            hit = face_left_of(xy, edges, xy[low, 0] - 0.5, xy[low, 1] + 0.5)
+            face_of_walk[w] = 0 if hit < 0 else face_of_walk[walk[hit]]
+            area[face_of_walk[w]] += walk_area[w]
+    return face_of_walk[walk], area[:faces].copy()
+
+
+@njit(cache=True)
+def chord(xy, edges, h):
+    """Length of the ray from the middle of half-edge `h` to its left until the first edge, and its unit direction."""
+    a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
+    ax, ay = 0.5 * (xy[a, 0] + xy[b, 0]), 0.5 * (xy[a, 1] + xy[b, 1])
+    dx, dy = float(xy[b, 0] - xy[a, 0]), float(xy[b, 1] - xy[a, 1])
+    length = np.hypot(dx, dy)
+    nx, ny = -dy / length, dx / length
+    nearest = np.inf
+    for e in range(len(edges)):
+        if e == h >> 1:
+            continue
+        c, d = edges[e, 0], edges[e, 1]
+        cx, cy, ex, ey = xy[c, 0] - ax, xy[c, 1] - ay, xy[d, 0] - ax, xy[d, 1] - ay
+        side_c, side_d = nx * cy - ny * cx, nx * ey - ny * ex
+        if side_c * side_d > 0 or side_c == side_d:
+            continue
+        s = side_c / (side_c - side_d)
+        along = nx * (cx + s * (ex - cx)) + ny * (cy + s * (ey - cy))
+        if 0 < along < nearest:
+            nearest = along
+    return nearest, nx, ny
+
+
+@njit(cache=True)
+def face_points(xy, edges, face, faces):
+    """A point (f, 2) well inside each face: the middle of its longest chord at right angles to an edge's middle."""
+    longest, best = np.zeros(faces), np.zeros(faces)
+    points = np.zeros((faces, 2))
+    for h in range(2 * len(edges)):
+        d = xy[edges[h >> 1, 0]] - xy[edges[h >> 1, 1]]
+        longest[face[h]] = max(longest[face[h]], np.hypot(float(d[0]), float(d[1])))
+    for h in range(2 * len(edges)):
+        f, a, b = face[h], edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
+        length = np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1]))
+        if f == 0 or length < 0.3 * longest[f]:
+            continue
+        reach, nx, ny = chord(xy, edges, h)
+        if np.isfinite(reach) and reach > best[f]:
+            best[f] = reach
+            points[f, 0] = 0.5 * (xy[a, 0] + xy[b, 0]) + 0.5 * reach * nx
+            points[f, 1] = 0.5 * (xy[a, 1] + xy[b, 1]) + 0.5 * reach * ny
+    return points
+
+
+@njit(cache=True)
+def covers(soup, low, high, x, y):
+    """Whether the polygon of soup[low:high] holds (x, y), by parity."""
+    inside = False
+    for e in range(low, high):
+        if (soup[e, 1] > y) != (soup[e, 3] > y):
+            t = (y - soup[e, 1]) / (soup[e, 3] - soup[e, 1])
+            if x < soup[e, 0] + t * (soup[e, 2] - soup[e, 0]):
+                inside = not inside
+    return inside
+
+
+@njit(cache=True)
+def active_plane(x, y, soup, soup_start, planes, plane_start):
+    """Plane active at (x, y): the lowest of each covering piece, the highest of those; UNCOVERED, OUTSIDE the outline.
+
+    Polygon 0 of the soup is the outline, polygon k + 1 the outline of piece k.
+    """
+    if not covers(soup, soup_start[0], soup_start[1], x, y):
+        return OUTSIDE
+    best, best_z = UNCOVERED, -np.inf
+    for k in range(len(plane_start) - 1):
+        if not covers(soup, soup_start[k + 1], soup_start[k + 2], x, y):
+            continue
+        low, low_z = -1, np.inf
+        for j in range(plane_start[k], plane_start[k + 1]):
+            z = planes[j, 0] * x + planes[j, 1] * y + planes[j, 2]
+            if z < low_z - 1e-3:
+                low, low_z = j, z
+        if low_z > best_z + 1e-3:
+            best, best_z = low, low_z
+    return best
+
+
+@njit(cache=True)
+def label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label):
+    """Label of each face (f,): the group of the plane active at its point, or what the last patch over it says."""
+    label = np.full(len(points), OUTSIDE, np.int64)
+    for f in range(1, len(points)):
+        plane = active_plane(points[f, 0], points[f, 1], soup, soup_start, planes, plane_start)
+        label[f] = group[plane] if plane >= 0 else plane
+        for p in range(len(patch_label)):
+            if covers(patches, patch_start[p], patch_start[p + 1], points[f, 0], points[f, 1]):
+                label[f] = patch_label[p]
+    return label
+
+
+@njit(cache=True)
+def find(parent, i):
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@njit(cache=True)
+def regions_of(edges, face, label):
+    """Region (f,) of each face: faces joined over edges that have the same label on both sides."""
+    parent = np.arange(len(label))
+    for e in range(len(edges)):
+        if label[face[2 * e]] == label[face[2 * e + 1]]:
+            a, b = find(parent, face[2 * e]), find(parent, face[2 * e + 1])
+            parent[max(a, b)] = min(a, b)
+    for f in range(len(label)):
+        parent[f] = find(parent, f)
+    return parent
+
+
+@njit(cache=True)
+def edge_lengths(xy, edges):
+    length = np.empty(len(edges))
+    for e in range(len(edges)):
+        d = xy[edges[e, 0]] - xy[edges[e, 1]]
+        length[e] = np.hypot(float(d[0]), float(d[1]))
+    return length
+
+
+@njit(cache=True)
+def merge_slivers(xy, edges, face, area, label, min_area, min_width):
+    """Give every region too small or too thin to the neighbour it shares the longest border with, smallest first."""
+    length = edge_lengths(xy, edges)
+    for _ in range(len(label)):
+        region = regions_of(edges, face, label)
+        size, border = np.zeros(len(label)), np.zeros(len(label))
+        open_to = np.zeros(len(label), np.bool_)
+        for f in range(1, len(label)):
+            size[region[f]] += area[f]
+        for e in range(len(edges)):
+            a, b = region[face[2 * e]], region[face[2 * e + 1]]
+            if a != b:
+                border[a] += length[e]
+                border[b] += length[e]
+                if label[a] != OUTSIDE and label[b] != OUTSIDE:
+                    open_to[a] = open_to[b] = True
+        smallest = -1
+        for r in range(1, len(label)):
+            if region[r] == r and open_to[r] and (size[r] < min_area or 2 * size[r] < min_width * border[r]):
+                if smallest < 0 or size[r] < size[smallest]:
+                    smallest = r
+        if smallest < 0:
+            break
+        shared = np.zeros(len(label))
+        for e in range(len(edges)):
+            a, b = region[face[2 * e]], region[face[2 * e + 1]]
+            if a != b and (a == smallest or b == smallest):
+                other = b if a == smallest else a
+                if label[other] != OUTSIDE:
+                    shared[other] += length[e]
+        into = label[np.argmax(shared)]
+        for f in range(len(label)):
+            if region[f] == smallest:
+                label[f] = into
+
+
+@njit(cache=True)
+def keep_largest_component(edges, face, area, label):
+    """Turn everything but the largest connected inside to OUTSIDE (a neck thinner than the reach was cut)."""
+    parent = np.arange(len(label))
+    for e in range(len(edges)):
+        a, b = face[2 * e], face[2 * e + 1]
+        if label[a] != OUTSIDE and label[b] != OUTSIDE:
+            a, b = find(parent, a), find(parent, b)
+            parent[max(a, b)] = min(a, b)
+    size = np.zeros(len(label))
+    for f in range(1, len(label)):
+        if label[f] != OUTSIDE:
+            size[find(parent, f)] += area[f]
+    largest = np.argmax(size)
+    for f in range(1, len(label)):
+        if find(parent, f) != largest:
+            label[f] = OUTSIDE
+
+
+@njit(cache=True)
+def dissolve(xy, edges, side):
+    """Drop edges with one label on both sides, then vertices on straight stretches; (xy, edges, side) compacted.
+
+    `side` (e, 2) holds the labels left and right of each edge. A vertex goes when it lies within COLLINEAR_UNITS of the
+    line between its two neighbours, counting what was already dropped along them.
+    """
+    kept = 0
+    for e in range(len(edges)):
+        if side[e, 0] != side[e, 1]:
+            edges[kept], side[kept] = edges[e], side[e]
+            kept += 1
+    edges, side = edges[:kept].copy(), side[:kept].copy()
+    degree, touching = np.zeros(len(xy), np.int64), np.zeros((len(xy), 2), np.int64)
+    for e in range(kept):
+        for end in range(2):
+            v = edges[e, end]
+            if degree[v] < 2:
+                touching[v, degree[v]] = e
+            degree[v] += 1
+    drift = np.zeros(kept)
+    changed = True
+    while changed:
+        changed = False
+        for v in range(len(xy)):
+            if degree[v] != 2:
+                continue
+            e, g = touching[v, 0], touching[v, 1]
+            a = edges[e, 0] if edges[e, 1] == v else edges[e, 1]
+            b = edges[g, 0] if edges[g, 1] == v else edges[g, 1]
+            off = abs(turn(xy[a], xy[b], xy[v])) / max(
+                np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1])), 1
+            )
+            off += max(drift[e], drift[g])
+            if a == b or off > COLLINEAR_UNITS or not is_beside(xy[v], xy[a], xy[b], 2 * COLLINEAR_UNITS):
+                continue
+            edges[e, 0 if edges[e, 0] == v else 1] = b
+            drift[e] = off
+            edges[g, 0] = edges[g, 1] = -1
+            degree[v] = 0
+            touching[b, 0 if touching[b, 0] == g else 1] = e
+            changed = True
+    number = np.full(len(xy), -1, np.int64)
+    out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
+    count, kept = 0, 0
+    for e in range(len(edges)):
+        if edges[e, 0] < 0:
+            continue
+        for end in range(2):
+            v = edges[e, end]
+            if number[v] < 0:
+                number[v], out_xy[count] = count, xy[v]
+                count += 1
+            out_edges[kept, end] = number[v]
+        out_side[kept] = side[e]
+        kept += 1
+    return out_xy[:count].copy(), out_edges[:kept].copy(), out_side[:kept].copy()
+
+
+@njit(cache=True)
+def plan_cells(
+    segments,
+    reach,
+    soup,
+    soup_start,
+    planes,
+    plane_start,
+    group,
+    patches,
+    patch_start,
+    patch_label,
+    min_area,
+    min_width,
+):
+    """Cells of the plan in which one plane is active, as labelled edges: (xy (n, 2), edges (e, 2), side (e, 2)).
+
+    `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones; what remains
+    UNCOVERED is for the caller to see in `side`.
+    """
+    xy, edges = node(segments, reach)
+    order, start = half_edge_order(xy, edges)
+    face, area = trace_faces(xy, edges, next_half_edges(edges, order, start))
+    points = face_points(xy, edges, face, len(area))
+    label = label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label)
+    merge_slivers(xy, edges, face, area, label, min_area, min_width)
+    keep_largest_component(edges, face, area, label)
+    side = label[face].reshape(-1, 2)
+    return dissolve(xy, edges, side)
+
+
+@njit(cache=True)
+def inside_intervals(soup, low, high, px, py, dx, dy):
+    """Sorted parameters (even in number) at which the line (px, py) + t (dx, dy) enters and leaves a polygon."""
+    cuts = np.empty(high - low)
+    count = 0
+    for e in range(low, high):
+        side_a = dx * (soup[e, 1] - py) - dy * (soup[e, 0] - px)
+        side_b = dx * (soup[e, 3] - py) - dy * (soup[e, 2] - px)
+        if (side_a > 0) != (side_b > 0):
+            s = side_a / (side_a - side_b)
+            x, y = soup[e, 0] + s * (soup[e, 2] - soup[e, 0]), soup[e, 1] + s * (soup[e, 3] - soup[e, 1])
+            cuts[count] = dx * (x - px) + dy * (y - py)
+            count += 1
+    return np.sort(cuts[:count])
+
+
+@njit(cache=True)
+def clip_to_lowest(planes, low, high, j, px, py, dx, dy, t_low, t_high):
+    """Narrow [t_low, t_high] to where plane j is the lowest of planes[low:high] along the line."""
+    for k in range(low, high):
+        if k == j:
+            continue
+        a, b, c = planes[k] - planes[j]
+        rise, base = a * dx + b * dy, a * px + b * py + c
+        if abs(rise) < 1e-12:
+            if base < -1e-3:
+                return 1.0, 0.0
+        elif rise > 0:
+            t_low = max(t_low, -base / rise)
+        else:
+            t_high = min(t_high, -base / rise)
+    return t_low, t_high
+
+
+@njit(cache=True)
+def meeting_lines(soup, soup_start, planes, plane_start):
+    """Segments (m, 4) in the plan along which the active plane changes, within a piece and between overlapping ones."""
+    out, count = np.empty((64, 4), np.int64), 0
+    pieces = len(plane_start) - 1
+    for p in range(pieces):
+        for q in range(p, pieces):
+            for i in range(plane_start[p], plane_start[p + 1]):
+                for j in range(i + 1 if p == q else plane_start[q], plane_start[q + 1]):
+                    a, b, c = planes[i] - planes[j]
+                    steep = np.hypot(a, b)
+                    if steep < 1e-7:
+                        continue
+                    px, py, dx, dy = -c * a / steep**2, -c * b / steep**2, -b / steep, a / steep
+                    low, high = clip_to_lowest(planes, plane_start[p], plane_start[p + 1], i, px, py, dx, dy, -1e9, 1e9)
+                    low, high = clip_to_lowest(planes, plane_start[q], plane_start[q + 1], j, px, py, dx, dy, low, high)
+                    if high - low < 1:
+                        continue
+                    in_p = inside_intervals(soup, soup_start[p + 1], soup_start[p + 2], px, py, dx, dy)
+                    in_q = inside_intervals(soup, soup_start[q + 1], soup_start[q + 2], px, py, dx, dy)
+                    for k in range(0, len(in_p) - 1, 2):
+                        for m in range(0, len(in_q) - 1, 2):
+                            t0, t1 = max(low, in_p[k], in_q[m]), min(high, in_p[k + 1], in_q[m + 1])
+                            if t1 - t0 < 1:
+                                continue
+                            if count == len(out):
+                                out = grown(out)
+                            out[count, 0], out[count, 1] = np.rint(px + t0 * dx), np.rint(py + t0 * dy)
+                            out[count, 2], out[count, 3] = np.rint(px + t1 * dx), np.rint(py + t1 * dy)
+                            count += 1
+    return out[:count].copy()

@@ -1,0 +1,165 @@
+"""From a roof to the cells of its plan: outline, pieces and the lines where the active plane changes, arranged."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from ..errors import CompositionError
+from ..model import Roof
+from .arrangement import (
+    GRID_M,
+    UNCOVERED,
+    half_edge_order,
+    meeting_lines,
+    next_half_edges,
+    plan_cells,
+    trace_faces,
+)
+
+MAX_EXTENT_M = 50_000.0
+
+
+@dataclass(frozen=True)
+class PlanProblem:
+    """A roof in grid units: polygons as soups of edges, polygon 0 the outline and polygon k + 1 that of piece k.
+
+    `planes` (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within its roof part,
+    `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that overrule the height function.
+    """
+
+    soups: list[np.ndarray]
+    planes: np.ndarray
+    plane_start: np.ndarray
+    group: np.ndarray
+    part: np.ndarray
+    patches: list[tuple[np.ndarray, int]] = field(default_factory=list)
+
+
+@dataclass(frozen=True)
+class PlanCells:
+    """The plan as labelled edges: `xy` (n, 2) int64 grid units, `edges` (e, 2), `side` (e, 2) labels left and right.
+
+    A label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
+    """
+
+    xy: np.ndarray
+    edges: np.ndarray
+    side: np.ndarray
+
+
+def polygon_soup(polygon: shapely.Polygon) -> np.ndarray:
+    """Edges (m, 4) of all rings of a polygon (or of several), rounded to the grid, without edges of no length."""
+    xy, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(polygon)), return_index=True)
+    if not np.isfinite(xy).all() or np.abs(xy).max(initial=0) > MAX_EXTENT_M:
+        raise CompositionError(
+            "expected plan coordinates within 50 km of the roof's local origin, got larger or non-finite ones;"
+            " give the outline in the roof's local frame"
+        )
+    xy = np.rint(xy / GRID_M)
+    soup = np.concatenate((xy[:-1], xy[1:]), axis=1)[ring[:-1] == ring[1:]]
+    return soup[(soup[:, :2] != soup[:, 2:]).any(axis=1)]
+
+
+def plan_problem(roof: Roof) -> PlanProblem:
+    """The roof on the grid. Raises CompositionError when it has no outline, no pieces or planes that are not finite."""
+    soups, planes, part = [polygon_soup(roof.outline)], [], []
+    plane_start = [0]
+    for index, roof_part in enumerate(roof.parts):
+        for piece in roof_part.pieces:
+            soup = polygon_soup(piece.outline)
+            if len(soup) == 0 or len(piece.planes) == 0:
+                continue
+            soups.append(soup)
+            planes.append(np.asarray(piece.planes, float).reshape(-1, 3))
+            part.extend([index] * len(planes[-1]))
+            plane_start.append(plane_start[-1] + len(planes[-1]))
+    if len(soups[0]) == 0 or not planes:
+        raise CompositionError(
+            "expected a roof with an outline and at least one piece with planes, got none; fall back to a flat block"
+        )
+    stacked = np.concatenate(planes)
+    if not np.isfinite(stacked).all():
+        raise CompositionError("expected finite roof planes, got NaN or infinity; fall back to a flat block")
+    group = equal_planes(stacked, np.array(part))
+    return PlanProblem(soups, stacked / [1, 1, GRID_M], np.array(plane_start), group, np.array(part))
+
+
+def equal_planes(planes: np.ndarray, part: np.ndarray) -> np.ndarray:
+    """Index (p,) of the first plane of the same part that equals each within a micrometre and a millionth of slope."""
+    same = (np.abs(planes[:, None] - planes[None]) < 1e-6).all(axis=2) & (part[:, None] == part[None])
+    return same.argmax(axis=1)
+
+
+def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """One array of edges and the start of each polygon in it."""
+    start = np.concatenate(([0], np.cumsum([len(soup) for soup in soups]))).astype(np.int64)
+    edges = np.concatenate(soups) if soups else np.zeros((0, 4))
+    return np.ascontiguousarray(edges, float), start
+
+
+def arrange(problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_m: float) -> PlanCells:
+    """Plan cells of a roof, well separated by `reach_m`; where no piece covers the outline, the piece beside it is extended."""
+    for _ in range(4):
+        soup, soup_start = stacked_soups(problem.soups)
+        patches, patch_start = stacked_soups([patch for patch, _ in problem.patches])
+        patch_label = np.array([label for _, label in problem.patches], np.int64)
+        lines = meeting_lines(soup, soup_start, problem.planes, problem.plane_start)
+        segments = np.concatenate((soup.astype(np.int64), patches.astype(np.int64), lines))
+        xy, edges, side = plan_cells(
+            segments,
+            reach_m / GRID_M,
+            soup,
+            soup_start,
+            problem.planes,
+            problem.plane_start,
+            problem.group,
+            patches,
+            patch_start,
+            patch_label,
+            min_area_m2 / GRID_M**2,
+            min_width_m / GRID_M,
+        )
+        if not (side == UNCOVERED).any():
+            return PlanCells(xy, edges, side)
+        problem = extend_over_gaps(problem, PlanCells(xy, edges, side))
+    raise CompositionError("expected the roof's pieces to reach all of its outline, got gaps that no piece borders")
+
+
+def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
+    """The problem with a further piece over each uncovered cell, its planes those of the piece it borders most."""
+    follow = next_half_edges(cells.edges, *half_edge_order(cells.xy, cells.edges))
+    face, _ = trace_faces(cells.xy, cells.edges, follow)
+    label = cells.side.ravel()
+    for gap in np.unique(face[label == UNCOVERED]):
+        around = np.flatnonzero((face == gap) & (face[np.arange(len(face)) ^ 1] != gap))
+        soup = cells.xy[cells.edges[around >> 1]].reshape(-1, 4).astype(float)
+        problem = with_gap_covered(problem, soup, label[around ^ 1])
+    return problem
+
+
+def with_gap_covered(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
+    """The problem with one more piece over the polygon `gap` (m, 4), whose edges border cells labelled `neighbour` (m,)."""
+    length = np.hypot(gap[:, 2] - gap[:, 0], gap[:, 3] - gap[:, 1])
+    piece_of_plane = np.searchsorted(problem.plane_start, np.arange(len(problem.planes)), side="right") - 1
+    roofed = neighbour >= 0
+    shared = np.bincount(piece_of_plane[neighbour[roofed]], length[roofed], minlength=len(problem.plane_start) - 1)
+    piece = int(shared.argmax()) if shared.any() else nearest_piece(problem, gap)
+    low, high = problem.plane_start[piece], problem.plane_start[piece + 1]
+    return PlanProblem(
+        [*problem.soups, gap],
+        np.concatenate((problem.planes, problem.planes[low:high])),
+        np.append(problem.plane_start, problem.plane_start[-1] + high - low),
+        np.concatenate((problem.group, problem.group[low:high])),
+        np.concatenate((problem.part, problem.part[low:high])),
+        problem.patches,
+    )
+
+
+def nearest_piece(problem: PlanProblem, gap: np.ndarray) -> int:
+    """The piece whose border comes nearest to the first corner of the gap's edges (m, 4)."""
+    corner = shapely.Point(gap[0, :2])
+    borders = [shapely.multilinestrings(list(soup.reshape(-1, 2, 2))) for soup in problem.soups[1:]]
+    return int(np.argmin([corner.distance(border) for border in borders]))

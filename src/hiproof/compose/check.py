@@ -1,0 +1,85 @@
+"""Is a solid valid by ISO 19107? Findings carry the codes of val3dity and a sentence each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Solid
+from .check_kernel import check_shell
+
+CODES = {
+    101: "has a ring with fewer than three points",
+    102: "has the same point twice in a row (points closer than 1 mm are one)",
+    103: "has a ring that is not closed",
+    104: "has a ring that crosses or touches itself, or is folded to a line",
+    201: "has rings that cross or share a stretch",
+    202: "has the same ring twice",
+    203: "is not planar: a vertex lies too far from its plane",
+    204: "is not planar: a corner turns out of its plane by more than 20 degrees",
+    205: "has an inside that its rings cut apart",
+    206: "has an inner ring outside its outer ring",
+    207: "has an inner ring inside another inner ring",
+    208: "has an inner ring that runs the same way as its outer ring",
+    301: "the shell has fewer than four faces",
+    302: "has an edge that no other face shares: the shell is not closed",
+    303: "has an edge or vertex where more than two faces meet: the shell is no manifold",
+    305: "is not connected to the rest of the shell",
+    306: "meets another face outside shared edges and vertices",
+    307: "is oriented against its neighbour",
+    405: "the shell is oriented inwards",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One defect: `code` as val3dity numbers it, index of the `face` (-1: the whole shell) and a `message` sentence."""
+
+    code: int
+    face: int
+    message: str
+
+
+def finding(code: int, face: int = -1, other: int = -1) -> Finding:
+    """The finding with its sentence."""
+    text = CODES[code]
+    subject = f"face {face} {text}" if face >= 0 else text
+    return Finding(code, face, f"{code}: {subject}{f' (face {other})' if other >= 0 else ''}")
+
+
+def flattened(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertex indices of all rings one after the other, the start of each ring, and of each face among the rings."""
+    rings = [ring for face in solid.faces for ring in face.rings]
+    index = np.array([vertex for ring in rings for vertex in ring], np.int64)
+    ring_start = np.cumsum([0, *map(len, rings)], dtype=np.int64)
+    face_start = np.cumsum([0, *(len(face.rings) for face in solid.faces)], dtype=np.int64)
+    return index, ring_start, face_start
+
+
+def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]:
+    """Everything wrong with the shell of `solid`, nothing if it is valid.
+
+    Rings count as closed; points closer than 1 mm are one; `planarity_m` is how far a vertex may lie from its face's
+    plane (val3dity's default is 0.01). As in val3dity, the shell is looked at only when every face is sound by
+    itself.
+
+    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    >>> from hiproof.model import Face
+    >>> rings = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
+    >>> check_solid(Solid(corners, tuple(Face((ring,), "WallSurface") for ring in rings)))
+    ()
+    >>> check_solid(Solid(corners, tuple(Face((ring,), "WallSurface") for ring in rings[:3])))[0].code
+    301
+    """
+    vertices = np.ascontiguousarray(solid.vertices, float).reshape(-1, 3)
+    index, ring_start, face_start = flattened(solid)
+    if len(index) == 0:
+        return (finding(301),)
+    if not np.isfinite(vertices).all() or index.min() < 0 or index.max() >= len(vertices):
+        return (
+            Finding(101, -1, "101: expected finite vertices and indices into them, got others; the file is damaged"),
+        )
+    local = vertices - vertices[index].mean(axis=0)
+    rows = check_shell(local, index, ring_start, face_start, float(planarity_m))
+    return tuple(finding(int(code), int(face), int(other)) for code, face, other in rows)

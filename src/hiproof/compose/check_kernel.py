@@ -1,0 +1,538 @@
+"""The compiled tests behind `check_solid`: each finding is a row (code, face, other face or -1).
+
+Faces are flattened: ring r has vertices `index[ring_start[r]:ring_start[r + 1]]`, face f the rings
+`face_start[f]:face_start[f + 1]`, the outer one first. Polygons are tested in the projection along the largest
+component of their normal, which only drops a coordinate and so moves nothing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+SAME_POINT_M = 1e-3
+TOUCH_M = 1e-9
+NORMAL_COSINE = np.cos(np.deg2rad(20.0))
+
+
+@njit(cache=True)
+def weld(vertices, tolerance):
+    """For each vertex (n,) the lowest index of a vertex closer than `tolerance`."""
+    same = np.arange(len(vertices))
+    order = np.argsort(vertices[:, 0])
+    for i in range(len(order)):
+        v = order[i]
+        for k in range(i - 1, -1, -1):
+            w = order[k]
+            if vertices[v, 0] - vertices[w, 0] >= tolerance:
+                break
+            d = vertices[v] - vertices[w]
+            if same[w] < same[v] and d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < tolerance * tolerance:
+                same[v] = same[w]
+    for v in range(len(same)):
+        while same[same[v]] != same[v]:
+            same[v] = same[same[v]]
+    return same
+
+
+@njit(cache=True)
+def newell(vertices, index, low, high):
+    """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the normal."""
+    total = np.zeros(3)
+    origin = vertices[index[low]]
+    for k in range(low, high):
+        p = vertices[index[k]] - origin
+        q = vertices[index[k + 1 if k + 1 < high else low]] - origin
+        total[0] += p[1] * q[2] - p[2] * q[1]
+        total[1] += p[2] * q[0] - p[0] * q[2]
+        total[2] += p[0] * q[1] - p[1] * q[0]
+    return 0.5 * total
+
+
+@njit(cache=True)
+def cross2(a, b, c):
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+@njit(cache=True)
+def distance_to_segment(p, a, b):
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    length2 = dx * dx + dy * dy
+    t = 0.0 if length2 == 0 else min(1.0, max(0.0, ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length2))
+    return np.hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy)
+
+
+@njit(cache=True)
+def crosses(a, b, c, d):
+    """Whether the open segments ab and cd cross in one point."""
+    left, right = cross2(a, b, c), cross2(a, b, d)
+    if not ((left > 0 and right < 0) or (left < 0 and right > 0)):
+        return False
+    left, right = cross2(c, d, a), cross2(c, d, b)
+    return (left > 0 and right < 0) or (left < 0 and right > 0)
+
+
+@njit(cache=True)
+def inside_ring(p, flat, index, low, high):
+    """Whether the plan point p lies in the ring, by parity."""
+    inside = False
+    for k in range(low, high):
+        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
+        if (a[1] > p[1]) != (b[1] > p[1]):
+            if p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]):
+                inside = not inside
+    return inside
+
+
+@njit(cache=True)
+def depth_in_face(p, flat, index, ring_start, first, last):
+    """Distance of the plan point p from the border of a face, negative outside."""
+    inside, nearest = False, np.inf
+    for r in range(first, last):
+        low, high = ring_start[r], ring_start[r + 1]
+        if inside_ring(p, flat, index, low, high):
+            inside = not inside
+        for k in range(low, high):
+            nearest = min(nearest, distance_to_segment(p, flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]))
+    return nearest if inside else -nearest
+
+
+@njit(cache=True)
+def ring_is_simple(flat, index, low, high):
+    """Whether a ring neither crosses nor touches nor folds back on itself (vertices already welded)."""
+    size = high - low
+    for i in range(size):
+        a, b = index[low + i], index[low + (i + 1) % size]
+        c = index[low + (i + 2) % size]
+        if distance_to_segment(flat[c], flat[a], flat[b]) <= TOUCH_M:
+            return False
+        if distance_to_segment(flat[a], flat[b], flat[c]) <= TOUCH_M:
+            return False
+        for j in range(i + 2, size):
+            if i == 0 and j == size - 1:
+                continue
+            c, d = index[low + j], index[low + (j + 1) % size]
+            if a == c or a == d or b == c or b == d or crosses(flat[a], flat[b], flat[c], flat[d]):
+                return False
+            if (
+                min(distance_to_segment(flat[c], flat[a], flat[b]), distance_to_segment(flat[d], flat[a], flat[b]))
+                <= TOUCH_M
+            ):
+                return False
+            if (
+                min(distance_to_segment(flat[a], flat[c], flat[d]), distance_to_segment(flat[b], flat[c], flat[d]))
+                <= TOUCH_M
+            ):
+                return False
+    return True
+
+
+@njit(cache=True)
+def same_ring(index, low, high, low2, high2):
+    """Whether two rings hold the same vertices."""
+    if high - low != high2 - low2:
+        return False
+    for k in range(low, high):
+        found = False
+        for m in range(low2, high2):
+            found = found or index[k] == index[m]
+        if not found:
+            return False
+    return True
+
+
+@njit(cache=True)
+def rings_meet(flat, index, low, high, low2, high2):
+    """(whether two rings cross or share a stretch, in how many points they touch)."""
+    touches = 0
+    for k in range(low, high):
+        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
+        on_other, middle_on_other = False, False
+        middle = 0.5 * (a + b)
+        for m in range(low2, high2):
+            c, d = flat[index[m]], flat[index[m + 1 if m + 1 < high2 else low2]]
+            if crosses(a, b, c, d):
+                return True, touches
+            on_other = on_other or distance_to_segment(a, c, d) <= TOUCH_M
+            middle_on_other = middle_on_other or distance_to_segment(middle, c, d) <= TOUCH_M
+            if distance_to_segment(c, a, b) <= TOUCH_M:
+                apart = np.hypot(c[0] - a[0], c[1] - a[1]) > TOUCH_M and np.hypot(c[0] - b[0], c[1] - b[1]) > TOUCH_M
+                touches += apart
+        if on_other and middle_on_other:
+            return True, touches
+        touches += on_other
+    return False, touches
+
+
+@njit(cache=True)
+def ring_in_ring(flat, index, low, high, low2, high2):
+    """Whether the first ring lies in the second, by its first vertex or edge middle that is not on the second's border."""
+    for k in range(low, high):
+        a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
+        for p in (a, 0.5 * (a + b)):
+            nearest = np.inf
+            for m in range(low2, high2):
+                nearest = min(
+                    nearest, distance_to_segment(p, flat[index[m]], flat[index[m + 1 if m + 1 < high2 else low2]])
+                )
+            if nearest > TOUCH_M:
+                return inside_ring(p, flat, index, low2, high2)
+    return False
+
+
+@njit(cache=True)
+def find_root(parent, i):
+    while parent[i] != i:
+        i = parent[i]
+    return i
+
+
+@njit(cache=True)
+def check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f):
+    """Codes 201, 202, 205, 206, 207, 208 of one face; `signed` are the rings' areas along the face's normal."""
+    parent = np.arange(last - first)
+    for r in range(first + 1, last):
+        low, high = ring_start[r], ring_start[r + 1]
+        code = 0
+        for s in range(first, r):
+            low2, high2 = ring_start[s], ring_start[s + 1]
+            if same_ring(index, low, high, low2, high2):
+                code = 202
+                break
+            meet, touches = rings_meet(flat, index, low, high, low2, high2)
+            if meet:
+                code = 201
+                break
+            root_r, root_s = find_root(parent, r - first), find_root(parent, s - first)
+            if touches > 1 or (touches == 1 and root_r == root_s):
+                code = 205
+                break
+            if touches == 1:
+                parent[root_r] = root_s
+            if s == first and not ring_in_ring(flat, index, low, high, low2, high2):
+                code = 206
+                break
+            if s > first and (
+                ring_in_ring(flat, index, low, high, low2, high2) or ring_in_ring(flat, index, low2, high2, low, high)
+            ):
+                code = 207
+                break
+        if code == 0 and signed[r - first] > 0:
+            code = 208
+        if code:
+            found[count, 0], found[count, 1], found[count, 2] = code, f, -1
+            count += 1
+    return count
+
+
+@njit(cache=True)
+def bends(vertices, index, low, high, normal):
+    """Whether some corner of a ring turns out of the face's plane by more than 20 degrees (those under 2 mm pass)."""
+    for k in range(low, high):
+        p = vertices[index[k]]
+        q = vertices[index[k + 1 if k + 1 < high else low]]
+        r = vertices[index[k + 2 if k + 2 < high else k + 2 - (high - low)]]
+        c = np.cross(q - p, r - q)
+        size = np.sqrt(c @ c)
+        longest = np.sqrt(max((q - p) @ (q - p), (r - q) @ (r - q), (r - p) @ (r - p)))
+        if size > 2e-3 * longest and abs(c @ normal) < NORMAL_COSINE * size:
+            return True
+    return False
+
+
+@njit(cache=True)
+def check_faces(vertices, index, ring_start, face_start, planarity, found):
+    """Ring and face codes. Returns (rows found, unit normals (f, 3), offsets (f,), flatness (f,))."""
+    faces = len(face_start) - 1
+    normals, offsets, flatness = np.zeros((faces, 3)), np.zeros(faces), np.zeros(faces)
+    count = 0
+    for f in range(faces):
+        first, last = face_start[f], face_start[f + 1]
+        code = 0
+        for r in range(first, last):
+            low, high = ring_start[r], ring_start[r + 1]
+            if high - low < 3:
+                code = 101
+                break
+            for k in range(low, high):
+                if index[k] == index[k + 1 if k + 1 < high else low]:
+                    code = 102
+        if first == last:
+            code = 101
+        area = np.zeros(3) if code else newell(vertices, index, ring_start[first], ring_start[first + 1])
+        size = np.sqrt(area @ area)
+        if code == 0 and size < 1e-7:
+            code = 104
+        if code:
+            found[count, 0], found[count, 1], found[count, 2] = code, f, -1
+            count += 1
+            continue
+        normal = area / size
+        low, high = ring_start[first], ring_start[last]
+        centre = np.zeros(3)
+        for k in range(low, high):
+            centre += vertices[index[k]]
+        centre /= high - low
+        for k in range(low, high):
+            flatness[f] = max(flatness[f], abs((vertices[index[k]] - centre) @ normal))
+        normals[f], offsets[f] = normal, centre @ normal
+        if flatness[f] > planarity:
+            code = 203
+        else:
+            for r in range(first, last):
+                if bends(vertices, index, ring_start[r], ring_start[r + 1], normal):
+                    code = 204
+        if code:
+            found[count, 0], found[count, 1], found[count, 2] = code, f, -1
+            count += 1
+        flat = projected(vertices, normal)
+        simple = True
+        for r in range(first, last):
+            if not ring_is_simple(flat, index, ring_start[r], ring_start[r + 1]):
+                simple = False
+        if not simple:
+            found[count, 0], found[count, 1], found[count, 2] = 104, f, -1
+            count += 1
+        elif last - first > 1:
+            signed = np.empty(last - first)
+            for r in range(first, last):
+                signed[r - first] = newell(vertices, index, ring_start[r], ring_start[r + 1]) @ normal
+            count = check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f)
+    return count, normals, offsets, flatness
+
+
+@njit(cache=True)
+def projected(vertices, normal):
+    """Vertices (n, 2) without the coordinate along the normal's largest component."""
+    axis = np.argmax(np.abs(normal))
+    flat = np.empty((len(vertices), 2))
+    flat[:, 0] = vertices[:, 1 if axis == 0 else 0]
+    flat[:, 1] = vertices[:, 1 if axis == 2 else 2]
+    return flat
+
+
+@njit(cache=True)
+def directed_edges(index, ring_start, face_start):
+    """All directed edges sorted by their vertices: (edge (e, 4): low vertex, high vertex, +1 or -1, face)."""
+    edges = np.empty((len(index), 4), np.int64)
+    count = 0
+    for f in range(len(face_start) - 1):
+        for r in range(face_start[f], face_start[f + 1]):
+            low, high = ring_start[r], ring_start[r + 1]
+            for k in range(low, high):
+                a, b = index[k], index[k + 1 if k + 1 < high else low]
+                edges[count, 0], edges[count, 1] = min(a, b), max(a, b)
+                edges[count, 2], edges[count, 3] = 1 if a < b else -1, f
+                count += 1
+    key = edges[:, 0] * (index.max() + 1) + edges[:, 1]
+    return edges[np.argsort(key, kind="mergesort")]
+
+
+@njit(cache=True)
+def check_edges(edges, faces, found, count):
+    """Codes 302, 303, 307 (every edge twice, in opposite directions) and 305 (one component)."""
+    parent = np.arange(faces)
+    start, clean = 0, True
+    while start < len(edges):
+        stop, balance = start, 0
+        while stop < len(edges) and edges[stop, 0] == edges[start, 0] and edges[stop, 1] == edges[start, 1]:
+            balance += edges[stop, 2]
+            a, b = find_root(parent, edges[start, 3]), find_root(parent, edges[stop, 3])
+            parent[max(a, b)] = min(a, b)
+            stop += 1
+        uses = stop - start
+        if uses != 2 or balance != 0:
+            clean = False
+            code = 302 if uses == 1 else 303 if uses > 2 else 307
+            found[count, 0], found[count, 1] = code, edges[start, 3]
+            found[count, 2] = edges[start + 1, 3] if uses > 1 else -1
+            count += 1
+        start = stop
+    for f in range(faces):
+        if find_root(parent, f) != 0:
+            found[count, 0], found[count, 1], found[count, 2] = 305, f, -1
+            return count + 1, False
+    return count, clean
+
+
+@njit(cache=True)
+def check_umbrellas(index, ring_start, face_start, edges, points, found, count):
+    """Code 303 where the faces around a vertex form more than one fan. Only for shells whose edges are all paired."""
+    corners = len(index)
+    parent = np.arange(corners)
+    face_of = np.empty(corners, np.int64)
+    before, after = np.empty(corners, np.int64), np.empty(corners, np.int64)
+    for f in range(len(face_start) - 1):
+        for r in range(face_start[f], face_start[f + 1]):
+            low, high = ring_start[r], ring_start[r + 1]
+            for k in range(low, high):
+                face_of[k] = f
+                before[k], after[k] = k - 1 if k > low else high - 1, k + 1 if k + 1 < high else low
+    by_vertex = np.argsort(index, kind="mergesort")
+    start = 0
+    while start < corners:
+        stop = start
+        while stop < corners and index[by_vertex[stop]] == index[by_vertex[start]]:
+            stop += 1
+        for i in range(start, stop):
+            k = by_vertex[i]
+            for j in range(start, stop):
+                m = by_vertex[j]
+                if index[after[k]] == index[before[m]]:
+                    parent[find_root(parent, k)] = find_root(parent, m)
+        root = find_root(parent, by_vertex[start])
+        for i in range(start + 1, stop):
+            if find_root(parent, by_vertex[i]) != root:
+                found[count, 0], found[count, 1], found[count, 2] = (
+                    303,
+                    face_of[by_vertex[i]],
+                    face_of[by_vertex[start]],
+                )
+                count += 1
+                break
+        start = stop
+    return count
+
+
+@njit(cache=True)
+def holds_vertex(index, low, high, v):
+    for k in range(low, high):
+        if index[k] == v:
+            return True
+    return False
+
+
+@njit(cache=True)
+def edges_pierce(
+    vertices,
+    index,
+    low,
+    high,
+    low2,
+    high2,
+    ring_start,
+    first2,
+    last2,
+    ring_first,
+    ring_last,
+    normal,
+    offset,
+    flat,
+    slack,
+):
+    """Whether an edge of one face meets another face elsewhere than in shared vertices. `slack` is how far off plane counts."""
+    for r in range(ring_first, ring_last):
+        for k in range(ring_start[r], ring_start[r + 1]):
+            a, b = index[k], index[k + 1 if k + 1 < ring_start[r + 1] else ring_start[r]]
+            da, db = vertices[a] @ normal - offset, vertices[b] @ normal - offset
+            if min(da, db) > slack or max(da, db) < -slack:
+                continue
+            if abs(da) <= slack and not holds_vertex(index, low2, high2, a):
+                if depth_in_face(flat[a], flat, index, ring_start, first2, last2) > -TOUCH_M:
+                    return True
+            if abs(da) <= slack and abs(db) <= slack:
+                if lies_across(flat, index, ring_start, first2, last2, a, b, slack):
+                    return True
+            elif (da > slack and db < -slack) or (da < -slack and db > slack):
+                t = da / (da - db)
+                if depth_in_face(flat[a] + t * (flat[b] - flat[a]), flat, index, ring_start, first2, last2) > slack:
+                    return True
+    return False
+
+
+@njit(cache=True)
+def lies_across(flat, index, ring_start, first, last, a, b, slack):
+    """Whether edge ab, in the plane of a face, runs through its inside."""
+    p, q = flat[a], flat[b]
+    for r in range(first, last):
+        low, high = ring_start[r], ring_start[r + 1]
+        for k in range(low, high):
+            c, d = index[k], index[k + 1 if k + 1 < high else low]
+            if c == a or c == b or d == a or d == b:
+                continue
+            if crosses(p, q, flat[c], flat[d]):
+                return True
+    return depth_in_face(0.5 * (p + q), flat, index, ring_start, first, last) > slack
+
+
+@njit(cache=True)
+def check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count):
+    """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; boxes are compared first."""
+    faces = len(face_start) - 1
+    low_box, high_box = np.empty((faces, 3)), np.empty((faces, 3))
+    for f in range(faces):
+        low, high = ring_start[face_start[f]], ring_start[face_start[f + 1]]
+        low_box[f] = high_box[f] = vertices[index[low]]
+        for k in range(low, high):
+            low_box[f] = np.minimum(low_box[f], vertices[index[k]])
+            high_box[f] = np.maximum(high_box[f], vertices[index[k]])
+    for f in range(faces):
+        flat = projected(vertices, normals[f])
+        low, high = ring_start[face_start[f]], ring_start[face_start[f + 1]]
+        slack = flatness[f] + 2e-4
+        for g in range(faces):
+            if f == g or apart(low_box[f], high_box[f], low_box[g], high_box[g], slack):
+                continue
+            low2, high2 = ring_start[face_start[g]], ring_start[face_start[g + 1]]
+            if edges_pierce(
+                vertices,
+                index,
+                low2,
+                high2,
+                low,
+                high,
+                ring_start,
+                face_start[f],
+                face_start[f + 1],
+                face_start[g],
+                face_start[g + 1],
+                normals[f],
+                offsets[f],
+                flat,
+                slack,
+            ) and count < len(found):
+                found[count, 0], found[count, 1], found[count, 2] = 306, f, g
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def apart(low, high, low2, high2, slack):
+    """Whether two boxes are further apart than `slack` along some axis."""
+    for axis in range(3):
+        if low2[axis] > high[axis] + slack or low[axis] > high2[axis] + slack:
+            return True
+    return False
+
+
+@njit(cache=True)
+def enclosed_volume(vertices, index, ring_start, face_start):
+    total = 0.0
+    for f in range(len(face_start) - 1):
+        anchor = vertices[index[ring_start[face_start[f]]]]
+        for r in range(face_start[f], face_start[f + 1]):
+            total += anchor @ newell(vertices, index, ring_start[r], ring_start[r + 1])
+    return total / 3.0
+
+
+@njit(cache=True)
+def check_shell(vertices, index, ring_start, face_start, planarity):
+    """All findings (k, 3) of one shell; shell codes only where every ring and face is sound, as val3dity does."""
+    index = weld(vertices, SAME_POINT_M)[index]
+    faces = len(face_start) - 1
+    found = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64)
+    count, normals, offsets, flatness = check_faces(vertices, index, ring_start, face_start, planarity, found)
+    if count:
+        return found[:count]
+    if faces < 4:
+        found[0, 0], found[0, 1], found[0, 2] = 301, -1, -1
+        return found[:1]
+    edges = directed_edges(index, ring_start, face_start)
+    count, clean = check_edges(edges, faces, found, count)
+    if clean:
+        count = check_umbrellas(index, ring_start, face_start, edges, vertices, found, count)
+    count = check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count)
+    if count == 0 and enclosed_volume(vertices, index, ring_start, face_start) <= 0:
+        found[0, 0], found[0, 1], found[0, 2] = 405, -1, -1
+        return found[:1]
+    return found[:count]

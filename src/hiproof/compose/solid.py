@@ -1,0 +1,126 @@
+"""A fitted roof becomes a closed solid: `compose`, the flat block it falls back to, volume, the line on the terrain."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from ..errors import CompositionError
+from ..frames import LocalFrame
+from ..model import Part, Piece, Roof, Solid
+from ..settings import Settings
+from .cells import PlanProblem, arrange, plan_problem
+from .check import check_solid
+from .shell import Saddle, raise_shell
+
+COARSER = (1.0, 3.0, 10.0, 30.0)  # factors on the snap distance, tried in turn until the solid is valid
+MAX_PATCHES = 40
+
+
+def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None) -> Solid:
+    """The valid solid (ISO 19107) under `roof` and above `z_ground_local` [m], both in the roof's local frame.
+
+    Over the roof's outline the top is max over covering pieces of min over their planes. Parts of the outline no
+    piece covers are roofed by the piece they border most. Faces under the smallest area are merged away, vertices
+    closer than the snap distance are one. Where the roof would come closer to the ground than the clearance, the
+    ground gives way.
+
+    RoofSurface faces carry the index of their roof part. Coordinates are multiples of 0.1 mm. Raises CompositionError
+    when no valid solid comes out, even with coarser snapping.
+
+    >>> import numpy as np, shapely
+    >>> house = shapely.box(0, 0, 10, 8)
+    >>> gable = Piece(house, np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]]))
+    >>> solid = compose(Roof((Part("gable", (gable,)),), house, LocalFrame(np.zeros(3))), 0.0)
+    >>> [len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface")], volume(solid)
+    ([2, 4, 1], 480.0)
+    """
+    options = (settings or Settings()).compose
+    if not np.isfinite(z_ground_local):
+        raise CompositionError(
+            f"expected a finite ground height, got {z_ground_local}; take the lowest terrain under the outline"
+        )
+    problem = plan_problem(roof)
+    failure = ""
+    for factor in COARSER:
+        try:
+            solid = compose_at(problem, z_ground_local, options, factor * options.snap_m)
+        except CompositionError as error:
+            failure = str(error)
+            continue
+        findings = check_solid(solid, planarity_m=options.planarity_m)
+        if not findings:
+            return solid
+        failure = "; ".join(finding.message for finding in findings[:3])
+    raise CompositionError(f"expected the roof to become a valid solid, got: {failure}; fall back to a simpler roof")
+
+
+def compose_at(problem: PlanProblem, z_ground: float, options, snap_m: float) -> Solid:
+    """One attempt at the given snap distance; corners where levels meet crosswise are set back one by one."""
+    reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
+    for _ in range(MAX_PATCHES):
+        cells = arrange(problem, reach_m, options.min_face_area_m2, options.min_face_width_m)
+        try:
+            return raise_shell(cells, problem, z_ground, options.ground_clearance_m, reach_m)
+        except Saddle as saddle:
+            problem = replace(problem, patches=[*problem.patches, saddle.patch])
+    raise CompositionError("expected at most forty corners where roof levels meet crosswise, got more")
+
+
+def flat_block(outline: shapely.Polygon, z_roof: float, z_ground: float, frame: LocalFrame) -> tuple[Roof, Solid]:
+    """The fallback: a flat roof at `z_roof` over `outline`, and its solid, all in the local `frame`.
+
+    Raises CompositionError when the outline itself has no usable area.
+
+    >>> roof, solid = flat_block(shapely.box(0, 0, 4, 5), 3.0, 0.0, LocalFrame(np.zeros(3)))
+    >>> roof.type, volume(solid)
+    ('flat', 60.0)
+    """
+    piece = Piece(outline, np.array([[0.0, 0.0, z_roof]]))
+    roof = Roof((Part("flat", (piece,), {"height": z_roof}),), outline, frame)
+    return roof, compose(roof, z_ground)
+
+
+def volume(solid: Solid) -> float:
+    """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
+    vertices = solid.vertices - solid.vertices.mean(axis=0)
+    rings = [ring for face in solid.faces for ring in face.rings]
+    here = np.concatenate([np.asarray(ring) for ring in rings])
+    after = np.concatenate([np.roll(ring, -1) for ring in rings])
+    anchor = np.concatenate([np.full(sum(map(len, face.rings)), face.rings[0][0]) for face in solid.faces])
+    spans = np.cross(vertices[here], vertices[after])
+    return round(float((vertices[anchor] * spans).sum() / 6.0), 9)
+
+
+def terrain_intersection(
+    outline: shapely.Polygon,
+    terrain_height_at: Callable[[np.ndarray], np.ndarray],
+    z_floor: float = float("nan"),
+    spacing_m: float = 1.0,
+) -> tuple[np.ndarray, ...]:
+    """Closed lines (m, 3) where the outline's walls meet the terrain: one a ring, a vertex at least every `spacing_m`.
+
+    `terrain_height_at` takes (n, 2) and returns (n,) in the outline's frame; where it knows nothing (NaN) the height
+    is that of the ring's other points on average, and `z_floor` if it knows nothing along the whole ring.
+
+    >>> line, = terrain_intersection(shapely.box(0, 0, 2, 1), lambda xy: xy[:, 0] * 0.1, 0.0)
+    >>> line.shape, line[0].tolist() == line[-1].tolist()
+    ((7, 3), True)
+    """
+    lines = []
+    for ring in [outline.exterior, *outline.interiors]:
+        xy = shapely.get_coordinates(shapely.segmentize(ring, spacing_m))
+        z = np.asarray(terrain_height_at(xy), float)
+        known = np.isfinite(z)
+        z = np.where(known, z, z[known].mean() if known.any() else z_floor)
+        lines.append(np.column_stack((xy, z)))
+    return tuple(lines)
+
+
+def lowest_terrain(outline: shapely.Polygon, terrain_height_at: Callable[[np.ndarray], np.ndarray]) -> float:
+    """Lowest terrain height under the outline's vertices (the paper's z_min under the eaves), NaN if none is known."""
+    z = np.asarray(terrain_height_at(shapely.get_coordinates(outline)), float)
+    return float(np.nanmin(z)) if np.isfinite(z).any() else float("nan")
