@@ -58,7 +58,7 @@ def first_vertex_beside(xy, count, a, b, reach):
     best, best_along = -1, np.int64(0)
     for v in range(count):
         x, y = xy[v, 0], xy[v, 1]
-        if x < x_low or x > x_high or y < y_low or y > y_high or v == a or v == b:
+        if x < x_low or x > x_high or y < y_low or y > y_high or v in (a, b):
             continue
         if is_beside(xy[v], xy[a], xy[b], reach):
             along = (xy[b, 0] - xy[a, 0]) * (x - xy[a, 0]) + (xy[b, 1] - xy[a, 1]) * (y - xy[a, 1])
@@ -80,7 +80,7 @@ def first_crossing(xy, edges, count, a, b):
     y_low, y_high = min(xy[a, 1], xy[b, 1]), max(xy[a, 1], xy[b, 1])
     for e in range(count):
         c, d = edges[e, 0], edges[e, 1]
-        if c < 0 or c == a or c == b or d == a or d == b:
+        if c < 0 or c in (a, b) or d in (a, b):
             continue
         if max(xy[c, 0], xy[d, 0]) < x_low or min(xy[c, 0], xy[d, 0]) > x_high:
             continue

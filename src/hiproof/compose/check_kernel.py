@@ -78,9 +78,8 @@ def inside_ring(p, flat, index, low, high):
     inside = False
     for k in range(low, high):
         a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
-        if (a[1] > p[1]) != (b[1] > p[1]):
-            if p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]):
-                inside = not inside
+        if (a[1] > p[1]) != (b[1] > p[1]) and p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]):
+            inside = not inside
     return inside
 
 
@@ -112,7 +111,7 @@ def ring_is_simple(flat, index, low, high):
             if i == 0 and j == size - 1:
                 continue
             c, d = index[low + j], index[low + (j + 1) % size]
-            if a == c or a == d or b == c or b == d or crosses(flat[a], flat[b], flat[c], flat[d]):
+            if a in (c, d) or b in (c, d) or crosses(flat[a], flat[b], flat[c], flat[d]):
                 return False
             if (
                 min(distance_to_segment(flat[c], flat[a], flat[b]), distance_to_segment(flat[d], flat[a], flat[b]))
@@ -396,7 +395,7 @@ def check_umbrellas(index, ring_start, face_start, edges, points, found, count):
 
 @njit(cache=True)
 def holds_vertex(index, low, high, v):
-    for k in range(low, high):
+    for k in range(low, high):  # noqa: SIM110 (compiled: no generators)
         if index[k] == v:
             return True
     return False
@@ -448,7 +447,7 @@ def lies_across(flat, index, ring_start, first, last, a, b, slack):
         low, high = ring_start[r], ring_start[r + 1]
         for k in range(low, high):
             c, d = index[k], index[k + 1 if k + 1 < high else low]
-            if c == a or c == b or d == a or d == b:
+            if c in (a, b) or d in (a, b):
                 continue
             if crosses(p, q, flat[c], flat[d]):
                 return True
@@ -499,7 +498,7 @@ def check_intersections(vertices, index, ring_start, face_start, normals, offset
 @njit(cache=True)
 def apart(low, high, low2, high2, slack):
     """Whether two boxes are further apart than `slack` along some axis."""
-    for axis in range(3):
+    for axis in range(3):  # noqa: SIM110 (compiled: no generators)
         if low2[axis] > high[axis] + slack or low[axis] > high2[axis] + slack:
             return True
     return False
