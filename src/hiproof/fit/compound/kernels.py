@@ -14,7 +14,7 @@ from numba import njit
 
 # Units of complexity: what a piece of structure must pay for in evidence.
 FLAT, AXIS_SLOPE, FREE_SLOPE = 1.0, 1.4, 1.9
-SYMMETRIC_GABLE_EXTRA = 0.5
+SYMMETRIC_GABLE_EXTRA, HIP_EXTRA = 0.5, 0.5
 CUT, CUT_AT_VERTEX, OVERLAY, REUSED_PLANE = 1.0, 0.5, 1.0, 0.3
 KIND_COST = np.array([FLAT, AXIS_SLOPE, AXIS_SLOPE, FREE_SLOPE])
 
@@ -160,6 +160,30 @@ def is_symmetric_gable(planes, count):
     kind = kind_of(planes[0])
     opposite = abs(planes[0, 0] + planes[1, 0]) + abs(planes[0, 1] + planes[1, 1]) < 1e-6
     return (kind == 1 or kind == 2) and kind_of(planes[1]) == kind and opposite
+
+
+@njit(cache=True)
+def is_symmetric_hip(planes, count):
+    """Two pairs of planes, each with opposite slopes along one axis: pyramid or hip."""
+    return (
+        count == 4
+        and is_symmetric_gable(planes[:2], 2)
+        and is_symmetric_gable(planes[2:4], 2)
+        and kind_of(planes[0]) != kind_of(planes[2])
+    )
+
+
+@njit(cache=True)
+def planes_complexity(planes, count):
+    """Units of complexity of a min of planes: symmetric gables and hips count as one thing, others plane by plane."""
+    if is_symmetric_gable(planes, count):
+        return KIND_COST[kind_of(planes[0])] + SYMMETRIC_GABLE_EXTRA
+    if is_symmetric_hip(planes, count):
+        return AXIS_SLOPE + SYMMETRIC_GABLE_EXTRA + HIP_EXTRA
+    total = 0.0
+    for k in range(count):
+        total += KIND_COST[kind_of(planes[k])]
+    return total
 
 
 @njit(cache=True)
@@ -392,10 +416,10 @@ def plane_pool(cloud, grid, candidates, tau, evidence, most):
 
 @njit(cache=True)
 def mirrored_gables(pool, grid):
-    """Every axis-sloped plane of the pool mirrored about ridges 0.25 m apart: candidates (m, 2, 3)."""
+    """Every axis-sloped plane of the pool mirrored about ridges 0.25 m apart: candidates (m, MAX_PLANES, 3)."""
     steps_u = int((grid.u[-1] - grid.u[0]) / 0.25) + 2
     steps_v = int((grid.v[-1] - grid.v[0]) / 0.25) + 2
-    out = np.zeros((len(pool) * (steps_u + steps_v), 2, 3))
+    out = np.zeros((len(pool) * (steps_u + steps_v), MAX_PLANES, 3))
     m = 0
     for plane in pool:
         kind = kind_of(plane)
@@ -416,23 +440,105 @@ def mirrored_gables(pool, grid):
 
 
 @njit(cache=True)
+def symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v, out):
+    """Planes of z = height - max(slope_u (|u - centre_u| - top_u), slope_v (...)) into `out`; a slope of 0 leaves its pair out."""
+    k = 0
+    for axis in range(2):
+        slope, top, centre = (slope_u, top_u, centre_u) if axis == 0 else (slope_v, top_v, centre_v)
+        if slope > 0.0:
+            for sign in (1.0, -1.0):
+                out[k] = 0.0
+                out[k, axis] = sign * slope
+                out[k, 2] = height + slope * (top - sign * centre)
+                k += 1
+    return k
+
+
+@njit(cache=True)
+def fit_template(cloud, drop, slope, tau):
+    """Robust (height, slope) of z = height - slope * drop (n,), from a start slope; the slope is 0 where it fails."""
+    height = np.median(cloud.z + slope * drop)
+    for step in range(5):
+        scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
+        n = sx = sy = sxx = sxy = 0.0
+        for i in range(len(drop)):
+            r = (cloud.z[i] - height + slope * drop[i]) / scale
+            w = 1.0 - r * r
+            if w > 0.0:
+                w *= w
+                n += w
+                sx += w * drop[i]
+                sy += w * cloud.z[i]
+                sxx += w * drop[i] * drop[i]
+                sxy += w * drop[i] * cloud.z[i]
+        determinant = n * sxx - sx * sx
+        if n < 2.0 or determinant < 1e-6:
+            return height, 0.0
+        slope = -(n * sxy - sx * sy) / determinant
+        height = (sy + slope * sx) / n
+        if not MIN_AXIS_SLOPE < slope < MAX_SLOPE:
+            return height, 0.0
+    return height, slope
+
+
+@njit(cache=True)
+def whole_roofs(cloud, grid, tau):
+    """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, MAX_PLANES, 3) and counts."""
+    out, counts, m = np.zeros((64, MAX_PLANES, 3)), np.zeros(64, np.int64), 0
+    half_u, half_v = 0.5 * (grid.u[-1] - grid.u[0]), 0.5 * (grid.v[-1] - grid.v[0])
+    mid_u, mid_v = grid.u[0] + half_u, grid.v[0] + half_v
+    long = 0 if half_u >= half_v else 1
+    for shape in range(8):
+        shift = (0.0, 0.25, -0.25)[shape % 3] if shape < 6 else 0.0
+        centre_u, centre_v = mid_u + shift * half_u * (shape < 3), mid_v + shift * half_v * (shape >= 3)
+        away_u, away_v = np.abs(cloud.u - centre_u), np.abs(cloud.v - centre_v)
+        ratio, top = 1.0, 0.0
+        if shape < 3:
+            drop = away_u
+        elif shape < 6:
+            drop = away_v
+        elif shape == 6:  # pyramid: drop in units of v
+            ratio = half_v / half_u
+            drop = np.maximum(away_u * ratio, away_v)
+        else:  # hip with one slope
+            top = abs(half_u - half_v)
+            drop = np.maximum(away_u - top * (long == 0), away_v - top * (long == 1))
+        for start in (0.2, 0.45, 0.8, 1.3):
+            height, slope = fit_template(cloud, drop, start, tau)
+            if slope == 0.0:
+                continue
+            slope_u = slope * ratio if shape < 3 or shape >= 6 else 0.0
+            slope_v = slope if shape >= 3 else 0.0
+            counts[m] = symmetric_planes(
+                height, slope_u, top * (long == 0), centre_u, slope_v, top * (long == 1), centre_v, out[m]
+            )
+            m += 1
+    return out[:m], counts[:m]
+
+
+@njit(cache=True)
 def gable_pool(cloud, grid, pool, tau, evidence, most):
-    """Greedy pool of symmetric gables (k, 2, 3), refitted with one shared slope each."""
+    """Greedy pool of symmetric gables, pyramids and hips (k, MAX_PLANES, 3) and their counts; gables refitted."""
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
-    candidates = mirrored_gables(pool, grid)
-    counts = np.full(len(candidates), 2, np.int64)
+    mirrored = mirrored_gables(pool, grid)
+    whole, whole_counts = whole_roofs(cloud, grid, tau)
+    candidates = np.concatenate((mirrored, whole))
+    counts = np.concatenate((np.full(len(mirrored), 2, np.int64), whole_counts))
     bounds = np.full(len(candidates), np.inf)
     current = np.ones(len(cloud.u))
-    gables = np.zeros((most, 2, 3))
+    gables, gable_counts = np.zeros((most, MAX_PLANES, 3)), np.zeros(most, np.int64)
     for k in range(most):
         _, m, rectangle = best_candidate(cloud, candidates, counts, bounds, current, tau, 1.5 * evidence, gain)
         if m < 0:
-            return gables[:k]
+            return gables[:k], gable_counts[:k]
         members = members_of(cloud, rectangle)
-        fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
-        gables[k] = fitted if ok else candidates[m]
-        lower_costs(cloud, members, candidates[m], 2, tau, current)
-    return gables
+        gables[k], gable_counts[k] = candidates[m], counts[m]
+        if counts[m] == 2:
+            fitted, ok = fit_symmetric_gable(cloud, members, candidates[m], tau)
+            if ok:
+                gables[k, :2] = fitted
+        lower_costs(cloud, members, candidates[m], counts[m], tau, current)
+    return gables, gable_counts
 
 
 @njit(cache=True)
@@ -458,11 +564,11 @@ def without_twins(pool, cloud):
 
 
 @njit(cache=True)
-def primitives(pool, gables, cloud, evidence):
+def primitives(pool, gables, gable_counts, cloud, evidence):
     """Candidates for a rectangle: each plane, each crossing pair of planes as a min, each gable; with their penalty."""
     n, g = len(pool), len(gables)
     most = n + n * (n - 1) // 2 + g
-    planes, counts, penalty = np.zeros((most, 2, 3)), np.ones(most, np.int64), np.zeros(most)
+    planes, counts, penalty = np.zeros((most, MAX_PLANES, 3)), np.ones(most, np.int64), np.zeros(most)
     m = 0
     for i in range(n):
         planes[m, 0] = pool[i]
@@ -481,8 +587,8 @@ def primitives(pool, gables, cloud, evidence):
                 penalty[m] = evidence * (KIND_COST[kind_of(pool[i])] + KIND_COST[kind_of(pool[j])])
                 m += 1
     for k in range(g):
-        planes[m], counts[m] = gables[k], 2
-        penalty[m] = evidence * (KIND_COST[kind_of(gables[k, 0])] + SYMMETRIC_GABLE_EXTRA)
+        planes[m], counts[m] = gables[k], gable_counts[k]
+        penalty[m] = evidence * planes_complexity(gables[k], gable_counts[k])
         m += 1
     return planes[:m], counts[:m], penalty[:m]
 

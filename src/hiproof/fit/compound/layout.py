@@ -19,13 +19,12 @@ from .kernels import (
     MIN_SIDE_M,
     OVERLAY,
     REUSED_PLANE,
-    SYMMETRIC_GABLE_EXTRA,
     best_candidate,
     fit_plane,
     fit_symmetric_gable,
-    is_symmetric_gable,
     kind_of,
     members_of,
+    planes_complexity,
     truncated,
 )
 
@@ -167,16 +166,6 @@ def evaluate(layout, u, v):
 @njit(cache=True)
 def ghost_cost(ghosts, q, z):
     return ghosts.weight[q] if z < ghosts.low or z > ghosts.high else 0.0
-
-
-@njit(cache=True)
-def planes_complexity(planes, count):
-    if is_symmetric_gable(planes, count):
-        return KIND_COST[kind_of(planes[0])] + SYMMETRIC_GABLE_EXTRA
-    total = 0.0
-    for k in range(count):
-        total += KIND_COST[kind_of(planes[k])]
-    return total
 
 
 @njit(cache=True)

@@ -7,12 +7,14 @@ import numpy as np
 from .kernels import (
     CUT,
     CUT_AT_VERTEX,
+    MAX_PLANES,
     Cloud,
     cost_prefix,
     gable_pool,
     guillotine,
     hypotheses,
     is_symmetric_gable,
+    is_symmetric_hip,
     leaf_costs,
     plane_pool,
     primitives,
@@ -33,7 +35,7 @@ from .layout import (
 )
 from .plan import MIN_STRUCTURE_POINTS, Plan
 
-COARSE_TAU_M = 0.3
+ROUNDS = 2
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
 POOL_POINTS = 1500  # the planes are looked for on at most so many points, evenly spread
 SEEDS, PAIRS_PER_SEED = 150, 4
@@ -49,13 +51,13 @@ def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
     evidence, tau = evidence_per_unit(plan.density, settings), settings.tolerance_m
     cloud, grid, ghosts = plan.cloud, plan.grid, plan.ghosts
     if len(cloud.u) < MIN_STRUCTURE_POINTS:
-        layout = single_plane_layout((0.0, 0.0, 0.0))
+        layout = single_plane_layout((0.0, 0.0, upper_median(cloud.z)))
         return layout, objective(layout, cloud, ghosts, tau, evidence)
-    pool, gables = propose(plan, evidence)
+    pool, gables = propose(plan, tau, evidence)
     best, best_value = None, np.inf
-    for round_tau in (COARSE_TAU_M, tau):
+    for _ in range(ROUNDS):
         pool = without_twins(pool, cloud)
-        layout = partition(plan, pool, gables, round_tau, evidence)
+        layout = partition(plan, pool, gables, tau, evidence)
         for last in (False, False, True):
             refine(layout, cloud, grid, pool[:0] if last else pool, tau, evidence)
         value = objective(layout, cloud, ghosts, tau, evidence)
@@ -67,6 +69,11 @@ def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
     return best, objective(best, cloud, ghosts, tau, evidence)
 
 
+def upper_median(z: np.ndarray) -> float:
+    """The middle height, of an even number the upper one: what strays lies below a roof (facades) more than above it."""
+    return float(np.sort(z)[len(z) // 2])
+
+
 def thinned(cloud: Cloud, most: int) -> Cloud:
     """At most `most` points of `cloud`, evenly spread over their order."""
     n = len(cloud.u)
@@ -76,20 +83,22 @@ def thinned(cloud: Cloud, most: int) -> Cloud:
     return Cloud(*(column[kept] for column in cloud))
 
 
-def propose(plan: Plan, evidence: float) -> tuple[np.ndarray, np.ndarray]:
+def propose(plan: Plan, tau: float, evidence: float) -> tuple[np.ndarray, tuple[np.ndarray, np.ndarray]]:
     """Pools of planes (k, 3) and of symmetric gables (g, 2, 3) that explain the points, best first."""
     few = thinned(plan.cloud, POOL_POINTS)
     evidence *= len(few.u) / len(plan.cloud.u)
     candidates = hypotheses(few, SEEDS, PAIRS_PER_SEED)
-    pool = plane_pool(few, plan.grid, candidates, COARSE_TAU_M, evidence, POOL_PLANES)
+    pool = plane_pool(few, plan.grid, candidates, tau, evidence, POOL_PLANES)
     pool = np.concatenate([pool, np.zeros((1, 3))])
-    gables = gable_pool(few, plan.grid, pool, COARSE_TAU_M, evidence, POOL_GABLES)
+    gables = gable_pool(few, plan.grid, pool, tau, evidence, POOL_GABLES)
     return pool, gables
 
 
-def partition(plan: Plan, pool: np.ndarray, gables: np.ndarray, tau: float, evidence: float) -> Layout:
+def partition(
+    plan: Plan, pool: np.ndarray, gables: tuple[np.ndarray, np.ndarray], tau: float, evidence: float
+) -> Layout:
     """The guillotine partition of the plan into primitives of the pools that costs least."""
-    planes, counts, penalty = primitives(pool, gables, plan.cloud, evidence)
+    planes, counts, penalty = primitives(pool, *gables, plan.cloud, evidence)
     sums = cost_prefix(plan.cloud, plan.ghosts, plan.grid, planes, counts, tau)
     cut_u, cut_v = (
         evidence * np.where(at_vertex, CUT_AT_VERTEX, CUT)
@@ -101,15 +110,18 @@ def partition(plan: Plan, pool: np.ndarray, gables: np.ndarray, tau: float, evid
     return layout
 
 
-def with_layout(layout: Layout, pool: np.ndarray, gables: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The pools with the planes and gables of `layout` put in front."""
-    planes, own_gables = [], []
+def with_layout(layout: Layout, pool: np.ndarray, gables: tuple[np.ndarray, np.ndarray]):
+    """The pools with the planes and the symmetric roofs of `layout` put in front."""
+    planes, roofs, counts = [], [], []
     for h in range(layout.count[HOLDERS]):
-        own = layout.table[layout.plane_of[h, : layout.planes_of[h]]]
+        count = layout.planes_of[h]
+        own = layout.table[layout.plane_of[h, :count]]
         planes.append(own)
-        if is_symmetric_gable(own, len(own)):
-            own_gables.append(own[None])
-    return np.concatenate([*planes, pool])[:KEPT_PLANES], np.concatenate([*own_gables, gables])
+        if is_symmetric_gable(own, count) or is_symmetric_hip(own, count):
+            roofs.append(np.concatenate([own, np.zeros((MAX_PLANES - count, 3))])[None])
+            counts.append(count)
+    pool = np.concatenate([*planes, pool])[:KEPT_PLANES]
+    return pool, (np.concatenate([*roofs, gables[0]]), np.concatenate([counts, gables[1]]).astype(np.int64))
 
 
 def cover_outliers(layout: Layout, plan: Plan, tau: float, evidence: float) -> None:
