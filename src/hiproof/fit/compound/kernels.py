@@ -359,11 +359,24 @@ def gain_by_cell(cloud, planes, count, current, tau, gain):
 
 
 @njit(cache=True)
+def positive_gain(cloud, planes, count, current, tau):
+    """Upper bound of what the min of `planes` gains on any rectangle: the sum over the points that gain."""
+    total = 0.0
+    for q in range(len(cloud.u)):
+        z, _ = lower_envelope(planes, count, cloud.u[q], cloud.v[q])
+        total += max(current[q] - truncated(cloud.z[q] - z, tau), 0.0)
+    return total
+
+
+@njit(cache=True)
 def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain):
     """The candidate with the best rectangle, lazily: `bounds` are upper bounds of its gain, and costs only ever fall.
 
     Returns (gain, candidate or -1, i0, i1, j0, j1) and tightens `bounds` (in place).
     """
+    for m in range(len(bounds)):
+        if bounds[m] == np.inf:
+            bounds[m] = positive_gain(cloud, candidates[m], counts[m], current, tau)
     best, chosen, rectangle = least, -1, (0, 0, 0, 0)
     for m in np.argsort(-bounds, kind="mergesort"):
         if bounds[m] <= best:

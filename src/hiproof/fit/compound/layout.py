@@ -14,6 +14,7 @@ from numba import njit
 
 from .kernels import (
     CUT,
+    FLAT,
     KIND_COST,
     MAX_PLANES,
     MIN_SIDE_M,
@@ -360,24 +361,34 @@ def add_plane(cloud, members, planes, count, pool, cost, tau, evidence):
 
 
 @njit(cache=True)
-def add_overlay(layout, cloud, grid, candidates, tau, evidence):
-    """Cover the roof with the one rectangle of one plane that explains unexplained points best; False when none pays."""
+def current_costs(layout, cloud, tau):
+    z, _, _ = evaluate(layout, cloud.u, cloud.v)
+    costs = np.empty(len(z))
+    for i in range(len(z)):
+        costs[i] = truncated(cloud.z[i] - z[i], tau)
+    return costs
+
+
+@njit(cache=True)
+def add_overlay(layout, cloud, few, grid, candidates, tau, evidence):
+    """Cover the roof with the one rectangle of one plane that explains unexplained points best; False when none pays.
+
+    Candidates are compared on the points of `few`; the chosen one is fitted, and judged, on all.
+    """
     if layout.count[OVERLAYS] >= MAX_OVERLAYS:
         return False
-    z, _, _ = evaluate(layout, cloud.u, cloud.v)
-    current = np.empty(len(z))
-    for i in range(len(z)):
-        current[i] = truncated(cloud.z[i] - z[i], tau)
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
     bounds, counts = np.full(len(candidates), np.inf), np.ones(len(candidates), np.int64)
     stacked = candidates.reshape((len(candidates), 1, 3))
-    score, m, box = best_candidate(cloud, stacked, counts, bounds, current, tau, 0.0, gain)
-    if m < 0 or score < evidence * (OVERLAY + KIND_COST[kind_of(candidates[m])]):
+    least = 0.9 * evidence * (OVERLAY + FLAT) * len(few.u) / len(cloud.u)
+    _, m, box = best_candidate(few, stacked, counts, bounds, current_costs(layout, few, tau), tau, least, gain)
+    if m < 0:
         return False
+    current = current_costs(layout, cloud, tau)
     plane, _ = fit_plane(cloud, members_of(cloud, box), candidates[m], tau, evidence)
     rect = np.array([grid.u[box[0]], grid.u[box[1]], grid.v[box[2]], grid.v[box[3]]])
-    benefit = np.empty(len(z))
-    for i in range(len(z)):
+    benefit = np.empty(len(cloud.u))
+    for i in range(len(cloud.u)):
         r = cloud.z[i] - plane[0] * cloud.u[i] - plane[1] * cloud.v[i] - plane[2]
         benefit[i] = current[i] - truncated(r, tau)
     score = 0.0

@@ -15,7 +15,7 @@ from .kernels import Cloud, Ghosts, Grid
 MIN_STRUCTURE_POINTS = 4
 BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this close to the border: facade returns
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
-MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 26
+MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 28
 GHOST_MARGIN_M = 0.3
 
 
@@ -104,15 +104,17 @@ def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> tu
     for x in np.sort(vertices):
         if min(abs(x - y) for y in kept) > MERGE_LINES_M:
             kept.append(float(x))
-        if len(kept) > MAX_CELLS:
-            break
-    kept.sort()
+    kept = np.sort(kept)
+    while len(kept) > MAX_CELLS:  # an outline of hundreds of vertices: give up the line closest to its neighbours
+        crowded = 1 + int(np.argmin(kept[2:] - kept[:-2]))
+        kept = np.delete(kept, crowded)
     step = max(cell, (high - low) / MAX_CELLS)
-    lines, at_vertex = [], []
-    for a, b in pairwise(kept):
-        count = max(1, round((b - a) / step))
-        lines += [a + (b - a) * q / count for q in range(count)]
-        at_vertex += [True] + [False] * (count - 1)
+    fill = np.maximum(1, np.round(np.diff(kept) / step)).astype(int)
+    while fill.sum() > MAX_CELLS and fill.max() > 1:
+        step *= 1.1
+        fill = np.maximum(1, np.round(np.diff(kept) / step)).astype(int)
+    lines = [a + (b - a) * q / count for (a, b), count in zip(pairwise(kept), fill, strict=True) for q in range(count)]
+    at_vertex = [q == 0 for count in fill for q in range(count)]
     return np.array([*lines, high]), np.array([*at_vertex, True])
 
 

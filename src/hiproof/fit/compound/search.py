@@ -37,8 +37,8 @@ from .plan import MIN_STRUCTURE_POINTS, Plan
 
 ROUNDS = 2
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
-POOL_POINTS = 1500  # the planes are looked for on at most so many points, evenly spread
-SEEDS, PAIRS_PER_SEED = 150, 4
+POOL_POINTS = 1000  # the planes are looked for on at most so many points, evenly spread
+SEEDS, PAIRS_PER_SEED = 150, 2
 
 
 def evidence_per_unit(density: float, settings) -> float:
@@ -126,14 +126,14 @@ def with_layout(layout: Layout, pool: np.ndarray, gables: tuple[np.ndarray, np.n
 
 def cover_outliers(layout: Layout, plan: Plan, tau: float, evidence: float) -> None:
     """Add overlays (to `layout`) for the points it leaves unexplained, as long as they pay."""
-    cloud = plan.cloud
+    cloud, few = plan.cloud, thinned(plan.cloud, POOL_POINTS)
     for _ in range(len(layout.overlays)):
         z, _, _ = evaluate(layout, cloud.u, cloud.v)
         outliers = np.abs(cloud.z - z) > 0.995 * tau
         if outliers.sum() < MIN_STRUCTURE_POINTS:
             return
-        few = thinned(Cloud(*(column[outliers] for column in cloud)), POOL_POINTS)
-        candidates = hypotheses(few, SEEDS, PAIRS_PER_SEED)
-        if not add_overlay(layout, cloud, plan.grid, candidates, tau, evidence):
+        unexplained = thinned(Cloud(*(column[outliers] for column in cloud)), POOL_POINTS)
+        candidates = hypotheses(unexplained, SEEDS, PAIRS_PER_SEED)
+        if not add_overlay(layout, cloud, few, plan.grid, candidates, tau, evidence):
             return
     assert layout.count[OVERLAYS] <= len(layout.overlays)
