@@ -41,6 +41,9 @@ class FitSettings:
 
     types: tuple[str, ...] = setting((), "roof types to choose among; empty means the whole catalogue")
     objective: str = setting("likelihood", "objective to minimise", choices=("likelihood", "paper"))
+    side_softness_m: tuple[float, ...] = setting(
+        (0.1, 0.04, 0.015, 0.006), "softness of the roof's sides tried at last, the most likely kept", "m"
+    )
     parts: str = setting("compound", "as many primitives as the evidence pays for, or one", choices=("compound", "one"))
 
 

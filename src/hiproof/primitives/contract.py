@@ -40,6 +40,15 @@ class DerivedStart:
 
 
 @dataclass(frozen=True)
+class Vote:
+    """Start values by a vote of the points: which quarter turns, slopes and shifts of the ridge (shares of V) are tried."""
+
+    turns: int = 2
+    slopes: tuple[float, ...] = (0.08, 0.2, 0.32, 0.45, 0.58, 0.72, 0.9, 1.15)
+    shifts: tuple[float, ...] = (0.0,)
+
+
+@dataclass(frozen=True)
 class Primitive:
     """One roof shape.
 
@@ -51,7 +60,8 @@ class Primitive:
     faces        vertex indices (from 0) of each roof surface, counter-clockwise from above
     typical      (width, length, height) -> theta_p of an ordinary roof of that size
     bounds       (low, high) of q1, q2, q3 as far as used
-    starts       where derived types start; empty for the types that start from a vote on the points
+    vote         how the points vote for start values, or None for a type whose
+    starts       derive from the fits of simpler types
     canonical    theta -> the one theta chosen among those of the same surface
     strips       number of teeth: planes are then chosen by equal strips across instead of by the minimum
     more         the same roof type with other strips
@@ -68,6 +78,7 @@ class Primitive:
     faces: tuple[tuple[int, ...], ...]
     typical: Callable[[float, float, float], dict[str, float]]
     bounds: tuple[tuple[float, float], ...] = ()
+    vote: Vote | None = None
     starts: tuple[DerivedStart, ...] = ()
     canonical: Callable[[np.ndarray], np.ndarray] = field(default=lambda theta: theta)
     signed: tuple[str, ...] = ()

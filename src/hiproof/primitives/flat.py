@@ -3,7 +3,7 @@
 import numpy as np
 
 from .algebra import U, V, q0
-from .contract import HALF_LENGTH, HALF_WIDTH, Primitive, quarter_turned, rectangle
+from .contract import HALF_LENGTH, HALF_WIDTH, Primitive, Vote, quarter_turned, rectangle
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
@@ -22,5 +22,6 @@ PRIMITIVE = Primitive(
     corners=rectangle,
     faces=((1, 0, 3, 2),),
     typical=lambda width, length, height: {"width": width, "length": length},
+    vote=Vote(turns=1, slopes=(0.0,)),
     canonical=canonical,
 )

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from .algebra import U, V, q0, q1
-from .contract import SLOPE_MAX, SLOPE_MIN, Primitive
+from .contract import SLOPE_MAX, SLOPE_MIN, Primitive, Vote
 
 SLOPES = ((0, q1, q0), (0, -q1, q0))  # the planes on the -v and the +v side, shared by the shapes with a ridge
 FACES = ((3, 2, 1, 0), (2, 3, 4, 5))  # S1 {v4 v3 v2 v1}, S2 {v3 v4 v5 v6}
@@ -27,4 +27,5 @@ PRIMITIVE = Primitive(
     faces=FACES,
     typical=lambda width, length, height: {"width": width, "length": length, "height": height},
     bounds=((SLOPE_MIN, SLOPE_MAX),),
+    vote=Vote(shifts=(-0.3, 0.0, 0.3)),
 )

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .algebra import U, V, q0, q1, q2
-from .contract import HALF_LENGTH, HALF_WIDTH, Q1, Q2, SLOPE_MAX, SLOPE_MIN, Primitive, quarter_turned
+from .contract import HALF_LENGTH, HALF_WIDTH, Q1, Q2, SLOPE_MAX, SLOPE_MIN, Primitive, Vote, quarter_turned
 from .gable import FACES, SLOPES
 
 EAVE = q0 - q1 * V
@@ -52,5 +52,6 @@ PRIMITIVE = Primitive(
     faces=(*FACES, (0, 4, 3), (5, 1, 2)),
     typical=typical,
     bounds=((SLOPE_MIN, SLOPE_MAX), (SLOPE_MIN, SLOPE_MAX)),
+    vote=Vote(),
     canonical=canonical,
 )

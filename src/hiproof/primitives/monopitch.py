@@ -1,7 +1,7 @@
 """Monopitch: one plane rising across the roof, towards +v."""
 
 from .algebra import U, V, q0, q1
-from .contract import SLOPE_MAX, Primitive, rectangle
+from .contract import SLOPE_MAX, Primitive, Vote, rectangle
 
 PRIMITIVE = Primitive(
     name="monopitch",
@@ -15,5 +15,6 @@ PRIMITIVE = Primitive(
     faces=((1, 0, 3, 2),),
     typical=lambda width, length, height: {"width": width, "length": length, "height": height},
     bounds=((1e-4, SLOPE_MAX),),
+    vote=Vote(turns=4),
     half_turn_symmetric=False,
 )

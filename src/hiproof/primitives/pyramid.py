@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from .algebra import U, V, q0, q1
-from .contract import HALF_LENGTH, HALF_WIDTH, Q1, SLOPE_MAX, SLOPE_MIN, Primitive, quarter_turned, rectangle
+from .contract import HALF_LENGTH, HALF_WIDTH, Q1, SLOPE_MAX, SLOPE_MIN, Primitive, Vote, quarter_turned, rectangle
 from .gable import SLOPES
 
 END_SLOPE = q1 * V / U
@@ -37,5 +37,6 @@ PRIMITIVE = Primitive(
     faces=((1, 0, 4), (3, 2, 4), (0, 3, 4), (2, 1, 4)),
     typical=lambda width, length, height: {"width": width, "length": length, "height": height},
     bounds=((SLOPE_MIN, SLOPE_MAX),),
+    vote=Vote(),
     canonical=canonical,
 )

@@ -1,0 +1,129 @@
+"""Plan directions of a roof before any fit: of its slopes, of its smallest rectangle, of a given outline. Compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+from numba import njit
+
+
+@njit(cache=True)
+def nearest(points, i, indices, distances):
+    """Indices of the points nearest to point `i`, itself included, by insertion; returns how many were found."""
+    found, farthest = 0, np.inf
+    for j in range(len(points)):
+        dx, dy, dz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+        squared = dx * dx + dy * dy + dz * dz
+        if squared < farthest:
+            if found < len(indices):
+                found += 1
+            k = found - 1
+            while k > 0 and distances[k - 1] > squared:
+                distances[k], indices[k] = distances[k - 1], indices[k - 1]
+                k -= 1
+            distances[k], indices[k] = squared, j
+            if found == len(indices):
+                farthest = distances[found - 1]
+    return found
+
+
+@njit(cache=True)
+def local_slope(points, indices):
+    """(a, b, mean squared residual) of the least-squares plane through `points[indices]`; NaN where they are a line."""
+    centre = np.zeros(3)
+    for j in indices:
+        centre += points[j, :3] / len(indices)
+    xx = xy = yy = xz = yz = zz = 0.0
+    for j in indices:
+        x, y, z = points[j, 0] - centre[0], points[j, 1] - centre[1], points[j, 2] - centre[2]
+        xx += x * x
+        xy += x * y
+        yy += y * y
+        xz += x * z
+        yz += y * z
+        zz += z * z
+    determinant = xx * yy - xy * xy
+    if determinant < 1e-3 * (xx + yy) ** 2 or determinant <= 0.0:
+        return np.nan, np.nan, np.nan
+    a, b = (xz * yy - yz * xy) / determinant, (yz * xx - xz * xy) / determinant
+    return a, b, max(zz - a * xz - b * yz, 0.0) / len(indices)
+
+
+@njit(cache=True)
+def slope_direction(points, queries, neighbours):
+    """(kappa, confidence 0..1) of the four-fold harmonic of the azimuths of local slopes at about `queries` points.
+
+    Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak.
+    """
+    stride = max(1, len(points) // queries)
+    azimuths, weights = np.empty(len(points)), np.empty(len(points))
+    indices, distances = np.empty(neighbours, np.int64), np.empty(neighbours)
+    count = 0
+    for i in range(0, len(points), stride):
+        found = nearest(points, i, indices, distances)
+        a, b, squared = local_slope(points, indices[:found])
+        slope = math.hypot(a, b)
+        if 0.08 < slope < 2.5:
+            azimuths[count], weights[count] = math.atan2(b, a), min(slope, 1.0) / (1.0 + squared / 0.0064)
+            count += 1
+    kappa, sharpness, confidence = 0.0, 0.0, 0.0
+    for _ in range(3):
+        real = imaginary = total = 0.0
+        for k in range(count):
+            angle = 4.0 * (azimuths[k] - kappa)
+            w = weights[k] * math.exp(sharpness * (math.cos(angle) - 1.0))
+            real += w * math.cos(angle)
+            imaginary += w * math.sin(angle)
+            total += weights[k]
+        kappa += math.atan2(imaginary, real) / 4.0
+        confidence = math.hypot(real, imaginary) / (total + 1e-9)
+        sharpness = 6.0
+    return kappa, confidence
+
+
+@njit(cache=True)
+def rectangle_direction(points, trim, angles):
+    """Direction in 0..pi/2, out of `angles`, of the smallest rectangle that holds all but `trim` of the points per side."""
+    extents = np.empty(2 * angles)
+    across = np.empty(len(points))
+    for k in range(2 * angles):
+        c, s = math.cos(k * math.pi / (2 * angles)), math.sin(k * math.pi / (2 * angles))
+        for i in range(len(points)):
+            across[i] = c * points[i, 0] + s * points[i, 1]
+        low, high = trimmed_range(across, trim)
+        extents[k] = high - low
+    areas = extents[:angles] * extents[angles:]
+    return np.argmin(areas) * math.pi / (2 * angles)
+
+
+@njit(cache=True)
+def trimmed_range(values, trim):
+    """(low, high) between which all but a share `trim` at each end of `values` lie."""
+    ordered = np.sort(values)
+    cut = int(trim * len(values))
+    return ordered[cut], ordered[len(values) - 1 - cut]
+
+
+@njit(cache=True)
+def rectangle_in_direction(points, kappa, trim):
+    """Plan (5,) cx, cy, kappa, V, U of the trimmed rectangle of the points in the direction `kappa`."""
+    c, s = math.cos(kappa), math.sin(kappa)
+    low_u, high_u = trimmed_range(c * points[:, 0] + s * points[:, 1], trim)
+    low_v, high_v = trimmed_range(c * points[:, 1] - s * points[:, 0], trim)
+    u, v = 0.5 * (low_u + high_u), 0.5 * (low_v + high_v)
+    return np.array([c * u - s * v, s * u + c * v, kappa, 0.5 * (high_v - low_v), 0.5 * (high_u - low_u)])
+
+
+def outline_direction(outline: shapely.Polygon) -> float:
+    """Four-fold direction (rad) of an outline: its edges' azimuths, weighted by their lengths."""
+    edges = np.diff(np.asarray(outline.exterior.coords)[:, :2], axis=0)
+    azimuth = np.arctan2(edges[:, 1], edges[:, 0])
+    harmonic = (np.hypot(*edges.T) * np.exp(4j * azimuth)).sum()
+    return float(np.angle(harmonic)) / 4
+
+
+def outline_rectangle(outline: shapely.Polygon, kappa: float) -> np.ndarray:
+    """Plan (5,) cx, cy, kappa, V, U of the outline's bounding rectangle in the direction `kappa`."""
+    return rectangle_in_direction(np.asarray(outline.exterior.coords)[:, :2], kappa, 0.0)

@@ -1,0 +1,616 @@
+"""The compiled core: one likelihood of one roof, its gradient and Hessian, and its minimisation, for every primitive alike.
+
+Each point is drawn from a mixture: inside the plan rectangle with soft sides, normal about the roof's height, or an outlier
+anywhere in the cloud's volume,
+
+    p_i = w_i (1 - eps) S(mu_u / tau) S(mu_v / tau) / (4 U V) N(z_i; roof, sigma) + (1 - w_i (1 - eps)) / volume
+
+with mu_u = U - |u|, mu_v = V - |v| the margins to the sides, S the logistic function, w_i the given probability that the
+point is roof. The roof at (u, v) is the lowest plane (or the plane of the strip, for a saw-tooth). A point enters the
+gradient and the Gauss-Newton Hessian through its active plane only, so sums of moments of (u, v, 1) by plane, and five by
+side, suffice; a small Jacobian of planes by parameters (from the term table) takes them to theta.
+
+All compiled functions live in this file, because the compiler's cache does not notice changes in another one.
+Units are metres and radians, points are (n, 4): x, y, z, w.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+MAX_PLANES = 6
+CENTRE_X, CENTRE_Y, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0 = range(6)
+SIZE = 9
+STEP_CAP_M, STEP_CAP_RAD = 1.5, 0.25
+FAR_SQUARED = 60.0  # squared normalised residual beyond which a point is certainly an outlier
+SOFT = 12.0  # margins of more than this many tau are inside for certain
+SQRT_2PI = math.sqrt(2 * math.pi)
+
+
+class Tables(NamedTuple):
+    """Primitives as data, one row a variant (T of them); terms of variant t are first_term[t]:first_term[t + 1]."""
+
+    size: np.ndarray  # (T,) used entries of theta
+    planes: np.ndarray  # (T,) number of planes
+    strips: np.ndarray  # (T,) 1, or the number of teeth
+    first_term: np.ndarray  # (T + 1,)
+    factor: np.ndarray  # (m,)
+    target: np.ndarray  # (m,) 3 plane + coefficient
+    power: np.ndarray  # (m, 6) exponents of V, U, q0..q3
+    turns: np.ndarray  # (T,) quarter turns tried by the vote, 0 where there is none
+    slopes: np.ndarray  # (T, k) slopes tried by the vote, NaN where fewer
+    shifts: np.ndarray  # (T, k) shifts of the ridge tried, shares of V, NaN where fewer
+
+
+class Problem(NamedTuple):
+    """The points of one roof and what is known before fitting."""
+
+    points: np.ndarray  # (n, 4) x, y, z and the probability of being roof
+    log_background: float  # log density of an outlier, per m3 (per m of height where the plan is given)
+    plan_is_free: bool  # whether the sides are fitted; a given outline has no plan likelihood
+
+
+class Noise(NamedTuple):
+    """sigma (m) of heights, tau (m) softness of the sides, eps share of outliers."""
+
+    sigma: float
+    tau: float
+    eps: float
+
+
+class Space(NamedTuple):
+    """Working arrays of one evaluation."""
+
+    planes: np.ndarray  # (MAX_PLANES, 3)
+    jacobian: np.ndarray  # (MAX_PLANES, 3, SIZE) of the planes by theta
+    moments: np.ndarray  # (MAX_PLANES, 9) six of the Hessian, three of the gradient
+    sides: np.ndarray  # (4, 5) at +u, -u, +v, -v: two of the gradient, three of the Hessian
+
+
+@njit(cache=True)
+def new_space():
+    return Space(
+        np.zeros((MAX_PLANES, 3)),
+        np.zeros((MAX_PLANES, 3, SIZE)),
+        np.zeros((MAX_PLANES, 9)),
+        np.zeros((4, 5)),
+    )
+
+
+@njit(cache=True)
+def integer_power(base, exponent):
+    """base ** exponent for the small, possibly negative exponents of the term table."""
+    if exponent == 1:
+        return base
+    result = 1.0
+    for _ in range(abs(exponent)):
+        result *= base
+    return result if exponent >= 0 else 1.0 / result
+
+
+@njit(cache=True)
+def planes_from_terms(tables, kind, theta, planes, jacobian):
+    """Fill `planes` (k, 3), z = a u + b v + c, and their exact `jacobian` (k, 3, 9) by theta; return the number of planes."""
+    count = tables.planes[kind]
+    planes[:count] = 0.0
+    jacobian[:count] = 0.0
+    for m in range(tables.first_term[kind], tables.first_term[kind + 1]):
+        plane, coefficient = tables.target[m] // 3, tables.target[m] % 3
+        value = tables.factor[m]
+        for k in range(6):
+            if tables.power[m, k] != 0:
+                value *= integer_power(theta[HALF_WIDTH + k], tables.power[m, k])
+        planes[plane, coefficient] += value
+        for k in range(6):
+            exponent = tables.power[m, k]
+            if exponent != 0:
+                derivative = tables.factor[m] * exponent * integer_power(theta[HALF_WIDTH + k], exponent - 1)
+                for other in range(6):
+                    if other != k and tables.power[m, other] != 0:
+                        derivative *= integer_power(theta[HALF_WIDTH + other], tables.power[m, other])
+                jacobian[plane, coefficient, HALF_WIDTH + k] += derivative
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    for j in range(count):
+        a, b = planes[j, 0], planes[j, 1]
+        jacobian[j, 2, CENTRE_X] = -a * c + b * s
+        jacobian[j, 2, CENTRE_Y] = -a * s - b * c
+        jacobian[j, 0, KAPPA] = -b
+        jacobian[j, 1, KAPPA] = a
+    return count
+
+
+@njit(cache=True)
+def active_plane(planes, count, strips, half_width, u, v):
+    """Index of the plane that is the roof at (u, v) and the height there."""
+    if strips > 1:
+        j = int((v + half_width) * strips / (2.0 * half_width))
+        j = min(max(j, 0), strips - 1)
+        return j, planes[j, 0] * u + planes[j, 1] * v + planes[j, 2]
+    lowest, j = planes[0, 0] * u + planes[0, 1] * v + planes[0, 2], 0
+    for k in range(1, count):
+        z = planes[k, 0] * u + planes[k, 1] * v + planes[k, 2]
+        if z < lowest:
+            lowest, j = z, k
+    return j, lowest
+
+
+@njit(cache=True, fastmath=True)
+def sum_moments(problem, tables, kind, theta, noise, space):
+    """Minus the log likelihood at `theta`; fills planes, Jacobian, moments and sides of `space`.
+
+    Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
+    """
+    points, planes, moments, sides = problem.points, space.planes, space.moments, space.sides
+    count = planes_from_terms(tables, kind, theta, planes, space.jacobian)
+    strips = tables.strips[kind]
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
+    per_sigma, per_tau = 1.0 / noise.sigma, 1.0 / noise.tau
+    background = math.exp(problem.log_background)
+    scale = (1.0 - noise.eps) * per_sigma / SQRT_2PI
+    if problem.plan_is_free:
+        scale /= 4.0 * half_width * half_length
+    moments[:] = 0.0
+    sides[:] = 0.0
+    value = inliers = squares = 0.0
+    product = 1.0  # logs are taken of products of many densities: far fewer calls
+    for i in range(points.shape[0]):
+        dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
+        u, v = c * dx + s * dy, c * dy - s * dx
+        j, roof = active_plane(planes, count, strips, half_width, u, v)
+        residual = (points[i, 2] - roof) * per_sigma
+        prior = points[i, 3]
+        outlier = (1.0 - prior * (1.0 - noise.eps)) * background
+        margin_u, margin_v = SOFT, SOFT
+        if problem.plan_is_free:
+            margin_u, margin_v = (half_length - abs(u)) * per_tau, (half_width - abs(v)) * per_tau
+        if residual * residual > FAR_SQUARED or margin_u < -25.0 or margin_v < -25.0:
+            product *= outlier
+            if product < 1e-250:
+                value -= math.log(product)
+                product = 1.0
+            continue
+        inside_u = 1.0 / (1.0 + math.exp(-margin_u)) if margin_u < SOFT else 1.0
+        inside_v = 1.0 / (1.0 + math.exp(-margin_v)) if margin_v < SOFT else 1.0
+        inlier = prior * scale * inside_u * inside_v * math.exp(-0.5 * residual * residual)
+        total = inlier + outlier
+        product *= total
+        if product < 1e-250 or product > 1e250:
+            value -= math.log(product)
+            product = 1.0
+        w = inlier / total
+        inliers += w
+        squares += w * residual * residual
+        weight, pull = w * per_sigma * per_sigma, w * residual * per_sigma
+        m = moments[j]
+        m[0] += weight * u * u
+        m[1] += weight * u * v
+        m[2] += weight * u
+        m[3] += weight * v * v
+        m[4] += weight * v
+        m[5] += weight
+        m[6] += pull * u
+        m[7] += pull * v
+        m[8] += pull
+        if margin_u < SOFT:
+            add_side(sides[0 if u > 0 else 1], w * (1.0 - inside_u) * per_tau, inside_u * per_tau, v)
+        if margin_v < SOFT:
+            add_side(sides[2 if v > 0 else 3], w * (1.0 - inside_v) * per_tau, inside_v * per_tau, u)
+    return value - math.log(product), inliers, squares
+
+
+@njit(cache=True)
+def add_side(side, push, stiffness, along):
+    """Add a point near a side, `along` metres from its middle."""
+    side[0] += push
+    side[1] += push * along
+    side[2] += push * stiffness
+    side[3] += push * stiffness * along
+    side[4] += push * stiffness * along * along
+
+
+@njit(cache=True)
+def add_height_terms(space, planes, size, gradient, hessian):
+    """Add the part of the residuals to `gradient` (9,) and the lower triangle of `hessian` (9, 9)."""
+    for j in range(planes):
+        m, d = space.moments[j], space.jacobian[j]
+        for a in range(size):
+            gradient[a] -= m[6] * d[0, a] + m[7] * d[1, a] + m[8] * d[2, a]
+            t0 = m[0] * d[0, a] + m[1] * d[1, a] + m[2] * d[2, a]
+            t1 = m[1] * d[0, a] + m[3] * d[1, a] + m[4] * d[2, a]
+            t2 = m[2] * d[0, a] + m[4] * d[1, a] + m[5] * d[2, a]
+            for b in range(a + 1):
+                hessian[a, b] += t0 * d[0, b] + t1 * d[1, b] + t2 * d[2, b]
+
+
+@njit(cache=True)
+def add_side_terms(space, theta, inliers, gradient, hessian):
+    """Add the part of the soft sides and of the area: margin = half extent - |u|, alpha + beta * (position along the side)."""
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    gradient[HALF_WIDTH] += inliers / theta[HALF_WIDTH]
+    gradient[HALF_LENGTH] += inliers / theta[HALF_LENGTH]
+    alpha, beta = np.zeros(5), np.zeros(5)
+    for e in range(4):
+        sign = 1.0 - 2.0 * (e % 2)
+        alpha[:] = 0.0
+        beta[:] = 0.0
+        if e < 2:
+            alpha[CENTRE_X], alpha[CENTRE_Y], alpha[HALF_LENGTH] = sign * c, sign * s, 1.0
+            beta[KAPPA] = -sign
+        else:
+            alpha[CENTRE_X], alpha[CENTRE_Y], alpha[HALF_WIDTH] = -sign * s, sign * c, 1.0
+            beta[KAPPA] = sign
+        side = space.sides[e]
+        for a in range(5):
+            gradient[a] -= side[0] * alpha[a] + side[1] * beta[a]
+            for b in range(a + 1):
+                mixed = alpha[a] * beta[b] + beta[a] * alpha[b]
+                hessian[a, b] += side[2] * alpha[a] * alpha[b] + side[3] * mixed + side[4] * beta[a] * beta[b]
+
+
+@njit(cache=True)
+def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
+    """Minus the log likelihood with its `gradient` (9,) and Gauss-Newton `hessian` (9, 9) at `theta` (9,).
+
+    Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
+    """
+    value, inliers, squares = sum_moments(problem, tables, kind, theta, noise, space)
+    gradient[:] = 0.0
+    hessian[:] = 0.0
+    add_height_terms(space, tables.planes[kind], tables.size[kind], gradient, hessian)
+    if problem.plan_is_free:
+        add_side_terms(space, theta, inliers, gradient, hessian)
+    for a in range(SIZE):
+        for b in range(a):
+            hessian[b, a] = hessian[a, b]
+    return value, inliers, squares
+
+
+@njit(cache=True)
+def solve_damped(hessian, gradient, damping, size, step, factor):
+    """Step of (H + damping diag H) step = -gradient by Cholesky; False where that is not positive definite."""
+    for i in range(size):
+        for j in range(i + 1):
+            total = hessian[i, j]
+            if i == j:
+                total += damping * hessian[i, i] + 1e-6
+            for k in range(j):
+                total -= factor[i, k] * factor[j, k]
+            if i > j:
+                factor[i, j] = total / factor[j, j]
+            elif total > 1e-12:
+                factor[i, i] = math.sqrt(total)
+            else:
+                return False
+    for i in range(size):
+        total = -gradient[i]
+        for k in range(i):
+            total -= factor[i, k] * step[k]
+        step[i] = total / factor[i, i]
+    for i in range(size - 1, -1, -1):
+        total = step[i]
+        for k in range(i + 1, size):
+            total -= factor[k, i] * step[k]
+        step[i] = total / factor[i, i]
+    return True
+
+
+@njit(cache=True)
+def freeze_at_bounds(theta, low, high, size, gradient, hessian):
+    """Take the parameters whose bound stops them out of the step: the active set."""
+    for k in range(size):
+        if (theta[k] <= low[k] and gradient[k] >= 0.0) or (theta[k] >= high[k] and gradient[k] <= 0.0):
+            gradient[k] = 0.0
+            hessian[k, :] = 0.0
+            hessian[:, k] = 0.0
+            hessian[k, k] = 1.0
+
+
+@njit(cache=True)
+def take_step(theta, step, low, high, size, moved):
+    """`moved` = theta + step, shortened to the step caps and kept within the bounds."""
+    share = 1.0
+    for k in range(size):
+        cap = STEP_CAP_RAD if k == KAPPA else STEP_CAP_M
+        if abs(step[k]) * share > cap:
+            share = cap / abs(step[k])
+    for k in range(SIZE):
+        move = share * step[k] if k < size else 0.0
+        moved[k] = min(max(theta[k] + move, low[k]), high[k])
+
+
+@njit(cache=True)
+def minimise(problem, tables, kind, theta, low, high, noise, iterations, tolerance):
+    """Levenberg-Marquardt within the box [low, high]; `theta` (9,) is moved in place.
+
+    A parameter with low = high is fixed. Ends after `iterations` or when a step gains less than `tolerance` (nats).
+    Returns (value, inliers, squares, number of evaluations), the middle two as `evaluate`.
+    """
+    size = tables.size[kind]
+    space = new_space()
+    gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    gradient_new, hessian_new = np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    step, factor, moved = np.zeros(SIZE), np.zeros((SIZE, SIZE)), theta.copy()
+    take_step(theta, step, low, high, size, theta)
+    value, inliers, squares = evaluate(problem, tables, kind, theta, noise, space, gradient, hessian)
+    evaluations, damping = 1, 1e-3
+    for _ in range(iterations):
+        freeze_at_bounds(theta, low, high, size, gradient, hessian)
+        gain = -1.0
+        for _ in range(6):
+            if not solve_damped(hessian, gradient, damping, size, step, factor):
+                damping = max(10 * damping, 1e-3)
+                continue
+            take_step(theta, step, low, high, size, moved)
+            value_new, inliers_new, squares_new = evaluate(
+                problem, tables, kind, moved, noise, space, gradient_new, hessian_new
+            )
+            evaluations += 1
+            if value_new < value:
+                gain = value - value_new
+                break
+            damping = max(8 * damping, 1e-3)
+        if gain < 0:
+            break
+        theta[:] = moved
+        value, inliers, squares = value_new, inliers_new, squares_new
+        gradient, gradient_new = gradient_new, gradient
+        hessian, hessian_new = hessian_new, hessian
+        damping *= 0.15
+        if gain < tolerance:
+            break
+    return value, inliers, squares, evaluations
+
+
+@njit(cache=True)
+def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations, tolerance):
+    """`minimise` from every row of `thetas` (m, 9), in place. Returns (values (m,), evaluations)."""
+    values = np.empty(len(kinds))
+    total = 0
+    for i in range(len(kinds)):
+        values[i], _, _, evaluations = minimise(
+            problem, tables, kinds[i], thetas[i], lows[i], highs[i], noise, iterations, tolerance
+        )
+        total += evaluations
+    return values, total
+
+
+@njit(cache=True)
+def learn_noise(points_count, inliers, squares, noise, prior):
+    """EM step: `noise` with sigma and eps that maximise the expected likelihood under the prior on sigma.
+
+    `prior` is (sigma, its worth in points, smallest, largest).
+    """
+    sigma = math.sqrt((squares * noise.sigma**2 + prior[1] * prior[0] ** 2) / (inliers + prior[1]))
+    eps = (points_count - inliers + 0.5) / (points_count + 5.0)
+    return Noise(min(max(sigma, prior[2]), prior[3]), noise.tau, min(max(eps, 0.005), 0.5))
+
+
+@njit(cache=True)
+def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, rounds):
+    """Fit theta and noise in turns from every row of `thetas` (m, 9) and `noises` (m, 3), both in place.
+
+    Returns (values (m,), evaluations).
+    """
+    values = np.empty(len(kinds))
+    total = 0
+    for i in range(len(kinds)):
+        noise = Noise(noises[i, 0], noises[i, 1], noises[i, 2])
+        for k in range(rounds):
+            last = k == rounds - 1
+            values[i], inliers, squares, evaluations = minimise(
+                problem,
+                tables,
+                kinds[i],
+                thetas[i],
+                lows[i],
+                highs[i],
+                noise,
+                15 if last else 6,
+                1e-3 if last else 0.02,
+            )
+            total += evaluations
+            if not last:
+                noise = learn_noise(len(problem.points), inliers, squares, noise, prior)
+        noises[i, 0], noises[i, 1], noises[i, 2] = noise.sigma, noise.tau, noise.eps
+    return values, total
+
+
+@njit(cache=True)
+def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
+    """Re-fit with harder and harder sides, keeping the best; `theta` in place. Returns (value, noise, evaluations).
+
+    Ends when two steps of `taus` in a row did not better the likelihood.
+    """
+    best, best_noise, moved = np.inf, noise, theta.copy()
+    worse = total = 0
+    for tau in taus:
+        noise = Noise(noise.sigma, tau, noise.eps)
+        _, inliers, squares, first = minimise(problem, tables, kind, moved, low, high, noise, 10, 0.01)
+        noise = learn_noise(len(problem.points), inliers, squares, noise, prior)
+        value, _, _, second = minimise(problem, tables, kind, moved, low, high, noise, 6, 0.01)
+        total += first + second
+        if value < best:
+            best, best_noise, worse = value, noise, 0
+            theta[:] = moved
+        else:
+            worse += 1
+            if worse == 2:
+                break
+    return best, best_noise, total
+
+
+@njit(cache=True)
+def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
+    """Log likelihood ratio (4, k) of moving each side (+u, -u, +v, -v) outward by `shifts` (2, k), along u and along v."""
+    points, planes = problem.points, space.planes
+    count = planes_from_terms(tables, kind, theta, planes, space.jacobian)
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    background = math.exp(problem.log_background)
+    scale = (1.0 - noise.eps) / (4.0 * theta[HALF_WIDTH] * theta[HALF_LENGTH] * noise.sigma * SQRT_2PI)
+    table = np.zeros((4, shifts.shape[1]))
+    for i in range(len(points)):
+        dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
+        u, v = c * dx + s * dy, c * dy - s * dx
+        _, roof = active_plane(planes, count, tables.strips[kind], theta[HALF_WIDTH], u, v)
+        residual = (points[i, 2] - roof) / noise.sigma
+        if residual * residual > FAR_SQUARED:
+            continue
+        height = points[i, 3] * scale * math.exp(-0.5 * residual * residual)
+        outlier = (1.0 - points[i, 3] * (1.0 - noise.eps)) * background
+        for axis in range(2):
+            across, along = (u, v) if axis == 0 else (v, u)
+            margin = (theta[HALF_LENGTH - axis] - abs(across)) / noise.tau
+            margin_other = (theta[HALF_WIDTH + axis] - abs(along)) / noise.tau
+            if margin + shifts[axis, 0] / noise.tau > 8.0 or margin_other < -8.0:
+                continue
+            inlier = height / (1.0 + math.exp(-margin_other))
+            row = table[2 * axis + (0 if across > 0 else 1)]
+            for k in range(shifts.shape[1]):
+                soft = margin + shifts[axis, k] / noise.tau
+                inside = 1.0 / (1.0 + math.exp(-soft)) if soft > -30.0 else 1e-13
+                row[k] += math.log((inlier * inside + outlier) / (inlier + outlier))
+    return table
+
+
+@njit(cache=True)
+def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
+    """Posterior (mean shift of the centre, of the half extent, and their variances) of an axis on the grid of `shifts`.
+
+    `plus` and `minus` (k,) are the sides' log likelihood ratios; the heights hold the centre with `centre_precision`.
+    """
+    count = len(shifts)
+    logs = np.empty((count, count))
+    for a in range(count):
+        for b in range(count):
+            centre, growth = 0.5 * (shifts[a] - shifts[b]), 0.5 * (shifts[a] + shifts[b])
+            logs[a, b] = plus[a] + minus[b] - inliers * math.log(1.0 + growth / half_extent)
+            logs[a, b] -= 0.5 * centre_precision * centre * centre
+    top = logs.max()
+    total = centre_sum = growth_sum = centre_squares = growth_squares = 0.0
+    for a in range(count):
+        for b in range(count):
+            w = math.exp(logs[a, b] - top)
+            centre, growth = 0.5 * (shifts[a] - shifts[b]), 0.5 * (shifts[a] + shifts[b])
+            total += w
+            centre_sum += w * centre
+            growth_sum += w * growth
+            centre_squares += w * centre * centre
+            growth_squares += w * growth * growth
+    centre, growth = centre_sum / total, growth_sum / total
+    return centre, growth, centre_squares / total - centre**2, growth_squares / total - growth**2
+
+
+@njit(cache=True)
+def height_hessian(problem, tables, kind, theta, noise):
+    """Hessian (9, 9) of the heights alone (no sides) and the sum of inlier probabilities."""
+    space = new_space()
+    gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
+    _, inliers, _ = sum_moments(problem, tables, kind, theta, noise, space)
+    add_height_terms(space, tables.planes[kind], tables.size[kind], gradient, hessian)
+    for a in range(SIZE):
+        for b in range(a):
+            hessian[b, a] = hessian[a, b]
+    return hessian, inliers
+
+
+@njit(cache=True)
+def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, grid):
+    """Move `theta` to the posterior means of its four sides, heights held; in place.
+
+    `centre_precision` (2,) along u and v. Returns the variances (4,) of centre u, centre v, V, U.
+    """
+    shifts = np.empty((2, grid))
+    for axis in range(2):
+        gap = 2.0 * theta[HALF_LENGTH - axis] / max(inliers, 1.0)
+        low, high = -(2.0 * noise.tau + 1.5 * gap), 2.0 * noise.tau + 7.0 * gap
+        low = max(low, -0.5 * theta[HALF_LENGTH - axis])
+        for k in range(grid):
+            shifts[axis, k] = low + (high - low) * k / (grid - 1)
+    table = tabulate_sides(problem, tables, kind, theta, noise, shifts, new_space())
+    centre_u, growth_u, var_u, var_length = side_posterior(
+        table[0], table[1], shifts[0], theta[HALF_LENGTH], inliers, centre_precision[0]
+    )
+    centre_v, growth_v, var_v, var_width = side_posterior(
+        table[2], table[3], shifts[1], theta[HALF_WIDTH], inliers, centre_precision[1]
+    )
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    theta[CENTRE_X] += c * centre_u - s * centre_v
+    theta[CENTRE_Y] += s * centre_u + c * centre_v
+    theta[HALF_LENGTH] += growth_u
+    theta[HALF_WIDTH] += growth_v
+    return np.array([var_u, var_v, var_width, var_length])
+
+
+@njit(cache=True)
+def mode(values, bin_m, counts):
+    """(count, position) of the fullest pair of neighbouring bins of `values`; `counts` is working space."""
+    low, high = values.min(), values.max()
+    bins = min(int((high - low) / bin_m) + 2, len(counts))
+    counts[:bins] = 0
+    for value in values:
+        k = int((value - low) / bin_m)
+        if k < bins:
+            counts[k] += 1
+    best = 0
+    for k in range(bins - 1):
+        if counts[k] + counts[k + 1] > counts[best] + counts[best + 1]:
+            best = k
+    return counts[best] + counts[best + 1], low + (best + 1) * bin_m
+
+
+@njit(cache=True)
+def vote(points, tables, kind, theta, space, heights, counts):
+    """Best slope and height of `kind` in the plan of `theta` (in place): a small Hough transform. Returns the votes."""
+    best, best_slope, best_shift, best_z = -1, 0.0, 0.0, 0.0
+    c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+    theta[Q0:] = 0.0
+    for shift in tables.shifts[kind]:
+        for slope in tables.slopes[kind]:
+            if math.isnan(shift) or math.isnan(slope):
+                continue
+            for k in range(Q0 + 1, tables.size[kind]):
+                theta[k] = slope
+            count = planes_from_terms(tables, kind, theta, space.planes, space.jacobian)
+            for i in range(len(points)):
+                dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
+                u, v = c * dx + s * dy, c * dy - s * dx - shift * theta[HALF_WIDTH]
+                _, roof = active_plane(space.planes, count, tables.strips[kind], theta[HALF_WIDTH], u, v)
+                heights[i] = points[i, 2] - roof
+            votes, z = mode(heights, 0.2, counts)
+            if votes > best:
+                best, best_slope, best_shift, best_z = votes, slope, shift, z
+    for k in range(Q0 + 1, tables.size[kind]):
+        theta[k] = best_slope
+    theta[Q0] = best_z
+    theta[CENTRE_X] -= s * best_shift * theta[HALF_WIDTH]
+    theta[CENTRE_Y] += c * best_shift * theta[HALF_WIDTH]
+    return best
+
+
+@njit(cache=True)
+def vote_each(points, tables, rectangles):
+    """Starts of every voting variant in every plan of `rectangles` (d, 5): cx, cy, kappa, V, U, and in its quarter turns.
+
+    Returns (kinds (m,), thetas (m, 9), votes (m,)).
+    """
+    limit = len(rectangles) * tables.turns.sum()
+    kinds, thetas, votes = np.empty(limit, np.int64), np.zeros((limit, SIZE)), np.empty(limit)
+    space, heights, counts = new_space(), np.empty(len(points)), np.zeros(400, np.int64)
+    found = 0
+    for rectangle in rectangles:
+        for kind in range(len(tables.size)):
+            for turn in range(tables.turns[kind]):
+                theta = thetas[found]
+                theta[:Q0] = rectangle
+                theta[KAPPA] += turn * math.pi / 2
+                if turn % 2 == 1:
+                    theta[HALF_WIDTH], theta[HALF_LENGTH] = rectangle[HALF_LENGTH], rectangle[HALF_WIDTH]
+                kinds[found] = kind
+                votes[found] = vote(points, tables, kind, theta, space, heights, counts)
+                found += 1
+    return kinds[:found], thetas[:found], votes[:found]

@@ -1,0 +1,297 @@
+"""The default objective: from points to the best roof of every type, the choice among them, and what is known of it.
+
+    points -> starts by vote -> annealed fits -> derived types -> noise by EM -> choice by evidence -> sides -> covariance
+
+The cloud is coarse at first (120 points, sigma and tau half a metre) and fine at last; types far behind the best are dropped
+early. Everything compiled is in kernel.py and direction.py; here is the schedule.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import shapely
+
+from ..primitives import CATALOGUE, Primitive
+from ..primitives.algebra import formula
+from ..primitives.contract import HALF_LENGTH, HALF_WIDTH, KAPPA, Q0
+from . import kernel
+from .direction import (
+    outline_direction,
+    outline_rectangle,
+    rectangle_direction,
+    rectangle_in_direction,
+    slope_direction,
+)
+from .kernel import Noise, Problem, Tables
+from .tables import bounds, tables, variants
+
+COARSE_POINTS = 120
+OUTLIERS_AT_FIRST = 0.1
+COARSE, MIDDLE, FINE = (Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in ((0.5, 0.5), (0.25, 0.3), (0.15, 0.15)))
+SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, largest
+SIDE_TAU_M = 0.1  # softness of the sides while types are compared
+SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04  # types further behind the best after annealing are dropped
+SIDE_GRID = 28
+PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """The chosen roof: `theta` (9,) of `primitive`, its `covariance` (9, 9), the `noise` learnt and how each type fared.
+
+    `value` is minus the log likelihood, `bics` by type (lower is better), both of the chosen type's optimum.
+    """
+
+    primitive: Primitive
+    theta: np.ndarray
+    covariance: np.ndarray
+    noise: Noise
+    value: float
+    bics: dict[str, float]
+    evaluations: int
+
+
+@dataclass(frozen=True)
+class Candidates:
+    """Roofs under test: row `kinds` (m,) of the tables, `thetas` (m, 9), minus log likelihoods `values` (m,)."""
+
+    kinds: np.ndarray
+    thetas: np.ndarray
+    values: np.ndarray
+    evaluations: int = 0
+
+    def chosen(self, rows: np.ndarray) -> Candidates:
+        return replace(self, kinds=self.kinds[rows], thetas=self.thetas[rows], values=self.values[rows])
+
+    def joined(self, other: Candidates) -> Candidates:
+        return Candidates(
+            np.concatenate([self.kinds, other.kinds]),
+            np.concatenate([self.thetas, other.thetas]),
+            np.concatenate([self.values, other.values]),
+            self.evaluations + other.evaluations,
+        )
+
+
+@dataclass(frozen=True)
+class Search:
+    """One roof's problem, whole and thinned, with the shapes to try and the box of theta."""
+
+    whole: Problem
+    thinned: Problem
+    tables: Tables
+    shapes: tuple[Primitive, ...]
+    family: np.ndarray  # (T,) the type's number, the same for all tooth counts
+    low: np.ndarray  # (T, 9)
+    high: np.ndarray
+
+    def box(self, candidates: Candidates) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds (m, 9) of each candidate; a given plan is a box without width."""
+        low, high = self.low[candidates.kinds], self.high[candidates.kinds]
+        if not self.whole.plan_is_free:
+            low[:, :Q0] = high[:, :Q0] = candidates.thetas[:, :Q0]
+        return low, high
+
+    def minimised(
+        self, problem: Problem, candidates: Candidates, noise: Noise, iterations: int, tolerance: float
+    ) -> Candidates:
+        """Every candidate after some Levenberg-Marquardt steps on `problem`."""
+        thetas = candidates.thetas.copy()
+        values, evaluations = kernel.minimise_each(
+            problem, self.tables, candidates.kinds, thetas, *self.box(candidates), noise, iterations, tolerance
+        )
+        return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations)
+
+    def best_of_type(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
+        """The `count` best of each type that are within `slack` nats of its best, types in the tables' order."""
+        family = self.family[candidates.kinds]
+        order = np.lexsort((candidates.values, family))
+        family, values = family[order], candidates.values[order]
+        first = np.searchsorted(family, family)
+        keep = (np.arange(len(order)) - first < count) & (values <= values[first] + slack)
+        return candidates.chosen(order[keep])
+
+
+def fit_likelihood(
+    points: np.ndarray,
+    types: tuple[str, ...],
+    outline: shapely.Polygon | None = None,
+    side_taus: tuple[float, ...] = (),
+    log_prior: dict[str, float] | None = None,
+) -> Estimate:
+    """The most evident roof of `types` for `points` (n, 4): x, y, z about their centre, and the probability of being roof.
+
+    With an `outline` the plan is its rectangle in the roof's direction and only heights are fitted. `side_taus` are the
+    softnesses (m) tried at last on the sides; `log_prior` by type is added to the evidence (nats).
+    """
+    search = new_search(points, types, outline is None)
+    basic = anneal(search, vote_starts(search, outline))
+    derived = derive(search, basic)
+    candidates = basic.joined(derived) if len(derived.kinds) else basic
+    asked = [t for t, shape in enumerate(search.shapes) if shape.name in types]
+    candidates = candidates.chosen(np.isin(candidates.kinds, asked))
+    slack = SLACK_NATS + SLACK_NATS_A_POINT * len(points)
+    candidates = candidates.chosen(candidates.values <= candidates.values.min() + slack)
+    candidates, noises = learn(search, candidates)
+    winner, bics = choose(search, candidates, log_prior or {})
+    return finish(search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus)
+
+
+def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool) -> Search:
+    """The problem of `points` (n, 4) and all shapes needed: `types` and those their starts derive from."""
+    needed = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
+    names = tuple(name for name in CATALOGUE if name in needed)
+    shapes = variants(names)
+    z_low, z_high = kernel_range(points[:, 2])
+    extents = np.sqrt(12 * np.linalg.eigvalsh(np.cov(points[:, :2].T))) + 1 if plan_is_free else np.ones(2)
+    log_background = -float(np.log(extents.prod() * (max(z_high - z_low, 1.0) + 1.0)))
+    low, high = (bound.copy() for bound in bounds(names))
+    low[:, Q0], high[:, Q0] = z_low - 1.0, z_high + 1.5
+    stride = max(1, round(len(points) / COARSE_POINTS))
+    whole = Problem(points, log_background, plan_is_free)
+    thinned = whole._replace(points=np.ascontiguousarray(points[::stride]))
+    family = np.array([names.index(shape.name) for shape in shapes])
+    return Search(whole, thinned, tables(names), shapes, family, low, high)
+
+
+def kernel_range(z: np.ndarray) -> tuple[float, float]:
+    """Lowest and highest height but for one in a hundred and one in two hundred."""
+    ordered = np.sort(z)
+    return float(ordered[int(0.01 * len(z))]), float(ordered[len(z) - 1 - int(0.005 * len(z))])
+
+
+def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
+    """Starts of the voting types in the likely directions, after a few coarse steps: the best two of each type."""
+    points = search.thinned.points
+    by_slope, confidence = slope_direction(search.whole.points, COARSE_POINTS, 9)
+    if outline is None:
+        by_extent = rectangle_direction(points, 0.015, 30)
+        plan = lambda kappa: rectangle_in_direction(points, kappa, 0.02)  # noqa: E731
+    else:
+        by_extent = outline_direction(outline)
+        plan = lambda kappa: outline_rectangle(outline, kappa)  # noqa: E731
+    directions = [by_slope] if confidence > 0.15 else []
+    turn = (by_slope - by_extent + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    if not directions or abs(turn) > 0.06:
+        directions.append(by_extent)
+    rectangles = np.array([plan(kappa) for kappa in directions])
+    kinds, thetas, votes = kernel.vote_each(points, search.tables, rectangles)
+    candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 4)
+    return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, slack_of(search))
+
+
+def slack_of(search: Search) -> float:
+    """How far behind its type's best (nats, on the thinned points) a second candidate is still worth its time."""
+    return 3.0 + 0.05 * len(search.thinned.points)
+
+
+def anneal(search: Search, candidates: Candidates) -> Candidates:
+    """The best candidate of each type after medium steps on the thinned points and fine ones on all."""
+    candidates = search.minimised(search.thinned, candidates, MIDDLE, 5, 0.3)
+    return search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
+
+
+def derive(search: Search, basic: Candidates) -> Candidates:
+    """The best candidate of each type that starts from the fits of simpler ones."""
+    kinds, thetas = [], []
+    theta_of = {search.shapes[kind].name: theta for kind, theta in zip(basic.kinds, basic.thetas, strict=True)}
+    for t, shape in enumerate(search.shapes):
+        for start in shape.starts:
+            theta = theta_of[start.source].copy()
+            theta[Q0 : Q0 + len(start.q)] = [formula(q)(*theta_of[start.source][HALF_WIDTH:]) for q in start.q]
+            kinds.append(t)
+            thetas.append(theta)
+    candidates = Candidates(np.array(kinds, np.int64), np.reshape(thetas, (-1, 9)), np.zeros(len(kinds)))
+    if not kinds:
+        return candidates
+    candidates = search.minimised(search.thinned, candidates, Noise(0.25, 0.25, OUTLIERS_AT_FIRST), 4, 0.5)
+    candidates = search.best_of_type(candidates, 2, slack_of(search))
+    return search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
+
+
+def learn(search: Search, candidates: Candidates) -> tuple[Candidates, np.ndarray]:
+    """Candidates fitted together with their noise (m, 3) by EM."""
+    noises = np.tile([0.1, SIDE_TAU_M, OUTLIERS_AT_FIRST], (len(candidates.kinds), 1))
+    thetas = candidates.thetas.copy()
+    values, evaluations = kernel.estimate_each(
+        search.whole, search.tables, candidates.kinds, thetas, *search.box(candidates), noises, SIGMA_PRIOR, 3
+    )
+    return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations), noises
+
+
+def choose(search: Search, candidates: Candidates, log_prior: dict[str, float]) -> tuple[int, dict[str, float]]:
+    """(row of the most evident proper roof, BIC by type). The penalty is twice the textbook's: it is safest there."""
+    shapes = [search.shapes[kind] for kind in candidates.kinds]
+    sizes = np.array([shape.theta_size + 1 for shape in shapes])
+    evidence = candidates.values + sizes * np.log(len(search.whole.points))
+    evidence -= np.array([log_prior.get(shape.name, 0.0) for shape in shapes])
+    order = np.argsort(evidence, kind="stable")
+    bics = {shapes[row].name: 2 * float(evidence[row]) for row in order}
+    for row in order:
+        if shapes[row].is_proper(shapes[row].canonical_theta(candidates.thetas[row])):
+            return int(row), bics
+    return int(order[0]), bics
+
+
+def finish(
+    search: Search, winner: Candidates, noise: Noise, bics: dict[str, float], side_taus: tuple[float, ...]
+) -> Estimate:
+    """The winner with its sides sharpened and averaged, its heights fitted again, and its covariance."""
+    kind, theta, value = int(winner.kinds[0]), winner.thetas[0].copy(), float(winner.values[0])
+    (low,), (high,) = search.box(winner)
+    evaluations = winner.evaluations
+    variances = np.zeros(4)
+    if search.whole.plan_is_free:
+        if side_taus:
+            value, noise, more = kernel.sharpen_sides(
+                search.whole, search.tables, kind, theta, low, high, noise, SIGMA_PRIOR, np.array(side_taus)
+            )
+            evaluations += more
+        variances, more = settle_sides(search, kind, theta, low, high, noise)
+        evaluations += more
+    shape = search.shapes[kind]
+    canonical = shape.canonical_theta(theta)
+    if abs(np.sin(canonical[KAPPA] - theta[KAPPA])) > 0.5:  # the axes are exchanged, and their variances with them
+        variances = variances[[1, 0, 3, 2]]
+    covariance = covariance_of(search, kind, canonical, noise, variances)
+    return Estimate(shape, canonical, covariance, noise, value, bics, evaluations)
+
+
+def settle_sides(search, kind, theta, low, high, noise) -> tuple[np.ndarray, int]:
+    """Posterior means of the four sides, then heights, slopes and direction with them held; `theta` in place.
+
+    Returns (variances (4,) of centre u, centre v, V, U, evaluations).
+    """
+    hessian, inliers = kernel.height_hessian(search.whole, search.tables, kind, theta, noise)
+    c, s = np.cos(theta[KAPPA]), np.sin(theta[KAPPA])
+    size = search.tables.size[kind]
+    free = [k for k in range(size) if k not in (HALF_WIDTH, HALF_LENGTH)]
+    turned = np.eye(9)
+    turned[:2, :2] = [[c, -s], [s, c]]
+    information = (turned.T @ hessian @ turned)[np.ix_(free, free)] + 1e-4 * np.eye(len(free))
+    centre_precision = 1 / np.diag(np.linalg.inv(information))[:2]
+    variances = kernel.mean_sides(search.whole, search.tables, kind, theta, noise, centre_precision, inliers, SIDE_GRID)
+    low, high = low.copy(), high.copy()
+    low[PLAN] = high[PLAN] = theta[PLAN]
+    _, _, _, evaluations = kernel.minimise(search.whole, search.tables, kind, theta, low, high, noise, 4, 1e-3)
+    return variances, evaluations
+
+
+def covariance_of(search: Search, kind: int, theta: np.ndarray, noise: Noise, variances: np.ndarray) -> np.ndarray:
+    """Covariance (9, 9) of theta: the sides' own `variances` carried through the heights' inverse Hessian."""
+    hessian, _ = kernel.height_hessian(search.whole, search.tables, kind, theta, noise)
+    c, s = np.cos(theta[KAPPA]), np.sin(theta[KAPPA])
+    turn = np.eye(4)
+    turn[:2, :2] = [[c, -s], [s, c]]
+    first = KAPPA if search.whole.plan_is_free else Q0
+    heights = [k for k in range(first, search.tables.size[kind]) if k not in PLAN]
+    by_heights = np.linalg.inv(hessian[np.ix_(heights, heights)] + 1e-6 * np.eye(len(heights)))
+    response = -by_heights @ hessian[np.ix_(heights, PLAN)]
+    covariance = np.zeros((9, 9))
+    of_plan = turn @ np.diag(variances) @ turn.T
+    covariance[np.ix_(PLAN, PLAN)] = of_plan
+    covariance[np.ix_(heights, PLAN)] = response @ of_plan
+    covariance[np.ix_(PLAN, heights)] = (response @ of_plan).T
+    covariance[np.ix_(heights, heights)] = by_heights + response @ of_plan @ response.T
+    return covariance

@@ -1,0 +1,144 @@
+"""One primitive fitted to the points of one roof: the door to both objectives."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from ..errors import FitError, SettingsError
+from ..frames import LocalFrame
+from ..model import Fit
+from ..primitives import CATALOGUE, get
+from ..primitives.contract import HALF_WIDTH, KAPPA, placed
+from ..settings import Settings
+from .likelihood import Estimate, fit_likelihood
+
+FEWEST_POINTS = 4
+THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
+
+
+def fit_roof(
+    points: np.ndarray,
+    types: tuple[str, ...] | None = None,
+    outline: shapely.Polygon | None = None,
+    objective: str | None = None,
+    settings: Settings | None = None,
+    weights: np.ndarray | None = None,
+    type_log_prior: dict[str, float] | None = None,
+) -> Fit:
+    """The roof primitive that stands best for `points`.
+
+    points          (n, 3) metres in any frame; points that are not finite are dropped, and their order does not matter
+    types           names of the catalogue to choose among, all by default (or `settings.fit.types`)
+    outline         a given plan, in the frame of `points`: the roof covers its rectangle in the roof's own direction, and
+                    only heights, slopes and ridge are fitted, to the points inside it
+    objective       "likelihood" (default; fit/likelihood.py) or "paper" (fit/paper.py, the published method)
+    weights         (n,) probability of each point of being roof, 1 by default
+    type_log_prior  natural logarithm of each type's probability before its points are seen, 0 by default
+
+    Raises FitError where no roof can be determined: no or fewer than four finite points, all in one place or on a line.
+
+    >>> import numpy as np
+    >>> x, y = np.meshgrid(np.linspace(-6, 6, 25), np.linspace(-4, 4, 17))
+    >>> gable = np.stack([x.ravel(), y.ravel(), 8 - 0.7 * np.abs(y.ravel())], axis=1)
+    >>> fit = fit_roof(gable)
+    >>> fit.type, round(fit.parameters["height"], 1)
+    ('gable', 2.8)
+    """
+    settings = settings or Settings()
+    names = checked_types(types if types is not None else settings.fit.types)
+    objective = objective or settings.fit.objective
+    cloud = usable_points(points, weights, outline)
+    frame = LocalFrame.around(cloud)
+    local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
+    outline_local = None
+    if outline is not None:
+        outline_local = shapely.transform(outline, frame.to_local)
+    if objective == "paper":
+        from .paper import fit_paper
+
+        return fit_paper(local[:, :3], names, outline_local, frame)
+    if objective != "likelihood":
+        raise SettingsError(f"expected the objective likelihood or paper, got {objective!r}; likelihood is the default")
+    estimate = fit_likelihood(local, names, outline_local, settings.fit.side_softness_m, type_log_prior)
+    return as_fit(estimate, frame, len(local))
+
+
+def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
+    """`types` in the catalogue's order, each known; all of them for an empty tuple."""
+    if isinstance(types, str):
+        types = (types,)
+    for name in types:
+        get(name)
+    return tuple(name for name in CATALOGUE if not types or name in types)
+
+
+def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shapely.Polygon | None) -> np.ndarray:
+    """Finite points inside the outline as (n, 4) x, y, z, weight, in lexicographic order. Raises FitError for too few."""
+    points = np.asarray(points, float)
+    if points.ndim != 2 or points.shape[1] < 3:
+        raise FitError(f"expected points of shape (n, 3), got {points.shape}; give x, y and z in metres")
+    weights = np.ones(len(points)) if weights is None else np.asarray(weights, float)
+    if weights.shape != (len(points),) or not np.all((weights >= 0) & (weights <= 1)):
+        raise FitError(f"expected {len(points)} weights between 0 and 1, got shape {weights.shape}; give one a point")
+    finite = np.isfinite(points[:, :3]).all(axis=1)
+    cloud = np.column_stack([points[finite, :3], weights[finite]])
+    where = "finite points"
+    if outline is not None:
+        cloud = cloud[shapely.intersects_xy(outline, cloud[:, 0], cloud[:, 1])]
+        where = "finite points inside the outline"
+    if len(cloud) < FEWEST_POINTS:
+        raise FitError(
+            f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {len(cloud)} of {len(points)} given; "
+            "a flat roof at their median height is all that can be said"
+        )
+    cloud = cloud[np.lexsort(cloud.T[::-1])]
+    spread = np.linalg.svd(cloud[:, :2] - cloud[:, :2].mean(axis=0), compute_uv=False)
+    if spread[1] <= max(THINNEST * spread[0], 1e-9):
+        shape = "in one place" if spread[0] < 1e-6 else "on one line in plan"
+        raise FitError(f"expected points spread over a roof, got {len(cloud)} points {shape}; add points beside it")
+    return cloud
+
+
+def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
+    """The estimate in the words of the paper: theta_p, kappa, T_L, T_G, standard deviations, vertices and faces."""
+    shape = estimate.primitive
+    theta_p, kappa, translation = shape.from_theta(estimate.theta)
+    sigma = standard_deviations(estimate)
+    vertices = placed(shape.vertices(theta_p), kappa, translation)
+    return Fit(
+        type=shape.name,
+        parameters=theta_p,
+        kappa=kappa,
+        translation=translation,
+        global_translation=frame.origin,
+        sigma=sigma,
+        objective="likelihood",
+        value=estimate.value,
+        bic=estimate.bics[shape.name],
+        bics=estimate.bics,
+        points_used=points_used,
+        noise_m=estimate.noise.sigma,
+        outlier_share=estimate.noise.eps,
+        evaluations=estimate.evaluations,
+        part=shape.part(estimate.theta, sigma),
+        vertices=frame.to_world(vertices),
+        faces=shape.faces,
+    )
+
+
+def standard_deviations(estimate: Estimate) -> dict[str, float]:
+    """Standard deviation by name, by the delta method: gradients of the named formulas through theta's covariance."""
+    shape, covariance = estimate.primitive, estimate.covariance
+    values = estimate.theta[HALF_WIDTH:]
+    named = {**shape.measures, "t_z": shape.eave}
+    gradients = np.zeros((len(named), 9))
+    for row, measure in zip(gradients, named.values(), strict=True):
+        row[HALF_WIDTH:] = measure.gradient(values)
+    variances = np.einsum("ij,jk,ik->i", gradients, covariance, gradients)
+    sigma = {name: math.sqrt(max(variance, 0.0)) for name, variance in zip(named, variances, strict=True)}
+    for name, k in (("kappa", KAPPA), ("t_x", 0), ("t_y", 1)):
+        sigma[name] = math.sqrt(max(covariance[k, k], 0.0))
+    return sigma

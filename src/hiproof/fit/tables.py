@@ -1,0 +1,74 @@
+"""The catalogue as arrays for the compiled core: one row a variant, the planes' formulas as a list of terms."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+from ..primitives import CATALOGUE, Primitive
+from ..primitives.algebra import formula
+from ..primitives.contract import Vote
+from .kernel import MAX_PLANES, SIZE, Tables
+
+PLAN_LOW, PLAN_HIGH = (-np.inf, -np.inf, -np.inf, 0.6, 0.6), (np.inf, np.inf, np.inf, 150.0, 150.0)
+
+
+@cache
+def variants(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[Primitive, ...]:
+    """All variants of the primitives called `names`, in the order of the tables' rows."""
+    return tuple(variant for name in names for variant in CATALOGUE[name].variants)
+
+
+@cache
+def tables(names: tuple[str, ...] = tuple(CATALOGUE)) -> Tables:
+    """The term table of the variants of `names`. Raises ValueError for a shape with more planes than the core holds."""
+    return tabulate(variants(names))
+
+
+def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
+    """The term table of `shapes`, one row each."""
+    if any(len(shape.planes) > MAX_PLANES for shape in shapes):
+        raise ValueError(f"expected at most {MAX_PLANES} planes a primitive; raise kernel.MAX_PLANES for more")
+    factors, targets, powers, first_term = [], [], [], [0]
+    for shape in shapes:
+        for j, plane in enumerate(shape.planes):
+            for coefficient, expression in enumerate(plane):
+                for factor, power in formula(expression).terms:
+                    factors.append(factor)
+                    targets.append(3 * j + coefficient)
+                    powers.append(power)
+        first_term.append(len(factors))
+    votes = [shape.vote or Vote(0, (), ()) for shape in shapes]
+    return Tables(
+        size=np.array([shape.theta_size for shape in shapes]),
+        planes=np.array([len(shape.planes) for shape in shapes]),
+        strips=np.array([shape.strips for shape in shapes]),
+        first_term=np.array(first_term),
+        factor=np.array(factors, float),
+        target=np.array(targets),
+        power=np.array(powers),
+        turns=np.array([vote.turns for vote in votes]),
+        slopes=padded([vote.slopes for vote in votes]),
+        shifts=padded([vote.shifts for vote in votes]),
+    )
+
+
+def padded(rows: list[tuple[float, ...]]) -> np.ndarray:
+    """`rows` as one array, NaN where a row is shorter than the longest."""
+    result = np.full((len(rows), max(len(row) for row in rows)), np.nan)
+    for k, row in enumerate(rows):
+        result[k, : len(row)] = row
+    return result
+
+
+@cache
+def bounds(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[np.ndarray, np.ndarray]:
+    """(low, high), each (T, 9): the box of theta for every variant; q0 is left to the data."""
+    shapes = variants(names)
+    low, high = np.full((len(shapes), SIZE), -np.inf), np.full((len(shapes), SIZE), np.inf)
+    low[:, : len(PLAN_LOW)], high[:, : len(PLAN_HIGH)] = PLAN_LOW, PLAN_HIGH
+    for t, shape in enumerate(shapes):
+        for k, (smallest, largest) in enumerate(shape.bounds):
+            low[t, 6 + k], high[t, 6 + k] = smallest, largest
+    return low, high
