@@ -564,14 +564,15 @@ def mode(values, bin_m, counts):
 
 
 @njit(cache=True)
-def vote(points, tables, kind, theta, space, heights, counts):
+def vote(problem, tables, kind, theta, space, heights, counts):
     """Best slope and height of `kind` in the plan of `theta` (in place): a small Hough transform. Returns the votes."""
+    points = problem.points
     best, best_slope, best_shift, best_z = -1, 0.0, 0.0, 0.0
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     theta[Q0:] = 0.0
     for shift in tables.shifts[kind]:
         for slope in tables.slopes[kind]:
-            if math.isnan(shift) or math.isnan(slope):
+            if math.isnan(shift) or math.isnan(slope) or (shift != 0.0 and not problem.plan_is_free):
                 continue
             for k in range(Q0 + 1, tables.size[kind]):
                 theta[k] = slope
@@ -593,14 +594,14 @@ def vote(points, tables, kind, theta, space, heights, counts):
 
 
 @njit(cache=True)
-def vote_each(points, tables, rectangles):
+def vote_each(problem, tables, rectangles):
     """Starts of every voting variant in every plan of `rectangles` (d, 5): cx, cy, kappa, V, U, and in its quarter turns.
 
     Returns (kinds (m,), thetas (m, 9), votes (m,)).
     """
     limit = len(rectangles) * tables.turns.sum()
     kinds, thetas, votes = np.empty(limit, np.int64), np.zeros((limit, SIZE)), np.empty(limit)
-    space, heights, counts = new_space(), np.empty(len(points)), np.zeros(400, np.int64)
+    space, heights, counts = new_space(), np.empty(len(problem.points)), np.zeros(400, np.int64)
     found = 0
     for rectangle in rectangles:
         for kind in range(len(tables.size)):
@@ -611,6 +612,6 @@ def vote_each(points, tables, rectangles):
                 if turn % 2 == 1:
                     theta[HALF_WIDTH], theta[HALF_LENGTH] = rectangle[HALF_LENGTH], rectangle[HALF_WIDTH]
                 kinds[found] = kind
-                votes[found] = vote(points, tables, kind, theta, space, heights, counts)
+                votes[found] = vote(problem, tables, kind, theta, space, heights, counts)
                 found += 1
     return kinds[:found], thetas[:found], votes[:found]

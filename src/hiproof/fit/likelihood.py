@@ -163,22 +163,35 @@ def kernel_range(z: np.ndarray) -> tuple[float, float]:
 
 def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
     """Starts of the voting types in the likely directions, after a few coarse steps: the best two of each type."""
-    points = search.thinned.points
-    by_slope, confidence = slope_direction(search.whole.points, COARSE_POINTS, 9)
-    if outline is None:
-        by_extent = rectangle_direction(points, 0.015, 30)
-        plan = lambda kappa: rectangle_in_direction(points, kappa, 0.02)  # noqa: E731
-    else:
-        by_extent = outline_direction(outline)
-        plan = lambda kappa: outline_rectangle(outline, kappa)  # noqa: E731
-    directions = [by_slope] if confidence > 0.15 else []
-    turn = (by_slope - by_extent + np.pi / 4) % (np.pi / 2) - np.pi / 4
-    if not directions or abs(turn) > 0.06:
-        directions.append(by_extent)
-    rectangles = np.array([plan(kappa) for kappa in directions])
-    kinds, thetas, votes = kernel.vote_each(points, search.tables, rectangles)
+    rectangles = np.array(
+        [
+            rectangle_in_direction(search.thinned.points, kappa, 0.02)
+            if outline is None
+            else outline_rectangle(outline, kappa)
+            for kappa in directions(search, outline)
+        ]
+    )
+    kinds, thetas, votes = kernel.vote_each(search.thinned, search.tables, rectangles)
     candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 4)
     return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, slack_of(search))
+
+
+def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
+    """Likely directions (rad, modulo a quarter turn): of the slopes, and of the plan where that is another one.
+
+    A given outline's own direction stands for both where they are close.
+    """
+    by_slope, confidence = slope_direction(search.whole.points, COARSE_POINTS, 9)
+    if outline is None:
+        by_plan = rectangle_direction(search.thinned.points, 0.015, 30)
+    else:
+        by_plan = outline_direction(outline)
+    if confidence <= 0.15:
+        return [by_plan]
+    turn = (by_slope - by_plan + np.pi / 4) % (np.pi / 2) - np.pi / 4
+    if abs(turn) > 0.06:
+        return [by_slope, by_plan]
+    return [by_slope if outline is None else by_plan]
 
 
 def slack_of(search: Search) -> float:

@@ -1,0 +1,163 @@
+"""fit_roof as its users meet it: laws of recovery and equivariance, evidence, and bad input."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.errors import FitError, SettingsError
+from hiproof.fit import fit_roof
+from hiproof.primitives import CATALOGUE
+from points_of_roofs import points_on, typical_theta
+
+NAMES = tuple(CATALOGUE)
+
+
+@pytest.fixture(scope="module")
+def gable_points():
+    return points_on("gable", typical_theta("gable"), outlier_share=0.03)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_generated_roof_is_recovered_with_its_type(name):
+    theta = typical_theta(name, height=1.5 if name == "shed" else 3.0, teeth=3 if name == "shed" else None)
+    fit = fit_roof(points_on(name, theta, density=6.0, teeth=3))
+    assert fit.type == name
+    truth = CATALOGUE[name].variant({"teeth": 3}) if name == "shed" else CATALOGUE[name]
+    theta_p, kappa, translation = truth.from_theta(truth.canonical_theta(theta))
+    for key, value in theta_p.items():
+        assert fit.parameters[key] == pytest.approx(value, abs=0.35), key
+    assert np.sin(fit.kappa - kappa) == pytest.approx(0, abs=0.02)
+    np.testing.assert_allclose(fit.translation + fit.global_translation, translation, atol=0.2)
+    assert fit.noise_m == pytest.approx(0.05, abs=0.03)
+
+
+def test_errors_are_a_few_standard_deviations():
+    theta = typical_theta("hip")
+    truth, _, _ = CATALOGUE["hip"].from_theta(theta)
+    scores = []
+    for seed in range(20):
+        fit = fit_roof(points_on("hip", theta, seed=seed), types=("hip",))
+        scores.append([(fit.parameters[key] - value) / fit.sigma[key] for key, value in truth.items()])
+    assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.5)
+
+
+def test_order_of_points_does_not_matter(gable_points):
+    shuffled = np.random.default_rng(0).permutation(gable_points)
+    first, second = fit_roof(gable_points), fit_roof(shuffled)
+    assert first.parameters == second.parameters and first.bics == second.bics
+    np.testing.assert_array_equal(first.vertices, second.vertices)
+
+
+@pytest.mark.parametrize("name", ["gable", "hip", "half_hip"])
+def test_the_fit_moves_with_the_points(name):
+    points = points_on(name, typical_theta(name))
+    shift = np.array([1e7, -1e7, 500.0])
+    moved = fit_roof(points + shift)
+    still = fit_roof(points)
+    np.testing.assert_allclose(moved.vertices - shift, still.vertices, atol=2e-3)
+
+
+@pytest.mark.parametrize("name", ["gable", "hip", "half_hip"])
+def test_the_fit_turns_with_the_points(name):
+    points = points_on(name, typical_theta(name))
+    c, s = np.cos(1.1), np.sin(1.1)
+    turn = np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+    still, turned = fit_roof(points), fit_roof(points @ turn)
+    assert turned.type == still.type
+    assert turned.parameters == pytest.approx(still.parameters, abs=0.02)
+    np.testing.assert_allclose(
+        shapely.centroid(shapely.MultiPoint(turned.vertices[:, :2])).coords[0],
+        (still.vertices @ turn)[:, :2].mean(axis=0),
+        atol=0.02,
+    )
+
+
+def test_outline_gives_the_plan_and_only_heights_are_fitted():
+    theta = typical_theta("gable", kappa=0.4)
+    points = points_on("gable", theta, density=4.0)
+    plan = CATALOGUE["gable"].part(theta).pieces[0].outline.buffer(0.8, join_style="mitre")
+    around = np.random.default_rng(2).uniform(-12, 12, (60, 3))
+    fit = fit_roof(np.vstack([points, around]), types=("gable",), outline=plan)
+    assert fit.parameters["width"] == pytest.approx(8 + 1.6, abs=0.02)
+    assert fit.parameters["length"] == pytest.approx(13 + 1.6, abs=0.02)
+    assert fit.parameters["height"] / (fit.parameters["width"] / 2) == pytest.approx(0.75, abs=0.03)
+    assert fit.sigma["width"] == 0
+    assert fit.points_used < len(points) + 60
+
+
+def test_height_at_and_vertices_agree(gable_points):
+    fit = fit_roof(gable_points)
+    inside = fit.vertices.mean(axis=0) + 0.98 * (fit.vertices - fit.vertices.mean(axis=0))
+    heights = fit.height_at(inside[:, :2])
+    assert np.abs(heights - fit.vertices[:, 2]).max() < 0.2
+    assert np.isnan(fit.height_at(np.array([[1e3, 1e3]]))).all()
+
+
+def test_weights_take_a_tree_out_of_the_roof():
+    theta = typical_theta("gable", kappa=0.0)
+    roof = points_on("gable", theta)
+    tree = np.random.default_rng(3).normal((8.0, 0.0, 6.0), (1.0, 2.0, 1.0), (150, 3))
+    weights = np.concatenate([np.ones(len(roof)), np.full(len(tree), 0.01)])
+    fit = fit_roof(np.vstack([roof, tree]), weights=weights)
+    assert fit.type == "gable"
+    assert fit.parameters["length"] == pytest.approx(13.0, abs=0.2)
+
+
+def test_log_prior_decides_between_what_points_cannot():
+    level = points_on("flat", typical_theta("flat"), density=1.0)
+    assert fit_roof(level, types=("flat", "gable")).type == "flat"
+    prior = {"gable": 0.0, "flat": -1e4}
+    assert fit_roof(level, types=("flat", "gable"), type_log_prior=prior).type == "gable"
+
+
+def test_types_narrow_the_choice(gable_points):
+    fit = fit_roof(gable_points, types=("half_hip", "flat"))
+    assert set(fit.bics) <= {"half_hip", "flat"}
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 3])
+def test_too_few_points_are_one_sentence(count):
+    with pytest.raises(FitError, match=f"expected at least 4 finite points .* got {count} of {count}"):
+        fit_roof(np.arange(3.0 * count).reshape(-1, 3) ** 2)
+
+
+@pytest.mark.parametrize("count", [4, 5, 8])
+def test_four_points_and_more_have_a_fit(count):
+    points = points_on("flat", typical_theta("flat"), density=1.0)[:count]
+    assert np.isfinite(fit_roof(points).vertices).all()
+
+
+def test_coincident_points_are_refused():
+    with pytest.raises(FitError, match="20 points in one place"):
+        fit_roof(np.tile([5.0, 6.0, 7.0], (20, 1)))
+
+
+def test_points_on_a_line_are_refused():
+    line = np.linspace(0, 10, 30)[:, None] * [1.0, 2.0, 0.1]
+    with pytest.raises(FitError, match="30 points on one line"):
+        fit_roof(line)
+
+
+def test_points_that_are_not_finite_are_dropped(gable_points):
+    spoilt = np.vstack([gable_points, [[np.nan, 0, 0], [0, np.inf, 0], [0, 0, -np.inf]]])
+    fit = fit_roof(spoilt)
+    assert fit.points_used == len(gable_points)
+    assert fit.parameters == fit_roof(gable_points).parameters
+    with pytest.raises(FitError, match="got 0 of 9 given"):
+        fit_roof(np.full((9, 3), np.nan))
+
+
+def test_wrong_shapes_names_and_weights_are_refused(gable_points):
+    with pytest.raises(FitError, match=r"shape \(n, 3\)"):
+        fit_roof(gable_points[:, :2])
+    with pytest.raises(FitError, match="weights between 0 and 1"):
+        fit_roof(gable_points, weights=np.full(len(gable_points), 2.0))
+    with pytest.raises(SettingsError, match="expected a roof type"):
+        fit_roof(gable_points, types=("onion",))
+    with pytest.raises(SettingsError, match="likelihood or paper"):
+        fit_roof(gable_points, objective="magic")
+
+
+def test_an_outline_without_points_is_refused(gable_points):
+    with pytest.raises(FitError, match="inside the outline"):
+        fit_roof(gable_points, outline=shapely.box(100, 100, 110, 110))
