@@ -47,7 +47,7 @@ viewer.addLayer("LINES", mesh.edges, new Uint8Array(mesh.edges.length / 3 * 4).m
 const cloudColours = new Uint8Array(4 * distances.length).fill(255);
 distances.forEach((value, i) => cloudColours.set(rgb(residualColour(value)), 4 * i));
 const cloud = viewer.addLayer("POINTS", places, cloudColours);
-if (!viewer.gl) document.querySelector(".hint").textContent = "This browser offers no WebGL, so there is no 3D view; the map shows all buildings.";
+if (!viewer.gl) document.getElementById("hint").textContent = "This browser offers no WebGL, so there is no 3D view; the map shows all buildings.";
 
 const map = document.getElementById("map"), svg = "http://www.w3.org/2000/svg";
 const marks = data.buildings.map((building, index) => building.rings.length ? outlineOf(building, index) : buttonOf(building, index));

@@ -1,0 +1,178 @@
+"""The report as text, and as a browser shows it: headless Chromium opens the page, clicks, and dumps what came of it."""
+
+import json
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import typer
+
+from hiproof.cli.report import report
+from hiproof.errors import HiproofError
+from hiproof.evaluate.report import embedded, report_html
+from hiproof.evaluate.report_pictures import RESIDUAL_STOPS, histogram, residual_bins
+from hiproof.evaluate.run import evaluate_run
+from sample_models import sample_points, write_sample_run
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
+
+LISTEN = """<script>
+const faults = [];
+window.addEventListener("error", event => faults.push(String(event.message)));
+for (const level of ["error", "warn"]) console[level] = (...texts) => faults.push(texts.join(" "));
+HTMLCanvasElement.prototype.setPointerCapture = () => {};  // knows no pointers that scripts invent
+</script>"""
+
+ACT = """<script>
+const say = {}, details = () => document.getElementById("details").textContent;
+say.marks = document.querySelectorAll("[data-building]").length;
+document.querySelector('#map [data-building="0"]').dispatchEvent(new MouseEvent("click"));
+say.afterMapClick = details();
+say.webgl = Boolean(viewer.gl);
+const top3 = index => { let best = [0, 0, -1];
+  for (let t = 0; t < mesh.owner.length; t++) if (mesh.owner[t] === index && mesh.roof[t]) {
+    best = [0, 1, 2].map(k => (mesh.corners[9 * t + k] + mesh.corners[9 * t + 3 + k] + mesh.corners[9 * t + 6 + k]) / 3); }
+  return best; };
+const at = viewer.project(top3(1)), box = viewer.canvas.getBoundingClientRect();
+for (const kind of ["pointerdown", "pointerup"]) viewer.canvas.dispatchEvent(new PointerEvent(kind,
+  { clientX: box.left + at[0], clientY: box.top + at[1], button: 0, buttons: 1, pointerId: 1 }));
+say.afterSceneClick = details();
+const before = document.querySelector('#map [data-building="0"]').getAttribute("fill");
+for (const value of ["residual", "status", "type"]) {
+  const mode = document.getElementById("mode"); mode.value = value; mode.dispatchEvent(new Event("change"));
+  say[value] = document.querySelector('#map [data-building="0"]').getAttribute("fill");
+}
+say.before = before;
+document.querySelector("[data-select]").click();
+say.afterWorstClick = details();
+say.faults = faults;
+const result = document.createElement("pre"); result.id = "said"; result.textContent = JSON.stringify(say);
+document.body.append(result);
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run")
+    write_sample_run(folder)
+    np.savetxt(folder / "points.xyz", sample_points(), fmt="%.3f")
+    return evaluate_run(folder, [str(folder / "points.xyz")])
+
+
+@pytest.fixture(scope="module")
+def page(run):
+    return report_html(run, "a <sample> run")
+
+
+def in_browser(page, folder, *flags):
+    """What the script ACT saw of the page in headless Chromium."""
+    acting = page.replace("<head>", "<head>" + LISTEN, 1).replace("</body>", ACT + "</body>", 1)
+    (folder / "page.html").write_text(acting)
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    command += [
+        f"--user-data-dir={folder / 'profile'}",
+        "--window-size=1500,1200",
+        "--virtual-time-budget=3000",
+        *flags,
+    ]
+    done = subprocess.run(
+        [*command, "--dump-dom", (folder / "page.html").as_uri()], capture_output=True, text=True, timeout=120
+    )
+    said = re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.DOTALL)
+    assert said, f"the page's scripts did not run to their end: {done.stderr[-2000:]}"
+    return json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+
+
+@pytest.fixture(scope="module")
+def said(page, tmp_path_factory):
+    return in_browser(page, tmp_path_factory.mktemp("browser"), "--enable-unsafe-swiftshader")
+
+
+@needs_browser
+def test_no_script_errs_or_complains(said):
+    assert said["faults"] == []
+
+
+@needs_browser
+def test_every_building_of_the_run_is_shown(said, run):
+    assert said["marks"] == len(run.models)
+
+
+@needs_browser
+def test_a_click_on_the_map_shows_the_building(said):
+    assert "house-1" in said["afterMapClick"] and "rf_volume_lod22" in said["afterMapClick"]
+
+
+@needs_browser
+def test_a_click_in_the_scene_shows_the_building_under_it(said):
+    assert said["webgl"] and "block 2" in said["afterSceneClick"]
+
+
+@needs_browser
+def test_the_worst_leads_to_its_building(said):
+    assert "block 2" in said["afterWorstClick"]
+
+
+@needs_browser
+def test_the_colours_follow_the_choice(said):
+    assert said["type"] == said["before"] and len({said["residual"], said["status"], said["type"]}) == 3
+
+
+@needs_browser
+def test_without_webgl_the_map_still_works(page, tmp_path):
+    said = in_browser(page, tmp_path, "--disable-3d-apis")
+    assert not said["webgl"] and said["marks"] == 3 and "house-1" in said["afterMapClick"] and not said["faults"]
+
+
+def test_nothing_in_the_page_asks_the_network(page):
+    outside = {name for name in re.findall(r"https?://[^\s\"'<>\\]+", page)}
+    assert outside <= {"http://www.w3.org/2000/svg"}
+    assert not re.search(r"<(link|script|img)[^>]+(src|href)=[\"'](?!data:)", page)
+
+
+def test_names_from_the_data_cannot_become_markup(run):
+    wicked = replace(run.models[0], id="</script><img src=x>")
+    page = report_html(replace(run, models=(wicked, *run.models[1:])), "<b>")
+    assert "<img" not in page and "&lt;b&gt;" in page
+    assert json.loads(embedded(["</script>"])) == ["</script>"]
+
+
+def test_text_of_the_data_is_not_taken_for_a_place_in_the_page(run):
+    page = report_html(run, "<!--data-->")
+    assert page.count('"buildings":[') == 1
+
+
+def test_a_run_without_points_is_reported_too(tmp_path):
+    write_sample_run(tmp_path)
+    app = typer.Typer()
+    app.command()(report)
+    app([str(tmp_path)], standalone_mode=False)
+    page = (tmp_path / "report.html").read_text()
+    assert "no residuals" in page and "no points given" in page
+
+
+def test_an_empty_run_makes_a_page(tmp_path):
+    head = {"type": "CityJSON", "version": "2.0", "CityObjects": {}, "vertices": []}
+    (tmp_path / "buildings.city.jsonl").write_text(json.dumps(head) + "\n")
+    assert "0 buildings" in report_html(evaluate_run(tmp_path))
+
+
+def test_a_folder_that_is_no_run_is_refused(tmp_path):
+    with pytest.raises(HiproofError, match="hiproof reconstruct"):
+        report(tmp_path)
+
+
+def test_residual_colours_begin_at_their_stops():
+    distances = np.array([stop for stop, _ in RESIDUAL_STOPS])
+    assert residual_bins(distances).tolist() == list(range(len(RESIDUAL_STOPS)))
+    assert residual_bins(np.array([0.049, 99.0, np.inf])).tolist() == [0, 4, 4]
+
+
+@pytest.mark.parametrize("values", [[], [np.nan], [1.0], [2.0, 2.0]])
+def test_histograms_of_next_to_nothing(values):
+    assert histogram(np.array(values), "x", "m").startswith("<figure>")
