@@ -1,0 +1,89 @@
+"""How long writing takes a building, by format, and how memory grows with the number of buildings.
+
+    python -m benchmarks.writing [COUNT]
+
+Generated roofs of every type, composed once, are written COUNT times over (default 2000) to a temporary folder. Prints CPU
+milliseconds a building (median of five runs) for each writer, given the solid's figures, and the process's peak memory
+after COUNT / 10 and after COUNT buildings.
+"""
+
+import resource
+import statistics
+import sys
+import tempfile
+import time
+from dataclasses import replace
+from itertools import cycle, islice
+from pathlib import Path
+
+import numpy as np
+
+from hiproof.compose import compose
+from hiproof.model import Building, Quality
+from hiproof.simulate import ROOF_TYPES, random_building
+from hiproof.status import Status
+from hiproof.write import AttributesWriter, CityGMLWriter, CityJSONWriter, ParametersWriter, roof_figures, write_all
+
+WRITERS = {
+    "buildings.gml": CityGMLWriter,
+    "buildings.city.jsonl": CityJSONWriter,
+    "parameters.jsonl": ParametersWriter,
+    "buildings.gpkg": AttributesWriter,
+}
+
+
+def generated(seed=0):
+    """One building of each roof type, in world coordinates."""
+    rng = np.random.default_rng(seed)
+    for type in ROOF_TYPES:
+        made = random_building(rng, type)
+        origin = made.roof.frame.origin
+        solid = compose(made.roof, 0.0).moved(origin)
+        quality = Quality(300, 5.0, 0.05, 0.04, 0.06, 0.1, 0.99, 0.95, 0.02, 0.0)
+        yield Building(type, Status.MODELLED, "", made.roof, solid, quality, float(origin[2]), "simulated")
+
+
+def street(buildings, count):
+    """`count` buildings with ids of their own."""
+    return (replace(building, id=f"b{n}") for n, building in enumerate(islice(cycle(buildings), count)))
+
+
+def cpu_ms(work, count, runs=5):
+    times = []
+    for _ in range(runs):
+        start = time.process_time()
+        work()
+        times.append((time.process_time() - start) / count * 1e3)
+    return statistics.median(times)
+
+
+def write_with(writer, path, pairs):
+    with writer(path) as out:
+        for building, figures in pairs:
+            out.add(building, figures)
+
+
+def peak_mb():
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+
+
+def main(count):
+    buildings = list(generated())
+    with tempfile.TemporaryDirectory() as folder:
+        for size in (count // 10, count):
+            write_all(folder, street(buildings, size), "EPSG:7415")
+            print(f"peak memory after {size} buildings: {peak_mb():.0f} MB")
+        some = list(street(buildings, 500))
+        figures = [roof_figures(building.solid) for building in some]
+        total = cpu_ms(lambda: [roof_figures(building.solid) for building in some], len(some))
+        print(f"{'figures of the solid':22} {total:.3f} ms")
+        for name, writer in WRITERS.items():
+            pairs = list(zip(some, figures, strict=True))
+            spent = cpu_ms(lambda w=writer, n=name, p=pairs: write_with(w, Path(folder, n), p), len(some))
+            total += spent if name != "buildings.gpkg" else 0.0
+            print(f"{name:22} {spent:.3f} ms")
+        print(f"{'without the table':22} {total:.3f} ms")
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]) if len(sys.argv) > 1 else 2000)
