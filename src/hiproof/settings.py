@@ -30,9 +30,6 @@ class ReadSettings:
         0.0, "without footprints: clear space that separates buildings; 0 adapts it to the density", "m", 0.0, 20.0
     )
     split_min_points: int = setting(30, "without footprints: groups of fewer points are no building", "", 3, 100000)
-    ground_reach_m: float = setting(
-        50.0, "terrain is unknown farther than this from any ground point", "m", 1.0, 1000.0
-    )
 
 
 @dataclass(frozen=True)

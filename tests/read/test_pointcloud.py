@@ -190,6 +190,10 @@ def damaged(tmp_path, kind):
         raw = bytearray(write_las(path, xyz, classes).read_bytes())
         raw[600:4000:3] = bytes(len(raw[600:4000:3]))
         path.write_bytes(raw)
+    elif kind == "missing records":
+        raw = bytearray(write_copc(path, xyz, classes).read_bytes())
+        struct.pack_into("<I", raw, 243, 4_000_000_000)
+        path.write_bytes(raw)
     elif kind == "text as laz":
         path.write_text("1 2 3\n4 5 6\n")
     elif kind == "empty":
@@ -231,20 +235,12 @@ def damaged(tmp_path, kind):
 
 
 BAD = {
-    **{
-        "truncated laz": "truncated",
-        "truncated las": "truncated",
-        "header only": "truncated",
-        "garbled laz": "truncated",
-    },
-    **{"text as laz": "rename it to .xyz", "empty": "an empty file", "zero points": "got none"},
-    **{
-        "missing": "no such file",
-        "empty folder": "point files in the folder",
-        "truncated ply": "the file is truncated",
-    },
-    **{"ply of faces": "'face' before the vertices", "ply without end": "does not end", "prose": "Dear reader"},
-    **{"word among numbers": "after 0 points", "two columns": "nothing like a point", "binary text": "binary data"},
+    **dict.fromkeys(("truncated laz", "truncated las", "header only", "garbled laz"), "truncated"),
+    **{"missing records": "4000000000 records", "text as laz": "rename it to .xyz", "empty": "an empty file"},
+    **{"missing": "no such file", "empty folder": "point files in the folder", "zero points": "got none"},
+    **{"truncated ply": "the file is truncated", "ply of faces": "'face' before the vertices"},
+    **{"ply without end": "does not end", "prose": "Dear reader", "word among numbers": "after 0 points"},
+    **{"two columns": "nothing like a point", "binary text": "binary data"},
     **{"degrees": "in degree", "feet": "survey foot", "other ending": r"ending in \.jpg"},
 }
 

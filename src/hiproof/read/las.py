@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +14,7 @@ import numpy as np
 from ..errors import InputError, InputWarning
 
 Chunk = tuple[np.ndarray, np.ndarray | None]  # xyz (n, 3) float64, classification (n,) uint8 or None
+EVLR_HEADER_BYTES = 60
 
 
 @contextmanager
@@ -35,8 +37,23 @@ def explained(path: str | Path) -> Iterator[None]:
 
 def read_las_header(path: str | Path) -> laspy.LasHeader:
     """The header of a LAS, LAZ or COPC file. Raises InputError when it cannot be read."""
+    refuse_missing_records(path)
     with explained(path), laspy.open(path) as reader:
         return reader.header
+
+
+def refuse_missing_records(path: str | Path) -> None:
+    """Raise InputError where LAS 1.4's extended records reach beyond the file: laspy would read on, billions of times."""
+    if is_url(path):
+        return
+    with explained(path), open(path, "rb") as file:
+        head = file.read(247)
+        size = file.seek(0, 2)
+        if len(head) < 247 or head[25] < 4:
+            return
+        start, count = struct.unpack_from("<QI", head, 235)
+        if count and start + EVLR_HEADER_BYTES * count > size:
+            raise ValueError(f"its header tells of {count} records from byte {start} on, the file has {size} bytes")
 
 
 def las_crs(header: laspy.LasHeader, path: str | Path):
@@ -58,7 +75,7 @@ def las_chunks(path: str | Path, chunk_points: int, box: tuple[float, float, flo
     selection = laspy.DecompressionSelection
     wanted = selection.base() | selection.Z | selection.CLASSIFICATION | selection.FLAGS
     found = 0
-    with explained(path), laspy.open(path, decompression_selection=wanted) as reader:
+    with explained(path), laspy.open(path, decompression_selection=wanted, read_evlrs=False) as reader:
         expected = reader.header.point_count
         for record in reader.chunk_iterator(chunk_points):
             found += len(record)
@@ -84,6 +101,7 @@ def is_url(path: str | Path) -> bool:
 
 
 def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chunk:
+    refuse_missing_records(path)
     with explained(path), laspy.CopcReader.open(str(path)) as reader:
         low, high = reader.header.mins[2], reader.header.maxs[2]
         bounds = laspy.copc.Bounds(np.array([box[0], box[1], low]), np.array([box[2], box[3], high]))
