@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from ..errors import HiproofError
+
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="Simulated towns with their truth.")
 
 
@@ -16,13 +18,34 @@ def neighbourhood(
     """The demo's neighbourhood: every roof type and several compounds."""
     from .neighbourhood import write_neighbourhood
 
-    counts = write_neighbourhood(out, seed)
+    try:
+        counts = write_neighbourhood(out, seed)
+    except HiproofError as error:
+        typer.echo(f"error: {error}", err=True)
+        raise typer.Exit(2) from error
     typer.echo(f"{counts['buildings']} buildings, {counts['points']} points in {out}")
 
 
-@app.callback()
-def main() -> None:
-    pass
+@app.command()
+def city(
+    out: Annotated[Path, typer.Argument(help="new folder for tiles/*.laz, footprints.gpkg and truth.jsonl")],
+    buildings: Annotated[int, typer.Option(help="how many buildings")] = 10000,
+    density: Annotated[float, typer.Option(help="points per square metre")] = 5.0,
+    tile: Annotated[float, typer.Option(help="side of a tile in metres")] = 500.0,
+    seed: Annotated[int, typer.Option(help="the same seed gives the same city")] = 0,
+) -> None:
+    """A city of any size, tile by tile."""
+    from .city import City, write_city
+
+    total = 0
+    try:
+        for counts in write_city(out, City(buildings, seed, density, tile)):
+            total += counts["points"]
+            typer.echo(f"{counts['tile']}: {counts['buildings']} buildings, {counts['points']} points")
+    except HiproofError as error:
+        typer.echo(f"error: {error}", err=True)
+        raise typer.Exit(2) from error
+    typer.echo(f"{buildings} buildings, {total} points in {out}")
 
 
 if __name__ == "__main__":

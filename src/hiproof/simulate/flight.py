@@ -31,9 +31,14 @@ class Beams:
 
 @dataclass(frozen=True)
 class Swath:
-    """One pass: flight `heading` (rad), spacings (m) of lines and of points on a line, tangent of the scan angle over
-    the centre and its growth a metre across track (1 / flying height), `pairing` 0-1 of an oscillating mirror, `edges`
-    (m across track, relative to the centre) between which the swath lies, `shift` (3,) registration error."""
+    """One pass over a disc.
+
+    Flight `heading` (rad); spacings (m) of lines and of points on a line; tangent of the scan angle over the disc's
+    centre and its growth a metre across track (1 / flying height); `pairing` 0-1 of an oscillating mirror; `edges` (m
+    across track, relative to the centre) between which the swath lies; `shift` (3,) registration error. `anchor` is
+    the centre's place (along, across) in the flight's own axes, so that discs side by side continue each other's
+    lines; without it the lines' phases are drawn.
+    """
 
     heading: float
     line_spacing: float
@@ -43,6 +48,7 @@ class Swath:
     pairing: float = 0.0
     edges: tuple[float, float] = (-math.inf, math.inf)
     shift: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    anchor: tuple[float, float] | None = None
 
 
 def random_swaths(
@@ -80,21 +86,33 @@ def random_swaths(
 def beams_of(rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius: float, z_ref: float) -> Beams:
     """Beams of `swath` that cross the disc of `radius` about `centre` (2,) at height `z_ref`."""
     cosine, sine = math.cos(swath.heading), math.sin(swath.heading)
-    lines = int(2 * radius / swath.line_spacing) + 2
-    steps = int(2 * radius / swath.point_spacing) + 2
-    index = np.arange(lines)
-    along_lines = (index + swath.pairing * 0.5 * (index % 2) + rng.random()) * swath.line_spacing - radius
-    across_steps = np.arange(steps) * swath.point_spacing - radius
-    jitter = rng.normal(0.0, 0.07, (2, lines, steps))
-    phase = rng.random((lines, 1)) * swath.point_spacing
+    along_lines, phase, across_steps = _lattice(rng, swath, radius)
+    jitter = rng.normal(0.0, 0.07, (2, len(along_lines), len(across_steps)))
     along = (along_lines[:, None] + swath.line_spacing * jitter[0]).ravel()
-    across = (across_steps + phase + swath.point_spacing * jitter[1]).ravel()
+    across = (across_steps + swath.point_spacing * (phase[:, None] + jitter[1])).ravel()
     keep = (along**2 + across**2 < radius**2) & (across >= swath.edges[0]) & (across < swath.edges[1])
     along, across = along[keep], across[keep]
     xy_ref = np.column_stack([cosine * along - sine * across, sine * along + cosine * across]) + centre
     tan = swath.tan_angle + swath.tan_growth * across
     slope = tan[:, None] * (sine, -cosine)
     return Beams(xy_ref - slope * z_ref, slope, np.broadcast_to(swath.shift, (len(tan), 3)))
+
+
+def _lattice(rng: np.random.Generator, swath: Swath, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Scan lines along track (m from the centre), each line's phase (0-1), and steps across track (m from the
+    centre)."""
+    lines = np.arange(int(2 * radius / swath.line_spacing) + 2)
+    steps = np.arange(int(2 * radius / swath.point_spacing) + 2)
+    if swath.anchor is None:
+        start, phase, across = rng.random() * swath.line_spacing - radius, rng.random(len(lines)), -radius
+    else:
+        along_centre, across_centre = swath.anchor
+        lines += math.floor((along_centre - radius) / swath.line_spacing)
+        steps += math.floor((across_centre - radius) / swath.point_spacing)
+        # Successive multiples of the golden ratio spread phases evenly, and each line finds its own again.
+        start, phase, across = -along_centre, lines * 0.6180339887498949 % 1.0, -across_centre
+    along = (lines + 0.5 * swath.pairing * (lines % 2)) * swath.line_spacing + start
+    return along, phase, steps * swath.point_spacing + across
 
 
 def joined(beams: list[Beams]) -> Beams:

@@ -90,3 +90,27 @@ def cast_crowns(xy0, slope, crowns, free_path, z_crown):
                 stretch = np.sqrt(1.0 + sx * sx + sy * sy)
                 if through * stretch > free_path[i]:
                     z_crown[i] = max(z_crown[i], z_top - free_path[i] / stretch)
+
+
+@njit(cache=True)
+def cast_waves(xy0, slope, waves, base):
+    """Heights (n,) where the beams meet the terrain z = base + sum of amplitude sin(kx x + ky y + phase).
+
+    `waves` (w, 4) = (kx, ky, phase, amplitude). Three Newton steps from the base reach far less than a millimetre, as
+    the terrain's slope and curvature are small.
+    """
+    z = np.full(len(xy0), base)
+    for i in range(len(xy0)):
+        for _ in range(3):
+            x, y = xy0[i, 0] + slope[i, 0] * z[i], xy0[i, 1] + slope[i, 1] * z[i]
+            above, climb = z[i] - base, 1.0
+            for w in range(len(waves)):
+                kx, ky, phase, amplitude = waves[w, 0], waves[w, 1], waves[w, 2], waves[w, 3]
+                angle = kx * x + ky * y + phase
+                above -= amplitude * np.sin(angle)
+                climb -= amplitude * np.cos(angle) * (kx * slope[i, 0] + ky * slope[i, 1])
+            step = above / climb
+            z[i] -= step
+            if abs(step) < 0.05:
+                break
+    return z

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .raycast import cast_waves
+
 
 @dataclass(frozen=True)
 class Plane:
@@ -44,20 +46,13 @@ class Relief:
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
         """Terrain height (n,) at `xy` (n, 2)."""
-        angle = (np.asarray(xy, float) - self.origin) @ self.waves[:, :2].T + self.waves[:, 2]
-        return self.base + np.sin(angle) @ self.waves[:, 3]
+        x, y = (np.asarray(xy, float) - self.origin).T
+        return self.base + sum(amplitude * np.sin(kx * x + ky * y + phase) for kx, ky, phase, amplitude in self.waves)
 
     def moved(self, shift: np.ndarray) -> Relief:
         """The same terrain in a frame whose points are those of this one plus `shift` (3,)."""
         return Relief(self.waves, self.base + float(shift[2]), self.origin + shift[:2])
 
     def hit(self, xy0: np.ndarray, slope: np.ndarray) -> np.ndarray:
-        """Height (n,) where the beams p(z) = xy0 + slope z meet the terrain.
-
-        The step is a contraction, as the product of both slopes is at most a few percent: three steps reach a
-        millimetre.
-        """
-        z = np.full(len(xy0), self.base)
-        for _ in range(3):
-            z = self.height_at(xy0 + slope * z[:, None])
-        return z
+        """Height (n,) where the beams p(z) = xy0 + slope z meet the terrain."""
+        return cast_waves(xy0 - self.origin, slope, self.waves, self.base)

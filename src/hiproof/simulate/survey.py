@@ -13,6 +13,7 @@ import numpy as np
 from ..errors import OutputError
 from .flight import Beams, Swath, beams_of, joined
 from .relief import Relief
+from .roofs import turned
 from .scanner import Scan, ScanSettings, returns, with_outliers
 from .scene import SOURCE_GROUND, SOURCE_TREE
 from .town import Lot, town_scene
@@ -43,7 +44,7 @@ class Flight:
         the mean."""
         half_width = self.altitude_m * math.tan(math.radians(self.half_view_deg))
         spacing = math.sqrt(2 * half_width / self.line_distance_m / density)
-        across = float((centre - self.origin) @ (-math.sin(self.heading), math.cos(self.heading)))
+        along, across = turned((centre - self.origin)[None], -self.heading)[0]
         first = math.ceil((across - radius - half_width) / self.line_distance_m)
         last = math.floor((across + radius + half_width) / self.line_distance_m)
         swaths = []
@@ -60,6 +61,7 @@ class Flight:
                     pairing=0.3,
                     edges=(-half_width - from_line, half_width - from_line),
                     shift=tuple(rng.normal(0.0, self.registration_m, 3)),
+                    anchor=(float(along), float(from_line)),
                 )
             )
         return swaths

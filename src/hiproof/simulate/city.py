@@ -1,0 +1,190 @@
+"""A simulated city of any size, made tile by tile: street blocks of houses and works on hills, surveyed from the air.
+
+Every block is drawn from a seed of its own, so a tile needs only the blocks that reach into it: memory stays that of
+one tile, and a tile is the same whatever else is made.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError, OutputError
+from .relief import Relief
+from .roofs import SimBuilding, turned
+from .scanner import ScanSettings
+from .survey import Bounds, Flight, survey, write_footprints, write_laz
+from .town import Lot, furnished, street_side
+
+ORIGIN_XY = np.array([95000.0, 455000.0])
+GROUND_M = 15.0
+HEADING = math.radians(11.0)
+BLOCK_M = np.array([100.0, 64.0])
+STREET_M = 10.0
+BUILDINGS_A_BLOCK = 9.6
+WORKS_SHARE = 0.12
+TREE_REACH_M = 30.0
+CACHED_BLOCKS = 400
+
+HOUSES = {
+    "gable": 0.26,
+    "hip": 0.10,
+    "flat": 0.10,
+    "row": 0.10,
+    "half_hip": 0.06,
+    "monopitch": 0.05,
+    "asymmetric_gable": 0.05,
+    "pyramid": 0.04,
+    "mansard": 0.04,
+    "gambrel": 0.04,
+    "extension": 0.06,
+    "L": 0.04,
+    "T": 0.03,
+    "two_level": 0.02,
+    "cross": 0.005,
+    "U": 0.005,
+}
+WORKS = {"shed": 0.35, "saw_tooth_hall": 0.15, "flat": 0.2, "two_level": 0.15, "monopitch": 0.1, "U": 0.05}
+
+
+@dataclass(frozen=True)
+class City:
+    """The first `buildings` buildings of the endless city of `seed`, surveyed at `density` (points/m2).
+
+    Blocks lie in rows of `blocks_a_row`; block (i, j) is the same in every city of that seed, whatever its size.
+    """
+
+    buildings: int
+    seed: int = 0
+    density: float = 5.0
+    tile_m: float = 500.0
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.buildings <= 10_000_000:
+            raise InputError(f"expected 1 to 10000000 buildings, got {self.buildings}; 10000 is a small city")
+        if not 50.0 <= self.tile_m <= 5000.0:
+            raise InputError(f"expected tiles of 50 to 5000 m, got {self.tile_m}; 500 is usual")
+        if not 0.1 <= self.density <= 100.0:
+            raise InputError(f"expected a density of 0.1 to 100 points/m2, got {self.density}; 1 to 20 is usual")
+
+    @property
+    def blocks_a_row(self) -> int:
+        """As many as make the city about square."""
+        blocks = self.buildings / BUILDINGS_A_BLOCK
+        return max(1, round(math.sqrt(blocks * BLOCK_M[1] / BLOCK_M[0])))
+
+    @property
+    def terrain(self) -> Relief:
+        return Relief.random(np.random.default_rng([self.seed, 1]), GROUND_M, ORIGIN_XY)
+
+    @property
+    def flight(self) -> Flight:
+        return Flight(heading=HEADING + math.radians(35.0), origin=ORIGIN_XY)
+
+
+def block_buildings(seed: int, i: int, j: int, terrain: Relief) -> list[SimBuilding]:
+    """The buildings of block (i, j): two rows of houses back to back, or one of works."""
+    rng = np.random.default_rng([seed, 11, i, j])
+    corner = ORIGIN_XY + turned(BLOCK_M * [[i, j]], HEADING)[0]
+    length, depth = BLOCK_M - STREET_M
+    if rng.random() < WORKS_SHARE:
+        return street_side(rng, drawn_names(rng, WORKS), corner, HEADING, length, depth, terrain)
+    opposite = corner + turned(np.array([[length, depth]]), HEADING)[0]
+    half = depth / 2 - 1.0
+    front = street_side(rng, drawn_names(rng, HOUSES), corner, HEADING, length, half, terrain)
+    back = street_side(rng, drawn_names(rng, HOUSES), opposite, HEADING + math.pi, length, half, terrain)
+    return front + back
+
+
+def drawn_names(rng: np.random.Generator, weights: dict[str, float]) -> Iterator[str]:
+    """Names without end, as often as their weights say."""
+    names, p = list(weights), np.array(list(weights.values()))
+    while True:
+        yield names[rng.choice(len(names), p=p / p.sum())]
+
+
+class Stock:
+    """Which buildings stand in which block, known by number alone; the buildings are drawn again when asked for."""
+
+    def __init__(self, city: City):
+        self.city, self.terrain = city, city.terrain
+        self.blocks, self.first = self._counted()
+        corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * BLOCK_M
+        lower = np.array(self.blocks) * BLOCK_M
+        plan = turned((lower[:, None] + corners).reshape(-1, 2), HEADING).reshape(-1, 4, 2) + ORIGIN_XY
+        self.low, self.high = plan.min(axis=1), plan.max(axis=1)
+        self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self._lots)
+
+    def _counted(self) -> tuple[list[tuple[int, int]], list[int]]:
+        """Blocks, and the number of buildings before each; the last block may be cut short."""
+        blocks, first, total, k = [], [], 0, 0
+        while total < self.city.buildings:
+            j, i = divmod(k, self.city.blocks_a_row)
+            blocks.append((i, j))
+            first.append(total)
+            total += len(block_buildings(self.city.seed, i, j, self.terrain))
+            k += 1
+        return blocks, first
+
+    def _lots(self, block: int) -> tuple[Lot, ...]:
+        start, seed, (i, j) = self.first[block], self.city.seed, self.blocks[block]
+        buildings = block_buildings(seed, i, j, self.terrain)[: self.city.buildings - start]
+        return tuple(
+            furnished(np.random.default_rng([seed, 12, i, j, k]), f"b{start + k:07d}", building)
+            for k, building in enumerate(buildings, 1)
+        )
+
+    def near(self, bounds: Bounds) -> list[Lot]:
+        """All lots of the blocks that reach into `bounds` or its trees' surroundings."""
+        low, high = np.array(bounds[:2]) - TREE_REACH_M, np.array(bounds[2:]) + TREE_REACH_M
+        blocks = np.flatnonzero((self.low < high).all(axis=1) & (self.high > low).all(axis=1))
+        return [lot for block in blocks for lot in self.lots(int(block))]
+
+    def tiles(self) -> Iterator[Bounds]:
+        """Squares of the city's tile size, on round coordinates, that touch a block."""
+        size = self.city.tile_m
+        first, last = np.floor(self.low.min(axis=0) / size), np.ceil(self.high.max(axis=0) / size)
+        for y in np.arange(first[1], last[1]) * size:
+            for x in np.arange(first[0], last[0]) * size:
+                if ((self.low < (x + size, y + size)) & (self.high > (x, y))).all(axis=1).any():
+                    yield (float(x), float(y), float(x + size), float(y + size))
+
+
+def write_city(folder: Path, city: City) -> Iterator[dict[str, int | str]]:
+    """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`; yields each tile's name and counts.
+
+    Each building is in footprints and truth once, with the tile its frame's origin lies in. Raises OutputError where
+    the folder cannot be written or already holds a city.
+    """
+    stock, settings = Stock(city), ScanSettings(density=city.density)
+    footprints, truth = folder / "footprints.gpkg", folder / "truth.jsonl"
+    if footprints.exists() or truth.exists():
+        raise OutputError(f"expected a folder without a city in it, got {folder}; remove its files or choose another")
+    try:
+        (folder / "tiles").mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"expected to write in {folder}, got: {error}; choose a folder that can be written"
+        ) from error
+    for bounds in stock.tiles():
+        name = f"{bounds[0]:.0f}_{bounds[1]:.0f}"
+        lots = stock.near(bounds)
+        clouds = survey(bounds, lots, stock.terrain, city.flight, city.seed, settings)
+        points = write_laz(folder / "tiles" / f"{name}.laz", clouds, np.array([*bounds[:2], 0.0]))
+        own = [lot for lot in lots if _holds(bounds, lot)]
+        if own:
+            write_footprints(footprints, own, append=footprints.exists())
+        with truth.open("a") as file:
+            file.writelines(json.dumps({"id": lot.id, "tile": name, **lot.building.truth()}) + "\n" for lot in own)
+        yield {"tile": name, "buildings": len(own), "points": points}
+
+
+def _holds(bounds: Bounds, lot: Lot) -> bool:
+    x, y, _ = lot.building.roof.frame.origin
+    return bounds[0] <= x < bounds[2] and bounds[1] <= y < bounds[3]
