@@ -21,9 +21,11 @@ from ..model import Fit
 from ..primitives import Primitive, get
 from ..primitives.contract import placed
 from ..settings import Settings
-from .alpha_shape import alpha_shape
+from .alpha_shape import SPACINGS, alpha_shape, default_radius
 
 BETA = 0.1
+ALPHA_SPACINGS = 4.0
+"""Radius of the alpha shape in point spacings, which the paper does not give: this comes closest to its figures."""
 SMALLEST_M = 0.1
 IMPROPER = 1.0
 """Added to J where the vertices form no roof (a ridge longer than the eaves): larger than any difference of J2."""
@@ -48,11 +50,16 @@ def fit_paper(
         raise FitError(f"expected at least 4 finite points to fit a roof to, got {len(points)}")
     frame = LocalFrame.around(points)
     xyz = frame.to_local(points)
-    boundary = alpha_shape(xyz[:, :2]) if outline is None else shapely.transform(outline, frame.to_local)
+    boundary = observed_outline(xyz[:, :2]) if outline is None else shapely.transform(outline, frame.to_local)
     names = types or (settings or Settings()).fit.types or tuple(CATALOGUE)
     tried = [best_variant(get(name), xyz, boundary) for name in names]
     values = {fitted.shape.name: fitted.value for fitted in tried}
     return min(tried, key=lambda fitted: fitted.value).outcome(xyz, frame, values)
+
+
+def observed_outline(xy: np.ndarray) -> shapely.Polygon:
+    """The paper's B: the alpha shape of `xy` (n, 2). Raises FitError for points that span no area."""
+    return alpha_shape(xy, default_radius(xy) * ALPHA_SPACINGS / SPACINGS)
 
 
 class PaperFit:

@@ -1,0 +1,62 @@
+"""The methods under comparison behind one verb: points in, bounded roof surfaces and parameters out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import shapely
+
+from hiproof.errors import FitError
+from hiproof.evaluate.metrics import iou, plan_outline, psd
+from hiproof.fit.paper import fit_paper
+from hiproof.model import Fit
+
+OBJECTIVES = ("paper", "likelihood")
+
+
+@dataclass(frozen=True)
+class Model:
+    """Roof surfaces (rings (m, 3)) and, of a parametric method, its `fit`; both in the frame of the points."""
+
+    polygons: list[np.ndarray] = field(default_factory=list)
+    fit: Fit | None = None
+
+    def psd(self, points: np.ndarray) -> np.ndarray:
+        """Distances (n,) of points to the nearest surface."""
+        return psd(self.polygons, points)
+
+    def outline_iou(self, outline: shapely.Geometry) -> float:
+        return iou(plan_outline(self.polygons), outline) if self.polygons else 0.0
+
+
+def fit_model(
+    method: str, points: np.ndarray, types: Sequence[str] | None = None, outline: shapely.Polygon | None = None
+) -> Model:
+    """Model of `points` (n, 3) by `method` ("paper", "likelihood" or "ransac"); empty where the method finds none."""
+    if method == "ransac":
+        from .ransac import detect_planes
+
+        return Model([plane.polygon(points) for plane in detect_planes(points)])
+    try:
+        if method == "paper":
+            fit = fit_paper(points, types, outline)
+        else:
+            from hiproof.fit import fit_roof
+
+            fit = fit_roof(points, types, outline)
+    except FitError:
+        return Model()
+    return Model([fit.vertices[list(face)] for face in fit.faces], fit)
+
+
+def in_parallel(function: Callable[..., Any], work: Iterable[tuple], jobs: int) -> list[Any]:
+    """`function(*item)` for every item, in order; with several processes the work is shared out in small chunks."""
+    work = list(work)
+    if jobs <= 1 or len(work) < 2:
+        return [function(*item) for item in work]
+    with ProcessPoolExecutor(jobs) as pool:
+        return list(pool.map(function, *zip(*work, strict=True), chunksize=max(1, len(work) // (20 * jobs))))
