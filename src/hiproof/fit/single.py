@@ -59,7 +59,7 @@ def fit_roof(
     if objective == "paper":
         from .paper import fit_paper
 
-        return fit_paper(local[:, :3], names, outline_local, frame)
+        return fit_paper(cloud[:, :3], names, outline, settings)
     if objective != "likelihood":
         raise SettingsError(f"expected the objective likelihood or paper, got {objective!r}; likelihood is the default")
     estimate = fit_likelihood(local, names, outline_local, settings.fit.side_softness_m, type_log_prior)
