@@ -49,16 +49,18 @@ def shape_of(name: str, width: float, length: float, height: float, rng: np.rand
         return {"hip_height": share * height, "ridge_length": length - share * width * rng.uniform(0.6, 1.0)}
     if name == "mansard":
         run = width * rng.uniform(0.15, 0.3)
-        return {"top_width": width - 2 * run, "top_length": length - 2 * run * rng.uniform(0.8, 1.2)}
+        top = {"top_width": width - 2 * run, "top_length": length - 2 * run * rng.uniform(0.8, 1.2)}
+        return top | {"height": run * rng.uniform(0.7, 2.0)}
     if name == "asymmetric_gable":
         offset = width * rng.uniform(0.08, 0.25)
         return {"ridge_offset": offset, "eave_step": height * rng.uniform(0.1, 0.5)}
     if name == "gambrel":
-        return {"break_width": width * rng.uniform(0.45, 0.7), "break_height": height * rng.uniform(0.55, 0.7)}
+        return {"break_width": width * rng.uniform(0.5, 0.7), "break_height": height * rng.uniform(0.62, 0.75)}
     if name == "monopitch":
         return {"height": height * rng.uniform(0.5, 1.0)}
     if name == "shed":
-        return {"height": height * rng.uniform(0.4, 0.8)}
+        teeth = int(rng.integers(2, 7))
+        return {"teeth": teeth, "height": width / teeth * rng.uniform(0.3, 0.9)}
     return {}
 
 

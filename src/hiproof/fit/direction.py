@@ -11,21 +11,29 @@ from numba import njit
 
 @njit(cache=True)
 def nearest(points, i, indices, distances):
-    """Indices of the points nearest to point `i`, itself included, by insertion; returns how many were found."""
-    found, farthest = 0, np.inf
-    for j in range(len(points)):
-        dx, dy, dz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
-        squared = dx * dx + dy * dy + dz * dz
-        if squared < farthest:
-            if found < len(indices):
-                found += 1
-            k = found - 1
-            while k > 0 and distances[k - 1] > squared:
-                distances[k], indices[k] = distances[k - 1], indices[k - 1]
-                k -= 1
-            distances[k], indices[k] = squared, j
-            if found == len(indices):
-                farthest = distances[found - 1]
+    """Indices of the points nearest to point `i`, itself included; returns how many were found. `points` ascend in x.
+
+    Searches outwards on both sides of `i` and ends a side where x alone is too far.
+    """
+    indices[0], distances[0], found, farthest = i, 0.0, 1, np.inf
+    for direction in (-1, 1):
+        j = i + direction
+        while 0 <= j < len(points):
+            dx, dy, dz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+            if dx * dx >= farthest:
+                break
+            squared = dx * dx + dy * dy + dz * dz
+            if squared < farthest:
+                if found < len(indices):
+                    found += 1
+                k = found - 1
+                while k > 0 and distances[k - 1] > squared:
+                    distances[k], indices[k] = distances[k - 1], indices[k - 1]
+                    k -= 1
+                distances[k], indices[k] = squared, j
+                if found == len(indices):
+                    farthest = distances[found - 1]
+            j += direction
     return found
 
 
@@ -55,7 +63,7 @@ def local_slope(points, indices):
 def slope_direction(points, queries, neighbours):
     """(kappa, confidence 0..1) of the four-fold harmonic of the azimuths of local slopes at about `queries` points.
 
-    Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak.
+    Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak. `points` (n, 3 or more) ascend in x.
     """
     stride = max(1, len(points) // queries)
     azimuths, weights = np.empty(len(points)), np.empty(len(points))

@@ -93,18 +93,26 @@ def integer_power(base, exponent):
 
 
 @njit(cache=True)
-def planes_from_terms(tables, kind, theta, planes, jacobian):
-    """Fill `planes` (k, 3), z = a u + b v + c, and their exact `jacobian` (k, 3, 9) by theta; return the number of planes."""
+def planes_from_terms(tables, kind, theta, planes):
+    """Fill `planes` (k, 3), z = a u + b v + c, at `theta`; return the number of planes."""
     count = tables.planes[kind]
     planes[:count] = 0.0
-    jacobian[:count] = 0.0
     for m in range(tables.first_term[kind], tables.first_term[kind + 1]):
-        plane, coefficient = tables.target[m] // 3, tables.target[m] % 3
         value = tables.factor[m]
         for k in range(6):
             if tables.power[m, k] != 0:
                 value *= integer_power(theta[HALF_WIDTH + k], tables.power[m, k])
-        planes[plane, coefficient] += value
+        planes[tables.target[m] // 3, tables.target[m] % 3] += value
+    return count
+
+
+@njit(cache=True)
+def jacobian_from_terms(tables, kind, theta, planes, jacobian):
+    """Fill the exact `jacobian` (k, 3, 9) of `planes` (k, 3) by theta."""
+    count = tables.planes[kind]
+    jacobian[:count] = 0.0
+    for m in range(tables.first_term[kind], tables.first_term[kind + 1]):
+        plane, coefficient = tables.target[m] // 3, tables.target[m] % 3
         for k in range(6):
             exponent = tables.power[m, k]
             if exponent != 0:
@@ -120,7 +128,6 @@ def planes_from_terms(tables, kind, theta, planes, jacobian):
         jacobian[j, 2, CENTRE_Y] = -a * s - b * c
         jacobian[j, 0, KAPPA] = -b
         jacobian[j, 1, KAPPA] = a
-    return count
 
 
 @njit(cache=True)
@@ -140,12 +147,12 @@ def active_plane(planes, count, strips, half_width, u, v):
 
 @njit(cache=True, fastmath=True)
 def sum_moments(problem, tables, kind, theta, noise, space):
-    """Minus the log likelihood at `theta`; fills planes, Jacobian, moments and sides of `space`.
+    """Minus the log likelihood at `theta`; fills planes, moments and sides of `space`.
 
     Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
     """
     points, planes, moments, sides = problem.points, space.planes, space.moments, space.sides
-    count = planes_from_terms(tables, kind, theta, planes, space.jacobian)
+    count = planes_from_terms(tables, kind, theta, planes)
     strips = tables.strips[kind]
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
@@ -214,11 +221,16 @@ def add_side(side, push, stiffness, along):
 
 
 @njit(cache=True)
-def add_height_terms(space, planes, size, gradient, hessian):
+def add_height_terms(tables, kind, theta, space, gradient, hessian):
     """Add the part of the residuals to `gradient` (9,) and the lower triangle of `hessian` (9, 9)."""
-    for j in range(planes):
+    jacobian_from_terms(tables, kind, theta, space.planes, space.jacobian)
+    for j in range(tables.planes[kind]):
         m, d = space.moments[j], space.jacobian[j]
-        for a in range(size):
+        if m[5] == 0.0:
+            continue
+        for a in range(tables.size[kind]):
+            if d[0, a] == 0.0 and d[1, a] == 0.0 and d[2, a] == 0.0:
+                continue
             gradient[a] -= m[6] * d[0, a] + m[7] * d[1, a] + m[8] * d[2, a]
             t0 = m[0] * d[0, a] + m[1] * d[1, a] + m[2] * d[2, a]
             t1 = m[1] * d[0, a] + m[3] * d[1, a] + m[4] * d[2, a]
@@ -261,7 +273,7 @@ def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
     value, inliers, squares = sum_moments(problem, tables, kind, theta, noise, space)
     gradient[:] = 0.0
     hessian[:] = 0.0
-    add_height_terms(space, tables.planes[kind], tables.size[kind], gradient, hessian)
+    add_height_terms(tables, kind, theta, space, gradient, hessian)
     if problem.plan_is_free:
         add_side_terms(space, theta, inliers, gradient, hessian)
     for a in range(SIZE):
@@ -448,7 +460,7 @@ def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
 def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
     """Log likelihood ratio (4, k) of moving each side (+u, -u, +v, -v) outward by `shifts` (2, k), along u and along v."""
     points, planes = problem.points, space.planes
-    count = planes_from_terms(tables, kind, theta, planes, space.jacobian)
+    count = planes_from_terms(tables, kind, theta, planes)
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     background = math.exp(problem.log_background)
     scale = (1.0 - noise.eps) / (4.0 * theta[HALF_WIDTH] * theta[HALF_LENGTH] * noise.sigma * SQRT_2PI)
@@ -511,7 +523,7 @@ def height_hessian(problem, tables, kind, theta, noise):
     space = new_space()
     gradient, hessian = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     _, inliers, _ = sum_moments(problem, tables, kind, theta, noise, space)
-    add_height_terms(space, tables.planes[kind], tables.size[kind], gradient, hessian)
+    add_height_terms(tables, kind, theta, space, gradient, hessian)
     for a in range(SIZE):
         for b in range(a):
             hessian[b, a] = hessian[a, b]
@@ -576,7 +588,7 @@ def vote(problem, tables, kind, theta, space, heights, counts):
                 continue
             for k in range(Q0 + 1, tables.size[kind]):
                 theta[k] = slope
-            count = planes_from_terms(tables, kind, theta, space.planes, space.jacobian)
+            count = planes_from_terms(tables, kind, theta, space.planes)
             for i in range(len(points)):
                 dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
                 u, v = c * dx + s * dy, c * dy - s * dx - shift * theta[HALF_WIDTH]

@@ -9,12 +9,12 @@ early. Everything compiled is in kernel.py and direction.py; here is the schedul
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 import shapely
 
 from ..primitives import CATALOGUE, Primitive
-from ..primitives.algebra import formula
 from ..primitives.contract import HALF_LENGTH, HALF_WIDTH, KAPPA, Q0
 from . import kernel
 from .direction import (
@@ -129,8 +129,7 @@ def fit_likelihood(
     basic = anneal(search, vote_starts(search, outline))
     derived = derive(search, basic)
     candidates = basic.joined(derived) if len(derived.kinds) else basic
-    asked = [t for t, shape in enumerate(search.shapes) if shape.name in types]
-    candidates = candidates.chosen(np.isin(candidates.kinds, asked))
+    candidates = candidates.chosen(np.array([search.shapes[kind].name in types for kind in candidates.kinds]))
     slack = SLACK_NATS + SLACK_NATS_A_POINT * len(points)
     candidates = candidates.chosen(candidates.values <= candidates.values.min() + slack)
     candidates, noises = learn(search, candidates)
@@ -138,27 +137,40 @@ def fit_likelihood(
     return finish(search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus)
 
 
-def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool) -> Search:
-    """The problem of `points` (n, 4) and all shapes needed: `types` and those their starts derive from."""
+@cache
+def needed_for(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
+    """(`types` and those their starts derive from, the number of its type for each of their variants)."""
     needed = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
     names = tuple(name for name in CATALOGUE if name in needed)
-    shapes = variants(names)
-    z_low, z_high = kernel_range(points[:, 2])
-    extents = np.sqrt(12 * np.linalg.eigvalsh(np.cov(points[:, :2].T))) + 1 if plan_is_free else np.ones(2)
-    log_background = -float(np.log(extents.prod() * (max(z_high - z_low, 1.0) + 1.0)))
+    return names, np.array([names.index(shape.name) for shape in variants(names)])
+
+
+def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool) -> Search:
+    """The problem of `points` (n, 4) and all shapes needed."""
+    names, family = needed_for(types)
+    z_low, z_high = height_range(points[:, 2])
+    plan_area = (plan_extents(points[:, :2]) + 1.0).prod() if plan_is_free else 1.0
+    log_background = -float(np.log(plan_area * (max(z_high - z_low, 1.0) + 1.0)))
     low, high = (bound.copy() for bound in bounds(names))
     low[:, Q0], high[:, Q0] = z_low - 1.0, z_high + 1.5
     stride = max(1, round(len(points) / COARSE_POINTS))
     whole = Problem(points, log_background, plan_is_free)
     thinned = whole._replace(points=np.ascontiguousarray(points[::stride]))
-    family = np.array([names.index(shape.name) for shape in shapes])
-    return Search(whole, thinned, tables(names), shapes, family, low, high)
+    return Search(whole, thinned, tables(names), variants(names), family, low, high)
 
 
-def kernel_range(z: np.ndarray) -> tuple[float, float]:
+def height_range(z: np.ndarray) -> tuple[float, float]:
     """Lowest and highest height but for one in a hundred and one in two hundred."""
     ordered = np.sort(z)
     return float(ordered[int(0.01 * len(z))]), float(ordered[len(z) - 1 - int(0.005 * len(z))])
+
+
+def plan_extents(xy: np.ndarray) -> np.ndarray:
+    """Sides (2,), shorter first, of the rectangle whose uniform points would scatter like `xy` (n, 2)."""
+    x, y = xy[:, 0] - xy[:, 0].mean(), xy[:, 1] - xy[:, 1].mean()
+    xx, yy, xy_ = x @ x / len(x), y @ y / len(x), x @ y / len(x)
+    half_sum, half_gap = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy_)
+    return np.sqrt(12 * np.array([max(half_sum - half_gap, 0.0), half_sum + half_gap]))
 
 
 def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
@@ -211,10 +223,8 @@ def derive(search: Search, basic: Candidates) -> Candidates:
     theta_of = {search.shapes[kind].name: theta for kind, theta in zip(basic.kinds, basic.thetas, strict=True)}
     for t, shape in enumerate(search.shapes):
         for start in shape.starts:
-            theta = theta_of[start.source].copy()
-            theta[Q0 : Q0 + len(start.q)] = [formula(q)(*theta_of[start.source][HALF_WIDTH:]) for q in start.q]
             kinds.append(t)
-            thetas.append(theta)
+            thetas.append(start.theta(theta_of[start.source]))
     candidates = Candidates(np.array(kinds, np.int64), np.reshape(thetas, (-1, 9)), np.zeros(len(kinds)))
     if not kinds:
         return candidates

@@ -13,7 +13,7 @@ from ..model import Fit
 from ..primitives import CATALOGUE, get
 from ..primitives.contract import HALF_WIDTH, KAPPA, placed
 from ..settings import Settings
-from .likelihood import Estimate, fit_likelihood
+from .likelihood import Estimate, fit_likelihood, plan_extents
 
 FEWEST_POINTS = 4
 THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
@@ -51,17 +51,15 @@ def fit_roof(
     names = checked_types(types if types is not None else settings.fit.types)
     objective = objective or settings.fit.objective
     cloud = usable_points(points, weights, outline)
-    frame = LocalFrame.around(cloud)
-    local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
-    outline_local = None
-    if outline is not None:
-        outline_local = shapely.transform(outline, frame.to_local)
     if objective == "paper":
         from .paper import fit_paper
 
         return fit_paper(cloud[:, :3], names, outline, settings)
     if objective != "likelihood":
         raise SettingsError(f"expected the objective likelihood or paper, got {objective!r}; likelihood is the default")
+    frame = LocalFrame.around(cloud)
+    local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
+    outline_local = None if outline is None else shapely.transform(outline, frame.to_local)
     estimate = fit_likelihood(local, names, outline_local, settings.fit.side_softness_m, type_log_prior)
     return as_fit(estimate, frame, len(local))
 
@@ -95,9 +93,9 @@ def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shape
             "a flat roof at their median height is all that can be said"
         )
     cloud = cloud[np.lexsort(cloud.T[::-1])]
-    spread = np.linalg.svd(cloud[:, :2] - cloud[:, :2].mean(axis=0), compute_uv=False)
-    if spread[1] <= max(THINNEST * spread[0], 1e-9):
-        shape = "in one place" if spread[0] < 1e-6 else "on one line in plan"
+    narrow, wide = plan_extents(cloud[:, :2])
+    if narrow <= max(THINNEST * wide, 1e-6):
+        shape = "in one place" if wide < 1e-6 else "on one line in plan"
         raise FitError(f"expected points spread over a roof, got {len(cloud)} points {shape}; add points beside it")
     return cloud
 

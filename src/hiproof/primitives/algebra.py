@@ -7,7 +7,9 @@ and their exact derivatives, without knowing any of them.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -26,18 +28,34 @@ class Formula:
 
     def __call__(self, V: float, U: float, q0: float, q1: float, q2: float, q3: float) -> float:
         """Value at the six shape parameters."""
-        values = (V, U, q0, q1, q2, q3)
-        return float(sum(factor * _monomial(values, powers) for factor, powers in self.terms))
+        return self.at((V, U, q0, q1, q2, q3))
+
+    def at(self, shape: Sequence[float]) -> float:
+        """Value at `shape` (6,): V, U, q0, q1, q2, q3."""
+        total = 0.0
+        for factor, powers in self._sparse:
+            for k, power in powers:
+                factor *= shape[k] if power == 1 else shape[k] ** power
+            total += factor
+        return float(total)
+
+    @cached_property
+    def _sparse(self) -> tuple[tuple[float, tuple[tuple[int, int], ...]], ...]:
+        """The terms with only the exponents that are not zero."""
+        return tuple((f, tuple((k, power) for k, power in enumerate(powers) if power)) for f, powers in self.terms)
 
     def gradient(self, shape: np.ndarray) -> np.ndarray:
         """Derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""
-        result = np.zeros(len(SYMBOLS))
-        for factor, powers in self.terms:
-            for k, power in enumerate(powers):
-                if power:
-                    lowered = powers[:k] + (power - 1,) + powers[k + 1 :]
-                    result[k] += factor * power * _monomial(shape, lowered)
-        return result
+        return np.array([derivative.at(shape) for derivative in self.derivatives])
+
+    @cached_property
+    def derivatives(self) -> tuple[Formula, ...]:
+        """The six partial derivatives."""
+        result = []
+        for k in range(len(SYMBOLS)):
+            lowered = ((f * p[k], p[:k] + (p[k] - 1,) + p[k + 1 :]) for f, p in self.terms if p[k])
+            result.append(Formula(tuple(lowered)))
+        return tuple(result)
 
     def __add__(self, other: Formula | float) -> Formula:
         total: dict[tuple[int, ...], float] = {}
@@ -76,14 +94,6 @@ def formula(value: Formula | float) -> Formula:
     if isinstance(value, Formula):
         return value
     return Formula(((float(value), (0,) * len(SYMBOLS)),) if value else ())
-
-
-def _monomial(values, powers: tuple[int, ...]) -> float:
-    product = 1.0
-    for value, power in zip(values, powers, strict=True):
-        if power:
-            product *= float(value) ** power
-    return product
 
 
 V, U, q0, q1, q2, q3 = (Formula(((1.0, tuple(int(i == k) for i in range(len(SYMBOLS)))),)) for k in range(len(SYMBOLS)))

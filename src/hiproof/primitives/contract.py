@@ -16,6 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 import shapely
@@ -37,6 +38,12 @@ class DerivedStart:
 
     source: str
     q: tuple[Formula | float, ...]
+
+    def theta(self, source_theta: np.ndarray) -> np.ndarray:
+        """theta (9,) with the plan of `source_theta` (9,) and its q by the formulas."""
+        theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
+        theta[Q0 : Q0 + len(self.q)] = [q.at(shape) if isinstance(q, Formula) else q for q in self.q]
+        return theta
 
 
 @dataclass(frozen=True)
@@ -130,9 +137,9 @@ class Primitive:
 
     def from_theta(self, theta: np.ndarray) -> tuple[dict[str, float], float, np.ndarray]:
         """(theta_p by name, kappa, T_L (3,)) of `theta` (9,)."""
-        shape = np.asarray(theta, float)[HALF_WIDTH:]
-        theta_p = {name: measure(*shape) for name, measure in self.measures.items()}
-        return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], self.eave(*shape)])
+        shape = np.asarray(theta, float)[HALF_WIDTH:].tolist()
+        theta_p = {name: measure.at(shape) for name, measure in self.measures.items()}
+        return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], self.eave.at(shape)])
 
     def is_proper(self, theta: np.ndarray) -> bool:
         """Whether every length is positive: no ridge or top of negative length."""
@@ -148,8 +155,13 @@ class Primitive:
 
     def plane_values(self, theta: np.ndarray) -> np.ndarray:
         """Planes (k, 3), z = a u + b v + c, at `theta` (9,), in the order of `faces`."""
-        shape = np.asarray(theta, float)[HALF_WIDTH:]
-        return np.array([[formula(coefficient)(*shape) for coefficient in plane] for plane in self.planes])
+        shape = np.asarray(theta, float)[HALF_WIDTH:].tolist()
+        return np.array([[coefficient.at(shape) for coefficient in plane] for plane in self.plane_formulas])
+
+    @cached_property
+    def plane_formulas(self) -> tuple[tuple[Formula, ...], ...]:
+        """`planes` with every number a Formula."""
+        return tuple(tuple(formula(coefficient) for coefficient in plane) for plane in self.planes)
 
     def height_at(self, theta: np.ndarray, xy: np.ndarray) -> np.ndarray:
         """Height (n,) of the roof `theta` at `xy` (n, 2), continued beyond its plan rectangle."""

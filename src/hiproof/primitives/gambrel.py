@@ -55,7 +55,7 @@ PRIMITIVE = Primitive(
     corners=corners,
     faces=((3, 4, 5, 2), (4, 6, 7, 5), (1, 0, 3, 2), (8, 9, 7, 6)),
     typical=typical,
-    bounds=((SLOPE_MIN, SLOPE_MAX), (0.05, 3.6), (0.1, 0.9)),
+    bounds=((SLOPE_MIN, SLOPE_MAX), (0.05, 2.2), (0.1, 0.9)),
     starts=(
         DerivedStart("gable", (q0 - 0.15 * q1 * V, 0.6 * q1, q1, 0.5)),
         DerivedStart("gable", (q0, 0.9 * q1, 2.0, 0.8)),
