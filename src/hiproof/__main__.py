@@ -1,0 +1,5 @@
+"""`python -m hiproof`: the command line."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,278 @@
+"""Laws of a whole run: files in, files out, every building with an outcome, whatever happens on the way."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+import shapely
+from typer.testing import CliRunner
+
+from hiproof.city import run as city_run
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli.app import app
+from hiproof.compose import check_solid
+from hiproof.errors import InputError, OutputError
+from hiproof.read.solids import read_solids
+from hiproof.settings import Settings
+from tiny_town import make_town, write_cloud, write_footprints, write_town
+
+RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    return write_town(tmp_path_factory.mktemp("town"))
+
+
+@pytest.fixture(scope="module")
+def finished(files, tmp_path_factory):
+    """An undisturbed run to compare with."""
+    out = tmp_path_factory.mktemp("finished")
+    cloud, footprints = files
+    return out, reconstruct_area(Request((str(cloud),), out, str(footprints)))
+
+
+def records(out):
+    return {name: (out / name).read_bytes() for name in RECORDS}
+
+
+def parameters(out):
+    return [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+
+
+def test_every_building_is_modelled_validly(finished):
+    out, summary = finished
+    assert summary.exit_code == 0
+    assert summary.by_status == {"modelled": 4}
+    solids = list(read_solids(out / "buildings.city.jsonl"))
+    assert [id for id, _ in solids] == [f"house-{i}" for i in range(4)]
+    assert all(check_solid(solid, planarity_m=0.01) == () for _, solid in solids)
+    assert len(list(read_solids(out / "buildings.gml"))) == 4
+    assert {p.name for p in out.iterdir()} == {*RECORDS, "buildings.gpkg", "run.json", ".hiproof"}
+
+
+def test_the_run_record_names_settings_version_inputs_and_counts(finished):
+    record = json.loads((finished[0] / "run.json").read_text())
+    assert Settings.from_dict(record["settings"]) == Settings()
+    assert record["buildings"] == 4
+    assert record["inputs"]["footprints"].endswith("footprints.geojson")
+    assert set(record["seconds"]) == {"plan", "sort", "solve", "merge"}
+
+
+def test_heights_are_the_towns(finished):
+    heights = {id: solid.vertices[:, 2] for id, solid in read_solids(finished[0] / "buildings.city.jsonl")}
+    for i in range(3):
+        assert heights[f"house-{i}"].max() == pytest.approx(2 + 8 + 0.3 * i + 0.14, abs=0.35)
+        assert heights[f"house-{i}"].min() == pytest.approx(2 + 0.3 * i + 0.08, abs=0.15)
+
+
+def test_running_again_redoes_nothing_and_changes_nothing(finished, files):
+    out, summary = finished
+    before = {name: (out / name).stat().st_mtime_ns for name in RECORDS}
+    again = reconstruct_area(Request((str(files[0]),), out, str(files[1])))
+    assert again.by_status == summary.by_status
+    assert {name: (out / name).stat().st_mtime_ns for name in RECORDS} == before
+
+
+def test_other_settings_on_the_same_folder_are_refused_unless_restarted(files, tmp_path):
+    request = Request((str(files[0]),), tmp_path, str(files[1]))
+    reconstruct_area(request)
+    other = Request(
+        request.clouds, tmp_path, request.footprints, settings=Settings.from_dict({"fit": {"parts": "one"}})
+    )
+    with pytest.raises(OutputError, match="--restart"):
+        reconstruct_area(other)
+    anew = Request(request.clouds, tmp_path, request.footprints, settings=other.settings, restart=True)
+    assert reconstruct_area(anew).buildings == 4
+
+
+def test_how_the_area_is_cut_changes_no_byte(finished, tmp_path):
+    town = make_town()
+    rng = np.random.default_rng(3)
+    names = rng.permutation(9)
+    part = (town.xyz[:, 0] // 13).astype(int) % 3 * 3 + (town.xyz[:, 1] // 9).astype(int) % 3
+    clouds = []
+    for number, name in enumerate(names):
+        members = rng.permutation(
+            np.flatnonzero((part == number) | ((part == (number + 1) % 9) & (rng.random(len(part)) < 0.2)))
+        )
+        clouds.append(str(write_cloud(tmp_path / f"{name}.laz", town.xyz[members], town.classification[members])))
+    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    reconstruct_area(Request(tuple(sorted(clouds)), tmp_path / "out", str(footprints)))
+    assert records(tmp_path / "out") == records(finished[0])
+
+
+def test_two_workers_change_no_byte(finished, files, tmp_path, monkeypatch):
+    monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
+    reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), jobs=2))
+    assert records(tmp_path) == records(finished[0])
+
+
+def test_an_interrupted_run_goes_on_and_ends_the_same(finished, files, tmp_path, monkeypatch):
+    monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
+    request = Request((str(files[0]),), tmp_path, str(files[1]))
+
+    def interrupted(step, done, total):
+        if step == "solve" and done == 2:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct_area(request, interrupted)
+    assert not (tmp_path / "buildings.gml").exists()
+    solved = []
+    original = city_run.solve_tile
+    monkeypatch.setattr(city_run, "solve_tile", lambda folder, tile: solved.append(tile) or original(folder, tile))
+    reconstruct_area(request)
+    assert len(solved) == 2
+    assert records(tmp_path) == records(finished[0])
+
+
+def test_a_killed_run_goes_on_and_ends_the_same(finished, files, tmp_path):
+    command = [sys.executable, "-m", "hiproof", "reconstruct", str(files[0]), "--footprints", str(files[1]), "--out"]
+    process = subprocess.Popen([*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"})
+    while not (tmp_path / ".hiproof" / "plan.pickle").exists() and process.poll() is None:
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert (
+        subprocess.run([*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"}, check=False).returncode == 0
+    )
+    assert records(tmp_path) == records(finished[0])
+
+
+def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(files, tmp_path, monkeypatch):
+    from hiproof import stages
+
+    original = stages.fit
+
+    def fails_on_one(points, outline, recognised, settings):
+        if outline.bounds[0] < -6.4:
+            raise RuntimeError("planted")
+        return original(points, outline, recognised, settings)
+
+    monkeypatch.setattr(stages, "fit", fails_on_one)
+    summary = reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1])))
+    assert summary.exit_code == 1
+    assert 1 <= summary.by_status["internal_error"] < 4
+    assert all("planted" in detail for _, detail in summary.failures)
+    assert len(parameters(tmp_path)) == 4
+
+
+def test_strange_footprints_each_get_an_outcome(tmp_path):
+    town = make_town()
+    x, y = town.xyz[:, :2].min(axis=0)
+    footprints = {
+        **town.footprints,
+        "bow-tie": shapely.Polygon([(x + 8, y + 12), (x + 20, y + 20), (x + 20, y + 12), (x + 8, y + 20)]),
+        "empty": shapely.Polygon(),
+        "line": shapely.Polygon([(x, y), (x + 5, y), (x + 10, y), (x, y)]),
+        "away from points": shapely.box(x + 500, y, x + 510, y + 10),
+        "again": town.footprints["house-0"],
+    }
+    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification)
+    with pytest.warns(UserWarning):
+        path = write_footprints(tmp_path / "footprints.geojson", footprints)
+        summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
+    by_id = {row["id"]: row["status"] for row in parameters(tmp_path / "out")}
+    assert summary.exit_code == 0
+    assert by_id["house-0"] == by_id["again"] == "modelled"
+    assert by_id["empty"] == by_id["line"] == "bad_footprint"
+    assert by_id["away from points"] == "no_points"
+    assert any(id.startswith("bow-tie") for id in by_id)
+
+
+def test_a_damaged_tile_is_named_and_harms_no_other(finished, files, tmp_path):
+    town = make_town()
+    west = town.xyz[:, 0] < town.xyz[:, 0].min() + 60
+    good = write_cloud(tmp_path / "a.laz", town.xyz[west], town.classification[west])
+    bad = write_cloud(tmp_path / "b.laz", town.xyz[~west], town.classification[~west])
+    bad.write_bytes(bad.read_bytes()[: bad.stat().st_size // 3])
+    summary = reconstruct_area(Request((str(good), str(bad)), tmp_path / "out", str(files[1])))
+    assert summary.exit_code == 2
+    assert [name for name, _ in summary.broken_inputs] == [str(bad)]
+    whole = {row["id"]: row for row in parameters(finished[0])}
+    rows = {row["id"]: row for row in parameters(tmp_path / "out")}
+    assert set(rows) == set(whole)
+    assert all(rows[id] == whole[id] for id in ("house-0", "house-1"))
+
+
+def test_without_footprints_the_cloud_is_split(files, tmp_path):
+    summary = reconstruct_area(Request((str(files[0]),), tmp_path))
+    assert summary.by_status == {"modelled": 4}
+
+
+def test_without_the_building_class_the_sentence_names_the_classes(tmp_path):
+    town = make_town()
+    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, np.where(town.classification == 6, 1, 2))
+    path = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    for footprints in (str(path), None):
+        with pytest.raises(InputError, match="--building-class"):
+            reconstruct_area(Request((str(cloud),), tmp_path / "out", footprints, restart=True))
+    settings = Settings.from_dict({"read": {"building_classes": [1]}})
+    assert (
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path), settings=settings, restart=True)).buildings
+        == 4
+    )
+
+
+def test_without_a_ground_class_the_lowest_points_are_named(tmp_path):
+    town = make_town()
+    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, np.where(town.classification == 2, 1, 6))
+    path = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
+    assert b"lowest points around the building" in (tmp_path / "out" / "buildings.city.jsonl").read_bytes()
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(app, [str(a) for a in arguments])
+
+
+def test_the_command_line_says_what_it_did(files, tmp_path):
+    got = invoke("reconstruct", files[0], "--footprints", files[1], "--out", tmp_path)
+    assert got.exit_code == 0, got.output
+    assert "4 buildings" in got.output
+    assert invoke("check", tmp_path / "buildings.city.jsonl", tmp_path / "buildings.gml").exit_code == 0
+    assert "buildings done: 4 of 4" in invoke("status", tmp_path).output
+
+
+def test_check_finds_a_broken_solid(files, finished, tmp_path):
+    lines = (finished[0] / "buildings.city.jsonl").read_text().splitlines()
+    feature = json.loads(lines[1])
+    solid = next(g for g in feature["CityObjects"]["house-0"]["geometry"] if g["type"] == "Solid")
+    solid["boundaries"][0].pop()
+    solid["semantics"]["values"][0].pop()
+    path = tmp_path / "broken.city.jsonl"
+    path.write_text("\n".join([lines[0], json.dumps(feature)]))
+    got = invoke("check", path)
+    assert got.exit_code == 1
+    assert "302" in got.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["reconstruct", "missing.laz", "--out", "{out}"], "missing.laz"),
+        (["reconstruct", "{cloud}", "--out", "{cloud}/x"], "--out"),
+        (["reconstruct", "{cloud}", "--out", "{out}", "--footprints", "missing.gpkg"], "missing.gpkg"),
+        (["reconstruct", "{cloud}", "--out", "{out}", "--objective", "pretty"], "likelihood, paper"),
+        (["check", "missing.city.jsonl"], "missing.city.jsonl"),
+        (["status", "{out}"], "ledger"),
+    ],
+)
+def test_wrong_usage_gets_one_sentence_and_exit_code_2(arguments, expected, files, tmp_path):
+    filled = [a.format(cloud=files[0], out=tmp_path) for a in arguments]
+    got = subprocess.run(
+        [sys.executable, "-m", "hiproof", *filled],
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": "src"},
+        check=False,
+    )
+    assert got.returncode == 2
+    assert expected in got.stderr
+    assert "Traceback" not in got.stderr
