@@ -53,7 +53,9 @@ def detect_planes(points: np.ndarray, threshold_m: float = THRESHOLD_M, seed: in
     Each plane is refitted to its inliers by least squares. Raises HiproofError without pyransac3d.
     """
     if not available():
-        raise HiproofError("expected the package pyransac3d for the RANSAC baseline; pip install 'hiproof[experiments]'")
+        raise HiproofError(
+            "expected the package pyransac3d for the RANSAC baseline; pip install 'hiproof[experiments]'"
+        )
     import pyransac3d
 
     random.seed(seed)

@@ -142,7 +142,8 @@ def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Rec
     """One primitive for the whole building (paper section 3.2)."""
     from .fit import fit_roof
 
-    found = fit_roof(points, outline=outline, settings=settings)
+    prior = log_prior(recognised)
+    found = fit_roof(points, outline=outline, settings=settings, weights=recognised.weights, type_log_prior=prior)
     shift = found.global_translation
     part = dataclasses.replace(
         found.part, translation=found.part.translation + shift, pieces=tuple(moved(p, shift) for p in found.part.pieces)

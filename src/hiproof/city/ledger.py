@@ -68,6 +68,11 @@ class Ledger:
         self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
         self.database.execute("commit")
 
+    def unwritten(self, ids: list[str]) -> None:
+        """Buildings whose solid no format could hold are internal errors after all."""
+        sql = "update building set status = 'internal_error', detail = 'its solid could not be written' where id = ?"
+        self.database.executemany(sql, [(id,) for id in ids])
+
     def tasks(self) -> list[tuple]:
         sql = "select name, kind, buildings, state, attempts, message, finished from task order by kind, position"
         return self.database.execute(sql).fetchall()

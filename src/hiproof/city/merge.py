@@ -10,11 +10,14 @@ from ..model import Building
 from .plan import Plan
 
 
-def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
-    """Write buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg; each appears whole or not at all."""
+def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> list[str]:
+    """Write buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg, each whole or not at all.
+
+    Returns the ids of buildings whose solid could not be written; they appear without it.
+    """
     from ..write import write_all
 
-    write_all(out, buildings_of(plan, state, progress), plan.crs())
+    return write_all(out, buildings_of(plan, state, progress), plan.crs())
 
 
 def buildings_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Building]:

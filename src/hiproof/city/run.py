@@ -82,7 +82,7 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
         work_off(ledger, executor, "solve", solve_tile, state, progress)
         clock.lap("solve")
         if ledger.get("merged") != "yes":
-            merge(plan, state, request.out, progress)
+            ledger.unwritten(merge(plan, state, request.out, progress))
         summary = summarise(request, ledger, clock)
         write_run_record(request, plan, summary)
         ledger.set(merged="yes")

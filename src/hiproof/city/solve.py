@@ -13,6 +13,7 @@ import numpy as np
 from ..model import Building
 from ..read.terrain import Terrain, TerrainChain, lowest_points, read_terrain, terrain_from_points
 from ..reconstruct import reconstruct
+from ..stages import distinct
 from ..status import Status
 from ..write.files import atomic_file
 from .plan import Job, Plan, neighbourhood
@@ -66,9 +67,11 @@ def terrain_around(job: Job, around: dict[str, np.ndarray], model: Terrain | Non
     """The terrain model, else the ground points in the whole-metre box around the building, else the lowest points."""
     xmin, ymin, xmax, ymax = neighbourhood(job, GROUND_REACH_M)
     ground, low = (
-        p[(p[:, :2] >= (xmin, ymin)).all(1) & (p[:, :2] < (xmax, ymax)).all(1)]
-        for p in map(around.get, ("ground", "low"))
+        points[(points[:, :2] >= (xmin, ymin)).all(axis=1) & (points[:, :2] < (xmax, ymax)).all(axis=1)]
+        for points in (around["ground"], around["low"])
     )
+    # a point that stands in two overlapping files counts once
+    ground = distinct(ground)
     found = [model, terrain_from_points(ground) if len(ground) else None, lowest_points(low) if len(low) else None]
     return TerrainChain(found)
 
