@@ -114,13 +114,17 @@ class Face:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented outwards."""
+    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented outwards.
+
+    `defects` are (ISO 19107 code, face) of a shell read from a file that its vertices cannot show, such as an open ring.
+    """
 
     vertices: np.ndarray
     faces: tuple[Face, ...]
+    defects: tuple[tuple[int, int], ...] = ()
 
     def moved(self, shift: np.ndarray) -> Solid:
-        return Solid(self.vertices + shift, self.faces)
+        return Solid(self.vertices + shift, self.faces, self.defects)
 
     def of_kind(self, kind: str) -> tuple[Face, ...]:
         return tuple(face for face in self.faces if face.kind == kind)

@@ -81,5 +81,6 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
             Finding(101, -1, "101: expected finite vertices and indices into them, got others; the file is damaged"),
         )
     local = vertices - vertices[index].mean(axis=0)
+    read = tuple(finding(code, face) for code, face in solid.defects)
     rows = check_shell(local, index, ring_start, face_start, float(planarity_m))
-    return tuple(finding(int(code), int(face), int(other)) for code, face, other in rows)
+    return read + tuple(finding(int(code), int(face), int(other)) for code, face, other in rows)

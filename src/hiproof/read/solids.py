@@ -1,0 +1,287 @@
+"""Solids back from CityJSON, CityJSONSeq and CityGML 2.0 files, as they stand: for the validity check and for scanning.
+
+Each shell of each solid of a building or building part comes out by itself: a CompositeSolid or MultiSolid as several, the inner shells of a Solid turned
+inside out, so that each is a closed shell whose faces should point outwards. A MultiSurface comes out as one shell too; that
+it is rarely closed is for the check to say.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..model import WALL, Face, Solid
+
+GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
+XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
+SURFACES = {"RoofSurface", "WallSurface", "GroundSurface", "OuterCeilingSurface", "OuterFloorSurface", "ClosureSurface"}
+
+
+def read_solids(path: str | Path) -> Iterator[tuple[str, Solid]]:
+    """Yield (id, Solid) for each shell in a `.json`, `.jsonl` or `.gml` file, in the file's coordinates.
+
+    The id is the city object's, with `#2`, `#3` ... for its further shells. CityJSONSeq is read line by line and CityGML
+    city object by city object, so memory does not grow with the file. Raises InputError when the file cannot be read as what
+    its name says.
+    """
+    path = Path(path)
+    suffix = path.suffix.lower()
+    readers = {
+        ".json": cityjson_solids,
+        ".jsonl": cityjsonseq_solids,
+        ".gml": citygml_solids,
+        ".xml": citygml_solids,
+        ".citygml": citygml_solids,
+    }
+    if suffix not in readers:
+        raise InputError(
+            f"expected a CityJSON (.json), CityJSONSeq (.jsonl) or CityGML (.gml) file, got {path};"
+            " rename it if it is one of these"
+        )
+    if not path.is_file():
+        raise InputError(f"expected a file at {path}, got none; check the name")
+    yield from readers[suffix](path)
+
+
+def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
+    """The shells of one city object under its id."""
+    for k, solid in enumerate(solids):
+        yield (name if k == 0 else f"{name}#{k + 1}"), solid
+
+
+# CityJSON
+
+
+def parsed(text: str, place: str) -> dict[str, Any]:
+    """A JSON object. Raises InputError naming the place."""
+    try:
+        value = json.loads(text)
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error
+    if not isinstance(value, dict):
+        raise InputError(f"expected a JSON object in {place}, got {type(value).__name__}; is this CityJSON?")
+    return value
+
+
+def read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
+
+
+def cityjson_solids(path: Path) -> Iterator[tuple[str, Solid]]:
+    """Shells of a CityJSON 1.x or 2.0 file."""
+    city = parsed(read_text(path), str(path))
+    if city.get("type") != "CityJSON":
+        raise InputError(f'expected "type": "CityJSON" in {path}, got {city.get("type")!r}; is this another kind of JSON?')
+    yield from feature_solids(city, city.get("transform"), str(path))
+
+
+def cityjsonseq_solids(path: Path) -> Iterator[tuple[str, Solid]]:
+    """Shells of a CityJSONSeq file: a CityJSON line with the transform, then one CityJSONFeature a line."""
+    transform, seen_header = None, False
+    try:
+        with path.open(encoding="utf-8") as lines:
+            for number, line in enumerate(lines, 1):
+                if not line.strip():
+                    continue
+                value, place = parsed(line, f"line {number} of {path}"), f"line {number} of {path}"
+                if value.get("type") == "CityJSON":
+                    transform, seen_header = value.get("transform"), True
+                elif not seen_header or value.get("type") != "CityJSONFeature":
+                    raise InputError(
+                        f"expected a CityJSON line followed by CityJSONFeatures, got {value.get('type')!r} in {place}"
+                    )
+                yield from feature_solids(value, transform, place)
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
+    if not seen_header:
+        raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file")
+
+
+def feature_solids(value: dict[str, Any], transform: dict[str, Any] | None, place: str) -> Iterator[tuple[str, Solid]]:
+    """Shells of all city objects of one CityJSON object or feature."""
+    try:
+        vertices = np.array(value.get("vertices", []), float).reshape(-1, 3)
+        if transform:
+            vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
+        objects = value.get("CityObjects", {}).items()
+        found = [
+            (name, [solid for geometry in city_object.get("geometry", ()) for solid in geometry_shells(geometry, vertices)])
+            for name, city_object in objects
+            if str(city_object.get("type")).startswith("Building")
+        ]
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError(
+            f"expected CityJSON with vertices, a transform and boundaries in {place}, got {error!r}; validate the file first"
+        ) from error
+    for name, solids in found:
+        yield from numbered(name, solids)
+
+
+def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Solid]:
+    """Shells of one CityJSON geometry; points and lines have none, nor have templates."""
+    kind, boundaries = geometry.get("type"), geometry.get("boundaries", [])
+    semantics = geometry.get("semantics") or {}
+    surfaces, values = semantics.get("surfaces", []), semantics.get("values")
+    if kind in ("MultiSurface", "CompositeSurface"):
+        return [shell_solid(boundaries, values, surfaces, vertices)] if boundaries else []
+    if kind == "Solid":
+        boundaries, values = [boundaries], [values]
+    elif kind not in ("MultiSolid", "CompositeSolid"):
+        return []
+    shells = []
+    for s, solid in enumerate(boundaries):
+        for k, shell in enumerate(solid):
+            named = values[s][k] if values and values[s] else None
+            shells.append(shell_solid(shell, named, surfaces, vertices, inward=k > 0))
+    return shells
+
+
+def shell_solid(
+    shell: list, values: list | None, surfaces: list[dict], vertices: np.ndarray, inward: bool = False
+) -> Solid:
+    """One shell (faces of rings of indices) with its semantics, on the vertices it uses."""
+    faces, used = [], sorted({index for face in shell for ring in face for index in ring})
+    if used and (used[0] < 0 or used[-1] >= len(vertices)):
+        raise IndexError(f"vertex {used[-1]} of {len(vertices)}")
+    number = {index: k for k, index in enumerate(used)}
+    for k, face in enumerate(shell):
+        surface = values[k] if values and k < len(values) else None
+        kind = surfaces[surface].get("type", WALL) if surface is not None else WALL
+        rings = tuple(tuple(number[index] for index in ring) for ring in face)
+        faces.append(Face(tuple(ring[::-1] for ring in rings) if inward else rings, kind))
+    return Solid(vertices[used], tuple(faces))
+
+
+# CityGML
+
+
+def local_name(element: Any) -> str:
+    tag = element.tag
+    return tag.rpartition("}")[2] if isinstance(tag, str) else ""
+
+
+def citygml_solids(path: Path) -> Iterator[tuple[str, Solid]]:
+    """Shells of all solids of a CityGML file, one cityObjectMember after the other.
+
+    An object without a gml:Solid gives its boundary surfaces as one shell.
+    """
+    from lxml import etree
+
+    members = 0
+    try:
+        for _, element in etree.iterparse(str(path), events=("end",), huge_tree=True, resolve_entities=False):
+            if local_name(element) not in ("cityObjectMember", "featureMember"):
+                continue
+            members += 1
+            yield from member_solids(element, path)
+            element.clear()
+            while element.getprevious() is not None:
+                del element.getparent()[0]
+    except (etree.XMLSyntaxError, OSError) as error:
+        raise InputError(f"expected well-formed CityGML in {path}, got: {error}; the file is damaged or cut off") from error
+    if members == 0:
+        raise InputError(f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?")
+
+
+def gml_id(element: Any) -> str | None:
+    for namespace in GML_NAMESPACES:
+        if element.get(f"{{{namespace}}}id"):
+            return element.get(f"{{{namespace}}}id")
+    return None
+
+
+def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
+    """Shells of one cityObjectMember; a building and each of its parts under its own id."""
+    polygons = {gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"}
+    owners = [element for element in member.iter() if local_name(element) in ("Building", "BuildingPart")]
+    for owner in owners or list(member)[:1]:
+        solids = []
+        for element in own_descendants(owner):
+            if local_name(element) == "Solid":
+                solids += gml_shells(element, polygons, path)
+        if not solids:
+            loose = [
+                polygon
+                for polygon in own_descendants(owner)
+                if local_name(polygon) == "Polygon" and surface_kind(polygon, None) is not None
+            ]
+            solids = [polygons_solid(loose, path)] if loose else []
+        yield from numbered(gml_id(owner) or "unnamed", solids)
+
+
+def own_descendants(owner: Any) -> Iterator[Any]:
+    """Elements below `owner` that do not belong to one of its building parts."""
+    for child in owner:
+        if local_name(child) != "BuildingPart":
+            yield child
+            yield from own_descendants(child)
+
+
+def surface_kind(polygon: Any, default: str | None) -> str | None:
+    """Name of the thematic surface a polygon lies in."""
+    for ancestor in polygon.iterancestors():
+        if local_name(ancestor) in SURFACES:
+            return local_name(ancestor)
+    return default
+
+
+def gml_shells(solid: Any, polygons: dict[str | None, Any], path: Path) -> list[Solid]:
+    """Exterior and interior shells of a gml:Solid, surfaces by value or by xlink."""
+    shells = []
+    for boundary in solid:
+        if local_name(boundary) not in ("exterior", "interior"):
+            continue
+        members = []
+        for element in boundary.iter():
+            reference = element.get(XLINK_HREF) if isinstance(element.tag, str) else None
+            if reference is not None:
+                if reference.lstrip("#") not in polygons:
+                    raise InputError(
+                        f"expected a polygon with id {reference} in the same city object in {path}, got none;"
+                        " the solid refers to a surface that is missing"
+                    )
+                members.append(polygons[reference.lstrip("#")])
+            elif local_name(element) == "Polygon":
+                members.append(element)
+        shells.append(polygons_solid(members, path, inward=local_name(boundary) == "interior"))
+    return shells
+
+
+def polygons_solid(polygons: list[Any], path: Path, inward: bool = False) -> Solid:
+    """One shell of gml:Polygons; equal coordinates become one vertex. A ring that is not closed is noted as defect 103."""
+    number: dict[tuple[float, ...], int] = {}
+    faces, defects = [], []
+    for polygon in polygons:
+        rings = []
+        for ring in polygon.iter():
+            if local_name(ring) != "LinearRing":
+                continue
+            points = ring_points(ring, path)
+            if len(points) > 1 and points[0] == points[-1]:
+                points = points[:-1]
+            else:
+                defects.append((103, len(faces)))
+            indices = tuple(number.setdefault(point, len(number)) for point in points)
+            rings.append(indices[::-1] if inward else indices)
+        faces.append(Face(tuple(rings), surface_kind(polygon, WALL)))
+    return Solid(np.array(list(number), float).reshape(-1, 3), tuple(faces), tuple(defects))
+
+
+def ring_points(ring: Any, path: Path) -> list[tuple[float, ...]]:
+    """Points of a gml:LinearRing from posList or pos."""
+    texts = [element.text or "" for element in ring.iter() if local_name(element) in ("posList", "pos")]
+    try:
+        values = [float(word) for word in " ".join(texts).split()]
+    except ValueError as error:
+        raise InputError(f"expected numbers in a gml:posList of {path}, got: {error}") from error
+    if len(values) % 3:
+        raise InputError(f"expected three coordinates a point in a gml:LinearRing of {path}, got {len(values)} numbers")
+    return [tuple(values[k : k + 3]) for k in range(0, len(values), 3)]

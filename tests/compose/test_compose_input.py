@@ -1,0 +1,80 @@
+"""What compose does with roofs it cannot, or can hardly, make a solid of."""
+
+import numpy as np
+import pytest
+import roof_zoo
+import shapely
+from roof_zoo import FRAME
+
+from hiproof.compose import check_solid, compose, flat_block, volume
+from hiproof.errors import CompositionError
+from hiproof.model import Part, Piece, Roof
+from hiproof.settings import Settings
+
+HOUSE = shapely.box(0, 0, 10, 8)
+FLAT = np.array([[0.0, 0.0, 5.0]])
+
+
+@pytest.mark.parametrize(
+    ("roof", "sentence"),
+    [
+        (Roof((), HOUSE, FRAME), "at least one piece"),
+        (Roof((Part("flat", (Piece(HOUSE, np.zeros((0, 3))),)),), HOUSE, FRAME), "at least one piece"),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.Polygon(), FRAME), "outline"),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT * np.nan),)),), HOUSE, FRAME), "finite roof planes"),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(1e6, 0, 1e6 + 9, 9), FRAME), "local frame"),
+        (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(0, 0, 10, 1e-5), FRAME), "area"),
+    ],
+)
+def test_unusable_roof_raises_a_sentence(roof, sentence):
+    with pytest.raises(CompositionError, match=sentence):
+        compose(roof, 0.0)
+
+
+@pytest.mark.parametrize("z_ground", [np.nan, np.inf, -np.inf])
+def test_ground_must_be_finite(z_ground):
+    with pytest.raises(CompositionError, match="finite ground height"):
+        flat_block(HOUSE, 5.0, z_ground, FRAME)
+
+
+def test_piece_far_from_the_outline_still_roofs_it():
+    roof = roof_zoo.roof([Piece(shapely.box(50, 50, 60, 60), FLAT)], HOUSE)
+    assert volume(compose(roof, 0.0)) == pytest.approx(400.0)
+
+
+def test_bow_tie_outline_keeps_its_larger_half():
+    bow_tie = shapely.Polygon([(0, 0), (10, 4), (10, 0), (0, 6)])
+    _, solid = flat_block(bow_tie, 5.0, 0.0, FRAME)
+    assert check_solid(solid) == ()
+
+
+def test_neck_thinner_than_a_millimetre_leaves_the_larger_side():
+    neck = shapely.union_all([shapely.box(0, 0, 5, 5), shapely.box(5, 2, 8, 2.0005), shapely.box(8, 0, 10, 5)])
+    _, solid = flat_block(neck, 3.0, 0.0, FRAME)
+    assert volume(solid) == pytest.approx(75.0, abs=0.01)
+
+
+def test_repeated_and_collinear_outline_vertices_do_not_matter():
+    ring = [(0, 0), (0, 0), (5, 0), (5.0002, 0), (10, 0), (10, 8), (10, 8.0004), (0, 8)]
+    _, solid = flat_block(shapely.Polygon(ring), 5.0, 0.0, FRAME)
+    assert len(solid.faces) == 6
+
+
+def test_spike_of_the_outline_vanishes():
+    spike = shapely.Polygon([(0, 0), (10, 0), (10, 4), (15, 4.0003), (10, 4.0006), (10, 8), (0, 8)])
+    _, solid = flat_block(spike, 5.0, 0.0, FRAME)
+    assert volume(solid) == pytest.approx(400.0, abs=0.02)
+
+
+def test_slivers_join_a_neighbour_by_the_settings():
+    pieces = [Piece(shapely.box(0, 0, 5, 8), FLAT), Piece(shapely.box(5, 0, 5.05, 8), FLAT + [[0, 0, 1]])]
+    pieces.append(Piece(shapely.box(5.05, 0, 10, 8), FLAT + [[0, 0, 2]]))
+    roof = roof_zoo.roof(pieces, HOUSE)
+    wide = Settings.from_dict({"compose": {"min_face_width_m": 0.1}})
+    assert len(compose(roof, 0.0).of_kind("RoofSurface")) == 3
+    assert len(compose(roof, 0.0, wide).of_kind("RoofSurface")) == 2
+
+
+def test_coordinates_are_multiples_of_a_tenth_of_a_millimetre():
+    solid = compose(roof_zoo.generated("cross_gables", 1), -1.23456789)
+    assert np.abs(solid.vertices * 1e4 - np.rint(solid.vertices * 1e4)).max() < 1e-6

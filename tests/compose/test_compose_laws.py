@@ -1,0 +1,208 @@
+"""Laws every composed solid keeps, over generated roofs that hold everything that makes composing hard."""
+
+import numpy as np
+import pytest
+import roof_zoo
+import shapely
+from roof_zoo import FRAME, KINDS, generated, moved
+
+from hiproof.compose import check_solid, compose, flat_block, lowest_terrain, terrain_intersection, volume
+from hiproof.model import Part, Piece, Roof, Solid
+
+Z_GROUND = -2.0
+SEEDS = range(12)
+WORLD = np.array([85012.345, 446078.912, 3.217])
+
+
+def plan_polygon(solid, face):
+    rings = [solid.vertices[list(ring), :2] for ring in face.rings]
+    return shapely.Polygon(rings[0], rings[1:])
+
+
+def plane_of(solid, face):
+    """The face's plane (a, b, c) by least squares."""
+    points = solid.vertices[[v for ring in face.rings for v in ring]]
+    design = np.column_stack((points[:, :2], np.ones(len(points))))
+    return np.linalg.lstsq(design, points[:, 2], rcond=None)[0]
+
+
+def roof_height(solid, xy):
+    """Height (n,) of the solid's roof faces at `xy`, and how many of them cover each point."""
+    z, covering = np.full(len(xy), np.nan), np.zeros(len(xy), int)
+    for face in solid.of_kind("RoofSurface"):
+        inside = shapely.contains_xy(plan_polygon(solid, face), xy[:, 0], xy[:, 1])
+        z[inside] = np.column_stack((xy, np.ones(len(xy))))[inside] @ plane_of(solid, face)
+        covering += inside
+    return z, covering
+
+
+def sample(roof, count, seed):
+    """Points inside the outline, two centimetres off its border."""
+    x0, y0, x1, y1 = roof.outline.bounds
+    xy = np.random.default_rng(seed).uniform((x0, y0), (x1, y1), (count, 2))
+    return xy[shapely.contains_xy(roof.outline.buffer(-0.02), xy[:, 0], xy[:, 1])]
+
+
+@pytest.fixture(scope="module")
+def composed():
+    """Every (kind, seed) of the zoo with its roof and solid."""
+    roofs = {(kind, seed): generated(kind, seed) for kind in KINDS for seed in SEEDS}
+    return {key: (roof, compose(roof, Z_GROUND)) for key, roof in roofs.items()}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_solid_is_valid_also_in_the_world_and_rounded_as_written(composed, kind):
+    for seed in SEEDS:
+        _, solid = composed[kind, seed]
+        assert check_solid(solid) == ()
+        assert check_solid(Solid(np.round(solid.vertices + WORLD, 4), solid.faces)) == ()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_roof_of_the_solid_is_the_height_function(composed, kind):
+    for seed in SEEDS:
+        roof, solid = composed[kind, seed]
+        xy = sample(roof, 1500, seed)
+        wanted = roof.height_at(xy)
+        found, covering = roof_height(solid, xy)
+        assert (covering == 1).all()
+        off = np.abs(found - wanted)[np.isfinite(wanted)] > 2e-3
+        assert off.mean() < 2e-3, f"{kind} {seed}: {off.sum()} of {len(off)} points off"
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_roof_faces_tile_the_outline(composed, kind):
+    for seed in SEEDS:
+        roof, solid = composed[kind, seed]
+        area = sum(plan_polygon(solid, face).area for face in solid.of_kind("RoofSurface"))
+        assert area == pytest.approx(roof.outline.area, abs=2e-3 * roof.outline.length)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_volume_is_the_integral_over_the_roof(composed, kind):
+    for seed in SEEDS:
+        _, solid = composed[kind, seed]
+        z_ground = solid.vertices[:, 2].min()
+        total = 0.0
+        for face in solid.of_kind("RoofSurface"):
+            polygon = plan_polygon(solid, face)
+            middle = np.array([polygon.centroid.x, polygon.centroid.y, 1.0])
+            total += polygon.area * (middle @ plane_of(solid, face) - z_ground)
+        assert volume(solid) == pytest.approx(total, rel=1e-4, abs=1e-3)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_answer_moves_with_the_roof(composed, kind):
+    for seed in SEEDS:
+        roof, solid = composed[kind, seed]
+        other = compose(moved(roof, 33.3, np.array([12.3456, -7.8912])), Z_GROUND)
+        extent = solid.vertices[:, 2].max() - solid.vertices[:, 2].min()
+        assert volume(other) == pytest.approx(volume(solid), abs=2e-3 * roof.outline.length * extent)
+
+
+def test_a_part_under_the_others_changes_nothing(composed):
+    for kind in ("partition", "saw_tooth", "towers"):
+        roof, solid = composed[kind, 1]
+        low = Part("flat", (Piece(shapely.box(-9, -9, 9, 9), np.array([[0.0, 0.0, -50.0]])),))
+        other = compose(Roof((*roof.parts, low), roof.outline, roof.frame), Z_GROUND)
+        assert volume(other) == pytest.approx(volume(solid), rel=1e-4)
+        assert len(other.of_kind("RoofSurface")) == len(solid.of_kind("RoofSurface"))
+
+
+def test_order_of_the_parts_does_not_matter(composed):
+    for kind in ("partition", "cross_gables", "towers"):
+        roof, solid = composed[kind, 2]
+        other = compose(Roof(roof.parts[::-1], roof.outline, roof.frame), Z_GROUND)
+        assert volume(other) == pytest.approx(volume(solid), rel=1e-4)
+
+
+def test_same_roof_same_bytes():
+    first, second = (compose(generated("towers", 3), Z_GROUND) for _ in range(2))
+    assert first.faces == second.faces and first.vertices.tobytes() == second.vertices.tobytes()
+
+
+HOUSE = shapely.box(0, 0, 10, 8)
+GABLE = np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]])
+HIP = np.vstack((GABLE, [[0.5, 0.0, 5.0], [-0.5, 0.0, 10.0]]))
+COUNTS = {
+    "flat": ([Piece(HOUSE, np.array([[0.0, 0, 5]]))], HOUSE, (1, 4, 1)),
+    "gable": ([Piece(HOUSE, GABLE)], HOUSE, (2, 4, 1)),
+    "hip": ([Piece(HOUSE, HIP)], HOUSE, (4, 4, 1)),
+    "pyramid": ([Piece(shapely.box(0, 0, 8, 8), HIP - [[0, 0, 0], [0, 0, 1], [0, 0, 0], [0, 0, 1]])], None, (4, 4, 1)),
+    "gable clipped to an L": ([Piece(HOUSE, GABLE)], HOUSE.difference(shapely.box(6, 4.5, 10, 8)), (2, 6, 1)),
+    "gable around a courtyard": ([Piece(HOUSE, GABLE)], HOUSE.difference(shapely.box(3, 3, 5, 5)), (2, 8, 1)),
+    "two levels": (
+        [Piece(HOUSE, np.array([[0.0, 0, 5]])), Piece(shapely.box(10, 0, 14, 8), np.array([[0.0, 0, 3]]))],
+        shapely.box(0, 0, 14, 8),
+        (2, 5, 1),
+    ),
+    "tower in the middle": (
+        [Piece(HOUSE, np.array([[0.0, 0, 5]])), Piece(shapely.box(4, 3, 6, 5), np.array([[0.0, 0, 9]]))],
+        HOUSE,
+        (2, 8, 1),
+    ),
+}
+
+
+@pytest.mark.parametrize("name", COUNTS)
+def test_faces_of_small_cases(name):
+    pieces, outline, counts = COUNTS[name]
+    roof = roof_zoo.roof(pieces, outline or pieces[0].outline)
+    solid = compose(roof, 0.0)
+    assert tuple(len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface")) == counts
+    assert len(solid.of_kind("GroundSurface")[0].rings) == 1 + len(roof.outline.interiors)
+
+
+def test_roof_faces_name_their_part():
+    pieces, outline, _ = COUNTS["two levels"]
+    solid = compose(roof_zoo.roof(pieces, outline), 0.0)
+    heights = {face.part: solid.vertices[face.rings[0][0], 2] for face in solid.of_kind("RoofSurface")}
+    assert heights == {0: 5.0, 1: 3.0}
+    assert {face.part for face in solid.faces if face.kind != "RoofSurface"} == {-1}
+
+
+def test_gap_takes_the_roof_of_the_piece_beside_it():
+    outline = shapely.box(-1, -1, 11, 8)
+    solid = compose(roof_zoo.roof([Piece(HOUSE, GABLE)], outline), 0.0)
+    inside = np.array([[-0.5, 2.0], [10.5, 6.0], [5.0, -0.5]])
+    assert roof_height(solid, inside)[0] == pytest.approx(Piece(HOUSE, GABLE).height_at(inside), abs=1e-3)
+
+
+def test_levels_meeting_crosswise_are_set_back():
+    boxes = [shapely.box(x, y, x + 4, y + 4) for x in (0, 4) for y in (0, 4)]
+    pieces = [Piece(box, np.array([[0.0, 0.0, z]])) for box, z in zip(boxes, (9, 5, 5, 8), strict=True)]
+    solid = compose(roof_zoo.roof(pieces, shapely.box(0, 0, 8, 8)), 0.0)
+    assert check_solid(solid) == ()
+    assert volume(solid) == pytest.approx(16 * (9 + 5 + 5 + 8), abs=0.01)
+
+
+def test_hole_that_touches_the_outer_ring_is_cut_loose():
+    outline = shapely.Polygon([(0, 0), (10, 0), (10, 10), (0, 10)], [[(0, 5), (3, 3), (3, 7)]])
+    assert outline.is_valid
+    _, solid = flat_block(outline, 4.0, 0.0, FRAME)
+    assert check_solid(solid) == ()
+    assert volume(solid) == pytest.approx(4 * outline.area, abs=0.01)
+
+
+def test_ground_gives_way_to_a_roof_below_it():
+    roof, solid = flat_block(HOUSE, 3.0, 5.0, FRAME)
+    assert check_solid(solid) == ()
+    assert solid.vertices[:, 2].max() == 3.0 and solid.vertices[:, 2].min() == pytest.approx(2.9)
+    assert roof.type == "flat"
+
+
+def test_terrain_intersection_follows_the_terrain_around_every_ring():
+    outline = HOUSE.difference(shapely.box(3, 3, 5, 5))
+    lines = terrain_intersection(outline, lambda xy: 0.1 * xy[:, 0])
+    assert len(lines) == 2
+    for line in lines:
+        assert (line[0] == line[-1]).all()
+        assert np.hypot(*np.diff(line[:, :2], axis=0).T).max() <= 1.0 + 1e-9
+        assert line[:, 2] == pytest.approx(0.1 * line[:, 0])
+    assert lowest_terrain(outline, lambda xy: 1 + 0.1 * xy[:, 0]) == 1.0
+
+
+def test_terrain_that_knows_nothing_leaves_the_floor():
+    (line,) = terrain_intersection(HOUSE, lambda xy: np.full(len(xy), np.nan), -1.5)
+    assert (line[:, 2] == -1.5).all()
+    assert np.isnan(lowest_terrain(HOUSE, lambda xy: np.full(len(xy), np.nan)))
