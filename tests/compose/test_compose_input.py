@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-import roof_zoo
 import shapely
-from roof_zoo import FRAME
 
+import roof_zoo
 from hiproof.compose import check_solid, compose, flat_block, volume
 from hiproof.errors import CompositionError
 from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings
+from roof_zoo import FRAME
 
 HOUSE = shapely.box(0, 0, 10, 8)
 FLAT = np.array([[0.0, 0.0, 5.0]])

@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-import roof_zoo
 import shapely
-from roof_zoo import FRAME, KINDS, generated, moved
 
+import roof_zoo
 from hiproof.compose import check_solid, compose, flat_block, lowest_terrain, terrain_intersection, volume
 from hiproof.model import Part, Piece, Roof, Solid
+from roof_zoo import FRAME, KINDS, generated, moved
 
 Z_GROUND = -2.0
 SEEDS = range(12)

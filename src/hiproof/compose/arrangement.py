@@ -407,9 +407,9 @@ def merge_slivers(xy, edges, face, area, label, min_area, min_width):
                     open_to[a] = open_to[b] = True
         smallest = -1
         for r in range(1, len(label)):
-            if region[r] == r and open_to[r] and (size[r] < min_area or 2 * size[r] < min_width * border[r]):
-                if smallest < 0 or size[r] < size[smallest]:
-                    smallest = r
+            sliver = region[r] == r and open_to[r] and (size[r] < min_area or 2 * size[r] < min_width * border[r])
+            if sliver and (smallest < 0 or size[r] < size[smallest]):
+                smallest = r
         if smallest < 0:
             break
         shared = np.zeros(len(label))

@@ -16,6 +16,13 @@ NORMAL_COSINE = np.cos(np.deg2rad(20.0))
 
 
 @njit(cache=True)
+def find_root(parent, i):
+    while parent[i] != i:
+        i = parent[i]
+    return i
+
+
+@njit(cache=True)
 def weld(vertices, tolerance):
     """For each vertex (n,) the lowest index of a vertex closer than `tolerance`."""
     same = np.arange(len(vertices))
@@ -27,11 +34,11 @@ def weld(vertices, tolerance):
             if vertices[v, 0] - vertices[w, 0] >= tolerance:
                 break
             d = vertices[v] - vertices[w]
-            if same[w] < same[v] and d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < tolerance * tolerance:
-                same[v] = same[w]
+            if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < tolerance * tolerance:
+                a, b = find_root(same, v), find_root(same, w)
+                same[max(a, b)] = min(a, b)
     for v in range(len(same)):
-        while same[same[v]] != same[v]:
-            same[v] = same[same[v]]
+        same[v] = find_root(same, v)
     return same
 
 
@@ -177,13 +184,6 @@ def ring_in_ring(flat, index, low, high, low2, high2):
             if nearest > TOUCH_M:
                 return inside_ring(p, flat, index, low2, high2)
     return False
-
-
-@njit(cache=True)
-def find_root(parent, i):
-    while parent[i] != i:
-        i = parent[i]
-    return i
 
 
 @njit(cache=True)
@@ -355,8 +355,11 @@ def check_edges(edges, faces, found, count):
 
 
 @njit(cache=True)
-def check_umbrellas(index, ring_start, face_start, edges, points, found, count):
-    """Code 303 where the faces around a vertex form more than one fan. Only for shells whose edges are all paired."""
+def check_umbrellas(index, ring_start, face_start, found, count):
+    """Code 303 where the faces around a vertex form more than one fan. Only for shells whose edges are all paired.
+
+    A vertex in which two rings of one face touch is not asked: which corners adjoin there is not told by the rings.
+    """
     corners = len(index)
     parent = np.arange(corners)
     face_of = np.empty(corners, np.int64)
@@ -380,8 +383,11 @@ def check_umbrellas(index, ring_start, face_start, edges, points, found, count):
                 if index[after[k]] == index[before[m]]:
                     parent[find_root(parent, k)] = find_root(parent, m)
         root = find_root(parent, by_vertex[start])
+        touching = False
+        for i in range(start + 1, stop):  # corners at a vertex come in the order of their faces
+            touching = touching or face_of[by_vertex[i]] == face_of[by_vertex[i - 1]]
         for i in range(start + 1, stop):
-            if find_root(parent, by_vertex[i]) != root:
+            if not touching and find_root(parent, by_vertex[i]) != root:
                 found[count, 0], found[count, 1], found[count, 2] = (
                     303,
                     face_of[by_vertex[i]],
@@ -426,9 +432,9 @@ def edges_pierce(
             da, db = vertices[a] @ normal - offset, vertices[b] @ normal - offset
             if min(da, db) > slack or max(da, db) < -slack:
                 continue
-            if abs(da) <= slack and not holds_vertex(index, low2, high2, a):
-                if depth_in_face(flat[a], flat, index, ring_start, first2, last2) > -TOUCH_M:
-                    return True
+            lands = abs(da) <= slack and not holds_vertex(index, low2, high2, a)
+            if lands and depth_in_face(flat[a], flat, index, ring_start, first2, last2) > -TOUCH_M:
+                return True
             if abs(da) <= slack and abs(db) <= slack:
                 if lies_across(flat, index, ring_start, first2, last2, a, b, slack):
                     return True
@@ -529,7 +535,7 @@ def check_shell(vertices, index, ring_start, face_start, planarity):
     edges = directed_edges(index, ring_start, face_start)
     count, clean = check_edges(edges, faces, found, count)
     if clean:
-        count = check_umbrellas(index, ring_start, face_start, edges, vertices, found, count)
+        count = check_umbrellas(index, ring_start, face_start, found, count)
     count = check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count)
     if count == 0 and enclosed_volume(vertices, index, ring_start, face_start) <= 0:
         found[0, 0], found[0, 1], found[0, 2] = 405, -1, -1

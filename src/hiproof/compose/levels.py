@@ -103,18 +103,25 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
 
 
 @njit(cache=True)
-def first_saddle(order, start, level):
-    """First plan vertex around which the levels rise and fall more than once (a non-manifold solid), -1 if none."""
+def first_saddle(order, start, level, face, label):
+    """First plan vertex around which the solid is no clean manifold, -1 if there is none.
+
+    That is where the levels rise and fall more than once, or where one cell has two sectors that do not adjoin.
+    """
     for v in range(len(start) - 1):
         size = start[v + 1] - start[v]
         turns, last, first = 0, 0, 0
         for k in range(size):
-            change = level[order[start[v] + (k + 1) % size]] - level[order[start[v] + k]]
-            sign = 1 if change > 0 else -1 if change < 0 else 0
+            here, after = order[start[v] + k], order[start[v] + (k + 1) % size]
+            sign = np.sign(level[after] - level[here])
             if sign != 0:
                 turns += last != 0 and sign != last
                 first = sign if first == 0 else first
                 last = sign
+            if label[here] != OUTSIDE and face[here] != face[after]:
+                for m in range(2, size):
+                    if face[order[start[v] + (k + m) % size]] == face[here]:
+                        return v
         turns += last != first
         if turns > 2:
             return v

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,21 +15,39 @@ from .cells import PlanCells, PlanProblem
 from .levels import first_saddle, split_at_crossings, stack_levels
 
 SETBACK_M = 0.01
-MIN_SETBACK_M = 0.003
+
+
+class Levels(NamedTuple):
+    """Half-edges with the levels over their origins, as `stack_levels` returns them."""
+
+    order: np.ndarray
+    start: np.ndarray
+    follow: np.ndarray
+    face: np.ndarray
+    level: np.ndarray
+    vertices: np.ndarray
 
 
 class Saddle(Exception):
-    """The levels around a plan vertex rise and fall twice; `patch` (soup, label) cuts one tip off and cures it."""
+    """Around a plan vertex levels rise and fall twice, or a cell meets itself; `patch` (soup, label) is the cure."""
 
     def __init__(self, patch: tuple[np.ndarray, int]):
         super().__init__("the roof's levels form a checkerboard around a vertex")
         self.patch = patch
 
 
-def raise_shell(cells: PlanCells, problem: PlanProblem, z_ground: float, clearance_m: float, reach_m: float) -> Solid:
+def raise_shell(
+    cells: PlanCells,
+    problem: PlanProblem,
+    z_ground: float,
+    clearance_m: float,
+    reach_m: float,
+    merge_walls: bool = True,
+) -> Solid:
     """Solid over the plan cells. Raises Saddle where the problem needs a patch first, CompositionError when none helps.
 
-    The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
+    The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex. `merge_walls` makes one wall of
+    consecutive ones along a straight stretch of the outline.
     """
     planes = problem.planes
     xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reach_m / GRID_M)
@@ -38,14 +57,16 @@ def raise_shell(cells: PlanCells, problem: PlanProblem, z_ground: float, clearan
         )
     z_low = lowest_roof(xy, edges, side, planes) - clearance_m / GRID_M
     z_base = np.floor(min(z_ground / GRID_M, z_low))
-    order, start, follow, face, level, vertices = stack_levels(xy, edges, side, planes, z_base, ties)
-    saddle = first_saddle(order, start, level)
+    levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
+    saddle = first_saddle(levels.order, levels.start, levels.level, levels.face, side.ravel())
     if saddle >= 0:
-        raise Saddle(tip_patch(xy, edges, side, order[start[saddle] : start[saddle + 1]], level))
-    follow, face, level, label = follow.tolist(), face.tolist(), level.tolist(), side.ravel().tolist()
+        radius = max(SETBACK_M, 4 * reach_m) / GRID_M * (1 + 0.25 * len(problem.patches))  # grows: a cure may need room
+        raise Saddle(cure(sectors_at(saddle, xy, edges, side, levels), radius))
+    label, vertices = side.ravel().tolist(), levels.vertices
+    follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
     faces = roof_faces(follow, face, level, label, vertices, problem.part)
     rises = wall_rises(follow, level)
-    runs = wall_runs(rises, follow, label, vertices)
+    runs = wall_runs(rises, follow, label, vertices) if merge_walls else [[h] for h in rises]
     skip = {rises[h][0] for run in runs for h in run[1:]}
     faces += [Face((tuple(v for v in wall_ring(run, rises) if v not in skip),), WALL) for run in runs]
     faces.append(ground_face(follow, level, label, skip, vertices))
@@ -197,41 +218,81 @@ def compacted(vertices: np.ndarray, faces: list[Face]) -> Solid:
     return Solid(np.round(vertices[used] * GRID_M, 4), tuple(faces))
 
 
-def tip_patch(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, around: np.ndarray, level: np.ndarray):
-    """Patch (soup, label) that gives the tip of the narrowest peak around a plan vertex to its higher neighbour.
+@dataclass(frozen=True)
+class Sectors:
+    """The cells around a plan vertex, counter-clockwise: sector k lies between arm k and the next."""
 
-    `around` are the half-edges out of the vertex, counter-clockwise.
-    """
-    size = len(around)
-    levels = [int(level[h]) for h in around]
-    ends = np.array([xy[edges[h >> 1, 1 - (h & 1)]] for h in around], float)
-    corner = xy[edges[around[0] >> 1, around[0] & 1]].astype(float)
-    arms = ends - corner
-    length = np.hypot(*arms.T)
+    corner: np.ndarray
+    angle: list[float]
+    opening: list[float]
+    level: list[int]
+    face: list[int]
+    label: list[int]
+
+    def runs(self, same: list[int]) -> list[tuple[int, int]]:
+        """(first sector, number) of the runs of equal values around the vertex."""
+        size = len(same)
+        first = [k for k in range(size) if same[k] != same[k - 1]]
+        return [(k, (first[(i + 1) % len(first)] - k - 1) % size + 1) for i, k in enumerate(first)]
+
+    def width(self, run: tuple[int, int]) -> float:
+        return sum(self.opening[(run[0] + j) % len(self.opening)] for j in range(run[1]))
+
+    def tip(self, run: tuple[int, int], radius: float) -> np.ndarray:
+        """Edges (m, 4) of the wedge over a run of sectors, `radius` grid units long."""
+        width = self.width(run)
+        steps = np.linspace(0, width, max(2, math.ceil(width / (np.pi / 3)) + 1)) + self.angle[run[0]]
+        tips = np.rint(self.corner + radius * np.column_stack((np.cos(steps), np.sin(steps))))
+        polygon = np.vstack((self.corner, tips))
+        return np.hstack((polygon, np.roll(polygon, -1, axis=0)))
+
+
+def sectors_at(v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels) -> Sectors:
+    """The sectors around plan vertex v."""
+    around = levels.order[levels.start[v] : levels.start[v + 1]]
+    arms = (xy[edges[around >> 1, 1 - (around & 1)]] - xy[v]).astype(float)
     angle = np.arctan2(arms[:, 1], arms[:, 0])
     opening = np.mod(np.roll(angle, -1) - angle, 2 * np.pi)
-    labels = side.ravel()[around]
-    best = None
-    for k in range(size):
-        if levels[k - 1] >= levels[k]:
+    label = side.ravel()[around]
+    return Sectors(
+        xy[v].astype(float),
+        angle.tolist(),
+        opening.tolist(),
+        levels.level[around].tolist(),
+        levels.face[around].tolist(),
+        label.tolist(),
+    )
+
+
+def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
+    """Patch (soup, label) for a vertex that is no manifold: the tip of its narrowest peak goes to the higher neighbour.
+
+    Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to that cell.
+    """
+    size = len(sectors.level)
+    peaks = []
+    for first, count in sectors.runs(sectors.level):
+        before, after = first - 1, (first + count) % size
+        if max(sectors.level[before], sectors.level[after]) < sectors.level[first]:
+            higher = before if sectors.level[before] >= sectors.level[after] else after
+            peaks.append((sectors.width((first, count)), (first, count), sectors.label[higher]))
+    if len(peaks) < 2:
+        peaks = pinches(sectors)
+    _, run, label = min(peaks)
+    return sectors.tip(run, radius), label
+
+
+def pinches(sectors: Sectors) -> list[tuple[float, tuple[int, int], int]]:
+    """(width, run, label) of what a cell that meets itself encloses on either side, as far as it is roofed."""
+    found = []
+    for cell in {face for face, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE}:
+        runs = sectors.runs([int(face == cell) for face in sectors.face])
+        between = [run for run in runs if sectors.face[run[0]] != cell]
+        if len(between) < 2:
             continue
-        last = k
-        while levels[(last + 1) % size] == levels[k]:
-            last += 1
-        if levels[(last + 1) % size] > levels[k]:
-            continue
-        width = sum(opening[j % size] for j in range(k, last + 1))
-        if best is None or width < best[0]:
-            before, after = k - 1, (last + 1) % size
-            lower = labels[before] if levels[before] >= levels[after] else labels[after]
-            best = (width, k, last, int(lower))
-    width, first, _, lower = best
-    radius = min(SETBACK_M / GRID_M, 0.4 * length.min())
-    if radius < MIN_SETBACK_M / GRID_M:
-        raise CompositionError(
-            "expected room to set back a corner where roof levels meet crosswise, got edges too short"
-        )
-    steps = np.linspace(0, width, max(2, int(np.ceil(width / (np.pi / 3))) + 1)) + angle[first]
-    tips = np.rint(corner + radius * np.column_stack((np.cos(steps), np.sin(steps))))
-    polygon = np.vstack((corner, tips))
-    return np.hstack((polygon, np.roll(polygon, -1, axis=0))), lower
+        label = sectors.label[sectors.face.index(cell)]
+        for first, count in between:
+            roofed = all(sectors.label[(first + j) % len(sectors.label)] != OUTSIDE for j in range(count))
+            if roofed:
+                found.append((sectors.width((first, count)), (first, count), label))
+    return found

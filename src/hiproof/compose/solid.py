@@ -11,12 +11,13 @@ import shapely
 from ..errors import CompositionError
 from ..frames import LocalFrame
 from ..model import Part, Piece, Roof, Solid
-from ..settings import Settings
+from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
 from .check import check_solid
 from .shell import Saddle, raise_shell
 
-COARSER = (1.0, 3.0, 10.0, 30.0)  # factors on the snap distance, tried in turn until the solid is valid
+# factor on the snap distance and whether straight walls become one, tried in turn until the solid is valid
+ATTEMPTS = ((1.0, True), (1.0, False), (3.0, False), (10.0, False), (30.0, False))
 MAX_PATCHES = 40
 
 
@@ -45,9 +46,9 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
         )
     problem = plan_problem(roof)
     failure = ""
-    for factor in COARSER:
+    for factor, merge_walls in ATTEMPTS:
         try:
-            solid = compose_at(problem, z_ground_local, options, factor * options.snap_m)
+            solid = compose_at(problem, z_ground_local, options, factor * options.snap_m, merge_walls)
         except CompositionError as error:
             failure = str(error)
             continue
@@ -58,13 +59,15 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     raise CompositionError(f"expected the roof to become a valid solid, got: {failure}; fall back to a simpler roof")
 
 
-def compose_at(problem: PlanProblem, z_ground: float, options, snap_m: float) -> Solid:
+def compose_at(
+    problem: PlanProblem, z_ground: float, options: ComposeSettings, snap_m: float, merge_walls: bool
+) -> Solid:
     """One attempt at the given snap distance; corners where levels meet crosswise are set back one by one."""
     reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
     for _ in range(MAX_PATCHES):
         cells = arrange(problem, reach_m, options.min_face_area_m2, options.min_face_width_m)
         try:
-            return raise_shell(cells, problem, z_ground, options.ground_clearance_m, reach_m)
+            return raise_shell(cells, problem, z_ground, options.ground_clearance_m, reach_m, merge_walls)
         except Saddle as saddle:
             problem = replace(problem, patches=[*problem.patches, saddle.patch])
     raise CompositionError("expected at most forty corners where roof levels meet crosswise, got more")

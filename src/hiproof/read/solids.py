@@ -79,7 +79,9 @@ def cityjson_solids(path: Path) -> Iterator[tuple[str, Solid]]:
     """Shells of a CityJSON 1.x or 2.0 file."""
     city = parsed(read_text(path), str(path))
     if city.get("type") != "CityJSON":
-        raise InputError(f'expected "type": "CityJSON" in {path}, got {city.get("type")!r}; is this another kind of JSON?')
+        raise InputError(
+            f'expected "type": "CityJSON" in {path}, got {city.get("type")!r}; is this another kind of JSON?'
+        )
     yield from feature_solids(city, city.get("transform"), str(path))
 
 
@@ -113,7 +115,14 @@ def feature_solids(value: dict[str, Any], transform: dict[str, Any] | None, plac
             vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
         objects = value.get("CityObjects", {}).items()
         found = [
-            (name, [solid for geometry in city_object.get("geometry", ()) for solid in geometry_shells(geometry, vertices)])
+            (
+                name,
+                [
+                    solid
+                    for geometry in city_object.get("geometry", ())
+                    for solid in geometry_shells(geometry, vertices)
+                ],
+            )
             for name, city_object in objects
             if str(city_object.get("type")).startswith("Building")
         ]
@@ -186,7 +195,9 @@ def citygml_solids(path: Path) -> Iterator[tuple[str, Solid]]:
             while element.getprevious() is not None:
                 del element.getparent()[0]
     except (etree.XMLSyntaxError, OSError) as error:
-        raise InputError(f"expected well-formed CityGML in {path}, got: {error}; the file is damaged or cut off") from error
+        raise InputError(
+            f"expected well-formed CityGML in {path}, got: {error}; the file is damaged or cut off"
+        ) from error
     if members == 0:
         raise InputError(f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?")
 

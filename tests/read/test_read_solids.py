@@ -1,0 +1,191 @@
+"""Solids come back from CityJSON, CityJSONSeq and CityGML as they were, and broken files say what is wrong."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hiproof.compose import check_solid, compose, volume
+from hiproof.errors import InputError
+from hiproof.read.solids import read_solids
+from roof_zoo import generated
+
+DEN_HAAG = Path(__file__).parents[2] / "../shared/data/denhaag/DenHaag_01.city.json"
+SOLID = compose(generated("towers", 1), 0.0)
+TRANSFORM = {"scale": [1e-4] * 3, "translate": [85000.0, 446000.0, 0.0]}
+OTHER_SURFACES = [{"type": "RoofSurface"}, {"type": "WallSurface"}, {"type": "GroundSurface"}]
+
+
+def city_object(kind="Solid"):
+    """A building whose geometry is SOLID in the given kind of boundary, two of them where the kind holds several."""
+    shell = [[list(ring) for ring in face.rings] for face in SOLID.faces]
+    kinds = [surface["type"] for surface in OTHER_SURFACES]
+    values = [kinds.index(face.kind) for face in SOLID.faces]
+    nested = {"MultiSurface": (shell, values), "Solid": ([shell], [values])}
+    boundaries, values = nested.get(kind, ([[shell], [shell]], [[values], [values]]))
+    semantics = {"surfaces": OTHER_SURFACES, "values": values}
+    return {
+        "type": "Building",
+        "geometry": [{"type": kind, "lod": "2.2", "boundaries": boundaries, "semantics": semantics}],
+    }
+
+
+def integer_vertices():
+    return np.rint(SOLID.vertices / 1e-4).astype(int).tolist()
+
+
+def city(kind="Solid"):
+    return {
+        "type": "CityJSON",
+        "version": "2.0",
+        "transform": TRANSFORM,
+        "CityObjects": {"house": city_object(kind)},
+        "vertices": integer_vertices(),
+    }
+
+
+def gml(xlinked=True, points="posList"):
+    """SOLID as CityGML, its solid by xlink to the boundary surfaces or by value."""
+
+    def ring_text(ring):
+        xyz = [" ".join(map(repr, SOLID.vertices[v].tolist())) for v in (*ring, ring[0])]
+        inside = f"<gml:posList>{' '.join(xyz)}</gml:posList>" if points == "posList" else ""
+        return inside or "".join(f"<gml:pos>{place}</gml:pos>" for place in xyz)
+
+    def polygon(k, face):
+        rings = [f"<gml:LinearRing>{ring_text(ring)}</gml:LinearRing>" for ring in face.rings]
+        holes = "".join(f"<gml:interior>{ring}</gml:interior>" for ring in rings[1:])
+        return f'<gml:Polygon gml:id="p{k}"><gml:exterior>{rings[0]}</gml:exterior>{holes}</gml:Polygon>'
+
+    surfaces, members = "", ""
+    for k, face in enumerate(SOLID.faces):
+        if xlinked:
+            members += f'<gml:surfaceMember xlink:href="#p{k}"/>'
+            surface = f"<gml:MultiSurface><gml:surfaceMember>{polygon(k, face)}</gml:surfaceMember></gml:MultiSurface>"
+            surface = f"<bldg:{face.kind}><bldg:lod2MultiSurface>{surface}</bldg:lod2MultiSurface></bldg:{face.kind}>"
+            surfaces += f"<bldg:boundedBy>{surface}</bldg:boundedBy>"
+        else:
+            members += f"<gml:surfaceMember>{polygon(k, face)}</gml:surfaceMember>"
+    shell = f"<gml:exterior><gml:CompositeSurface>{members}</gml:CompositeSurface></gml:exterior>"
+    building = f"<bldg:lod2Solid><gml:Solid>{shell}</gml:Solid></bldg:lod2Solid>{surfaces}"
+    building = f'<bldg:Building gml:id="house">{building}</bldg:Building>'
+    names = (
+        'xmlns="http://www.opengis.net/citygml/2.0" xmlns:bldg="http://www.opengis.net/citygml/building/2.0"'
+        ' xmlns:gml="http://www.opengis.net/gml" xmlns:xlink="http://www.w3.org/1999/xlink"'
+    )
+    return f"<CityModel {names}><cityObjectMember>{building}</cityObjectMember></CityModel>"
+
+
+def written(folder, name, text):
+    path = folder / name
+    path.write_text(text)
+    return path
+
+
+def seq():
+    feature = {
+        "type": "CityJSONFeature",
+        "id": "house",
+        "CityObjects": {"house": city_object()},
+        "vertices": integer_vertices(),
+    }
+    header = {**city(), "CityObjects": {}, "vertices": []}
+    return f"{json.dumps(header)}\n{json.dumps(feature)}\n\n"
+
+
+FILES = {
+    "a.city.json": json.dumps(city()),
+    "a.city.jsonl": seq(),
+    "xlinked.gml": gml(),
+    "by_value.gml": gml(xlinked=False),
+    "single_positions.gml": gml(points="pos"),
+}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_solid_comes_back(tmp_path, name):
+    ((found_id, solid),) = read_solids(written(tmp_path, name, FILES[name]))
+    assert found_id == "house"
+    assert check_solid(solid) == ()
+    assert volume(solid) == pytest.approx(volume(SOLID))
+    if name != "by_value.gml":
+        kinds = ("RoofSurface", "WallSurface", "GroundSurface")
+        assert [len(solid.of_kind(kind)) for kind in kinds] == [len(SOLID.of_kind(kind)) for kind in kinds]
+
+
+@pytest.mark.parametrize(("kind", "ids"), [("MultiSurface", 1), ("CompositeSolid", 2), ("MultiSolid", 2)])
+def test_other_geometries_come_out_shell_by_shell(tmp_path, kind, ids):
+    found = list(read_solids(written(tmp_path, "a.city.json", json.dumps(city(kind)))))
+    assert [name for name, _ in found] == ["house", "house#2"][:ids]
+    assert all(check_solid(solid) == () for _, solid in found)
+
+
+def test_inner_shell_is_turned_inside_out(tmp_path):
+    model = city()
+    (outer,) = model["CityObjects"]["house"]["geometry"][0]["boundaries"]
+    model["CityObjects"]["house"]["geometry"][0]["boundaries"] = [
+        outer,
+        [[ring[::-1] for ring in face] for face in outer],
+    ]
+    del model["CityObjects"]["house"]["geometry"][0]["semantics"]
+    found = list(read_solids(written(tmp_path, "a.json", json.dumps(model))))
+    assert len(found) == 2 and all(check_solid(solid) == () for _, solid in found)
+
+
+def test_open_ring_is_a_finding(tmp_path):
+    text = gml()
+    start = text.index("<gml:posList>") + len("<gml:posList>")
+    stop = text.index("</gml:posList>")
+    opened = text[:start] + " ".join(text[start:stop].split()[:-3]) + text[stop:]
+    ((_, solid),) = read_solids(written(tmp_path, "open.gml", opened))
+    assert [finding.code for finding in check_solid(solid)] == [103]
+
+
+def test_building_without_solid_gives_its_surfaces(tmp_path):
+    text = gml()
+    start, stop = text.index("<bldg:lod2Solid>"), text.index("</bldg:lod2Solid>")
+    ((name, solid),) = read_solids(
+        written(tmp_path, "surfaces.gml", text[:start] + text[stop + len("</bldg:lod2Solid>") :])
+    )
+    assert name == "house" and check_solid(solid) == ()
+
+
+BROKEN = {
+    "cut.json": (FILES["a.city.json"][:500], "damaged or cut off"),
+    "list.json": ("[1, 2]", "expected a JSON object"),
+    "geo.json": ('{"type": "FeatureCollection"}', '"type": "CityJSON"'),
+    "index.json": (json.dumps({**city(), "vertices": [[0, 0, 0]]}), "vertices"),
+    "headless.jsonl": (seq().split("\n")[1], "expected a CityJSON line"),
+    "empty.jsonl": ("", "got an empty file"),
+    "cut.gml": (gml()[:900], "damaged or cut off"),
+    "other.gml": ("<a><b/></a>", "cityObjectMember"),
+    "link.gml": (gml().replace('href="#p0"', 'href="#nowhere"'), "surface that is missing"),
+    "words.gml": (gml().replace("<gml:posList>", "<gml:posList>here "), "expected numbers"),
+    "flat.gml": (gml().replace("<gml:posList>", "<gml:posList>1.0 "), "three coordinates"),
+    "model.obj": ("v 0 0 0", "expected a CityJSON"),
+}
+
+
+@pytest.mark.parametrize("name", BROKEN)
+def test_broken_file_raises_a_sentence(tmp_path, name):
+    text, sentence = BROKEN[name]
+    with pytest.raises(InputError, match=sentence):
+        list(read_solids(written(tmp_path, name, text)))
+
+
+def test_missing_and_binary_files_raise_a_sentence(tmp_path):
+    with pytest.raises(InputError, match="got none"):
+        list(read_solids(tmp_path / "none.json"))
+    (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00\x81")
+    with pytest.raises(InputError, match="readable text"):
+        list(read_solids(tmp_path / "binary.json"))
+
+
+@pytest.mark.skipif(not DEN_HAAG.exists(), reason="needs The Hague's city model in ../shared/data/denhaag")
+def test_the_hague_reads_whole_and_most_of_it_is_valid():
+    solids = dict(read_solids(DEN_HAAG))
+    assert len(solids) == 1990
+    codes = [tuple(sorted({f.code for f in check_solid(solid, planarity_m=0.01)})) for solid in solids.values()]
+    assert codes.count(()) > 1800
+    assert set(codes) <= {(), (102,), (104,), (203,)}
