@@ -57,7 +57,7 @@ def test_a_tile_is_the_same_without_the_others(folder):
     stock = Stock(SMALL)
     bounds = list(stock.tiles())[-1]
     settings = ScanSettings(density=SMALL.density)
-    clouds = survey(bounds, stock.near(bounds), stock.terrain, SMALL.flight, SMALL.seed, settings)
+    clouds = survey(stock.patches(bounds), stock.near(bounds), stock.terrain, SMALL.flight, SMALL.seed, settings)
     points = np.concatenate([cloud.points for cloud in clouds])
     las = laspy.read(path / "tiles" / f"{bounds[0]:.0f}_{bounds[1]:.0f}.laz")
     assert len(points) == len(las.points) and np.abs(points[:, 2] - las.z).max() < 0.0051

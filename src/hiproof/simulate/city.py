@@ -19,7 +19,7 @@ from ..errors import InputError, OutputError
 from .relief import Relief
 from .roofs import SimBuilding, turned
 from .scanner import ScanSettings
-from .survey import Bounds, Flight, survey, write_footprints, write_laz
+from .survey import Bounds, Flight, patches_of, survey, write_footprints, write_laz
 from .town import Lot, furnished, street_side
 
 ORIGIN_XY = np.array([95000.0, 455000.0])
@@ -29,7 +29,7 @@ BLOCK_M = np.array([100.0, 64.0])
 STREET_M = 10.0
 BUILDINGS_A_BLOCK = 9.6
 WORKS_SHARE = 0.12
-TREE_REACH_M = 30.0
+SURROUNDINGS_M = 30.0
 CACHED_BLOCKS = 400
 
 HOUSES = {
@@ -140,11 +140,19 @@ class Stock:
             for k, building in enumerate(buildings, 1)
         )
 
+    def blocks_near(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Numbers of the blocks that reach within SURROUNDINGS_M of the rectangle from `low` to `high` (2,)."""
+        is_near = (self.low < high + SURROUNDINGS_M) & (self.high > low - SURROUNDINGS_M)
+        return np.flatnonzero(is_near.all(axis=1))
+
     def near(self, bounds: Bounds) -> list[Lot]:
-        """All lots of the blocks that reach into `bounds` or its trees' surroundings."""
-        low, high = np.array(bounds[:2]) - TREE_REACH_M, np.array(bounds[2:]) + TREE_REACH_M
-        blocks = np.flatnonzero((self.low < high).all(axis=1) & (self.high > low).all(axis=1))
+        """All lots of the blocks that reach into `bounds`, their trees and shadows included."""
+        blocks = self.blocks_near(np.array(bounds[:2]), np.array(bounds[2:]))
         return [lot for block in blocks for lot in self.lots(int(block))]
+
+    def patches(self, bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
+        """The patches of `bounds` in or beside the city; the country around it is not surveyed."""
+        return [patch for patch in patches_of(bounds) if len(self.blocks_near(*patch))]
 
     def tiles(self) -> Iterator[Bounds]:
         """Squares of the city's tile size, on round coordinates, that touch a block."""
@@ -175,7 +183,7 @@ def write_city(folder: Path, city: City) -> Iterator[dict[str, int | str]]:
     for bounds in stock.tiles():
         name = f"{bounds[0]:.0f}_{bounds[1]:.0f}"
         lots = stock.near(bounds)
-        clouds = survey(bounds, lots, stock.terrain, city.flight, city.seed, settings)
+        clouds = survey(stock.patches(bounds), lots, stock.terrain, city.flight, city.seed, settings)
         points = write_laz(folder / "tiles" / f"{name}.laz", clouds, np.array([*bounds[:2], 0.0]))
         own = [lot for lot in lots if _holds(bounds, lot)]
         if own:

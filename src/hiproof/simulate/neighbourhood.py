@@ -12,7 +12,7 @@ import numpy as np
 from .relief import Relief
 from .roofs import SimBuilding, turned
 from .scanner import ScanSettings
-from .survey import CRS, Flight, survey, write_footprints, write_laz, write_terrain
+from .survey import CRS, Flight, patches_of, survey, write_footprints, write_laz, write_terrain
 from .town import Lot, furnished, street_side
 
 DEMO_SEED = 5
@@ -69,7 +69,7 @@ def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     bounds = (*low, *high)
     flight = Flight(heading=math.radians(70.0), origin=ORIGIN_XY - 250.0)
     folder.mkdir(parents=True, exist_ok=True)
-    clouds = survey(bounds, lots, terrain, flight, seed, SCAN)
+    clouds = survey(patches_of(bounds), lots, terrain, flight, seed, SCAN)
     points = write_laz(folder / "cloud.laz", clouds, np.array([*low, 0.0]))
     write_footprints(folder / "footprints.gpkg", lots)
     write_terrain(folder / "terrain.tif", bounds, terrain)

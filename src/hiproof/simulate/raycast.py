@@ -81,6 +81,9 @@ def cast_crowns(xy0, slope, crowns, free_path, z_crown):
         for t in range(len(crowns)):
             x, y = xy0[i, 0] - crowns[t, 0], xy0[i, 1] - crowns[t, 1]
             sx, sy, r, h = slope[i, 0], slope[i, 1], crowns[t, 3], crowns[t, 4]
+            aside_x, aside_y = x + sx * crowns[t, 2], y + sy * crowns[t, 2]
+            if aside_x * aside_x + aside_y * aside_y > (r + h) * (r + h):
+                continue
             a = (sx * sx + sy * sy) / (r * r) + 1.0 / (h * h)
             b = (x * sx + y * sy) / (r * r) - crowns[t, 2] / (h * h)
             c = (x * x + y * y) / (r * r) + crowns[t, 2] ** 2 / (h * h) - 1.0

@@ -102,8 +102,8 @@ def scan_solids(
     vertices = np.concatenate([solid.vertices for solid in solids])
     origin = np.append(np.round(vertices[:, :2].mean(axis=0)), vertices[:, 2].min())
     scene = solids_scene([solid.moved(-origin) for solid in solids], labels)
-    corners = scene.triangles[:, :, :2]
-    plan = shapely.union_all(shapely.make_valid(shapely.polygons(corners)), grid_size=1e-4)
+    cells = shapely.polygons(scene.triangles[:, :, :2])
+    plan = shapely.union_all(cells[shapely.area(cells) > 1e-6])
     height = float(vertices[:, 2].max() - origin[2])
     return scan_scene(scene, plan.buffer(settings.margin_m, quad_segs=2), height / 2, rng, settings).moved(origin)
 

@@ -67,23 +67,32 @@ class Flight:
         return swaths
 
 
-def survey(
-    bounds: Bounds, lots: list[Lot], terrain: Relief, flight: Flight, seed: int, settings: ScanSettings
-) -> Iterator[Scan]:
-    """Points (world) within `bounds`, patch by patch; the same whatever else of the town is surveyed.
+def patches_of(bounds: Bounds) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Lowest and highest corners (2,) of the patches of at most PATCH_M that tile `bounds`."""
+    low, high = np.array(bounds[:2]), np.array(bounds[2:])
+    columns, rows = np.ceil((high - low) / PATCH_M).astype(int)
+    corners = [low + PATCH_M * np.array([i, j]) for i in range(columns) for j in range(rows)]
+    return [(corner, np.minimum(corner + PATCH_M, high)) for corner in corners]
 
-    `lots` must hold every lot that reaches into `bounds`.
+
+def survey(
+    patches: list[tuple[np.ndarray, np.ndarray]],
+    lots: list[Lot],
+    terrain: Relief,
+    flight: Flight,
+    seed: int,
+    settings: ScanSettings,
+) -> Iterator[Scan]:
+    """Points (world) of each of `patches`; the same whatever else of the town is surveyed.
+
+    `lots` must hold every lot that reaches into the patches.
     """
-    x_low, y_low, x_high, y_high = bounds
     lot_bounds = np.array([lot.bounds for lot in lots]).reshape(-1, 4)
-    for i in range(math.ceil((x_high - x_low) / PATCH_M)):
-        for j in range(math.ceil((y_high - y_low) / PATCH_M)):
-            low = np.array([x_low + i * PATCH_M, y_low + j * PATCH_M])
-            high = np.minimum(low + PATCH_M, (x_high, y_high))
-            # Shadows and leaning trees of the next patch reach this far.
-            near = (lot_bounds[:, :2] < high + 20.0).all(axis=1) & (lot_bounds[:, 2:] > low - 20.0).all(axis=1)
-            patch_lots = [lot for lot, is_near in zip(lots, near, strict=True) if is_near]
-            yield surveyed_patch(low, high, patch_lots, terrain, flight, seed, settings)
+    for low, high in patches:
+        # Shadows and leaning trees of the next patch reach this far.
+        near = (lot_bounds[:, :2] < high + 20.0).all(axis=1) & (lot_bounds[:, 2:] > low - 20.0).all(axis=1)
+        patch_lots = [lot for lot, is_near in zip(lots, near, strict=True) if is_near]
+        yield surveyed_patch(low, high, patch_lots, terrain, flight, seed, settings)
 
 
 def surveyed_patch(
