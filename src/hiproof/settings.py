@@ -55,6 +55,15 @@ class CompoundSettings:
 
 
 @dataclass(frozen=True)
+class SegmentSettings:
+    """[segment] recognising the roof before fitting it."""
+
+    network: bool = setting(True, "let the network label the points and inform the choice of type")
+    weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")
+    device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
+
+
+@dataclass(frozen=True)
 class ComposeSettings:
     """[compose] from fitted roof to solid."""
 
@@ -83,6 +92,7 @@ class Settings:
     """
 
     read: ReadSettings = field(default_factory=ReadSettings)
+    segment: SegmentSettings = field(default_factory=SegmentSettings)
     fit: FitSettings = field(default_factory=FitSettings)
     compound: CompoundSettings = field(default_factory=CompoundSettings)
     compose: ComposeSettings = field(default_factory=ComposeSettings)

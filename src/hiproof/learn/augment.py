@@ -1,0 +1,42 @@
+"""PointNeXt's recipe on the data's side: random scaling, dropping and jittering, and the free symmetries of a roof."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .network import TURNED_PAIRS
+
+FEWEST_KEPT = 30
+
+
+@dataclass(frozen=True)
+class AugmentSettings:
+    """Bounds of the random changes: `scale` relative, `jitter_m` the largest standard deviation, `drop` a share."""
+
+    scale: float = 0.12
+    stretch: float = 0.08
+    jitter_m: float = 0.04
+    drop: float = 0.4
+
+
+def varied(xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settings: AugmentSettings):
+    """A cloud (n, 3) and its labels (n,), scaled, stretched in height, thinned and jittered at random."""
+    kept = rng.random(len(xyz)) >= settings.drop * rng.random() ** 2
+    if kept.sum() >= FEWEST_KEPT:
+        xyz, labels = xyz[kept], labels[kept]
+    factor = np.full(3, 1.0 + settings.scale * rng.uniform(-1, 1))
+    factor[2] *= 1.0 + settings.stretch * rng.uniform(-1, 1)
+    return xyz * factor + settings.jitter_m * rng.random() * rng.standard_normal(xyz.shape), labels
+
+
+def symmetric(features: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+    """Arranged features (N, 11) after a random quarter turn and, every second time, a reflection in plan."""
+    features = features.copy()
+    turn, mirrored = rng.integers(4), rng.random() < 0.5
+    c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[turn]
+    for i, j in TURNED_PAIRS:
+        x, y = features[:, i].copy(), features[:, j] * (-1 if mirrored else 1)
+        features[:, i], features[:, j] = c * x - s * y, s * x + c * y
+    return features

@@ -1,0 +1,254 @@
+"""Training: PointNeXt's recipe (AdamW, cosine schedule, label smoothing), checkpoints, and the best by validation.
+
+Every random draw is named by the seed and a sample's or an epoch's number, so that a run that was killed and resumed
+gives the weights of one that was not.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+import torch
+from torch import nn
+
+from ..errors import InputError, OutputError, SettingsError
+from ..segment.arrange import Layout, arrange
+from ..segment.scores import Scores
+from .augment import AugmentSettings, symmetric, varied
+from .batch import network_inputs
+from .card import write_card, write_curve
+from .data import Sample, Source
+
+
+def open_source(*a): ...
+
+from .export import export
+from .network import NetworkSettings, RoofNetwork
+
+
+@dataclass(frozen=True)
+class TrainSettings:
+    """How to train: `samples` clouds are shown in all, `epoch` of them between validations on `validation` clouds."""
+
+    types: tuple[str, ...] = ()
+    samples: int = 400_000
+    epoch: int = 8_000
+    validation: int = 1_000
+    batch: int = 32
+    rate: float = 2e-3
+    decay: float = 0.02
+    warm_up: float = 0.02
+    smoothing: float = 0.05
+    average: float = 0.999
+    seed: int = 1
+    threads: int = 1
+    device: str = "auto"
+    layout: Layout = field(default_factory=Layout)
+    augment: AugmentSettings = field(default_factory=AugmentSettings)
+
+
+def train(data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print) -> Path:
+    """Train the network on `data` and write weights, curve, model card and checkpoints to the folder `out`.
+
+    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up three quarters).
+    A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX file of the best epoch.
+    Raises InputError for data that cannot be used, OutputError for a folder that cannot be written, SettingsError for
+    a device that is not there.
+    """
+    settings = settings or TrainSettings()
+    source = open_source(data, settings.types, settings.seed)
+    folder = writable_folder(out)
+    torch.set_num_threads(settings.threads)
+    trainer = Trainer(source, settings, folder)
+    trainer.resume()
+    while trainer.epoch * settings.epoch < settings.samples:
+        trainer.run_epoch()
+        trainer.validate()
+        trainer.save()
+        write_curve(trainer.history, folder / "curve.png")
+        report(trainer.line())
+    return trainer.finish()
+
+
+class Trainer:
+    """One training run: the network, its running average, optimiser, history, and where they are kept."""
+
+    def __init__(self, source: Source, settings: TrainSettings, folder: Path):
+        torch.manual_seed(settings.seed)
+        self.source, self.settings, self.folder = source, settings, folder
+        self.device = chosen_device(settings.device)
+        network = NetworkSettings(types=source.types, layout=settings.layout)
+        self.network = RoofNetwork(network).to(self.device)
+        self.averaged = RoofNetwork(network).to(self.device).eval()
+        self.averaged.load_state_dict(self.network.state_dict())
+        self.optimiser = torch.optim.AdamW(self.network.parameters(), settings.rate, weight_decay=settings.decay)
+        self.epoch, self.seconds, self.history, self.best = 0, 0.0, [], None
+        self.validation = [arranged(sample, settings.layout) for sample in source.validation(settings.validation)]
+
+    def run_epoch(self):
+        """Show `settings.epoch` fresh clouds."""
+        settings, start = self.settings, perf_counter()
+        torch.manual_seed(settings.seed * 1_000_003 + self.epoch)
+        self.network.train()
+        losses = []
+        first = self.epoch * settings.epoch
+        for index in range(first, first + settings.epoch, settings.batch):
+            self.set_rate(index / settings.samples)
+            losses.append(self.step([self.training_cloud(i) for i in range(index, index + settings.batch)]))
+        self.epoch += 1
+        self.seconds += perf_counter() - start
+        self.history.append({"epoch": self.epoch, "loss": float(np.mean(losses))})
+
+    def training_cloud(self, index: int):
+        """The arranged cloud number `index`, varied at random by that number."""
+        rng = np.random.default_rng([self.settings.seed, 7, index])
+        sample = self.source.training(index)
+        xyz, labels = varied(sample.xyz, sample.labels, rng, self.settings.augment)
+        arrangement = arrange(xyz, self.settings.layout)
+        arrangement.features[:] = symmetric(arrangement.features, rng)
+        return arrangement, labels[arrangement.chosen], sample.type
+
+    def step(self, clouds) -> float:
+        """One step of the optimiser on a batch of (arrangement, labels, type)."""
+        inputs, labels, types = self.tensors(clouds)
+        point_logits, type_logits = self.network(*inputs)
+        smoothing = self.settings.smoothing
+        loss = nn.functional.cross_entropy(point_logits, labels, label_smoothing=smoothing)
+        loss = loss + nn.functional.cross_entropy(type_logits, types, label_smoothing=smoothing)
+        self.optimiser.zero_grad(set_to_none=True)
+        loss.backward()
+        nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
+        self.optimiser.step()
+        self.update_average()
+        return float(loss.detach())
+
+    def tensors(self, clouds):
+        """Network inputs, point labels (not-roof last) and types of a batch, on the device."""
+        inputs = network_inputs([cloud[0] for cloud in clouds], self.settings.layout)
+        labels = np.concatenate([cloud[1] for cloud in clouds])
+        labels = torch.from_numpy(np.where(labels < 0, len(self.source.types), labels).astype(np.int64))
+        types = torch.tensor([cloud[2] for cloud in clouds])
+        return tuple(array.to(self.device) for array in inputs), labels.to(self.device), types.to(self.device)
+
+    def set_rate(self, progress: float):
+        """Linear warm-up, then a cosine to zero."""
+        warm = self.settings.warm_up
+        share = progress / warm if progress < warm else 0.5 * (1 + math.cos(math.pi * (progress - warm) / (1 - warm)))
+        for group in self.optimiser.param_groups:
+            group["lr"] = self.settings.rate * max(share, 1e-3)
+
+    @torch.no_grad()
+    def update_average(self):
+        """Exponential running average of weights and statistics: steadier than any single step's."""
+        steps = self.epoch * self.settings.epoch // self.settings.batch
+        keep = min(self.settings.average, (1 + steps) / (10 + steps)) if steps < 1000 else self.settings.average
+        state = self.network.state_dict()
+        for name, value in self.averaged.state_dict().items():
+            if value.dtype.is_floating_point:
+                value.lerp_(state[name], 1.0 - keep)
+            else:
+                value.copy_(state[name])
+
+    @torch.no_grad()
+    def validate(self):
+        """Score the averaged weights and keep them if they are the best so far."""
+        told_points, true_points, told, true = [], [], [], []
+        for start in range(0, len(self.validation), self.settings.batch):
+            inputs, labels, types = self.tensors(self.validation[start : start + self.settings.batch])
+            point_logits, type_logits = self.averaged(*inputs)
+            told_points.append(point_logits.argmax(1).cpu())
+            told.append(type_logits.argmax(1).cpu())
+            true_points.append(labels.cpu())
+            true.append(types.cpu())
+        names = self.source.types
+        types = Scores.of(torch.cat(true).numpy(), torch.cat(told).numpy(), names)
+        points = Scores.of(torch.cat(true_points).numpy(), torch.cat(told_points).numpy(), (*names, "not roof"))
+        record = self.history[-1]
+        record |= {"balanced_accuracy": types.balanced_accuracy, "mean_iou": points.mean_iou, "recalls": types.recalls}
+        score = types.balanced_accuracy + points.mean_iou
+        if self.best is None or score > self.best["score"]:
+            weights = {name: value.clone() for name, value in self.averaged.state_dict().items()}
+            self.best = {"score": score, "epoch": self.epoch, "weights": weights}
+
+    def save(self):
+        """Write the checkpoint, whole or not at all."""
+        state = {
+            "network": self.network.state_dict(), "averaged": self.averaged.state_dict(),
+            "optimiser": self.optimiser.state_dict(), "epoch": self.epoch, "history": self.history,
+            "best": self.best, "seconds": self.seconds, "types": self.source.types,
+        }  # fmt: skip
+        partial = self.folder / "checkpoint.partial"
+        torch.save(state, partial)
+        os.replace(partial, self.folder / "checkpoint.pt")
+
+    def resume(self):
+        """Go on from the folder's checkpoint if there is one. Raises InputError if it is of another network."""
+        path = self.folder / "checkpoint.pt"
+        if not path.exists():
+            return
+        try:
+            state = torch.load(path, map_location=self.device, weights_only=True)
+            if tuple(state["types"]) != self.source.types:
+                raise ValueError(f"it knows the types {', '.join(state['types'])}")
+            self.network.load_state_dict(state["network"])
+            self.averaged.load_state_dict(state["averaged"])
+            self.optimiser.load_state_dict(state["optimiser"])
+        except Exception as error:
+            raise InputError(
+                f"expected {path} to be a checkpoint of this training, got: {str(error).splitlines()[0]}; "
+                "train into another folder or remove it"
+            ) from error
+        self.epoch, self.seconds = state["epoch"], state["seconds"]
+        self.history, self.best = state["history"], state["best"]
+
+    def finish(self) -> Path:
+        """Export the best epoch and write the model card."""
+        self.averaged.load_state_dict(self.best["weights"])
+        path = export(self.averaged.cpu(), self.folder / "roof_types.onnx")
+        made_by = {"device": device_name(self.device), "hours": round(self.seconds / 3600, 2)}
+        write_card(self.folder, self.source.description, asdict(self.settings), self.history, self.best["epoch"], made_by)
+        return path
+
+    def line(self) -> str:
+        """Progress in one line."""
+        last, settings = self.history[-1], self.settings
+        return (
+            f"epoch {self.epoch}/{math.ceil(settings.samples / settings.epoch)}  loss {last['loss']:.3f}  "
+            f"balanced accuracy {last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f}  "
+            f"lowest recall {min(last['recalls'].values()):.3f}  {self.seconds / 60:.1f} min"
+        )
+
+
+def arranged(sample: Sample, layout: Layout):
+    """A validation cloud as it is: (arrangement, labels of its chosen points, type)."""
+    arrangement = arrange(sample.xyz, layout)
+    return arrangement, sample.labels[arrangement.chosen], sample.type
+
+
+def chosen_device(name: str) -> torch.device:
+    """The device asked for; "auto" takes a GPU where there is one. Raises SettingsError when it is absent."""
+    available = torch.cuda.is_available()
+    if name == "cuda" and not available:
+        raise SettingsError("expected a CUDA GPU for --device cuda, but PyTorch finds none; use --device cpu or auto")
+    if name not in ("auto", "cpu", "cuda"):
+        raise SettingsError(f"expected the device to be one of auto, cpu, cuda, got {name!r}")
+    return torch.device("cuda" if name == "cuda" or (name == "auto" and available) else "cpu")
+
+
+def device_name(device: torch.device) -> str:
+    return torch.cuda.get_device_name(device) if device.type == "cuda" else "CPU"
+
+
+def writable_folder(out: str | Path) -> Path:
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "checkpoint.partial").touch()
+    except OSError as error:
+        raise OutputError(f"expected a folder that can be written at {folder}, got: {error}; choose another --out") from error
+    return folder

@@ -1,0 +1,196 @@
+"""The shipped network in ONNX Runtime: `segment` labels a building's points and names its roof type.
+
+The first step of Li, Zhang and Shan (2020): only roof points go on to the fit, with the network's probabilities as the
+prior of its choice of type.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import FitError, InputError, SettingsError
+from ..settings import SegmentSettings, Settings
+from .arrange import Arrangement, Layout, arrange
+
+FORMAT = "hiproof-roof-types-1"
+INPUT_NAMES = (
+    "features", "group1", "group2", "group3", "radii", "up_index1", "up_index2", "up_weight1", "up_weight2",
+)  # fmt: skip
+OUTPUT_NAMES = ("point_logits", "type_logits")
+SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "roof_types.onnx"
+NOT_ROOF = -1
+FEWEST_POINTS = 10
+CARRIED_NEIGHBOURS = 3
+CARRIED_CHUNK = 200_000
+
+
+@dataclass(frozen=True)
+class Segmentation:
+    """What the network says of one building's n points.
+
+    `labels` (n,) index of the point's roof type in `types`' order, -1 where it is no roof; `not_roof` (n,) that
+    probability; `types` probability of the building's roof type by name, in the catalogue's order, summing to 1.
+    """
+
+    labels: np.ndarray
+    not_roof: np.ndarray
+    types: dict[str, float]
+
+    @property
+    def type(self) -> str:
+        """The most probable roof type."""
+        return max(self.types, key=self.types.get)
+
+    @property
+    def is_roof(self) -> np.ndarray:
+        """(n,) True where a point is labelled with a roof type."""
+        return self.labels != NOT_ROOF
+
+
+@dataclass(frozen=True)
+class Model:
+    """A loaded ONNX network with what its file says of itself."""
+
+    session: object
+    types: tuple[str, ...]
+    layout: Layout
+    temperature: float
+
+
+def segment(points: np.ndarray, settings: Settings | SegmentSettings | None = None) -> Segmentation:
+    """Roof type, and roof or not, of every point of one building, and the probabilities of the building's type.
+
+    `points` (n, 3) metres, any frame and order, n >= 10; the answer does not change when they turn about Z. A cloud
+    beyond the network's size is thinned to farthest points and its labels are carried back to all points.
+
+    Raises FitError for points no roof can be told from (fewer than 10, all in one place, not finite), InputError for
+    an array of another shape or weights that are missing or of another kind, SettingsError for a device not there.
+
+    >>> x, y = np.meshgrid(np.arange(0, 12, 0.5), np.arange(0, 8, 0.5))
+    >>> gable = np.column_stack([x.ravel(), y.ravel(), 6 - 0.7 * abs(y.ravel() - 3.75)])
+    >>> segment(gable).type
+    'gable'
+    """
+    settings = settings or SegmentSettings()
+    section = settings.segment if isinstance(settings, Settings) else settings
+    xyz = checked_points(points)
+    model = load(section.weights or str(SHIPPED_WEIGHTS), section.device)
+    arranged = arrange(xyz, model.layout)
+    point_logits, type_logits = run(model, [arranged])
+    point_probability = softmax(point_logits[: arranged.sampled])
+    type_probability = softmax(type_logits[0] / model.temperature)
+    labels, not_roof = carried_back(point_probability, xyz[arranged.chosen[: arranged.sampled]], xyz)
+    return Segmentation(labels, not_roof, dict(zip(model.types, map(float, type_probability), strict=True)))
+
+
+def run(model: Model, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
+    """Point logits (B N, types + 1) and type logits (B, types) of arranged buildings."""
+    return tuple(model.session.run(list(OUTPUT_NAMES), stacked(arrangements, model.layout)))
+
+
+def stacked(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
+    """The graph's inputs by name for B buildings: flat over buildings, indices counting rows of the level above."""
+    sizes = (layout.points, *layout.levels)
+
+    def flat(indices, size):
+        return np.concatenate([index + i * size for i, index in enumerate(indices)])
+
+    groups = [flat([a.groups[level] for a in arrangements], sizes[level]) for level in range(3)]
+    ups = [flat([a.up_indices[k] for a in arrangements], sizes[above]) for k, above in ((0, 3), (1, 1))]
+    weights = [np.concatenate([a.up_weights[k] for a in arrangements]) for k in (0, 1)]
+    features = np.concatenate([a.features for a in arrangements])
+    radii = np.stack([a.radii for a in arrangements])
+    return dict(zip(INPUT_NAMES, (features, *groups, radii, *ups, *weights), strict=True))
+
+
+def carried_back(probability: np.ndarray, sampled: np.ndarray, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (n,) and not-roof probability (n,) of all `xyz` from the nearest of the `sampled` points.
+
+    `probability` (m, types + 1), not-roof last; the mean of the three nearest weighted by inverse distance, in pieces,
+    so that memory beyond the result is bounded.
+    """
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(sampled)
+    labels, not_roof = np.empty(len(xyz), np.int64), np.empty(len(xyz))
+    for start in range(0, len(xyz), CARRIED_CHUNK):
+        piece = slice(start, start + CARRIED_CHUNK)
+        distance, index = tree.query(xyz[piece], k=min(CARRIED_NEIGHBOURS, len(sampled)))
+        weight = 1.0 / (distance + 1e-3)
+        mean = np.einsum("nk,nkc->nc", weight / weight.sum(axis=1, keepdims=True), probability[index])
+        not_roof[piece] = mean[:, -1]
+        labels[piece] = np.where(mean[:, -1] > 0.5, NOT_ROOF, mean[:, :-1].argmax(axis=1))
+    return labels, not_roof
+
+
+def checked_points(points: np.ndarray) -> np.ndarray:
+    """`points` as float64 (n, 3) in a frame of their own. Raises as `segment` does."""
+    xyz = np.asarray(points)
+    if xyz.ndim != 2 or xyz.shape[1] < 3 or not np.issubdtype(xyz.dtype, np.number):
+        raise InputError(f"expected points as an (n, 3) array of numbers, got shape {xyz.shape} of {xyz.dtype}")
+    if len(xyz) < FEWEST_POINTS:
+        raise FitError(
+            f"expected at least {FEWEST_POINTS} points to recognise a roof, got {len(xyz)}; "
+            "give the whole building or reconstruct without the network"
+        )
+    xyz = xyz[:, :3].astype(float)
+    finite = np.isfinite(xyz).all(axis=1)
+    if not finite.all():
+        raise FitError(f"expected finite coordinates, got NaN or infinity in {np.sum(~finite)} of {len(xyz)} points")
+    if np.ptp(xyz[:, :2], axis=0).max() < 1e-6:
+        raise FitError(f"expected points spread over a roof, got {len(xyz)} points all in one place")
+    return xyz - xyz[0]
+
+
+@lru_cache(maxsize=4)
+def load(weights: str, device: str = "cpu") -> Model:
+    """The network in the ONNX file `weights`, loaded once a process, on one thread. Raises as `segment` does."""
+    import onnxruntime
+
+    if device == "cuda" and "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
+        found = ", ".join(onnxruntime.get_available_providers())
+        raise SettingsError(
+            f"expected a CUDA device for segment.device = 'cuda', but ONNX Runtime here offers only {found}; "
+            "install onnxruntime-gpu or set it to 'cpu'"
+        )
+    if not Path(weights).is_file():
+        raise InputError(
+            f"expected the network's weights at {weights}, but there is no such file; install hiproof again, "
+            "name another ONNX file in segment.weights, or reconstruct without the network"
+        )
+    options = onnxruntime.SessionOptions()
+    options.intra_op_num_threads = options.inter_op_num_threads = 1
+    options.log_severity_level = 4
+    providers = ["CUDAExecutionProvider", "CPUExecutionProvider"] if device == "cuda" else ["CPUExecutionProvider"]
+    try:
+        session = onnxruntime.InferenceSession(weights, options, providers=providers)
+        metadata = session.get_modelmeta().custom_metadata_map
+    except Exception as error:
+        raise InputError(
+            f"expected an ONNX network in {weights}, got a file ONNX Runtime cannot read ({first_line(error)}); "
+            "install hiproof again or export the network anew with `hiproof train`"
+        ) from error
+    if metadata.get("format") != FORMAT:
+        raise InputError(
+            f"expected an ONNX file of the kind {FORMAT!r} in {weights}, got {metadata.get('format', 'another network')!r}; "
+            "use a file written by this version's `hiproof train`"
+        )
+    layout = json.loads(metadata["layout"])
+    layout["levels"] = tuple(layout["levels"])
+    types = tuple(json.loads(metadata["types"]))
+    return Model(session, types, Layout(**layout), float(metadata.get("temperature", 1.0)))
+
+
+def first_line(error: Exception) -> str:
+    return str(error).splitlines()[0][:120] if str(error) else type(error).__name__
+
+
+def softmax(logits: np.ndarray) -> np.ndarray:
+    """Probabilities along the last axis, in float64."""
+    shifted = np.exp(np.asarray(logits, float) - logits.max(axis=-1, keepdims=True))
+    return shifted / shifted.sum(axis=-1, keepdims=True)

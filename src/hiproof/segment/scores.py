@@ -1,0 +1,55 @@
+"""Figures of a classification: confusion matrix, accuracy, balanced accuracy, recalls, mean intersection over union."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Scores:
+    """What a confusion matrix (true, told) of classes `names` says; classes that never occur count nowhere.
+
+    >>> scores = Scores.of(np.array([0, 0, 1, 1]), np.array([0, 0, 1, 0]), ("flat", "gable"))
+    >>> scores.accuracy, scores.balanced_accuracy, scores.lowest_recall
+    (0.75, 0.75, 0.5)
+    """
+
+    names: tuple[str, ...]
+    confusion: np.ndarray
+
+    @classmethod
+    def of(cls, true: np.ndarray, told: np.ndarray, names: tuple[str, ...]) -> Scores:
+        """Scores of class indices `true` (n,) and `told` (n,), both in 0 .. len(names) - 1."""
+        size = len(names)
+        counts = np.bincount(np.asarray(true) * size + np.asarray(told), minlength=size * size)
+        return cls(tuple(names), counts.reshape(size, size))
+
+    @property
+    def accuracy(self) -> float:
+        return float(np.trace(self.confusion) / max(self.confusion.sum(), 1))
+
+    @property
+    def recalls(self) -> dict[str, float]:
+        """Share of each true class told rightly, of those that occur."""
+        truths = self.confusion.sum(axis=1)
+        return {
+            name: float(self.confusion[i, i] / truths[i]) for i, name in enumerate(self.names) if truths[i]
+        }
+
+    @property
+    def balanced_accuracy(self) -> float:
+        """Mean of the recalls: what always naming the commonest class cannot raise."""
+        return float(np.mean(list(self.recalls.values())))
+
+    @property
+    def lowest_recall(self) -> float:
+        return min(self.recalls.values())
+
+    @property
+    def mean_iou(self) -> float:
+        """Mean over the classes that occur of intersection over union."""
+        union = self.confusion.sum(axis=0) + self.confusion.sum(axis=1) - np.diag(self.confusion)
+        occurs = self.confusion.sum(axis=1) > 0
+        return float(np.mean(np.diag(self.confusion)[occurs] / union[occurs]))
