@@ -3,12 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 
 from ..errors import InputError
-from ..simulate.shapes import ROOF_TYPES
+from ..segment.inference import NOT_ROOF
+from ..simulate import ROOF_TYPES, Scan, scan, scan_solids
+from ..simulate.scene import SOURCE_ROOF
+from ..simulate.training import random_settings
+from .houses import training_house
+from .shapes import Shape, read_shapes
+
+DENSITY = (1.0, 20.0)
+POINTS = (60, 1500)
+ANNEX_SHARE = 0.3
+FIRST_SOURCE_SHARE = 0.85
+TRAINING, VALIDATION, TEST = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -21,11 +33,138 @@ class Sample:
 
 
 class Source(Protocol):
-    """A supply of labelled clouds. Training cloud `index` is the same whenever it is asked for."""
+    """A supply of labelled clouds by role (TRAINING, VALIDATION, TEST) and number: the same whenever asked for."""
 
     types: tuple[str, ...]
     description: str
 
-    def training(self, index: int) -> Sample: ...
+    def sample(self, role: int, index: int) -> Sample: ...
 
-    def validation(self, count: int) -> list[Sample]: ...
+
+@dataclass(frozen=True)
+class Simulated:
+    """Buildings made up without end, some with annexes, under a scanner with all its defects."""
+
+    types: tuple[str, ...]
+    seed: int
+    annex_share: float = ANNEX_SHARE
+
+    @property
+    def description(self) -> str:
+        return (
+            f"simulated airborne scans, {DENSITY[0]:g}-{DENSITY[1]:g} points/m2, all defects, "
+            f"{100 * self.annex_share:.0f} % of the buildings with annexes, seed {self.seed}"
+        )
+
+    def sample(self, role: int, index: int) -> Sample:
+        rng = np.random.default_rng([self.seed, role, index])
+        type = int(rng.integers(len(self.types)))
+        while True:
+            building = training_house(rng, self.types[type], self.annex_share)
+            cloud = scan(building, rng, random_settings(rng, building, DENSITY, POINTS, None))
+            if usable(cloud):
+                return as_sample(cloud, self.types, type, rng)
+
+
+@dataclass(frozen=True)
+class Scanned:
+    """Solids of a CityJSON file with a roofType under the same scanner; types are drawn evenly, then their shapes.
+
+    Training never sees the buildings held out for validation and test (a share by the hash of the building's id).
+    """
+
+    types: tuple[str, ...]
+    seed: int
+    path: Path
+    shapes: tuple[Shape, ...]
+
+    @property
+    def description(self) -> str:
+        return f"{len(self.shapes)} real shapes of {self.path.name} under the simulated scanner, seed {self.seed}"
+
+    def sample(self, role: int, index: int) -> Sample:
+        rng = np.random.default_rng([self.seed, 11, role, index])
+        shapes = [shape for shape in self.shapes if shape.held_out == (role != TRAINING)]
+        present = sorted({shape.type for shape in shapes}, key=self.types.index)
+        type = present[rng.integers(len(present))]
+        while True:
+            shapes_of_type = [shape for shape in shapes if shape.type == type]
+            shape = shapes_of_type[rng.integers(len(shapes_of_type))]
+            settings = random_settings(rng, shape, DENSITY, POINTS, None)
+            cloud = scan_solids([shape.solid], rng, settings, [shape.type])
+            if usable(cloud):
+                return as_sample(cloud, self.types, self.types.index(type), rng)
+
+
+@dataclass(frozen=True)
+class Mixture:
+    """Several sources, the first the main one; validation and test are the first's alone."""
+
+    sources: tuple[Source, ...]
+    seed: int
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        return self.sources[0].types
+
+    @property
+    def description(self) -> str:
+        share = 100 * FIRST_SOURCE_SHARE
+        return f"{share:.0f} %: {self.sources[0].description}; else: " + "; ".join(
+            source.description for source in self.sources[1:]
+        )
+
+    def sample(self, role: int, index: int) -> Sample:
+        rng = np.random.default_rng([self.seed, 13, role, index])
+        if role != TRAINING or rng.random() < FIRST_SOURCE_SHARE:
+            return self.sources[0].sample(role, index)
+        return self.sources[1 + rng.integers(len(self.sources) - 1)].sample(role, index)
+
+
+def usable(cloud: Scan) -> bool:
+    """Whether enough of the roof was seen to call it by its name."""
+    return len(cloud) >= POINTS[0] and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * POINTS[0]
+
+
+def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Generator) -> Sample:
+    """A scan with its labels counted in `types`, thinned to the most points a training cloud may have."""
+    if len(cloud) > POINTS[1]:
+        cloud = cloud.chosen(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
+    index = np.full(len(ROOF_TYPES) + 1, NOT_ROOF)
+    for position, name in enumerate(types):
+        index[ROOF_TYPES.index(name)] = position
+    return Sample(cloud.points - cloud.points.mean(axis=0), index[cloud.label], type)
+
+
+def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 1) -> Source:
+    """The source(s) that `data` names: "simulated", "denhaag:FILE" or "roofn3d:DIR"; `types` empty means all of them.
+
+    Raises InputError for names, types or files that cannot be used.
+    """
+    unknown = [name for name in types if name not in ROOF_TYPES]
+    if unknown:
+        raise InputError(f"expected roof types among {', '.join(ROOF_TYPES)}, got {', '.join(unknown)}")
+    names = [data] if isinstance(data, str) else list(data)
+    if not names:
+        raise InputError("expected training data, got none; give simulated, denhaag:FILE or roofn3d:DIR")
+    sources = tuple(open_one(name, tuple(types), seed) for name in names)
+    if any(source.types != sources[0].types for source in sources):
+        raise InputError("expected data of the same roof types to be mixed; name the types with --types")
+    return sources[0] if len(sources) == 1 else Mixture(sources, seed)
+
+
+def open_one(name: str, types: tuple[str, ...], seed: int) -> Source:
+    kind, _, path = name.partition(":")
+    if kind == "simulated" and not path:
+        return Simulated(types or ROOF_TYPES, seed)
+    if kind == "denhaag" and path:
+        types = types or ROOF_TYPES
+        shapes = tuple(shape for shape in read_shapes(Path(path)) if shape.type in types)
+        if not {shape.type for shape in shapes if not shape.held_out} or all(not shape.held_out for shape in shapes):
+            raise InputError(f"expected solids with a known roofType in {path}, got too few to train and validate on")
+        return Scanned(types, seed, Path(path), shapes)
+    if kind == "roofn3d" and path:
+        from .roofn3d import RoofN3D
+
+        return RoofN3D.open(Path(path), types, seed)
+    raise InputError(f"expected training data as simulated, denhaag:FILE or roofn3d:DIR, got {name!r}")

@@ -22,11 +22,7 @@ from ..segment.scores import Scores
 from .augment import AugmentSettings, symmetric, varied
 from .batch import network_inputs
 from .card import write_card, write_curve
-from .data import Sample, Source
-
-
-def open_source(*a): ...
-
+from .data import TRAINING, VALIDATION, Sample, Source, open_source
 from .export import export
 from .network import NetworkSettings, RoofNetwork
 
@@ -88,7 +84,9 @@ class Trainer:
         self.averaged.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.AdamW(self.network.parameters(), settings.rate, weight_decay=settings.decay)
         self.epoch, self.seconds, self.history, self.best = 0, 0.0, [], None
-        self.validation = [arranged(sample, settings.layout) for sample in source.validation(settings.validation)]
+        self.validation = [
+            arranged(source.sample(VALIDATION, index), settings.layout) for index in range(settings.validation)
+        ]
 
     def run_epoch(self):
         """Show `settings.epoch` fresh clouds."""
@@ -107,7 +105,7 @@ class Trainer:
     def training_cloud(self, index: int):
         """The arranged cloud number `index`, varied at random by that number."""
         rng = np.random.default_rng([self.settings.seed, 7, index])
-        sample = self.source.training(index)
+        sample = self.source.sample(TRAINING, index)
         xyz, labels = varied(sample.xyz, sample.labels, rng, self.settings.augment)
         arrangement = arrange(xyz, self.settings.layout)
         arrangement.features[:] = symmetric(arrangement.features, rng)
@@ -145,8 +143,7 @@ class Trainer:
     @torch.no_grad()
     def update_average(self):
         """Exponential running average of weights and statistics: steadier than any single step's."""
-        steps = self.epoch * self.settings.epoch // self.settings.batch
-        keep = min(self.settings.average, (1 + steps) / (10 + steps)) if steps < 1000 else self.settings.average
+        keep = self.settings.average if self.epoch else 0.99
         state = self.network.state_dict()
         for name, value in self.averaged.state_dict().items():
             if value.dtype.is_floating_point:

@@ -1,0 +1,70 @@
+"""Houses for training, closer to real ones than the tests' clean types: annexes, and hips that are nearly pyramids."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ..model import Part
+from ..simulate.roofs import SimBuilding, assemble, random_building
+from ..simulate.shapes import make_part
+
+ANNEX_TYPES = ("flat", "monopitch", "gable", "hip")
+LOWEST_EAVE_M = 2.2
+OVERLAP_M = 0.05
+
+
+def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:
+    """A building of roof `type`; `annex_share` of them have one or two smaller parts (porch, extension, cross wing)
+    at their sides, and a quarter of the hips a short ridge. The type stays the main roof's."""
+    building = random_building(rng, type)
+    main = building.roof.parts[0]
+    if type == "hip" and rng.random() < 0.25:
+        main = with_short_ridge(rng, main)
+    count = 1 + int(rng.random() < 0.3) if rng.random() < annex_share else 0
+    annexes = tuple(annex(rng, main) for _ in range(count))
+    return assemble((main, *annexes), "annexed" if annexes else "single", building.roof.frame.origin)
+
+
+def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
+    """A hip whose ridge is a tenth to a quarter of its width."""
+    ridge = hip.parameters["width"] * rng.uniform(0.1, 0.25)
+    parameters = hip.parameters | {"length": 2 * hip.parameters["hip_run"] + ridge}
+    return make_part("hip", parameters, hip.kappa, hip.translation)
+
+
+def annex(rng: np.random.Generator, main: Part) -> Part:
+    """One part against a random side of `main`: under its eave, or level with it and reaching under its roof."""
+    length, width = main.parameters["length"], main.parameters["width"]
+    quarters = int(rng.integers(4))
+    reach, side = (length / 2, width) if quarters % 2 == 0 else (width / 2, length)
+    across = side * rng.uniform(0.3, 0.7)
+    depth = rng.uniform(1.5, 0.4 * 2 * reach + 1.5)
+    level = rng.random() < 0.4
+    inside = reach * rng.uniform(0.3, 1.0) if level else OVERLAP_M
+    eave = main.translation[2] - (0.0 if level else rng.uniform(0.3, 2.8))
+    type = "gable" if level else str(rng.choice(ANNEX_TYPES))
+    parameters = annex_parameters(rng, type, depth + inside, across, main.parameters.get("height", 0.0))
+    along, aside = reach + (depth - inside) / 2, rng.uniform(-0.5, 0.5) * (side - across)
+    angle = main.kappa + quarters * math.pi / 2
+    x = math.cos(angle) * along - math.sin(angle) * aside
+    y = math.sin(angle) * along + math.cos(angle) * aside
+    turn = math.pi / 2 if type == "monopitch" else 0.0
+    if turn:
+        parameters["length"], parameters["width"] = parameters["width"], parameters["length"]
+    translation = np.array([main.translation[0] + x, main.translation[1] + y, max(eave, LOWEST_EAVE_M)])
+    return make_part(type, parameters, angle + turn, translation)
+
+
+def annex_parameters(rng: np.random.Generator, type: str, length: float, width: float, limit: float) -> dict[str, float]:
+    """theta_p of an annex `length` (outwards) by `width`, a gable or hip no higher than `limit` unless that is low."""
+    slope = math.tan(math.radians(rng.uniform(15.0, 45.0)))
+    parameters = {"length": length, "width": width}
+    if type in ("gable", "hip"):
+        parameters["height"] = min(width / 2 * slope, max(limit, 1.0))
+    if type == "hip":
+        parameters["hip_run"] = min(width / 2, length / 2) * rng.uniform(0.6, 1.0)
+    if type == "monopitch":
+        parameters["height"] = length * math.tan(math.radians(rng.uniform(5.0, 20.0)))
+    return parameters
