@@ -58,7 +58,7 @@ class CompoundSettings:
 class SegmentSettings:
     """[segment] recognising the roof before fitting it."""
 
-    network: bool = setting(True, "let the network label the points and inform the choice of type")
+    enabled: bool = setting(True, "let the network label the points and inform the choice of type")
     weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")
     device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
 

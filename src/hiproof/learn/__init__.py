@@ -1,19 +1,31 @@
 """Training of the network that recognises roofs (extra `train`): network, data sets, training, export.
 
-The only room that imports torch. `train` makes weights, `segment` uses them.
+    data       labelled clouds: simulated, The Hague's shapes scanned, RoofN3D
+    augment    random scaling, dropping, jittering, and the roof's symmetries
+    network    PointNet++ in PyTorch
+    training   the recipe, checkpoints and the best by validation
+    export     to the ONNX file that `segment` runs
+    card       training curve and model card
+
+The only room that imports torch, and not before `train` is asked for.
 """
 
 from __future__ import annotations
 
 from ..errors import InputError
 
-try:
-    import torch as _torch  # noqa: F401
-except ImportError as error:
-    raise InputError(
-        "expected PyTorch for training, but it is not installed; install hiproof with the extra: pip install 'hiproof[train]'"
-    ) from error
-
-from .training import TrainSettings, train
-
 __all__ = ["TrainSettings", "train"]
+
+
+def __getattr__(name: str):
+    """`train` and `TrainSettings`, imported when used. Raises InputError where PyTorch is missing."""
+    if name not in __all__:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    try:
+        from . import training
+    except ImportError as error:
+        raise InputError(
+            f"expected PyTorch, onnx and matplotlib for training, got: {error}; "
+            "install hiproof with its extra: pip install 'hiproof[train]'"
+        ) from error
+    return getattr(training, name)

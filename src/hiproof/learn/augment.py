@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .network import TURNED_PAIRS
+from ..segment.arrange import TURNED_PAIRS
 
 FEWEST_KEPT = 30
 

@@ -18,7 +18,7 @@ from .network import RoofNetwork
 def export(network: RoofNetwork, path: str | Path, details: dict[str, str] | None = None) -> Path:
     """Write `network` as ONNX to `path`, with its types, layout and the temperature of its probabilities inside.
 
-    The graph takes the arrays of `segment.arrange.Arrangement`, flat over any number of buildings.
+    Weights keep their names, so that they can be read back from the file. The graph takes the arrays of `segment.arrange.Arrangement`, flat over any number of buildings.
     """
     import onnx
 
@@ -29,7 +29,7 @@ def export(network: RoofNetwork, path: str | Path, details: dict[str, str] | Non
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            network, example_batch(network.settings.layout), str(path), dynamo=False, opset_version=17,
+            network, example_batch(network.settings.layout), str(path), dynamo=False, do_constant_folding=False, opset_version=17,
             input_names=list(INPUT_NAMES), output_names=list(OUTPUT_NAMES), dynamic_axes=flat,
         )  # fmt: skip
     model = onnx.load(path)

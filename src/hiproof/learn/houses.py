@@ -57,7 +57,9 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
     return make_part(type, parameters, angle + turn, translation)
 
 
-def annex_parameters(rng: np.random.Generator, type: str, length: float, width: float, limit: float) -> dict[str, float]:
+def annex_parameters(
+    rng: np.random.Generator, type: str, length: float, width: float, limit: float
+) -> dict[str, float]:
     """theta_p of an annex `length` (outwards) by `width`, a gable or hip no higher than `limit` unless that is low."""
     slope = math.tan(math.radians(rng.uniform(15.0, 45.0)))
     parameters = {"length": length, "width": width}

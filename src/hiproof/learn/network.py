@@ -16,10 +16,9 @@ from dataclasses import dataclass, field
 import torch
 from torch import nn
 
-from ..segment.arrange import FEATURES, POSITION_SCALE, Layout
+from ..segment.arrange import FEATURES, POSITION_SCALE, TURNED_PAIRS, Layout
 
 QUARTER_TURNS = 4
-TURNED_PAIRS = ((0, 1), (3, 4), (8, 9))
 
 
 @dataclass(frozen=True)
@@ -49,7 +48,8 @@ class SetAbstraction(nn.Module):
     """PointNet over each group: two layers on (features, relative position / radius), then the maximum.
 
     The first layer is linear in the neighbour's features and in the difference of positions, so it is evaluated once
-    a source and once a centre and subtracted after grouping: the same numbers for a tenth of the products.
+    a source and once a centre and subtracted after grouping: the same numbers for a tenth of the products. Both
+    normalisations act outside the groups, before grouping and after the maximum, where the rows are few.
     """
 
     def __init__(self, inputs: int, hidden: int, outputs: int):
@@ -57,13 +57,31 @@ class SetAbstraction(nn.Module):
         self.features = nn.Linear(inputs, hidden, bias=False)
         self.position = nn.Linear(3, hidden, bias=False)
         self.norm = nn.BatchNorm1d(hidden)
-        self.second = Dense(hidden, outputs)
+        self.second = nn.Linear(hidden, outputs, bias=False)
+        self.second_norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x, position, centres, group):
         """Features (rows, O, C) and positions over the radius (rows, O, 3) to the centres' features (S, O, outputs)."""
-        source = self.features(x) + self.position(position)
-        grouped = gathered(source, group) - self.position(centres).unsqueeze(1)
-        return self.second(torch.relu(normalised(self.norm, grouped))).max(dim=1)[0]
+        source = normalised(self.norm, self.features(x) + self.position(position))
+        grouped = torch.relu(gathered(source, group) - self.position(centres).unsqueeze(1))
+        return torch.relu(normalised(self.second_norm, self.second(grouped).max(dim=1)[0]))
+
+
+class FeaturePropagation(nn.Module):
+    """Coarse features interpolated at finer points, joined with the fine ones, through a layer.
+
+    The layer's coarse half is applied before interpolation, with which it commutes and where the rows are few.
+    """
+
+    def __init__(self, coarse: int, fine: int, outputs: int):
+        super().__init__()
+        self.coarse, self.fine = nn.Linear(coarse, outputs, bias=False), nn.Linear(fine, outputs, bias=False)
+        self.norm = nn.BatchNorm1d(outputs)
+
+    def forward(self, coarse, fine, index, weight):
+        """Coarse (rows, O, C) and fine features (S, O, D), interpolation `index`, `weight` (S, 3): (S, O, outputs)."""
+        joined = interpolated(self.coarse(coarse), index, weight) + self.fine(fine)
+        return torch.relu(normalised(self.norm, joined))
 
 
 class GlobalAbstraction(nn.Module):
@@ -89,7 +107,10 @@ class RoofNetwork(nn.Module):
         self.down = nn.ModuleList(SetAbstraction(inputs[i], *widths[i]) for i in range(3))
         self.everything = GlobalAbstraction(inputs[3], *widths[3])
         self.up = nn.ModuleList(
-            [Dense(inputs[3] + inputs[4] + inputs[1], up[0]), Dense(up[0] + len(FEATURES), up[1])]
+            [
+                FeaturePropagation(inputs[3] + inputs[4], inputs[1], up[0]),
+                FeaturePropagation(up[0], len(FEATURES), up[1]),
+            ]
         )
         self.dropout = nn.Dropout(settings.dropout)
         self.point_head = nn.Linear(up[1], classes + 1)
@@ -115,8 +136,8 @@ class RoofNetwork(nn.Module):
             position = first_rows(position, sizes[i], sizes[i + 1])
         building = self.everything(levels[3], position / 10.0, sizes[3])
         coarse = torch.cat([levels[3], building.repeat_interleave(sizes[3], dim=0)], dim=-1)
-        middle = self.up[0](torch.cat([interpolated(coarse, up_index1, up_weight1), levels[1]], dim=-1))
-        fine = self.up[1](torch.cat([interpolated(middle, up_index2, up_weight2), levels[0]], dim=-1))
+        middle = self.up[0](coarse, levels[1], up_index1, up_weight1)
+        fine = self.up[1](middle, levels[0], up_index2, up_weight2)
         return self.point_head(self.dropout(fine)).mean(dim=1), self.type_head(building).mean(dim=1)
 
 

@@ -43,7 +43,9 @@ def read_shapes(path: Path) -> list[Shape]:
         vertices = np.array(city["vertices"], float) * transform["scale"] + transform["translate"]
         objects = city["CityObjects"].items()
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(f"expected a CityJSON file at {path}, got: {error}; give one with roofType attributes") from error
+        raise InputError(
+            f"expected a CityJSON file at {path}, got: {error}; give one with roofType attributes"
+        ) from error
     shapes = []
     for name, item in objects:
         type = TYPE_OF_CODE.get(str(item.get("attributes", {}).get("roofType")))

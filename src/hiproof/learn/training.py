@@ -32,13 +32,13 @@ class TrainSettings:
     """How to train: `samples` clouds are shown in all, `epoch` of them between validations on `validation` clouds."""
 
     types: tuple[str, ...] = ()
-    samples: int = 400_000
-    epoch: int = 8_000
+    samples: int = 150_000
+    epoch: int = 6_000
     validation: int = 1_000
     batch: int = 32
     rate: float = 2e-3
     decay: float = 0.02
-    warm_up: float = 0.02
+    warm_up: float = 0.01
     smoothing: float = 0.05
     average: float = 0.999
     seed: int = 1
@@ -208,7 +208,9 @@ class Trainer:
         self.averaged.load_state_dict(self.best["weights"])
         path = export(self.averaged.cpu(), self.folder / "roof_types.onnx")
         made_by = {"device": device_name(self.device), "hours": round(self.seconds / 3600, 2)}
-        write_card(self.folder, self.source.description, asdict(self.settings), self.history, self.best["epoch"], made_by)
+        write_card(
+            self.folder, self.source.description, asdict(self.settings), self.history, self.best["epoch"], made_by
+        )
         return path
 
     def line(self) -> str:
@@ -247,5 +249,7 @@ def writable_folder(out: str | Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "checkpoint.partial").touch()
     except OSError as error:
-        raise OutputError(f"expected a folder that can be written at {folder}, got: {error}; choose another --out") from error
+        raise OutputError(
+            f"expected a folder that can be written at {folder}, got: {error}; choose another --out"
+        ) from error
     return folder

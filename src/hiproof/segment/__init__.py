@@ -1,15 +1,15 @@
 """Recognising a roof before fitting it: the shipped PointNet++ in ONNX Runtime, and its part in the choice of type.
 
-    sampling    farthest points and ball neighbours, compiled
-    arrange     a cloud in its canonical frame, as the network takes it (shared with training)
-    inference   the session and `segment`
-    posterior   `combine`: the network's prior times the fits' evidence
-    scores      figures of a classification
+sampling    farthest points and ball neighbours, compiled
+arrange     a cloud in its canonical frame, as the network takes it (shared with training)
+inference   the session and `segment`
+posterior   `combine`: the network's prior times the fits' evidence
+scores      figures of a classification
 """
 
 from __future__ import annotations
 
 from .inference import NOT_ROOF, Segmentation, segment
-from .posterior import combine
+from .posterior import combine, fit_prior
 
-__all__ = ["NOT_ROOF", "Segmentation", "combine", "segment"]
+__all__ = ["NOT_ROOF", "Segmentation", "combine", "fit_prior", "segment"]

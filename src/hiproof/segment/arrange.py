@@ -8,12 +8,26 @@ network itself averages.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
 from .sampling import ball_neighbours, farthest_point_order, thin_to_grid
 
-FEATURES = ("x", "y", "z", "normal_x", "normal_y", "normal_z", "roughness", "convexity", "offset_x", "offset_y", "spacing")
+FEATURES = (
+    "x",
+    "y",
+    "z",
+    "normal_x",
+    "normal_y",
+    "normal_z",
+    "roughness",
+    "convexity",
+    "offset_x",
+    "offset_y",
+    "spacing",
+)
+TURNED_PAIRS = ((0, 1), (3, 4), (8, 9))
 POSITION_SCALE = (10.0, 10.0, 5.0)
 NORMAL_NEIGHBOURS = 10
 BALL_FACTOR = 2.0
@@ -74,7 +88,7 @@ def neighbourhoods(position, sampled, cover, layout):
     """Ball groups of each level in the one above, and the interpolation back; repeated points join no group."""
     groups, radii = [], []
     sizes = (layout.points, *layout.levels)
-    for above, size in zip(sizes[:-1], sizes[1:], strict=True):
+    for above, size in pairwise(sizes):
         radius = BALL_FACTOR * max(cover[min(size, sampled) - 1], cover[min(above, sampled) - 1], 1e-3)
         index, _ = ball_neighbours(position[:size], position[: min(above, sampled)], layout.neighbours, radius)
         groups.append(index)

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import FitError, InputError, SettingsError
-from ..settings import SegmentSettings, Settings
+from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
 
 FORMAT = "hiproof-roof-types-1"
@@ -62,11 +62,12 @@ class Model:
     temperature: float
 
 
-def segment(points: np.ndarray, settings: Settings | SegmentSettings | None = None) -> Segmentation:
+def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentation:
     """Roof type, and roof or not, of every point of one building, and the probabilities of the building's type.
 
     `points` (n, 3) metres, any frame and order, n >= 10; the answer does not change when they turn about Z. A cloud
-    beyond the network's size is thinned to farthest points and its labels are carried back to all points.
+    beyond the network's size is thinned to farthest points and its labels are carried back to all points. Types outside
+    `settings.fit.types` get probability 0: the paper's three-type configuration is `("pyramid", "gable", "hip")`.
 
     Raises FitError for points no roof can be told from (fewer than 10, all in one place, not finite), InputError for
     an array of another shape or weights that are missing or of another kind, SettingsError for a device not there.
@@ -76,16 +77,25 @@ def segment(points: np.ndarray, settings: Settings | SegmentSettings | None = No
     >>> segment(gable).type
     'gable'
     """
-    settings = settings or SegmentSettings()
-    section = settings.segment if isinstance(settings, Settings) else settings
+    settings = settings or Settings()
     xyz = checked_points(points)
-    model = load(section.weights or str(SHIPPED_WEIGHTS), section.device)
+    model = load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
     arranged = arrange(xyz, model.layout)
     point_logits, type_logits = run(model, [arranged])
-    point_probability = softmax(point_logits[: arranged.sampled])
-    type_probability = softmax(type_logits[0] / model.temperature)
+    barred = barred_types(model, settings.fit.types)
+    point_probability = softmax(point_logits[: arranged.sampled] + np.append(barred, 0.0))
+    type_probability = softmax(type_logits[0] / model.temperature + barred)
     labels, not_roof = carried_back(point_probability, xyz[arranged.chosen[: arranged.sampled]], xyz)
     return Segmentation(labels, not_roof, dict(zip(model.types, map(float, type_probability), strict=True)))
+
+
+def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
+    """Log prior (types,) of a choice among `allowed` types only: 0 or minus infinity; empty allows all."""
+    if allowed and not set(allowed) & set(model.types):
+        raise SettingsError(
+            f"expected fit.types to name types the network knows ({', '.join(model.types)}), got {', '.join(allowed)}"
+        )
+    return np.array([0.0 if not allowed or name in allowed else -np.inf for name in model.types])
 
 
 def run(model: Model, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:

@@ -29,11 +29,24 @@ def combine(
     if not bics:
         return dict(types)
     names = [name for name, bic in bics.items() if np.isfinite(bic)] or list(bics)
-    mean_prior = 1.0 / max(len(types), 1)
-    prior = np.array([max(types.get(name, mean_prior), SMALLEST_PRIOR) for name in names])
+    prior = log_prior(types, tuple(names))
     bic = np.array([bics[name] if np.isfinite(bics[name]) else 0.0 for name in names])
-    log_posterior = prior_exponent * np.log(prior) - evidence_exponent * 0.5 * (bic - bic.min())
+    log_posterior = prior_exponent * np.array([prior[name] for name in names]) - evidence_exponent * 0.5 * bic
     posterior = np.exp(log_posterior - log_posterior.max())
     posterior /= posterior.sum()
     ranked = np.argsort(-posterior, kind="stable")
     return {names[i]: float(posterior[i]) for i in ranked}
+
+
+def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str, float]:
+    """Natural logarithm of the network's probability of each of `names` (all of `types` by default), bounded below.
+
+    A network may be wrong with confidence; no evidence could undo a prior of zero.
+    """
+    mean_prior = 1.0 / max(len(types), 1)
+    return {name: float(np.log(max(types.get(name, mean_prior), SMALLEST_PRIOR))) for name in names or tuple(types)}
+
+
+def fit_prior(types: dict[str, float]) -> dict[str, float]:
+    """Log prior on the scale of `fit_roof(type_log_prior=...)`: its choice is then the best of `combine`."""
+    return {name: PRIOR_EXPONENT / EVIDENCE_EXPONENT * value for name, value in log_prior(types).items()}

@@ -45,34 +45,36 @@ def farthest_point_order(xyz, count):
 
 @numba.njit(cache=True)
 def ball_neighbours(centres, sources, count, radius):
-    """The nearest `count` of `sources` (m, 3) within `radius` of each of `centres` (s, 3): indices (s, count), distances.
+    """The nearest `count` of `sources` (m, 3) within `radius` of each of `centres` (s, 3): indices, distances (s, count).
 
-    Missing neighbours repeat the nearest one, which a maximum over the group does not notice. The nearest source
+    Missing neighbours repeat the nearest one, which a maximum over the group does not notice; the nearest source
     counts even if it lies outside the ball.
+
+    >>> sources = np.array([[0.0, 0, 0], [1, 0, 0], [9, 0, 0]])
+    >>> ball_neighbours(sources[:1], sources, 3, 2.0)[0].tolist()
+    [[0, 1, 0]]
     """
     indices = np.empty((len(centres), count), np.int64)
     distances = np.empty((len(centres), count))
+    squared = np.empty(count)
     for s in range(len(centres)):
         found = 0
         for m in range(len(sources)):
             d = 0.0
             for axis in range(3):
                 d += (centres[s, axis] - sources[m, axis]) ** 2
-            if found == count and d >= distances[s, count - 1]:
+            if found == count and d >= squared[count - 1]:
                 continue
-            place = found if found < count else count - 1
-            while place > 0 and distances[s, place - 1] > d:
-                distances[s, place] = distances[s, place - 1]
-                indices[s, place] = indices[s, place - 1]
+            place = min(found, count - 1)
+            while place > 0 and squared[place - 1] > d:
+                squared[place], indices[s, place] = squared[place - 1], indices[s, place - 1]
                 place -= 1
-            distances[s, place], indices[s, place] = d, m
+            squared[place], indices[s, place] = d, m
             found = min(found + 1, count)
         for k in range(count):
-            if k >= found or (k > 0 and distances[s, k] > radius * radius):
-                distances[s, k], indices[s, k] = distances[s, 0], indices[s, 0]
-            distances[s, k] = np.sqrt(distances[s, k]) if k < found else distances[s, k]
-        for k in range(found, count):
-            distances[s, k] = distances[s, 0]
+            if k >= found or squared[k] > radius * radius:
+                squared[k], indices[s, k] = squared[0], indices[s, 0]
+            distances[s, k] = np.sqrt(squared[k])
     return indices, distances
 
 
@@ -87,7 +89,7 @@ def thin_to_grid(xyz, count, chunk=500_000):
         return np.arange(n)
     low = xyz.min(axis=0)
     extent = np.maximum(xyz.max(axis=0) - low, 1e-6)
-    cell = np.sqrt(extent[0] * extent[1] / count) + 1e-9
+    cell = max(np.sqrt(extent[0] * extent[1] / count), extent.max() / 1e6)
     while True:
         kept = first_of_each_cell(xyz, low, cell, chunk)
         if len(kept) <= count:

@@ -34,9 +34,7 @@ class Scores:
     def recalls(self) -> dict[str, float]:
         """Share of each true class told rightly, of those that occur."""
         truths = self.confusion.sum(axis=1)
-        return {
-            name: float(self.confusion[i, i] / truths[i]) for i, name in enumerate(self.names) if truths[i]
-        }
+        return {name: float(self.confusion[i, i] / truths[i]) for i, name in enumerate(self.names) if truths[i]}
 
     @property
     def balanced_accuracy(self) -> float:

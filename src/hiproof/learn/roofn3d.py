@@ -1,0 +1,83 @@
+"""RoofN3D as training data: real clouds of gables, hips and pyramids, split 80/20 by id."""
+
+from __future__ import annotations
+
+import zlib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputError
+from ..read.roofn3d import read_roofn3d, read_roofn3d_labels
+from ..segment.inference import NOT_ROOF
+from ..simulate import ROOF_TYPES
+from .data import TRAINING, Sample
+
+BUILDINGS, SURFACES = "roofn3d_buildings.csv", "roofn3d_surfacegrowing.csv"
+TYPES = tuple(name for name in ROOF_TYPES if name in ("gable", "hip", "pyramid"))
+HELD_OUT_PERCENT = 20
+FEWEST_POINTS = 10
+
+
+@dataclass(frozen=True)
+class RoofN3D:
+    """All usable buildings: `xyz` (n, 3) float32 and `on_surface` (n,) end to end, cut at `starts` (b + 1), each with
+    its `type_of` (b,) and `held_out` (b,). Training draws types evenly; held-out buildings come in the file's order."""
+
+    types: tuple[str, ...]
+    seed: int
+    xyz: np.ndarray
+    on_surface: np.ndarray
+    starts: np.ndarray
+    type_of: np.ndarray
+    held_out: np.ndarray
+
+    @property
+    def description(self) -> str:
+        return f"RoofN3D, {(~self.held_out).sum()} buildings to train on and {self.held_out.sum()} held out by id"
+
+    @classmethod
+    def open(cls, folder: Path, types: tuple[str, ...] = (), seed: int = 1) -> RoofN3D:
+        """Read both csv files of `folder`. Raises InputError when they are missing, of another layout or too few."""
+        for name in (BUILDINGS, SURFACES):
+            if not (folder / name).is_file():
+                raise InputError(
+                    f"expected RoofN3D's {name} in {folder}, found none; download it from roofn3d.gis.tu-berlin.de"
+                )
+        types = types or TYPES
+        clouds, surfaces, kinds, ids = [], [], [], []
+        for record, labels in read_roofn3d_labels(folder / SURFACES, read_roofn3d(folder / BUILDINGS)):
+            if record.type in types and len(record.points) >= FEWEST_POINTS:
+                clouds.append((record.points - record.points.mean(axis=0)).astype(np.float32))
+                surfaces.append(labels >= 0)
+                kinds.append(types.index(record.type))
+                ids.append(record.id)
+        held_out = np.array([is_held_out(id) for id in ids], bool)
+        if held_out.all() or not held_out.any():
+            raise InputError(f"expected enough RoofN3D buildings in {folder} to train and validate on, got {len(ids)}")
+        starts = np.cumsum([0] + [len(cloud) for cloud in clouds])
+        return cls(types, seed, np.concatenate(clouds), np.concatenate(surfaces), starts, np.array(kinds), held_out)
+
+    def sample(self, role: int, index: int) -> Sample:
+        """Training cloud drawn by number, or held-out cloud number `index`."""
+        if role == TRAINING:
+            rng = np.random.default_rng([self.seed, 17, index])
+            present = np.unique(self.type_of[~self.held_out])
+            of_type = np.flatnonzero(~self.held_out & (self.type_of == present[rng.integers(len(present))]))
+            building = of_type[rng.integers(len(of_type))]
+        else:
+            held_out = np.flatnonzero(self.held_out)
+            building = held_out[index % len(held_out)]
+        own = slice(self.starts[building], self.starts[building + 1])
+        type = int(self.type_of[building])
+        return Sample(self.xyz[own].astype(float), np.where(self.on_surface[own], type, NOT_ROOF), type)
+
+
+def is_held_out(id: str) -> bool:
+    """Whether the building `id` is among the 20 % training never sees, whatever the file's order.
+
+    >>> round(sum(is_held_out(str(i)) for i in range(10_000)) / 10_000, 1)
+    0.2
+    """
+    return zlib.crc32(id.encode()) % 100 < HELD_OUT_PERCENT

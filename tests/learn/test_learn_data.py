@@ -1,0 +1,110 @@
+"""Training data: labels that mean what they say, splits that hold, and files that cannot be used."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hiproof.errors import InputError
+from hiproof.learn.data import TEST, TRAINING, VALIDATION, open_source
+from hiproof.learn.houses import training_house
+from hiproof.learn.shapes import read_shapes
+from hiproof.simulate import ROOF_TYPES
+
+DEN_HAAG = Path(__file__).parents[2] / ".." / "shared" / "data" / "denhaag" / "DenHaag_01.city.json"
+
+
+def box_city(count, code="1000"):
+    """A CityJSON of `count` boxes of 6 x 8 x 4 m in a row, flat roofs."""
+    vertices, objects = [], {}
+    for i in range(count):
+        base = len(vertices)
+        vertices += [[x + 20 * i, y, z] for z in (0, 4) for x, y in ((0, 0), (6, 0), (6, 8), (0, 8))]
+        sides = [[k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
+        faces = [[[base + v for v in ring]] for ring in ([3, 2, 1, 0], [4, 5, 6, 7], *sides)]
+        semantics = {
+            "surfaces": [{"type": "GroundSurface"}, {"type": "RoofSurface"}, {"type": "WallSurface"}],
+            "values": [[0, 1, 2, 2, 2, 2]],
+        }
+        geometry = [{"type": "Solid", "lod": "2", "boundaries": [faces], "semantics": semantics}]
+        objects[f"box-{i}"] = {"type": "Building", "attributes": {"roofType": code}, "geometry": geometry}
+    return {
+        "type": "CityJSON", "version": "2.0", "transform": {"scale": [1, 1, 1], "translate": [80000, 450000, 0]},
+        "CityObjects": objects, "vertices": vertices,
+    }  # fmt: skip
+
+
+def test_simulated_clouds_are_the_same_whenever_asked_for_and_differ_by_role():
+    source = open_source("simulated")
+    first, again, other = source.sample(TRAINING, 5), source.sample(TRAINING, 5), source.sample(VALIDATION, 5)
+    np.testing.assert_array_equal(first.xyz, again.xyz)
+    assert first.xyz.shape != other.xyz.shape or not np.array_equal(first.xyz, other.xyz)
+
+
+def test_simulated_labels_are_types_or_not_roof():
+    source = open_source("simulated", ("pyramid", "gable", "hip"))
+    samples = [source.sample(TRAINING, i) for i in range(40)]
+    assert {sample.type for sample in samples} == {0, 1, 2}
+    for sample in samples:
+        assert set(np.unique(sample.labels)) <= {-1, 0, 1, 2}
+        assert (sample.labels == sample.type).sum() >= 10
+        assert len(sample.labels) == len(sample.xyz) and np.isfinite(sample.xyz).all()
+
+
+@pytest.mark.parametrize("type", ROOF_TYPES)
+def test_an_annexed_house_keeps_its_type(type):
+    for seed in range(10):
+        house = training_house(np.random.default_rng(seed), type, annex_share=1.0)
+        assert house.type == type and len(house.roof.parts) >= 2
+        assert house.outline.geom_type == "Polygon"
+
+
+def test_boxes_of_a_cityjson_are_scanned_and_split(tmp_path):
+    path = tmp_path / "boxes.city.json"
+    path.write_text(json.dumps(box_city(12)))
+    shapes = read_shapes(path)
+    assert len(shapes) == 12 and all(shape.outline.area == pytest.approx(48.0) for shape in shapes)
+    assert 0 < sum(shape.held_out for shape in shapes) < 12
+    source = open_source(f"denhaag:{path}")
+    sample = source.sample(TRAINING, 0)
+    assert source.types[sample.type] == "flat"
+    roof = sample.xyz[sample.labels == sample.type]
+    assert np.ptp(roof[:, 2]) < 1.5
+
+
+def test_mixture_validates_on_the_first_source_alone(tmp_path):
+    path = tmp_path / "boxes.city.json"
+    path.write_text(json.dumps(box_city(12)))
+    mixture, simulated = open_source(["simulated", f"denhaag:{path}"]), open_source("simulated")
+    np.testing.assert_array_equal(mixture.sample(TEST, 3).xyz, simulated.sample(TEST, 3).xyz)
+    assert "boxes.city.json" in mixture.description
+
+
+def test_the_hagues_buildings_are_held_out_whole():
+    if not DEN_HAAG.exists():
+        pytest.skip("needs ../shared/data/denhaag")
+    city = json.loads(DEN_HAAG.read_text())["CityObjects"]
+    side = {}
+    for shape in read_shapes(DEN_HAAG):
+        side.setdefault(city[shape.id].get("parents", [shape.id])[0], set()).add(shape.held_out)
+    assert all(len(sides) == 1 for sides in side.values())
+
+
+@pytest.mark.parametrize("data", ["", "simulated:x", "roofn3d", "denhaag:", "nonsense", []])
+def test_unknown_data_is_refused(data):
+    with pytest.raises(InputError, match="expected training data"):
+        open_source(data)
+
+
+def test_unknown_types_and_unusable_files_are_refused(tmp_path):
+    with pytest.raises(InputError, match="onion"):
+        open_source("simulated", ("gable", "onion"))
+    (tmp_path / "text.json").write_text("{}")
+    with pytest.raises(InputError, match="CityJSON"):
+        open_source(f"denhaag:{tmp_path / 'text.json'}")
+    (tmp_path / "unknown.json").write_text(json.dumps(box_city(5, code="9999")))
+    with pytest.raises(InputError, match="too few"):
+        open_source(f"denhaag:{tmp_path / 'unknown.json'}")
+    with pytest.raises(InputError, match=r"roofn3d_buildings\.csv"):
+        open_source(f"roofn3d:{tmp_path}")

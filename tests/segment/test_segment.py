@@ -1,0 +1,159 @@
+"""The shipped network: what it must recognise, what it may not depend on, and what it refuses."""
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hiproof.errors import FitError, InputError, SettingsError
+from hiproof.primitives.catalogue import CATALOGUE
+from hiproof.segment import NOT_ROOF, segment
+from hiproof.segment.arrange import rotated
+from hiproof.segment.inference import SHIPPED_WEIGHTS, carried_back, load
+from hiproof.settings import Settings
+from hiproof.simulate import ROOF_TYPES, training_sample
+
+REAL_ROOFS = Path(__file__).parents[2] / ".." / "shared" / "data" / "roofn3d" / "labelled"
+AS_GABLE = {"asymmetric_gable": "gable"}
+
+
+def cloud(seed, types=ROOF_TYPES):
+    """Points (n, 3), labels (n,) with -1 for not-roof, and the type's name."""
+    points, labels, type = training_sample(np.random.default_rng([77, seed]), types, density=(4.0, 8.0))
+    return points, np.where(labels == len(types), NOT_ROOF, labels), types[type]
+
+
+def test_types_are_the_catalogues_in_its_order():
+    assert load(str(SHIPPED_WEIGHTS)).types == tuple(CATALOGUE)
+
+
+def test_probabilities_are_distributions():
+    points, _, _ = cloud(0)
+    found = segment(points)
+    assert sum(found.types.values()) == pytest.approx(1.0)
+    assert found.labels.shape == found.not_roof.shape == (len(points),)
+    assert ((found.not_roof >= 0) & (found.not_roof <= 1)).all()
+    assert set(np.unique(found.labels)) <= {NOT_ROOF, *range(len(CATALOGUE))}
+
+
+def test_simulated_roofs_are_recognised_and_freed_of_what_is_no_roof():
+    right, intersection, union = 0, 0, 0
+    for seed in range(60):
+        points, labels, type = cloud(seed)
+        found = segment(points)
+        right += found.type == type
+        told, true = ~found.is_roof, labels == NOT_ROOF
+        intersection, union = intersection + (told & true).sum(), union + (told | true).sum()
+    assert right >= 54
+    assert intersection / union > 0.8
+
+
+@pytest.mark.parametrize("angle", [0.4, np.pi / 2, 2.7])
+def test_turning_about_z_changes_nothing(angle):
+    for seed in range(3):
+        points, _, _ = cloud(seed)
+        before, after = segment(points), segment(rotated(points, angle))
+        np.testing.assert_allclose(list(after.types.values()), list(before.types.values()), atol=1e-3)
+        assert (before.labels == after.labels).mean() > 0.995
+
+
+def test_moving_and_reordering_change_nothing():
+    points, _, _ = cloud(3)
+    order = np.random.default_rng(0).permutation(len(points))
+    before, after = segment(points), segment(points[order] + (85_000.0, 446_000.0, 12.0))
+    np.testing.assert_allclose(list(after.types.values()), list(before.types.values()), atol=1e-3)
+    assert (before.labels[order] == after.labels).mean() > 0.995
+
+
+def test_named_types_alone_are_chosen_among():
+    points, _, _ = cloud(4, ("hip",))
+    found = segment(points, Settings().replace({"fit": {"types": ("pyramid", "gable", "hip")}}))
+    assert found.type == "hip"
+    assert sum(found.types[name] for name in ("pyramid", "gable", "hip")) == pytest.approx(1.0)
+    names = {tuple(CATALOGUE)[label] for label in np.unique(found.labels) if label != NOT_ROOF}
+    assert names <= {"pyramid", "gable", "hip"}
+
+
+def test_labelled_real_roofs():
+    if not REAL_ROOFS.is_dir():
+        pytest.skip("needs ../shared/data/roofn3d/labelled")
+    told = {path.name: segment(np.loadtxt(path)[:, :3]).type for path in REAL_ROOFS.glob("*/*.pts")}
+    wrong = [
+        path
+        for path in REAL_ROOFS.glob("*/*.pts")
+        if AS_GABLE.get(told[path.name], told[path.name]) != path.parent.name
+    ]
+    assert len(wrong) <= 1, wrong
+
+
+def test_labels_are_carried_back_from_the_nearest_samples():
+    sampled = np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0]])
+    probability = np.array([[0.9, 0.0, 0.1], [0.0, 0.2, 0.8], [0.1, 0.8, 0.1]])
+    labels, not_roof = carried_back(probability, sampled, sampled + 0.01)
+    assert labels.tolist() == [0, NOT_ROOF, 1]
+    np.testing.assert_allclose(not_roof, [0.1, 0.8, 0.1], atol=0.01)
+
+
+def test_a_large_cloud_takes_bounded_memory():
+    rng = np.random.default_rng(0)
+    xy = rng.uniform(0, (20.0, 12.0), (600_000, 2))
+    points = np.column_stack([xy, 8 - 0.6 * abs(xy[:, 1] - 6)])
+    segment(points[:1000])
+    tracemalloc.start()
+    found = segment(points)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert found.type == "gable" and len(found.labels) == len(points)
+    assert peak < 12 * points.nbytes
+
+
+@pytest.mark.parametrize(
+    ("points", "error", "words"),
+    [
+        (np.zeros((9, 3)), FitError, "at least 10 points"),
+        (np.ones((50, 3)), FitError, "all in one place"),
+        (np.r_[np.random.default_rng(0).random((20, 3)), [[np.nan, 0, 0]]], FitError, "finite coordinates"),
+        (np.zeros((20, 2)), InputError, r"\(n, 3\) array"),
+        (np.zeros(30), InputError, r"\(n, 3\) array"),
+        (np.array([["a", "b", "c"]] * 20), InputError, "array of numbers"),
+    ],
+)
+def test_points_that_cannot_be_a_roof_get_one_sentence(points, error, words):
+    with pytest.raises(error, match=words):
+        segment(points)
+
+
+def test_weights_that_cannot_be_used_get_one_sentence(tmp_path):
+    points = np.random.default_rng(0).random((20, 3))
+    broken = tmp_path / "broken.onnx"
+    broken.write_bytes(SHIPPED_WEIGHTS.read_bytes()[:1000])
+    for path, words in ((tmp_path / "none.onnx", "no such file"), (broken, "cannot read")):
+        with pytest.raises(InputError, match=words):
+            segment(points, Settings().replace({"segment": {"weights": str(path)}}))
+
+
+def test_another_networks_onnx_file_is_refused(tmp_path):
+    onnx = pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
+    other = onnx.load(SHIPPED_WEIGHTS)
+    onnx.helper.set_model_props(other, {"format": "something else"})
+    onnx.save(other, tmp_path / "other.onnx")
+    with pytest.raises(InputError, match="something else"):
+        segment(
+            np.random.default_rng(0).random((20, 3)),
+            Settings().replace({"segment": {"weights": str(tmp_path / "other.onnx")}}),
+        )
+
+
+def test_a_gpu_that_is_absent_is_refused():
+    import onnxruntime
+
+    if "CUDAExecutionProvider" in onnxruntime.get_available_providers():
+        pytest.skip("ONNX Runtime has CUDA here")
+    with pytest.raises(SettingsError, match="CUDA"):
+        segment(np.random.default_rng(0).random((20, 3)), Settings().replace({"segment": {"device": "cuda"}}))
+
+
+def test_types_the_network_does_not_know_are_refused():
+    with pytest.raises(SettingsError, match="onion"):
+        segment(np.random.default_rng(0).random((20, 3)), Settings().replace({"fit": {"types": ("onion",)}}))
