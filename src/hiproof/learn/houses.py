@@ -30,7 +30,8 @@ def training_house(rng: np.random.Generator, type: str, annex_share: float) -> S
 def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
     """A hip whose ridge is a tenth to a quarter of its width."""
     ridge = hip.parameters["width"] * rng.uniform(0.1, 0.25)
-    parameters = hip.parameters | {"length": 2 * hip.parameters["hip_run"] + ridge}
+    length = hip.parameters["length"] - hip.parameters["ridge_length"] + ridge
+    parameters = hip.parameters | {"length": length, "ridge_length": ridge}
     return make_part("hip", parameters, hip.kappa, hip.translation)
 
 
@@ -66,7 +67,7 @@ def annex_parameters(
     if type in ("gable", "hip"):
         parameters["height"] = min(width / 2 * slope, max(limit, 1.0))
     if type == "hip":
-        parameters["hip_run"] = min(width / 2, length / 2) * rng.uniform(0.6, 1.0)
+        parameters["ridge_length"] = length - min(width, length) * rng.uniform(0.6, 0.9)
     if type == "monopitch":
         parameters["height"] = length * math.tan(math.radians(rng.uniform(5.0, 20.0)))
     return parameters

@@ -48,23 +48,22 @@ class SetAbstraction(nn.Module):
     """PointNet over each group: two layers on (features, relative position / radius), then the maximum.
 
     The first layer is linear in the neighbour's features and in the difference of positions, so it is evaluated once
-    a source and once a centre and subtracted after grouping: the same numbers for a tenth of the products. Both
-    normalisations act outside the groups, before grouping and after the maximum, where the rows are few.
+    a source and once a centre and subtracted after grouping: the same numbers for a tenth of the products. Its inputs
+    are normalised already, so only the second layer is, after the maximum, where the rows are few.
     """
 
     def __init__(self, inputs: int, hidden: int, outputs: int):
         super().__init__()
-        self.features = nn.Linear(inputs, hidden, bias=False)
+        self.features = nn.Linear(inputs, hidden)
         self.position = nn.Linear(3, hidden, bias=False)
-        self.norm = nn.BatchNorm1d(hidden)
         self.second = nn.Linear(hidden, outputs, bias=False)
-        self.second_norm = nn.BatchNorm1d(outputs)
+        self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x, position, centres, group):
         """Features (rows, O, C) and positions over the radius (rows, O, 3) to the centres' features (S, O, outputs)."""
-        source = normalised(self.norm, self.features(x) + self.position(position))
+        source = self.features(x) + self.position(position)
         grouped = torch.relu(gathered(source, group) - self.position(centres).unsqueeze(1))
-        return torch.relu(normalised(self.second_norm, self.second(grouped).max(dim=1)[0]))
+        return torch.relu(normalised(self.norm, self.second(grouped).max(dim=1)[0]))
 
 
 class FeaturePropagation(nn.Module):

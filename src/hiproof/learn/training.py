@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import os
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
 
@@ -29,18 +29,23 @@ from .network import NetworkSettings, RoofNetwork
 
 @dataclass(frozen=True)
 class TrainSettings:
-    """How to train: `samples` clouds are shown in all, `epoch` of them between validations on `validation` clouds."""
+    """How to train: `samples` clouds are shown in all, each made one `views` times, `epoch` between validations.
+
+    A validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the share `warm_up` and
+    falls as a cosine; `average` is the running average's memory a step.
+    """
 
     types: tuple[str, ...] = ()
     samples: int = 150_000
     epoch: int = 6_000
+    views: int = 2
     validation: int = 1_000
     batch: int = 32
     rate: float = 2e-3
     decay: float = 0.02
     warm_up: float = 0.01
     smoothing: float = 0.05
-    average: float = 0.999
+    average: float = 0.998
     seed: int = 1
     threads: int = 1
     device: str = "auto"
@@ -94,22 +99,38 @@ class Trainer:
         torch.manual_seed(settings.seed * 1_000_003 + self.epoch)
         self.network.train()
         losses = []
-        first = self.epoch * settings.epoch
-        for index in range(first, first + settings.epoch, settings.batch):
-            self.set_rate(index / settings.samples)
-            losses.append(self.step([self.training_cloud(i) for i in range(index, index + settings.batch)]))
+        for number, batch in enumerate(self.batches()):
+            self.set_rate((self.epoch * settings.epoch + number * settings.batch) / settings.samples)
+            losses.append(self.step(batch))
+            self.update_average(self.epoch * settings.epoch // settings.batch + number)
         self.epoch += 1
         self.seconds += perf_counter() - start
         self.history.append({"epoch": self.epoch, "loss": float(np.mean(losses))})
 
+    def batches(self):
+        """Yield the epoch's batches: fresh clouds first, then the same again in another order and other symmetries."""
+        settings = self.settings
+        fresh = settings.epoch // settings.views
+        clouds = []
+        for index in range(0, fresh, settings.batch):
+            batch = [
+                self.training_cloud(self.epoch * fresh + i) for i in range(index, min(index + settings.batch, fresh))
+            ]
+            clouds += batch
+            yield batch
+        rng = np.random.default_rng([settings.seed, 19, self.epoch])
+        for _ in range(settings.views - 1):
+            order = rng.permutation(fresh)
+            for index in range(0, fresh, settings.batch):
+                yield [turned(clouds[i], rng) for i in order[index : index + settings.batch]]
+
     def training_cloud(self, index: int):
-        """The arranged cloud number `index`, varied at random by that number."""
+        """The arranged cloud number `index`, varied at random by that number, with its points' labels and its type."""
         rng = np.random.default_rng([self.settings.seed, 7, index])
         sample = self.source.sample(TRAINING, index)
         xyz, labels = varied(sample.xyz, sample.labels, rng, self.settings.augment)
         arrangement = arrange(xyz, self.settings.layout)
-        arrangement.features[:] = symmetric(arrangement.features, rng)
-        return arrangement, labels[arrangement.chosen], sample.type
+        return turned((arrangement, labels[arrangement.chosen], sample.type), rng)
 
     def step(self, clouds) -> float:
         """One step of the optimiser on a batch of (arrangement, labels, type)."""
@@ -122,7 +143,6 @@ class Trainer:
         loss.backward()
         nn.utils.clip_grad_norm_(self.network.parameters(), 5.0)
         self.optimiser.step()
-        self.update_average()
         return float(loss.detach())
 
     def tensors(self, clouds):
@@ -141,9 +161,9 @@ class Trainer:
             group["lr"] = self.settings.rate * max(share, 1e-3)
 
     @torch.no_grad()
-    def update_average(self):
-        """Exponential running average of weights and statistics: steadier than any single step's."""
-        keep = self.settings.average if self.epoch else 0.99
+    def update_average(self, steps: int):
+        """Exponential running average of weights and statistics, its memory short in the first of all `steps`."""
+        keep = min(self.settings.average, (1 + steps) / (10 + steps))
         state = self.network.state_dict()
         for name, value in self.averaged.state_dict().items():
             if value.dtype.is_floating_point:
@@ -221,6 +241,12 @@ class Trainer:
             f"balanced accuracy {last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f}  "
             f"lowest recall {min(last['recalls'].values()):.3f}  {self.seconds / 60:.1f} min"
         )
+
+
+def turned(cloud, rng: np.random.Generator):
+    """An arranged, labelled cloud in another of the roof's symmetries."""
+    arrangement, labels, type = cloud
+    return replace(arrangement, features=symmetric(arrangement.features, rng)), labels, type
 
 
 def arranged(sample: Sample, layout: Layout):

@@ -51,6 +51,12 @@ class Segmentation:
         """(n,) True where a point is labelled with a roof type."""
         return self.labels != NOT_ROOF
 
+    @property
+    def weights(self) -> np.ndarray:
+        """(n,) weight of each point in a fit: 1 on the roof, 0 elsewhere; all 1 where hardly any roof was found."""
+        enough = self.is_roof.sum() >= FEWEST_POINTS
+        return self.is_roof.astype(float) if enough else np.ones(len(self.labels))
+
 
 @dataclass(frozen=True)
 class Model:

@@ -1,0 +1,312 @@
+"""The network, the fit and both together, on simulated, scanned and real roofs. python -m benchmarks.segment [--quick]
+
+Writes `benchmarks/segment.md` and the confusion matrices in `benchmarks/figures/`. `--calibrate` prints instead how the
+exponents of `hiproof.segment.combine` change the accuracy. Real data are read from ../shared/data where they exist.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+
+from hiproof import reconstruct
+from hiproof.errors import FitError
+from hiproof.evaluate.distance import point_surface_distances
+from hiproof.fit import fit_roof
+from hiproof.learn.data import POINTS, as_sample
+from hiproof.learn.shapes import read_shapes
+from hiproof.model import ROOF
+from hiproof.primitives.catalogue import CATALOGUE
+from hiproof.segment import combine, segment
+from hiproof.segment.inference import SHIPPED_WEIGHTS
+from hiproof.segment.scores import Scores
+from hiproof.settings import Settings
+from hiproof.simulate import ScanSettings, scan_solids, training_sample
+
+TYPES = tuple(CATALOGUE)
+THREE = ("gable", "hip", "pyramid")
+TEST_SEED = 2024
+DATA = Path(__file__).parents[1] / ".." / "shared" / "data"
+HERE = Path(__file__).parent
+SAME_CODE = {"asymmetric_gable": "gable"}
+"""CityGML's list has one code for both gables; RoofN3D and The Hague call both gable."""
+
+
+@dataclass
+class Tally:
+    """Truths and answers of many buildings, by method, as indices of TYPES."""
+
+    truth: list[int] = field(default_factory=list)
+    told: dict[str, list[int]] = field(default_factory=dict)
+
+    def add(self, truth: str, **answers: str | None) -> None:
+        self.truth.append(TYPES.index(truth))
+        for method, answer in answers.items():
+            self.told.setdefault(method, []).append(TYPES.index(answer) if answer in TYPES else len(TYPES))
+
+    def scores(self, method: str) -> Scores:
+        return Scores.of(np.array(self.truth), np.array(self.told[method]), (*TYPES, "none"))
+
+
+@dataclass(frozen=True)
+class Opinion:
+    """What network and fit say of one building; `bics` are of the fit to the points the network calls roof."""
+
+    network: dict[str, float]
+    bics: dict[str, float]
+    fit_alone: str | None
+
+    @property
+    def combined(self) -> str:
+        return next(iter(combine(self.network, self.bics))) if self.bics else max(self.network, key=self.network.get)
+
+    @property
+    def network_alone(self) -> str:
+        return max(self.network, key=self.network.get)
+
+
+def opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
+    """Network alone, fit alone on all points, and the evidence of the fit to the network's roof points."""
+    found = segment(points, Settings().replace({"fit": {"types": types}}))
+    alone, informed = fitted(points, types), fitted(points, types, found.weights)
+    return Opinion(found.types, informed.bics if informed else {}, alone.type if alone else None)
+
+
+def fitted(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
+    try:
+        return fit_roof(points, types=types, weights=weights)
+    except FitError:
+        return None
+
+
+def three_types(count: int) -> tuple[str, Scores, Scores]:
+    """The paper's configuration: pyramid, gable, hip on simulated clouds with all defects, with labels of every point."""
+    true_points, told_points, tally = [], [], Tally()
+    allowed = Settings().replace({"fit": {"types": THREE}})
+    for index in range(count):
+        points, labels, type = training_sample(np.random.default_rng([TEST_SEED, 3, index]), THREE)
+        found = segment(points, allowed)
+        tally.add(THREE[type], network=found.type)
+        true_points.append(labels)
+        told = np.array([THREE.index(name) if name in THREE else 0 for name in TYPES])
+        told_points.append(np.where(found.is_roof, told[found.labels], len(THREE)))
+    types = tally.scores("network")
+    of_points = Scores.of(np.concatenate(true_points), np.concatenate(told_points), (*THREE, "not_roof"))
+    text = table(
+        ("measure", "reached", "to reach"),
+        [
+            ("accuracy", percent(types.accuracy), "98"),
+            ("balanced accuracy", percent(types.balanced_accuracy), "97"),
+            ("lowest recall", percent(types.lowest_recall), "95"),
+            ("mean IoU of point labels", percent(of_points.mean_iou), "85"),
+        ],
+    )
+    return text, types, of_points
+
+
+def all_types(count: int, densities: tuple[float, ...] = (2.0, 5.0, 10.0)) -> tuple[str, dict[float, Tally]]:
+    """Network, fit and combination on all types with all defects, `count` buildings a density."""
+    rows, tallies = [], {}
+    for density in densities:
+        tally = Tally()
+        for truth, points in simulated(count, density):
+            said = opinion(points)
+            tally.add(truth, network=said.network_alone, fit=said.fit_alone, combined=said.combined)
+        tallies[density] = tally
+        figures = [percent(tally.scores(method).balanced_accuracy) for method in ("network", "fit", "combined")]
+        rows.append((f"{density:g}", *figures))
+    return table(("points/m2", "network alone", "fit alone", "combined"), rows), tallies
+
+
+def simulated(count: int, density: float, seed: int = TEST_SEED) -> Iterator[tuple[str, np.ndarray]]:
+    """(type, points) of `count` buildings at one density, all of the scanner's defects in them."""
+    for index in range(count):
+        rng = np.random.default_rng([seed, int(10 * density), index])
+        points, _, type = training_sample(rng, TYPES, n_points=(30, 3000), density=(density, density))
+        yield TYPES[type], points
+
+
+def the_hague(scans: int) -> tuple[str, Tally] | None:
+    """Held-out shapes of The Hague at 5 points/m2, each type's shapes scanned about `scans` times in all."""
+    path = DATA / "denhaag" / "DenHaag_01.city.json"
+    if not path.exists():
+        return None
+    shapes = [s for s in read_shapes(path) if s.held_out and s.type in ("flat", "monopitch", "gable", "hip", "pyramid")]
+    tally = Tally()
+    for type in sorted({shape.type for shape in shapes}):
+        of_type = [shape for shape in shapes if shape.type == type]
+        for index in range(scans):
+            rng = np.random.default_rng([TEST_SEED, 5, index])
+            shape = of_type[index % len(of_type)]
+            cloud = scan_solids([shape.solid], rng, ScanSettings(density=5.0), [shape.type])
+            if len(cloud) < POINTS[0] // 2:
+                continue
+            said = opinion(as_sample(cloud, TYPES, TYPES.index(type), rng).xyz)
+            answers = {"network": said.network_alone, "fit": said.fit_alone, "combined": said.combined}
+            tally.add(type, **{method: SAME_CODE.get(answer, answer) for method, answer in answers.items()})
+    rows = [
+        (method, *(percent(getattr(tally.scores(method), name)) for name in ("balanced_accuracy", "lowest_recall")))
+        for method in ("network", "fit", "combined")
+    ]
+    return table(("method", "balanced accuracy (93 to reach, combined)", "lowest recall"), rows), tally
+
+
+def labelled_roofs() -> str | None:
+    """The twelve labelled real roofs, never trained on."""
+    folder = DATA / "roofn3d" / "labelled"
+    if not folder.is_dir():
+        return None
+    rows, right = [], np.zeros(3, int)
+    for path in sorted(folder.glob("*/*.pts")):
+        said, truth = opinion(np.loadtxt(path)[:, :3]), path.parent.name
+        answers = (said.network_alone, said.fit_alone, said.combined)
+        right += [SAME_CODE.get(answer, answer) == truth for answer in answers]
+        rows.append((f"{truth}/{path.stem}", *answers))
+    return table(("roof", "network alone", "fit alone", "combined"), [*rows, ("right", *map(str, right))])
+
+
+def new_york() -> str | None:
+    """392 real roofs through the whole pipeline with and without the network: distance of their roof points."""
+    path = DATA / "roofn3d" / "nyc_roofs.npz"
+    if not path.exists():
+        return None
+    data = np.load(path)
+    clouds = np.split(data["points"].astype(float), data["offset"][1:-1])
+    faces = np.split(data["face"], data["offset"][1:-1])
+    rows = []
+    for parts in ("one", "compound"):
+        for enabled in (False, True):
+            settings = Settings().replace({"fit": {"parts": parts}, "segment": {"enabled": enabled}})
+            distances = [roof_distance(cloud, face > 0, settings) for cloud, face in zip(clouds, faces, strict=True)]
+            figures = (np.mean(distances), np.median(distances), np.percentile(distances, 90))
+            rows.append((parts, "with" if enabled else "without", *(f"{figure:.3f} m" for figure in figures)))
+    return table(("parts", "network", "mean", "median", "90th percentile"), rows)
+
+
+def roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) -> float:
+    """Mean distance of a roof's points to the nearest roof surface of its reconstruction, NaN counted as 1 m."""
+    solid = reconstruct(cloud, settings=settings).solid
+    if solid is None:
+        return 1.0
+    rings = [[solid.vertices[list(ring)] for ring in face.rings] for face in solid.of_kind(ROOF)]
+    return float(point_surface_distances(cloud[is_roof], rings).mean())
+
+
+def speed() -> str:
+    """Time of one `segment` call of 300 points on one core, and the size of the weights."""
+    points = training_sample(np.random.default_rng(0), n_points=(300, 300), density=(5.0, 5.0))[0]
+    segment(points)
+    times = []
+    for _ in range(100):
+        start = time.process_time()
+        segment(points)
+        times.append(time.process_time() - start)
+    megabytes = SHIPPED_WEIGHTS.stat().st_size / 1e6
+    rows = [
+        ("segment, 300 points, one core", f"{1000 * np.median(times):.1f} ms", "10 ms"),
+        ("shipped weights", f"{megabytes:.2f} MB", "8 MB"),
+    ]
+    return table(("measure", "reached", "to reach"), rows)
+
+
+def calibrate(count: int) -> None:
+    """Print the balanced accuracy of the combination over exponents of the evidence, on buildings of another seed."""
+    for density in (1.0, 2.0, 5.0, 10.0):
+        said = [(truth, opinion(points)) for truth, points in simulated(count, density, TEST_SEED + 1)]
+        truth = np.array([TYPES.index(name) for name, _ in said])
+        line = []
+        for exponent in (0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 100.0):
+            told = [
+                next(iter(combine(o.network, o.bics, 1.0, exponent))) if o.bics else o.network_alone for _, o in said
+            ]
+            scores = Scores.of(truth, np.array([TYPES.index(name) for name in told]), TYPES)
+            line.append(f"{exponent:g}: {percent(scores.balanced_accuracy)}")
+        print(f"{density:g} points/m2  " + "  ".join(line), flush=True)
+
+
+def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    """A Markdown table."""
+    lines = ["| " + " | ".join(map(str, row)) + " |" for row in (header, ["---"] * len(header), *rows)]
+    return "\n".join(lines)
+
+
+def percent(share: float) -> str:
+    return f"{100 * share:.1f}"
+
+
+def picture(scores: Scores, title: str, name: str) -> None:
+    """A confusion matrix as PNG: rows are the truth, in percent of the truth."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    used = np.flatnonzero(scores.confusion.sum(axis=0) + scores.confusion.sum(axis=1))
+    names = [scores.names[i].replace("_", " ") for i in used]
+    counts = scores.confusion[np.ix_(used, used)]
+    shares = 100 * counts / np.maximum(counts.sum(axis=1, keepdims=True), 1)
+    figure = Figure(figsize=(1.8 + 0.62 * len(used), 1.6 + 0.56 * len(used)), layout="constrained")
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot()
+    axes.imshow(shares, cmap="Blues", vmin=0, vmax=100)
+    for (row, column), share in np.ndenumerate(shares):
+        if counts[row, column]:
+            axes.text(
+                column, row, f"{share:.1f}", ha="center", va="center", color="w" if share > 50 else "k", fontsize=8
+            )
+    axes.set_xticks(range(len(names)), names, rotation=50, ha="right")
+    axes.set_yticks(range(len(names)), names)
+    axes.set(xlabel="told", ylabel="true", title=title)
+    (HERE / "figures").mkdir(exist_ok=True)
+    figure.savefig(HERE / "figures" / f"{name}.png", dpi=110)
+
+
+def main() -> None:
+    """Run everything and write the report; parts without data are left out."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--quick", action="store_true", help="a tenth of the buildings")
+    parser.add_argument("--calibrate", action="store_true", help="print accuracies over the exponents and stop")
+    arguments = parser.parse_args()
+    scale = 10 if arguments.quick else 1
+    if arguments.calibrate:
+        calibrate(500 // scale)
+        return
+    parts = [
+        "# Recognising roofs",
+        "Written by `python -m benchmarks.segment`. Figures in percent unless they have a unit.",
+    ]
+    text, types, points = three_types(1500 // scale)
+    picture(types, "three types, simulated: buildings", "segment_three_types")
+    picture(points, "three types, simulated: points", "segment_three_types_points")
+    parts += ["## Three types, simulated with all defects, network alone", text, recalls(types)]
+    text, tallies = all_types(600 // scale)
+    for method in ("network", "fit", "combined"):
+        picture(tallies[5.0].scores(method), f"all types, 5 points/m2: {method}", f"segment_all_types_{method}")
+    parts += ["## All types, simulated with all defects: balanced accuracy (combined, 96 to reach at 5)", text]
+    parts += [recalls(tallies[5.0].scores("combined"))]
+    found = the_hague(150 // scale)
+    if found:
+        picture(found[1].scores("combined"), "The Hague, 5 points/m2: combined", "segment_the_hague")
+        parts += ["## The Hague's held-out shapes, 5 points/m2", found[0], recalls(found[1].scores("combined"))]
+    for title, text in (
+        ("Twelve labelled real roofs (an asymmetric gable counts as gable)", labelled_roofs()),
+        ("392 New York roofs through the pipeline: distance of roof points", None if arguments.quick else new_york()),
+        ("Speed and size", speed()),
+    ):
+        parts += [f"## {title}", text] if text else []
+    report = "\n\n".join(parts) + "\n"
+    print(report)
+    if not arguments.quick:
+        (HERE / "segment.md").write_text(report)
+
+
+def recalls(scores: Scores) -> str:
+    """Recall of every type that occurs, as one sentence."""
+    return "Recall: " + ", ".join(f"{name} {percent(recall)}" for name, recall in scores.recalls.items()) + "."
+
+
+if __name__ == "__main__":
+    main()
