@@ -11,12 +11,12 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
-from ..model import GROUND, ROOF, WALL, Face, Solid
+from ..model import GROUND, ROOF, Solid
+from ..primitives.catalogue import CATALOGUE
+from ..read.solids import read_solids
 
-TYPE_OF_CODE = {
-    "1000": "flat", "1010": "monopitch", "1030": "gable", "1040": "hip", "1050": "half_hip", "1060": "mansard",
-    "1070": "pyramid", "1100": "shed", "1120": "pyramid",
-}  # fmt: skip
+# Types that share a code (both gables) are read as the first, the commoner one; 1120 is a pyramidal broach.
+TYPE_OF_CODE = {CATALOGUE[name].citygml_code: name for name in reversed(CATALOGUE)} | {"1120": "pyramid"}
 HELD_OUT_PERCENT = 40
 SMALLEST_AREA_M2 = 12.0
 
@@ -37,25 +37,19 @@ def read_shapes(path: Path) -> list[Shape]:
 
     All parts of a building are held out together. Raises InputError for a file that is no CityJSON.
     """
-    try:
-        city = json.loads(path.read_text())
-        transform = city.get("transform", {"scale": (1, 1, 1), "translate": (0, 0, 0)})
-        vertices = np.array(city["vertices"], float) * transform["scale"] + transform["translate"]
-        objects = city["CityObjects"].items()
-    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"expected a CityJSON file at {path}, got: {error}; give one with roofType attributes"
-        ) from error
+    solids = dict(read_solids(path))
+    objects = json.loads(path.read_text(encoding="utf-8")).get("CityObjects", {})
     shapes = []
-    for name, item in objects:
+    for name, solid in solids.items():
+        item = objects.get(name, {})
         type = TYPE_OF_CODE.get(str(item.get("attributes", {}).get("roofType")))
-        for geometry in item.get("geometry", []):
-            if type is None or geometry["type"] != "Solid":
-                continue
-            solid = solid_of(geometry, vertices)
-            outline = ground_outline(solid)
-            if outline.area >= SMALLEST_AREA_M2:
-                shapes.append(Shape(name, type, solid, outline, is_held_out(item.get("parents", [name])[0])))
+        outline = ground_outline(solid)
+        if type is not None and outline.area >= SMALLEST_AREA_M2:
+            shapes.append(Shape(name, type, solid, outline, is_held_out((item.get("parents") or [name])[0])))
+    if not shapes:
+        raise InputError(
+            f"expected solids with a known roofType attribute in {path}, got none among {len(solids)} solids"
+        )
     return shapes
 
 
@@ -63,22 +57,10 @@ def is_held_out(building: str) -> bool:
     return zlib.crc32(building.encode()) % 100 < HELD_OUT_PERCENT
 
 
-def solid_of(geometry: dict, vertices: np.ndarray) -> Solid:
-    """The outer shell of a CityJSON Solid with its own vertices."""
-    shell, semantics = geometry["boundaries"][0], geometry.get("semantics", {})
-    surfaces, values = semantics.get("surfaces", []), semantics.get("values", [[None] * len(shell)])[0]
-    used, index = np.unique([v for face in shell for ring in face for v in ring], return_inverse=True)
-    local = iter(index.tolist())
-    faces = []
-    for face, value in zip(shell, values, strict=True):
-        kind = surfaces[value]["type"] if value is not None else WALL
-        rings = tuple(tuple(next(local) for _ in ring) for ring in face)
-        faces.append(Face(rings, kind if kind in (ROOF, GROUND) else WALL))
-    return Solid(vertices[used], tuple(faces))
-
-
 def ground_outline(solid: Solid) -> shapely.Geometry:
     """Plan outline of the ground surfaces (of the roof's where there are none)."""
     faces = solid.of_kind(GROUND) or solid.of_kind(ROOF)
     rings = [solid.vertices[list(face.rings[0])][:, :2] for face in faces]
-    return shapely.union_all([shapely.make_valid(shapely.Polygon(ring)) for ring in rings])
+    return shapely.union_all(
+        [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(np.unique(ring, axis=0)) > 2]
+    )
