@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from hiproof.errors import InputError
-from hiproof.model import Solid
+from hiproof.model import Piece, Solid
 from hiproof.simulate import (
     NOT_ROOF,
     ROOF_TYPES,
@@ -21,7 +21,9 @@ from hiproof.simulate import (
     uniform_points,
 )
 from hiproof.simulate.flight import Swath, beams_of
+from hiproof.simulate.raycast import cast_crowns
 from hiproof.simulate.scanner import bare_scene, first_hits, returns
+from hiproof.simulate.scene import Body, scene_of
 
 ROOF, WALL, GROUND = (SOURCES.index(name) for name in ("roof", "wall", "ground"))
 EXACT = ScanSettings(
@@ -175,6 +177,37 @@ def test_training_samples_keep_their_promises():
     assert seen == {0, 1, 2}
 
 
+def test_pieces_that_beams_cannot_enter_are_refused():
+    corner = shapely.Polygon([(0, 0), (4, 0), (4, 4), (2, 1), (0, 4)])
+    yard = shapely.Point(0, 0).buffer(9).difference(shapely.Point(0, 0).buffer(3))
+    for outline, fault in ((corner, "re-entrant corner"), (yard, "hole")):
+        with pytest.raises(InputError, match=fault):
+            scene_of([Body(Piece(outline, np.zeros((1, 3))))])
+
+
+@pytest.mark.parametrize("order", [1, -1])
+def test_either_orientation_of_an_outline_will_do(order):
+    square = shapely.Polygon([(0, 0), (4, 0), (4, 4), (0, 4)][::order])
+    scene = scene_of([Body(Piece(square, np.array([[0.0, 0.0, 3.0]])))])
+    z, _, _ = first_hits(scene, np.array([[2.0, 2.0], [5.0, 2.0]]), np.zeros((2, 2)))
+    assert z.tolist() == [3.0, 0.0]
+
+
+def test_crowns_catch_beams_inside_them_only():
+    """A dense crown catches every beam that meets it, where and only where the ellipsoid is."""
+    rng = np.random.default_rng(9)
+    crown = np.array([[1.0, -2.0, 7.0, 2.5, 3.0]])
+    xy0, slope = rng.uniform(-8, 8, (4000, 2)), rng.uniform(-0.3, 0.3, (4000, 2))
+    z = np.full(len(xy0), -np.inf)
+    cast_crowns(xy0, slope, crown, np.full(len(xy0), 1e-9), z)
+    caught = np.isfinite(z)
+    on_shell = np.column_stack([xy0 + slope * z[:, None], z])[caught] - crown[0, :3]
+    assert np.abs(((on_shell / (2.5, 2.5, 3.0)) ** 2).sum(axis=1) - 1).max() < 1e-6
+    heights = np.linspace(4.0, 10.0, 400)
+    walk = (xy0[~caught][:, None] + slope[~caught][:, None] * heights[:, None] - crown[0, :2]) / 2.5
+    assert ((walk**2).sum(axis=2) + ((heights - 7.0) / 3.0) ** 2).min() > 1.0
+
+
 def test_bad_requests_are_refused_in_a_sentence():
     rng = np.random.default_rng(0)
     building = random_building(rng, "flat")
@@ -182,6 +215,8 @@ def test_bad_requests_are_refused_in_a_sentence():
         scan(building, rng, ScanSettings(density=-1.0))
     with pytest.raises(InputError, match="expected noise"):
         scan(building, rng, ScanSettings(range_noise_m=-0.1))
+    with pytest.raises(InputError, match="expected noise"):
+        scan(building, rng, ScanSettings(margin_m=float("nan")))
     with pytest.raises(InputError, match="scan angle"):
         scan(building, rng, ScanSettings(max_scan_angle_deg=80.0))
     with pytest.raises(InputError, match="at least one solid"):

@@ -175,7 +175,15 @@ def first_hits(scene: Scene, xy0: np.ndarray, slope: np.ndarray) -> tuple[np.nda
     return z_hit, source, label
 
 
-def caught_by_leaves(scene, xy0, slope, z_hit, source, label, rng):
+def caught_by_leaves(
+    scene: Scene,
+    xy0: np.ndarray,
+    slope: np.ndarray,
+    z_hit: np.ndarray,
+    source: np.ndarray,
+    label: np.ndarray,
+    rng: np.random.Generator,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """The returns with those of leaves, and the beam index of each: a third of the beams caught return from below
     too."""
     z_crown = np.full(len(xy0), -np.inf)
@@ -236,7 +244,8 @@ def checked(settings: ScanSettings) -> ScanSettings:
     """`settings`, or InputError where a scanner could not have them."""
     if not 0.05 <= settings.density <= 1000:
         raise InputError(f"expected a density of 0.05 to 1000 points/m2, got {settings.density}; 1 to 20 is usual")
-    if min(settings.range_noise_m, settings.horizontal_noise_m, settings.beam_radius_m, settings.margin_m) < 0:
+    lengths = settings.range_noise_m, settings.horizontal_noise_m, settings.beam_radius_m, settings.margin_m
+    if not all(0 <= length < math.inf for length in lengths):
         raise InputError(f"expected noise, beam radius and margin of 0 m or more, got {settings}; 0 switches them off")
     if not 0 <= settings.max_scan_angle_deg <= 45:
         raise InputError(f"expected a scan angle of 0 to 45 degrees, got {settings.max_scan_angle_deg}; 20 is usual")
