@@ -23,6 +23,7 @@ from .kernels import (
     best_candidate,
     fit_plane,
     fit_symmetric_gable,
+    is_symmetric_gable,
     kind_of,
     members_of,
     planes_complexity,
@@ -225,17 +226,38 @@ def objective(layout, cloud, ghosts, tau, evidence):
 
 @njit(cache=True)
 def refine(layout, cloud, grid, pool, tau, evidence):
-    """Move every cut to where its two sides cost least, then refit every leaf on its own points (overlays untouched)."""
+    """Move every cut to where its two sides cost least, then refit every leaf on its own points."""
+    leaf_of = move_cuts(layout, cloud, grid, tau, evidence)
+    for node in range(layout.count[NODES]):
+        if layout.axis[node] < 0:
+            members = np.nonzero(leaf_of == node)[0]
+            if len(members) >= 3:
+                refine_leaf(layout, layout.holder[node], cloud, members, pool, tau, evidence)
+
+
+@njit(cache=True)
+def move_cuts(layout, cloud, grid, tau, evidence):
+    """Move every cut from the root down; returns the leaf (n,) of every point, -1 under an overlay."""
     node_of = np.full(len(cloud.u), layout.count[ROOT])
-    for node in range(layout.count[NODES]):  # children come after their parent
+    for i in range(len(cloud.u)):
+        for q in range(layout.count[OVERLAYS]):
+            if in_rectangle(layout.rect[layout.overlays[q]], cloud.u[i], cloud.v[i]):
+                node_of[i] = -1
+    stack = np.empty(MAX_NODES, np.int64)
+    stack[0], depth = layout.count[ROOT], 1
+    while depth > 0:
+        depth -= 1
+        node = stack[depth]
+        if layout.axis[node] < 0:
+            continue
         members = np.nonzero(node_of == node)[0]
-        if layout.axis[node] >= 0:
-            move_cut(layout, node, cloud, members, grid, tau, evidence)
-            x = cloud.u if layout.axis[node] == 0 else cloud.v
-            for i in members:
-                node_of[i] = layout.child[node, 0 if x[i] < layout.at[node] else 1]
-        elif len(members) >= 3:
-            refine_leaf(layout, layout.holder[node], cloud, members, pool, tau, evidence)
+        move_cut(layout, node, cloud, members, grid, tau, evidence)
+        x = cloud.u if layout.axis[node] == 0 else cloud.v
+        for i in members:
+            node_of[i] = layout.child[node, 0 if x[i] < layout.at[node] else 1]
+        stack[depth], stack[depth + 1] = layout.child[node, 1], layout.child[node, 0]
+        depth += 2
+    return node_of
 
 
 @njit(cache=True)
@@ -435,9 +457,74 @@ def move_edge(rect, edge, cloud, grid, benefit):
     return best
 
 
+# --- settle -----------------------------------------------------------------------------------------------------------
+
+
+@njit(cache=True)
+def settle(layout, cloud, ghosts, grid, tau, evidence):
+    """With overlays and shared planes in place: move cuts and overlay edges, refit every plane on all points it answers for."""
+    move_cuts(layout, cloud, grid, tau, evidence)
+    for index in range(layout.count[OVERLAYS]):
+        move_overlay(layout, index, cloud, grid, tau)
+    value = objective(layout, cloud, ghosts, tau, evidence)
+    _, holder, active = evaluate(layout, cloud.u, cloud.v)
+    alive = is_alive(layout)
+    for h in range(layout.count[HOLDERS]):
+        if alive[h]:
+            value = refit_holder(layout, h, holder, active, cloud, ghosts, tau, evidence, value)
+
+
+@njit(cache=True)
+def refit_holder(layout, h, holder, active, cloud, ghosts, tau, evidence, value):
+    """Refit the planes of holder `h`, as a pair where they are a symmetric gable; returns the objective, never higher."""
+    rows = layout.plane_of[h, : layout.planes_of[h]].copy()
+    old = layout.table[rows]
+    if is_symmetric_gable(old, len(rows)):
+        fitted, ok = fit_symmetric_gable(cloud, np.nonzero(holder == h)[0], old, tau)
+        if ok:
+            for k in range(2):
+                layout.table[rows[k]] = fitted[k]
+    else:
+        answering = np.empty(len(holder), np.int64)
+        for i in range(len(holder)):
+            answering[i] = layout.plane_of[holder[i], active[i]]
+        for k in range(len(rows)):
+            members = np.nonzero(answering == rows[k])[0]
+            if len(members) >= 3:
+                layout.table[rows[k]], _ = fit_plane(cloud, members, old[k], tau, evidence)
+    changed = objective(layout, cloud, ghosts, tau, evidence)
+    if changed < value:
+        return changed
+    for k in range(len(rows)):
+        layout.table[rows[k]] = old[k]
+    return value
+
+
+@njit(cache=True)
+def move_overlay(layout, index, cloud, grid, tau):
+    """Move the edges of one overlay to where it gains most over what lies below it, points under later ones left out."""
+    h = layout.overlays[index]
+    benefit = np.zeros(len(cloud.u))
+    order, count = layout.overlays.copy(), layout.count[OVERLAYS]
+    for i in range(len(benefit)):
+        u, v = cloud.u[i], cloud.v[i]
+        covered = False
+        for q in range(index + 1, count):
+            covered |= in_rectangle(layout.rect[order[q]], u, v)
+        if covered:
+            continue
+        layout.count[OVERLAYS] = index
+        below, _ = height_of(layout, holder_at(layout, u, v), u, v)
+        layout.count[OVERLAYS] = count
+        own, _ = height_of(layout, h, u, v)
+        benefit[i] = truncated(cloud.z[i] - below, tau) - truncated(cloud.z[i] - own, tau)
+    for edge in range(4):
+        move_edge(layout.rect[h], edge, cloud, grid, benefit)
+
+
 # --- polish -----------------------------------------------------------------------------------------------------------
 
-DROP_CUT, DROP_PLANE, DROP_OVERLAY, TIE_PLANES = range(4)
+DROP_CUT, DROP_PLANE, DROP_OVERLAY, TIE_PLANES, TAKE_PLANES = range(5)
 
 
 @njit(cache=True)
@@ -451,6 +538,7 @@ def polish(layout, cloud, ghosts, tau, evidence):
         best, move = try_cuts(layout, cloud, ghosts, state, base, tau, evidence, best, move)
         best, move = try_planes(layout, cloud, ghosts, state, base, tau, evidence, best, move)
         best, move = try_overlays(layout, cloud, ghosts, state, base, tau, evidence, best, move)
+        best, move = try_takes(layout, cloud, ghosts, state, base, tau, evidence, best, move)
         best, move, plane = try_ties(layout, cloud, ghosts, state, base, tau, evidence, best, move)
         if move[0] < 0:
             return
@@ -613,6 +701,28 @@ def try_overlays(layout, cloud, ghosts, state, base, tau, evidence, best, move):
 
 
 @njit(cache=True)
+def try_takes(layout, cloud, ghosts, state, base, tau, evidence, best, move):
+    """Let one holder take over all planes of another."""
+    alive = is_alive(layout)
+    for h in range(layout.count[HOLDERS]):
+        if not alive[h]:
+            continue
+        own, own_count = layout.plane_of[h].copy(), layout.planes_of[h]
+        under = np.nonzero(state.holder == h)[0]
+        for g in range(layout.count[HOLDERS]):
+            if not alive[g] or g == h:
+                continue
+            layout.plane_of[h], layout.planes_of[h] = layout.plane_of[g], layout.planes_of[g]
+            delta = evidence * (complexity(layout) - base)
+            for q in under:
+                delta += point_cost(layout, h, q, state.u[q], state.v[q], cloud, ghosts, tau) - state.cost[q]
+            layout.plane_of[h], layout.planes_of[h] = own, own_count
+            if delta < best:
+                best, move = delta, (TAKE_PLANES, h, g)
+    return best, move
+
+
+@njit(cache=True)
 def try_ties(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     """Replace two planes by one fitted to the points of both, wherever they are used."""
     n = len(cloud.u)
@@ -694,5 +804,7 @@ def apply_move(layout, move, plane):
         remove_plane(layout, first, second)
     elif kind == DROP_OVERLAY:
         remove_overlay(layout, first)
+    elif kind == TAKE_PLANES:
+        layout.plane_of[first], layout.planes_of[first] = layout.plane_of[second], layout.planes_of[second]
     else:
         tie(layout, first, second, plane)

@@ -31,11 +31,12 @@ from .layout import (
     objective,
     polish,
     refine,
+    settle,
     single_plane_layout,
 )
 from .plan import MIN_STRUCTURE_POINTS, Plan
 
-ROUNDS = 2
+ROUNDS, SETTLING_ROUNDS = 2, 1
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
 POOL_POINTS = 1000  # the planes are looked for on at most so many points, evenly spread
 SEEDS, PAIRS_PER_SEED = 150, 2
@@ -66,6 +67,9 @@ def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
         pool, gables = with_layout(layout, pool, gables)
     cover_outliers(best, plan, tau, evidence)
     polish(best, cloud, ghosts, tau, evidence)
+    for _ in range(SETTLING_ROUNDS):
+        settle(best, cloud, ghosts, grid, tau, evidence)
+        polish(best, cloud, ghosts, tau, evidence)
     return best, objective(best, cloud, ghosts, tau, evidence)
 
 
