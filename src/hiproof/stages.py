@@ -169,7 +169,7 @@ def posterior(bics: dict[str, float]) -> dict[str, float]:
 
 def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:
     """A flat roof at the median height: what a building becomes when nothing better can be told or built."""
-    height = float(np.median(points[:, 2]))
+    height = float(np.sort(points[:, 2])[len(points) // 2])  # the upper median: what strays lies below a roof
     part = Part("flat", (Piece(outline, np.array([[0.0, 0.0, height]])),), {}, 0.0, np.array([0.0, 0.0, height]))
     return Fitted((part,), outline, status=status, detail=detail or status.value)
 

@@ -83,14 +83,16 @@ def plan_problem(roof: Roof) -> PlanProblem:
     stacked = np.concatenate(planes)
     if not np.isfinite(stacked).all():
         raise CompositionError("expected finite roof planes, got NaN or infinity; fall back to a flat block")
-    group = equal_planes(stacked, np.array(part))
+    group = equal_planes(stacked)
     return PlanProblem(soups, stacked / [1, 1, GRID_M], np.array(plane_start), group, np.array(part))
 
 
-def equal_planes(planes: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Index (p,) of the first plane of the same part that equals each within a micrometre and a millionth of slope."""
-    same = (np.abs(planes[:, None] - planes[None]) < 1e-6).all(axis=2) & (part[:, None] == part[None])
-    return same.argmax(axis=1)
+def equal_planes(planes: np.ndarray) -> np.ndarray:
+    """Index (p,) of the first plane that equals each within a micrometre and a millionth of slope.
+
+    Parts that share a plane share its faces: where they touch, one face carries the first part's index.
+    """
+    return (np.abs(planes[:, None] - planes[None]) < 1e-6).all(axis=2).argmax(axis=1)
 
 
 def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
