@@ -104,15 +104,9 @@ def crossing_point(a, b, c, d):
 
 
 @njit(cache=True)
-def node(segments, reach):
-    """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by `reach` grid units.
-
-    Earlier segments have the right of way: their end points stay, later ones within reach move onto them. Returns no
-    edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a run).
-    """
+def numbered_ends(segments, reach):
+    """End points of the segments as numbered vertices: (xy with room to grow, how many, ends (m, 2))."""
     xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    stack, top = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
     ends = np.empty((len(segments), 2), np.int64)
     for s in range(len(segments)):
         for end in range(2):
@@ -122,6 +116,29 @@ def node(segments, reach):
                 v, xy[count, 0], xy[count, 1] = count, x, y
                 count += 1
             ends[s, end] = v
+    return xy, count, ends
+
+
+@njit(cache=True)
+def has_edge(edges, count, a, b):
+    """Whether edge ab is there, in either direction."""
+    for e in range(count):
+        c, d = edges[e, 0], edges[e, 1]
+        if (c == a and d == b) or (c == b and d == a):
+            return True
+    return False
+
+
+@njit(cache=True)
+def node(segments, reach):
+    """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by `reach` grid units.
+
+    Earlier segments have the right of way: their end points stay, later ones within reach move onto them. Returns no
+    edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a run).
+    """
+    xy, count, ends = numbered_ends(segments, reach)
+    stack, top = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
     for s in range(len(segments) - 1, -1, -1):
         stack[top] = ends[s]
         top += 1
@@ -142,13 +159,7 @@ def node(segments, reach):
             stack[top + 1, 0], stack[top + 1, 1] = a, v
             top += 2
             continue
-        twin = False
-        for e in range(edge_count):
-            c, d = edges[e, 0], edges[e, 1]
-            if (c == a and d == b) or (c == b and d == a):
-                twin = True
-                break
-        if twin:
+        if has_edge(edges, edge_count, a, b):
             continue
         e = first_crossing(xy, edges, edge_count, a, b)
         if e < 0:
@@ -170,12 +181,8 @@ def node(segments, reach):
                 stack[top] = edges[other]
                 edges[other, 0] = edges[other, 1] = -1
                 top += 1
-    kept = 0
-    for e in range(edge_count):
-        if edges[e, 0] >= 0:
-            edges[kept] = edges[e]
-            kept += 1
-    return xy[:count].copy(), edges[:kept].copy()
+    live = edges[:edge_count, 0] >= 0
+    return xy[:count].copy(), edges[:edge_count][live]
 
 
 @njit(cache=True)
@@ -445,6 +452,26 @@ def keep_largest_component(edges, face, area, label):
 
 
 @njit(cache=True)
+def renumbered(xy, edges, side):
+    """The edges that are left (first vertex not negative), their sides, and the vertices they use, numbered anew."""
+    number = np.full(len(xy), -1, np.int64)
+    out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
+    count, kept = 0, 0
+    for e in range(len(edges)):
+        if edges[e, 0] < 0:
+            continue
+        for end in range(2):
+            v = edges[e, end]
+            if number[v] < 0:
+                number[v], out_xy[count] = count, xy[v]
+                count += 1
+            out_edges[kept, end] = number[v]
+        out_side[kept] = side[e]
+        kept += 1
+    return out_xy[:count].copy(), out_edges[:kept].copy(), out_side[:kept].copy()
+
+
+@njit(cache=True)
 def dissolve(xy, edges, side):
     """Drop edges with one label on both sides, then vertices on straight stretches; (xy, edges, side) compacted.
 
@@ -486,21 +513,7 @@ def dissolve(xy, edges, side):
             degree[v] = 0
             touching[b, 0 if touching[b, 0] == g else 1] = e
             changed = True
-    number = np.full(len(xy), -1, np.int64)
-    out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
-    count, kept = 0, 0
-    for e in range(len(edges)):
-        if edges[e, 0] < 0:
-            continue
-        for end in range(2):
-            v = edges[e, end]
-            if number[v] < 0:
-                number[v], out_xy[count] = count, xy[v]
-                count += 1
-            out_edges[kept, end] = number[v]
-        out_side[kept] = side[e]
-        kept += 1
-    return out_xy[:count].copy(), out_edges[:kept].copy(), out_side[:kept].copy()
+    return renumbered(xy, edges, side)
 
 
 @njit(cache=True)

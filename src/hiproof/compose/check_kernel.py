@@ -231,10 +231,12 @@ def bends(vertices, index, low, high, normal):
         p = vertices[index[k]]
         q = vertices[index[k + 1 if k + 1 < high else low]]
         r = vertices[index[k + 2 if k + 2 < high else k + 2 - (high - low)]]
-        c = np.cross(q - p, r - q)
-        size = np.sqrt(c @ c)
-        longest = np.sqrt(max((q - p) @ (q - p), (r - q) @ (r - q), (r - p) @ (r - p)))
-        if size > 2e-3 * longest and abs(c @ normal) < NORMAL_COSINE * size:
+        a, b, chord = q - p, r - q, r - p
+        c = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+        size = np.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
+        longest = np.sqrt(max((a * a).sum(), (b * b).sum(), (chord * chord).sum()))
+        along = c[0] * normal[0] + c[1] * normal[1] + c[2] * normal[2]
+        if size > 2e-3 * longest and abs(along) < NORMAL_COSINE * size:
             return True
     return False
 
@@ -401,7 +403,7 @@ def check_umbrellas(index, ring_start, face_start, found, count):
 
 @njit(cache=True)
 def holds_vertex(index, low, high, v):
-    for k in range(low, high):  # noqa: SIM110 (compiled: no generators)
+    for k in range(low, high):
         if index[k] == v:
             return True
     return False
@@ -504,7 +506,7 @@ def check_intersections(vertices, index, ring_start, face_start, normals, offset
 @njit(cache=True)
 def apart(low, high, low2, high2, slack):
     """Whether two boxes are further apart than `slack` along some axis."""
-    for axis in range(3):  # noqa: SIM110 (compiled: no generators)
+    for axis in range(3):
         if low2[axis] > high[axis] + slack or low[axis] > high2[axis] + slack:
             return True
     return False

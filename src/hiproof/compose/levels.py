@@ -60,7 +60,7 @@ def split_at_crossings(xy, edges, side, planes, reach):
 @njit(cache=True)
 def tied(ties, v, low, high):
     """Whether some tie at vertex v spans the gap from low to high."""
-    for k in range(len(ties)):  # noqa: SIM110 (compiled: no generators)
+    for k in range(len(ties)):
         if ties[k, 0] == v and ties[k, 1] <= low and high <= ties[k, 2]:
             return True
     return False
