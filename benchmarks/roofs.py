@@ -33,11 +33,9 @@ def random_roof(name: str, rng: np.random.Generator) -> TrueRoof:
     width = rng.uniform(6, 12)
     length = width * (rng.uniform(1.05, 1.3) if name == "pyramid" else rng.uniform(1.3, 2.2))
     height = width / 2 * rng.uniform(0.36, 1.2)
-    primitive = CATALOGUE[name].variants[rng.integers(len(CATALOGUE[name].variants))]
-    theta_p = primitive.typical(width, length, height) | shape_of(name, width, length, height, rng)
-    return TrueRoof(
-        primitive, theta_p, rng.uniform(-np.pi / 2, np.pi / 2), rng.uniform(-1, 1, 3) * (1, 1, 0) + (0, 0, 6)
-    )
+    theta_p = CATALOGUE[name].typical(width, length, height) | shape_of(name, width, length, height, rng)
+    kappa, translation = rng.uniform(-np.pi / 2, np.pi / 2), np.array([*rng.uniform(-1, 1, 2), 6.0])
+    return TrueRoof(CATALOGUE[name].variant(theta_p), theta_p, kappa, translation)
 
 
 def shape_of(name: str, width: float, length: float, height: float, rng: np.random.Generator) -> dict[str, float]:

@@ -29,6 +29,7 @@ from .tables import bounds, tables, variants
 
 COARSE_POINTS = 120
 OUTLIERS_AT_FIRST = 0.1
+OUTLIER_REACH_M = 4.0  # outliers may lie anywhere in the points' extent and this far around
 COARSE, MIDDLE, FINE = (Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in ((0.5, 0.5), (0.25, 0.3), (0.15, 0.15)))
 SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, largest
 SIDE_TAU_M = 0.1  # softness of the sides while types are compared
@@ -149,8 +150,8 @@ def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool) -
     """The problem of `points` (n, 4) and all shapes needed."""
     names, family = needed_for(types)
     z_low, z_high = height_range(points[:, 2])
-    plan_area = (plan_extents(points[:, :2]) + 1.0).prod() if plan_is_free else 1.0
-    log_background = -float(np.log(plan_area * (max(z_high - z_low, 1.0) + 1.0)))
+    plan_area = (plan_extents(points[:, :2]) + 2 * OUTLIER_REACH_M).prod() if plan_is_free else 1.0
+    log_background = -float(np.log(plan_area * (max(z_high - z_low, 1.0) + OUTLIER_REACH_M)))
     low, high = (bound.copy() for bound in bounds(names))
     low[:, Q0], high[:, Q0] = z_low - 1.0, z_high + 1.5
     stride = max(1, round(len(points) / COARSE_POINTS))
@@ -184,7 +185,7 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
         ]
     )
     kinds, thetas, votes = kernel.vote_each(search.thinned, search.tables, rectangles)
-    candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 4)
+    candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 3)
     return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, slack_of(search))
 
 
