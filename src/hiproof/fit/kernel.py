@@ -27,7 +27,7 @@ CENTRE_X, CENTRE_Y, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0 = range(6)
 SIZE = 9
 STEP_CAP_M, STEP_CAP_RAD = 1.5, 0.25
 FAR_SQUARED = 60.0  # squared normalised residual beyond which a point is certainly an outlier
-SOFT = 12.0  # margins of more than this many tau are inside for certain
+SOFT = 10.0  # margins of more than this many tau are inside for certain
 SQRT_2PI = math.sqrt(2 * math.pi)
 
 

@@ -34,6 +34,7 @@ COARSE, MIDDLE, FINE = (Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in (
 SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, largest
 SIDE_TAU_M = 0.1  # softness of the sides while types are compared
 SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04  # types further behind the best after annealing are dropped
+ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15  # the same after the rough fit to the thinned points
 SIDE_GRID = 28
 PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
 
@@ -65,6 +66,10 @@ class Candidates:
 
     def chosen(self, rows: np.ndarray) -> Candidates:
         return replace(self, kinds=self.kinds[rows], thetas=self.thetas[rows], values=self.values[rows])
+
+    def within(self, slack: float) -> Candidates:
+        """Those at most `slack` nats behind the best."""
+        return self.chosen(self.values <= self.values.min() + slack)
 
     def joined(self, other: Candidates) -> Candidates:
         return Candidates(
@@ -104,6 +109,15 @@ class Search:
         )
         return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations)
 
+    def roughly_fitted(self, candidates: Candidates) -> Candidates:
+        """The best two of each type after medium steps on the thinned points."""
+        return self.best_of_type(self.minimised(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack)
+
+    @property
+    def slack(self) -> float:
+        """How far behind its type's best (nats, on the thinned points) a second candidate is still worth its time."""
+        return 3.0 + 0.05 * len(self.thinned.points)
+
     def best_of_type(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
         """The `count` best of each type that are within `slack` nats of its best, types in the tables' order."""
         family = self.family[candidates.kinds]
@@ -127,12 +141,12 @@ def fit_likelihood(
     softnesses (m) tried at last on the sides; `log_prior` by type is added to the evidence (nats).
     """
     search = new_search(points, types, outline is None)
-    basic = anneal(search, vote_starts(search, outline))
-    derived = derive(search, basic)
-    candidates = basic.joined(derived) if len(derived.kinds) else basic
+    basic = search.roughly_fitted(vote_starts(search, outline))
+    candidates = basic.joined(search.roughly_fitted(derived_starts(search, basic)))
     candidates = candidates.chosen(np.array([search.shapes[kind].name in types for kind in candidates.kinds]))
-    slack = SLACK_NATS + SLACK_NATS_A_POINT * len(points)
-    candidates = candidates.chosen(candidates.values <= candidates.values.min() + slack)
+    candidates = candidates.within(ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points))
+    candidates = search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
+    candidates = candidates.within(SLACK_NATS + SLACK_NATS_A_POINT * len(points))
     candidates, noises = learn(search, candidates)
     winner, bics = choose(search, candidates, log_prior or {})
     return finish(search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus)
@@ -186,7 +200,7 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
     )
     kinds, thetas, votes = kernel.vote_each(search.thinned, search.tables, rectangles)
     candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 3)
-    return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, slack_of(search))
+    return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, search.slack)
 
 
 def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
@@ -207,31 +221,15 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
     return [by_slope if outline is None else by_plan]
 
 
-def slack_of(search: Search) -> float:
-    """How far behind its type's best (nats, on the thinned points) a second candidate is still worth its time."""
-    return 3.0 + 0.05 * len(search.thinned.points)
-
-
-def anneal(search: Search, candidates: Candidates) -> Candidates:
-    """The best candidate of each type after medium steps on the thinned points and fine ones on all."""
-    candidates = search.minimised(search.thinned, candidates, MIDDLE, 5, 0.3)
-    return search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
-
-
-def derive(search: Search, basic: Candidates) -> Candidates:
-    """The best candidate of each type that starts from the fits of simpler ones."""
-    kinds, thetas = [], []
+def derived_starts(search: Search, basic: Candidates) -> Candidates:
+    """Starts of the types that derive from simpler ones, from the best `basic` fit of each."""
+    basic = search.best_of_type(basic, 1)
     theta_of = {search.shapes[kind].name: theta for kind, theta in zip(basic.kinds, basic.thetas, strict=True)}
-    for t, shape in enumerate(search.shapes):
-        for start in shape.starts:
-            kinds.append(t)
-            thetas.append(start.theta(theta_of[start.source]))
-    candidates = Candidates(np.array(kinds, np.int64), np.reshape(thetas, (-1, 9)), np.zeros(len(kinds)))
-    if not kinds:
-        return candidates
-    candidates = search.minimised(search.thinned, candidates, Noise(0.25, 0.25, OUTLIERS_AT_FIRST), 4, 0.5)
-    candidates = search.best_of_type(candidates, 2, slack_of(search))
-    return search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
+    starts = [
+        (t, start.theta(theta_of[start.source])) for t, shape in enumerate(search.shapes) for start in shape.starts
+    ]
+    kinds = np.array([t for t, _ in starts], np.int64)
+    return Candidates(kinds, np.reshape([theta for _, theta in starts], (-1, 9)), np.zeros(len(starts)))
 
 
 def learn(search: Search, candidates: Candidates) -> tuple[Candidates, np.ndarray]:

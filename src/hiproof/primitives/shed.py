@@ -30,7 +30,7 @@ def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
         faces=tuple((4 * k + 1, 4 * k, 4 * k + 3, 4 * k + 2) for k in range(teeth)),
         typical=lambda width, length, height: {"width": width, "length": length, "height": height, "teeth": teeth},
         bounds=((0.08, SLOPE_MAX),),
-        vote=Vote(turns=4, slopes=(0.2, 0.4, 0.7, 1.1)),
+        vote=Vote(turns=4, slopes=(0.2, 0.35, 0.5, 0.65, 0.8, 1.0)),
         half_turn_symmetric=False,
         strips=teeth,
         more=more,
