@@ -8,7 +8,7 @@ points, labels, type = training_sample(rng)     the same for a network (training
 
 from .compounds import COMPOUND_KINDS, random_compound
 from .neighbourhood import demo_files
-from .roofs import SimBuilding, random_building
+from .roofs import SimBuilding, building_of, random_building
 from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
 from .scene import NOT_ROOF, SOURCES, Defects
 from .shapes import ROOF_TYPES
@@ -23,6 +23,7 @@ __all__ = [
     "Scan",
     "ScanSettings",
     "SimBuilding",
+    "building_of",
     "demo_files",
     "random_building",
     "random_compound",

@@ -95,6 +95,25 @@ def assemble(parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[floa
     return SimBuilding(roof.type, kind, roof, float(origin[2]))
 
 
+def building_of(truth: dict) -> SimBuilding:
+    """The building whose `SimBuilding.truth` was written to a file. Raises InputError for anything else.
+
+    >>> building = random_building(np.random.default_rng(3), "mansard")
+    >>> building_of(building.truth()).outline.equals_exact(building.outline, 1e-9)
+    True
+    """
+    try:
+        parts = tuple(
+            make_part(part["type"], part["parameters"], part["kappa"], np.array(part["translation"], float))
+            for part in truth["parts"]
+        )
+        return assemble(parts, truth["kind"], truth["origin"])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InputError(
+            f"expected a building's truth as the simulator writes it, got: {error!r}; give a line of truth.jsonl"
+        ) from error
+
+
 def turned_building(building: SimBuilding, angle: float) -> SimBuilding:
     """The building turned by `angle` (rad) about its frame's origin."""
     parts = []
