@@ -1,4 +1,4 @@
-"""`python -m experiments NAME [--quick] [--data ...] [--out DIR]`; NAME may be `all`."""
+"""`python -m experiments NAME [--quick] [--data ...] [--out DIR]`; several names, or `all`, run one after the other."""
 
 from __future__ import annotations
 
@@ -8,10 +8,6 @@ import os
 import time
 from pathlib import Path
 
-# One thread a process: the work is shared out by processes, and small matrices only lose by more threads.
-for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
-    os.environ.setdefault(variable, "1")
-
 from .output import Options, write_result
 
 NAMES = ("table1", "table2", "fig6", "table3", "fig7", "fig8", "robust")
@@ -19,7 +15,7 @@ NAMES = ("table1", "table2", "fig6", "table3", "fig7", "fig8", "robust")
 
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m experiments", description=__doc__)
-    parser.add_argument("name", choices=(*NAMES, "all"))
+    parser.add_argument("names", nargs="+", choices=(*NAMES, "all"), metavar="NAME", help=f"{', '.join(NAMES)} or all")
     parser.add_argument("--quick", action="store_true", help="a few roofs only")
     parser.add_argument("--data", type=Path, help="folder with roofn3d/nyc_roofs.npz, or a RoofN3D csv file")
     parser.add_argument("--out", type=Path, default=Path("out/experiments"), help="folder for the files")
@@ -27,7 +23,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
     given = parser.parse_args(arguments)
     options = Options(given.quick, given.data, given.seed, 1 if given.quick else given.jobs)
-    for name in NAMES if given.name == "all" else (given.name,):
+    # One thread a process: the work is shared out by processes, and small matrices only lose by more threads. NumPy reads
+    # this when it is first imported, with the experiment.
+    for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
+        os.environ.setdefault(variable, "1")
+    for name in NAMES if "all" in given.names else given.names:
         start = time.perf_counter()
         result = importlib.import_module(f"experiments.{name}").run(options)
         print(write_result(name, result, given.out, options, time.perf_counter() - start).read_text())

@@ -78,7 +78,9 @@ def record_of(primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds
     errors["kappa"] = (errors["kappa"] + period / 2) % period - period / 2
     (given, _, place), (fitted, _, at) = primitive.from_theta(truth), primitive.from_theta(found)
     errors |= {f"dimension:{name}": fitted[name] - value for name, value in given.items() if name != "teeth"}
-    errors |= {f"relative:{name}": (fitted[name] - v) / v for name, v in given.items() if abs(v) > 0.5 and name != "teeth"}
+    errors |= {
+        f"relative:{name}": (fitted[name] - v) / v for name, v in given.items() if abs(v) > 0.5 and name != "teeth"
+    }
     top = (at[2] + fitted.get("height", 0.0)) - (place[2] + given.get("height", 0.0))
     errors |= {"place:x": at[0] - place[0], "place:y": at[1] - place[1], "place:top": top}
     return errors | {f"bound:{name}": value for name, value in bounds.items()}

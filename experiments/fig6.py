@@ -1,0 +1,32 @@
+"""Figure 6: the distributions of PSD and IoU over the roofs of Table 2."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .charts import distributions
+from .judge import METHODS, NO_RANSAC, judged_samples
+from .output import Options, Result, Table
+
+SHARES = (5, 25, 50, 75, 95)
+
+
+def run(options: Options) -> Result:
+    """Percentiles as tables, curves as pictures, a pair for each data set."""
+    tables, pictures = [], {}
+    samples, verdicts = judged_samples(options)
+    for name in samples:
+        psd = {m: np.array([verdict.psd_mean for verdict in verdicts[name][m]]) for m in METHODS}
+        iou = {m: np.array([verdict.iou for verdict in verdicts[name][m]]) for m in METHODS}
+        tables.append(percentiles(f"{name}: mean PSD of a roof, m", psd))
+        tables.append(percentiles(f"{name}: outline IoU", iou))
+        stem = "fig6_" + name.split()[0].lower()
+        pictures[f"{stem}_psd"] = distributions(psd, "mean distance of a roof's points, m", 0.4)
+        pictures[f"{stem}_iou"] = distributions(iou, "outline IoU", 1.0)
+    data = ", ".join(f"{len(roofs)} {name}" for name, roofs in samples.items())
+    return Result("distributions of residuals and IoU", data, tuple(tables), pictures, NO_RANSAC)
+
+
+def percentiles(title: str, values: dict[str, np.ndarray]) -> Table:
+    rows = [(method, *map(float, np.nanpercentile(numbers, SHARES))) for method, numbers in values.items()]
+    return Table(title, ("method", *(f"p{share}" for share in SHARES)), rows)

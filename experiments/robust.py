@@ -1,0 +1,136 @@
+"""Robustness: dimension errors of gables and hips against density, noise, missing parts, outliers, and shifted footprints."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from hiproof.simulate import SimBuilding, random_building, uniform_points
+
+from .charts import curves
+from .fig8 import placed_back, true_faces, without_corner
+from .methods import fit_model, in_parallel
+from .output import Options, Result, Table
+from .ransac import available, detect_planes, match_faces
+
+BASE_DENSITY, BASE_NOISE_M = 4.72, 0.12
+AXES = {
+    "density, points/m2": (20.0, 10.0, 5.0, 2.0, 1.0, 0.5),
+    "noise, m": (0.02, 0.05, 0.1, 0.2, 0.3, 0.5),
+    "missing at a corner": (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6),
+    "missing strip": (0.0, 0.1, 0.2, 0.3, 0.4),
+    "outliers": (0.0, 0.05, 0.1, 0.2, 0.3, 0.4),
+    "footprint off by, m": (0.0, 0.1, 0.25, 0.5, 1.0),
+}
+KINDS = ("gable", "hip")
+METHODS = ("paper", "likelihood")
+COLUMNS = (
+    "what",
+    "level",
+    *(f"{m}: {f}" for m in METHODS for f in ("dim. RMSE", "dim. median")),
+    "ransac: faces missed",
+)
+
+
+def run(options: Options) -> Result:
+    """One axis at a time; all methods see the same points."""
+    roofs = 1 if options.quick else 20
+    rows = []
+    for what, levels in AXES.items():
+        for level in levels[-1:] if options.quick else levels:
+            work = [(what, level, kind, options.seed, roof) for kind in KINDS for roof in range(roofs)]
+            outcomes = in_parallel(errors_of_roof, work, options.jobs)
+            rows.append((what, level, *figures(outcomes)))
+    table = Table("Errors of width, length, height (and ridge length)", COLUMNS, rows, NOTE)
+    data = f"{roofs} gables and {roofs} hips a level, otherwise {BASE_DENSITY} points/m2, noise {BASE_NOISE_M} m"
+    return Result("robustness", data, (table,), {"robust": picture(rows)})
+
+
+NOTE = (
+    "Metres, the type given. 'Missing at a corner': the given share of points nearest to one corner, in units of the sides; 'missing strip': a band "
+    "across the ridge at a random place; 'outliers': so many points in place of the roof's, anywhere in its box and up to "
+    "2 m over and under it; 'footprint': the fit is given the true footprint shifted that far in a random direction. RANSAC "
+    "has no dimensions: the share of true faces without a plane of their own stands for it."
+)
+
+
+def figures(outcomes: list[dict]) -> tuple:
+    """RMSE and median of the absolute dimension errors of each method, and RANSAC's missed share."""
+    cells: list[float | None] = []
+    for method in METHODS:
+        errors = np.concatenate([outcome[method] for outcome in outcomes])
+        errors = errors[np.isfinite(errors)]
+        cells += [float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))] if len(errors) else [None, None]
+    missed = [outcome["missed"] for outcome in outcomes if outcome["missed"] is not None]
+    return (*cells, float(np.mean(missed)) if missed else None)
+
+
+def errors_of_roof(what: str, level: float, kind: str, seed: int, roof: int) -> dict:
+    """Dimension errors (k,) by method (NaN without a fit), and the share of faces RANSAC misses."""
+    rng = np.random.default_rng([seed, roof, KINDS.index(kind), 99])
+    building = random_building(rng, kind)
+    points, outline = troubled(building, what, level, rng)
+    truth = building.roof.parts[0].parameters
+    outcome: dict = {}
+    for method in METHODS:
+        fit = fit_model(method, points, (kind,), outline).fit if len(points) > 3 else None
+        outcome[method] = np.array([fit.parameters[name] - v if fit else math.nan for name, v in truth.items()])
+    outcome["missed"] = missed_share(points, building) if available() else None
+    return outcome
+
+
+def missed_share(points: np.ndarray, building: SimBuilding) -> float:
+    faces = true_faces(building)
+    found, _ = match_faces(detect_planes(points), faces) if len(points) > 3 else (0, 0)
+    return 1 - found / len(faces)
+
+
+def troubled(
+    building: SimBuilding, what: str, level: float, rng: np.random.Generator
+) -> tuple[np.ndarray, shapely.Polygon | None]:
+    """Points of the building with one kind of trouble, and the footprint the fit is given, if any."""
+    density = level if what.startswith("density") else BASE_DENSITY
+    noise_m = level if what.startswith("noise") else BASE_NOISE_M
+    points = uniform_points(building, rng, density, noise_m)
+    if what == "missing at a corner":
+        return without_corner(points, building, level), None
+    if what == "missing strip":
+        return without_strip(points, building, level, rng), None
+    if what == "outliers":
+        return with_outliers(points, level, rng), None
+    if what.startswith("footprint"):
+        angle = rng.uniform(0, 2 * math.pi)
+        shift = level * np.array([math.cos(angle), math.sin(angle)])
+        return points, shapely.transform(building.footprint, lambda xy: xy + shift)
+    return points, None
+
+
+def without_strip(points: np.ndarray, building: SimBuilding, share: float, rng: np.random.Generator) -> np.ndarray:
+    """Points less those in a band across the ridge that takes the given share of the length, a tenth left at each end
+    (a band at the end would only make a shorter roof)."""
+    part = building.roof.parts[0]
+    along = placed_back(points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa)[:, 0]
+    length = part.parameters["length"]
+    start = rng.uniform(-0.4 * length, (0.4 - share) * length)
+    return points[(along < start) | (along > start + share * length)]
+
+
+def with_outliers(points: np.ndarray, share: float, rng: np.random.Generator) -> np.ndarray:
+    """Points of which the given share is replaced by draws from their box, 2 m higher and lower."""
+    points = points.copy()
+    chosen = rng.random(len(points)) < share
+    low, high = points.min(axis=0) - [0, 0, 2], points.max(axis=0) + [0, 0, 2]
+    points[chosen] = rng.uniform(low, high, (int(chosen.sum()), 3))
+    return points
+
+
+def picture(rows: list[tuple]):
+    """Dimension RMSE of both objectives, a panel an axis."""
+    panels = {}
+    for what in AXES:
+        mine = [row for row in rows if row[0] == what]
+        series = {"paper": [row[2] for row in mine], "likelihood": [row[4] for row in mine]}
+        panels[what] = ([row[1] for row in mine], series)
+    return curves(panels, "dimension RMSE, m", log=True)
