@@ -57,7 +57,7 @@ def shape_of(name: str, width: float, length: float, height: float, rng: np.rand
     if name == "monopitch":
         return {"height": height * rng.uniform(0.5, 1.0)}
     if name == "shed":
-        teeth = int(rng.integers(2, 7))
+        teeth = int(rng.integers(2, min(6, int(width / 2)) + 1))  # none narrower than 2 m
         return {"teeth": teeth, "height": width / teeth * rng.uniform(0.3, 0.9)}
     return {}
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from hiproof.fit.single import fit_roof
 
-from .roofs import DENSITY, TrueRoof, random_roof, scan
+from .roofs import DENSITY, NOISE_RMSE_M, TrueRoof, paper_noise, random_roof, scan
 
 TYPES = ("pyramid", "gable", "hip")
 PAPER = {"pyramid": (0.120, 4.37, 0.020), "gable": (0.217, 5.55, 0.046), "hip": (0.462, 5.90, 0.030)}
@@ -29,6 +29,11 @@ def main() -> None:
         every.append(errors)
         print(f"{name:8} {summary(errors)}   {PAPER[name]}")
     print(f"{'all':8} {summary(np.concatenate(every))}   (0.266, 5.27, 0.032)")
+    if arguments.objective == "likelihood":
+        ridge, slope = against_cramer_rao(roofs, trials, arguments.density)
+        print(
+            f"gable against the Cramer-Rao bound of least squares: ridge height {ridge:.2f}, slope {slope:.2f} times it"
+        )
 
 
 def errors_of(name: str, roofs: int, trials: int, objective: str, density: float):
@@ -48,6 +53,27 @@ def squared_errors(roof: TrueRoof, fit) -> np.ndarray:
     sigma = np.array([fit.sigma.get(key, np.nan) for key in roof.theta_p])
     rows = error**2, (error / truth) ** 2, translation**2, (error / sigma) ** 2
     return np.array([np.mean(row) for row in rows])
+
+
+def against_cramer_rao(roofs: int, trials: int, density: float) -> tuple[float, float]:
+    """RMSE of a gable's ridge height and slope over their Cramer-Rao bound, for normal noise of the same variance."""
+    rng = np.random.default_rng(23)
+    sigma = NOISE_RMSE_M * np.std(paper_noise(100_000, rng))
+    scores = []
+    for _ in range(roofs):
+        roof = random_roof("gable", rng)
+        slope, ridge = 2 * roof.theta_p["height"] / roof.theta_p["width"], roof.translation[2] + roof.theta_p["height"]
+        for _ in range(trials):
+            points = scan(roof, density, rng)
+            fit = fit_roof(points, types=("gable",))
+            c, s = np.cos(roof.kappa), np.sin(roof.kappa)
+            u, v = ((points[:, :2] - roof.translation[:2]) @ np.array([[c, -s], [s, c]])).T
+            design = np.column_stack([np.ones(len(u)), -np.abs(v), slope * np.sign(v), slope * np.sign(v) * u])
+            bound = sigma * np.sqrt(np.diag(np.linalg.inv(design.T @ design)))
+            height = fit.parameters["height"]
+            found = fit.translation[2] + fit.global_translation[2] + height, 2 * height / fit.parameters["width"]
+            scores.append(((found[0] - ridge) / bound[0], (found[1] - slope) / bound[1]))
+    return tuple(np.sqrt(np.mean(np.square(scores), axis=0)))
 
 
 def summary(errors: np.ndarray) -> str:
