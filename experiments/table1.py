@@ -2,83 +2,87 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from hiproof.primitives import CATALOGUE
+from hiproof.segment import NOT_ROOF, Segmentation, segment
+from hiproof.segment.scores import Scores
 from hiproof.simulate import training_sample
 
-from .data import ROOFN3D_TYPES, SHARED
+from .data import MOST_ROWS, ROOFN3D_TYPES, SHARED, roofn3d_roofs
 from .output import Options, Result, Table
 
-PUBLISHED = "Published on RoofN3D: see the paper's Table 1; always answering gable is right for 75.4 % of RoofN3D."
 TYPES = tuple(CATALOGUE)
+LABELS = (*TYPES, "not roof")
 UNSEEN = 90_001
-"""Added to the seed: training draws with small seeds, so these roofs were never trained on."""
+"""Added to the seed, so that these roofs are not those the network was trained on."""
+
+REMARKS = (
+    "The paper's Table 1 is on RoofN3D itself (three types, 118,073 roofs), which is not ours to ship; its network and ours "
+    "are compared there only by whoever has the data. Always answering gable is right for 75.4 % of RoofN3D, hence the "
+    "balanced accuracy and the recalls."
+)
 
 
 def run(options: Options) -> Result:
     """The shipped network on simulated roofs it never saw, and on the labelled real ones where they are at hand."""
-    from hiproof.segment import segment
-
-    rng = np.random.default_rng(options.seed + UNSEEN)
     count = 12 if options.quick else 1000
-    truth, answers, label_pairs = [], [], []
-    for _ in range(count):
-        points, labels, kind = training_sample(rng, TYPES)
-        found = segment(points)
-        truth.append(TYPES[kind])
-        answers.append(best_type(found.types))
-        label_pairs.append((labels, np.asarray(found.labels)))
-    tables = [label_table(label_pairs), *type_tables("simulated", truth, answers)]
-    data = f"{count} simulated roofs never trained on"
-    labelled = list(labelled_roofs())
+    rng = np.random.default_rng(options.seed + UNSEEN)
+    samples = [training_sample(rng, TYPES) for _ in range(count)]
+    answers = [segment(points) for points, _, _ in samples]
+    true_labels = np.concatenate([labels for _, labels, _ in samples])
+    labels = Scores.of(true_labels, np.concatenate([labels_of(answer) for answer in answers]), LABELS)
+    types = Scores.of(np.array([kind for _, _, kind in samples]), np.array([type_of(a) for a in answers]), TYPES)
+    tables = [label_table(labels), *type_tables("simulated", types)]
+    data = f"{count} simulated roofs of ten types, not trained on, with clutter, trees and gaps"
+    labelled = list(labelled_roofs(options))
     if labelled:
-        truth = [kind for kind, _ in labelled]
-        answers = [best_type(segment(points).types) for _, points in labelled]
-        tables += type_tables("labelled real roofs", truth, answers)
-        data += f", {len(labelled)} labelled RoofN3D roofs"
-    return Result("segmentation and roof types", data, tuple(tables), remarks=PUBLISHED)
+        truth = np.array([TYPES.index(kind) for kind, _ in labelled])
+        told = np.array([type_of(segment(points)) for _, points in labelled])
+        tables += type_tables("labelled RoofN3D roofs", Scores.of(truth, told, TYPES))
+        data += f"; {len(labelled)} labelled RoofN3D roofs"
+    return Result("segmentation and roof types", data, tuple(tables), remarks=REMARKS)
 
 
-def labelled_roofs():
-    """(type, points (n, 3)) of the labelled RoofN3D roofs."""
+def labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
+    """(type, points (n, 3)) of the RoofN3D csv given, else of the few labelled roofs in the shared data."""
+    if options.data is not None and options.data.is_file():
+        yield from (
+            (roof.type, roof.points) for roof in roofn3d_roofs(options.data, 20 if options.quick else MOST_ROWS)
+        )
+        return
     for kind in ROOFN3D_TYPES:
         for path in sorted((SHARED / "roofn3d" / "labelled" / kind).glob("*.pts")):
             yield kind, np.loadtxt(path)[:, :3]
 
 
-def best_type(types: dict[str, float]) -> str:
-    return max(types, key=types.__getitem__)
+def labels_of(answer: Segmentation) -> np.ndarray:
+    """Labels (n,) as indices into LABELS."""
+    return np.where(answer.labels == NOT_ROOF, len(TYPES), answer.labels)
 
 
-def label_table(pairs: Sequence[tuple[np.ndarray, np.ndarray]]) -> Table:
-    """IoU of each label over all points; the last label is "not roof"."""
-    truth, found = (np.concatenate(column) for column in zip(*pairs, strict=True))
-    names = (*TYPES, "not roof")
-    rows = []
-    for label, name in enumerate(names):
-        both, either = (truth == label) & (found == label), (truth == label) | (found == label)
-        rows.append((name, int((truth == label).sum()), float(both.sum() / either.sum()) if either.any() else None))
-    known = [row[2] for row in rows if row[2] is not None]
-    rows.append(("mean", len(truth), float(np.mean(known))))
+def type_of(answer: Segmentation) -> int:
+    return TYPES.index(answer.type)
+
+
+def label_table(scores: Scores) -> Table:
+    """IoU of each label over all points, and the mean."""
+    truth, told, both = scores.confusion.sum(axis=1), scores.confusion.sum(axis=0), np.diag(scores.confusion)
+    rows: list[Sequence] = []
+    for name, t, a, b in zip(scores.names, truth, told, both, strict=True):
+        rows.append((name, int(t), float(b / (t + a - b)) if t + a > b else None))
+    rows.append(("mean", int(truth.sum()), scores.mean_iou))
     return Table("simulated: labels of points", ("label", "points", "IoU"), rows)
 
 
-def type_tables(name: str, truth: Sequence[str], answers: Sequence[str]) -> list[Table]:
+def type_tables(name: str, scores: Scores) -> list[Table]:
     """Accuracy, balanced accuracy and recalls, and the confusion matrix."""
-    kinds = [kind for kind in TYPES if kind in truth]
-    right = np.array([a == t for a, t in zip(answers, truth, strict=True)])
-    truth_array = np.array(truth)
-    recalls = {kind: float(right[truth_array == kind].mean()) for kind in kinds}
-    rows = [("accuracy", float(right.mean())), ("balanced accuracy", float(np.mean(list(recalls.values()))))]
-    rows += [(f"recall of {kind}", value) for kind, value in recalls.items()]
-    columns = [kind for kind in TYPES if kind in truth or kind in answers]
-    confusion = [(kind, *(count(truth, answers, kind, column) for column in columns)) for kind in kinds]
+    rows = [("accuracy", scores.accuracy), ("balanced accuracy", scores.balanced_accuracy)]
+    rows += [(f"recall of {kind}", value) for kind, value in scores.recalls.items()]
+    used = [i for i in range(len(scores.names)) if scores.confusion[i].any() or scores.confusion[:, i].any()]
+    confusion = [(scores.names[i], *(int(scores.confusion[i, j]) for j in used)) for i in used]
+    columns = ("true", *(scores.names[j] for j in used))
     figures = Table(f"{name}: roof types", ("figure", "value"), rows)
-    return [figures, Table(f"{name}: true types (rows) and answers (columns)", ("true", *columns), confusion)]
-
-
-def count(truth: Sequence[str], answers: Sequence[str], kind: str, answer: str) -> int:
-    return sum(t == kind and a == answer for t, a in zip(truth, answers, strict=True))
+    return [figures, Table(f"{name}: true types (rows) and answers (columns)", columns, confusion)]

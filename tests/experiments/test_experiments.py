@@ -23,7 +23,7 @@ pytest.importorskip("matplotlib", reason="the experiments draw with matplotlib (
 needs_ransac = pytest.mark.skipif(not available(), reason="pyransac3d is not installed (extra `experiments`)")
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name != "table1"])
+@pytest.mark.parametrize("name", NAMES)
 def test_quick_form_writes_its_files(name, tmp_path, capsys):
     main([name, "--quick", "--out", str(tmp_path)])
     text = (tmp_path / f"{name}.md").read_text()
