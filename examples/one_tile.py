@@ -1,0 +1,19 @@
+"""One tile: the bundled neighbourhood through the same road as `hiproof reconstruct`, then a look at the worst building."""
+
+import json
+import sys
+from pathlib import Path
+
+from hiproof import Request, reconstruct_area
+from hiproof.simulate import demo_files
+
+out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+files = demo_files()
+request = Request((str(files["cloud"]),), out, str(files["footprints"]), str(files["terrain"]), restart=True)
+summary = reconstruct_area(request)
+print(f"{summary.buildings} buildings: {summary.by_status}, roof types {summary.by_type}")
+
+buildings = [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+worst = min(buildings, key=lambda building: building["residuals"]["share_within_20cm"])
+share = 100 * worst["residuals"]["share_within_20cm"]
+print(f"worst: {worst['id']}, {worst['type']}, {share:.0f} % of its points within 0.2 m")
