@@ -1,0 +1,76 @@
+"""The documents say what the code does: commands, examples, doctests, public names."""
+
+import doctest
+import importlib
+import pkgutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+import hiproof
+from hiproof.cli.app import app
+from hiproof.primitives import CATALOGUE
+
+ROOT = Path(__file__).parents[1]
+ENVIRONMENT = {"PYTHONPATH": str(ROOT / "src"), "PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1"}
+COMMANDS = typer.main.get_command(app).commands
+MODULES = sorted(m.name for m in pkgutil.walk_packages(hiproof.__path__, "hiproof.") if not m.name.endswith("__main__"))
+EXTRAS = {"torch", "distributed", "dask", "matplotlib", "psycopg", "onnx"}
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_the_readme_names_every_command(name):
+    assert f"hiproof {name}" in (ROOT / "README.md").read_text()
+
+
+@pytest.mark.parametrize("name", sorted(COMMANDS))
+def test_every_command_and_option_is_explained(name):
+    command = COMMANDS[name]
+    assert command.help
+    for parameter in command.params:
+        assert getattr(parameter, "help", None), parameter.name
+
+
+def test_the_readme_names_every_roof_type():
+    text = (ROOT / "README.md").read_text()
+    assert [name for name in CATALOGUE if f"`{name}`" not in text] == []
+
+
+def test_the_architecture_names_every_room():
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    rooms = [p.name for p in (ROOT / "src/hiproof").iterdir() if p.is_dir() and (p / "__init__.py").exists()]
+    assert [room for room in rooms if f"`{room}/`" not in text] == []
+
+
+@pytest.mark.parametrize("name", MODULES)
+def test_doctests(name):
+    try:
+        module = importlib.import_module(name)
+    except ImportError as error:
+        if error.name and error.name.split(".")[0] in EXTRAS:
+            pytest.skip(f"needs the extra that brings {error.name}")
+        raise
+    assert doctest.testmod(module).failed == 0
+
+
+@pytest.mark.parametrize("name", hiproof.__all__)
+def test_every_public_name_is_there_and_documented(name):
+    value = getattr(hiproof, name)
+    assert name == "__version__" or value.__doc__
+
+
+@pytest.mark.parametrize("example", ["one_building.py", "one_tile.py", "new_primitive.py"])
+def test_examples_run(example, tmp_path):
+    command = [sys.executable, ROOT / "examples" / example, str(tmp_path / "out")]
+    done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, cwd=tmp_path, check=False)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.strip()
+
+
+def test_importing_brings_neither_torch_nor_dask_nor_the_compiler():
+    code = "import sys, hiproof; print([m for m in ('torch', 'dask', 'numba', 'scipy', 'onnxruntime') if m in sys.modules])"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=ENVIRONMENT, check=True)
+    assert done.stdout.strip() == "[]"
