@@ -32,6 +32,7 @@ class Recognised:
 
     weights: np.ndarray | None = None
     types: dict[str, float] = field(default_factory=dict)
+    log_prior: dict[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -104,8 +105,16 @@ def to_local(outline: shapely.Polygon | None, frame: LocalFrame) -> shapely.Poly
 
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
-    """The network's opinion of the points (paper section 3.1), nothing where it is switched off or too few points came."""
-    return Recognised()
+    """The network's opinion of the points (paper section 3.1), none where it is switched off or cannot tell."""
+    if not settings.segment.enabled:
+        return Recognised()
+    from .segment import fit_prior, segment
+
+    try:
+        found = segment(points, settings)
+    except FitError:
+        return Recognised()
+    return Recognised(found.weights, found.types, fit_prior(found.types))
 
 
 def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
@@ -127,23 +136,17 @@ def fit_several(
     """As many parts as the evidence pays for, all fitted to all points together."""
     from .fit.compound import fit_building
 
-    found = fit_building(points, outline, settings, log_prior(recognised), recognised.weights)
+    found = fit_building(points, outline, settings, recognised.log_prior)
     return Fitted(found.roof_parts, found.outline, found.objective, found.types)
-
-
-def log_prior(recognised: Recognised) -> dict[str, float] | None:
-    """Log probabilities by type from the network, None without it."""
-    if not recognised.types:
-        return None
-    return {name: math.log(max(probability, 1e-6)) for name, probability in recognised.types.items()}
 
 
 def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
     """One primitive for the whole building (paper section 3.2)."""
     from .fit import fit_roof
 
-    prior = log_prior(recognised)
-    found = fit_roof(points, outline=outline, settings=settings, weights=recognised.weights, type_log_prior=prior)
+    found = fit_roof(
+        points, outline=outline, settings=settings, weights=recognised.weights, type_log_prior=recognised.log_prior
+    )
     shift = found.global_translation
     part = dataclasses.replace(
         found.part, translation=found.part.translation + shift, pieces=tuple(moved(p, shift) for p in found.part.pieces)
