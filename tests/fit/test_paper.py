@@ -37,7 +37,7 @@ def test_outline_misfit_is_one_minus_iou():
 
 
 def test_objective_is_j1_plus_beta_j2():
-    building, points = dense_points("gable")
+    _, points = dense_points("gable")
     xyz = LocalFrame.around(points).to_local(points)
     fitted = PaperFit(CATALOGUE["gable"], xyz, alpha_shape(xyz[:, :2]))
     vertices = fitted.vertices(fitted.theta)

@@ -1,8 +1,8 @@
 """Solids back from CityJSON, CityJSONSeq and CityGML 2.0 files, as they stand: for the validity check and for scanning.
 
 Each shell of each solid of a building or building part comes out by itself: a CompositeSolid or MultiSolid as several, the inner shells of a Solid turned
-inside out, so that each is a closed shell whose faces should point outwards. A MultiSurface comes out as one shell too; that
-it is rarely closed is for the check to say.
+inside out, so that each is a closed shell whose faces should point outwards. A MultiSurface comes out as one shell too, unless
+it is a footprint (LoD 0); that it is rarely closed is for the check to say.
 """
 
 from __future__ import annotations
@@ -120,6 +120,7 @@ def feature_solids(value: dict[str, Any], transform: dict[str, Any] | None, plac
                 [
                     solid
                     for geometry in city_object.get("geometry", ())
+                    if not str(geometry.get("lod", "")).startswith("0")
                     for solid in geometry_shells(geometry, vertices)
                 ],
             )
