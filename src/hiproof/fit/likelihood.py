@@ -189,7 +189,10 @@ def plan_extents(xy: np.ndarray) -> np.ndarray:
 
 
 def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
-    """Starts of the voting types in the likely directions, after a few coarse steps: the best two of each type."""
+    """Starts of the voting types in the likely directions, after a few coarse steps: the best two of each type.
+
+    Up to eight a type are stepped, for a saw-tooth has many counts and turns, but only those with nearly as many votes.
+    """
     rectangles = np.array(
         [
             rectangle_in_direction(search.thinned.points, kappa, 0.02)
@@ -199,7 +202,8 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
         ]
     )
     kinds, thetas, votes = kernel.vote_each(search.thinned, search.tables, rectangles)
-    candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 3)
+    few_votes_less = 0.2 * len(search.thinned.points)
+    candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 8, few_votes_less)
     return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, search.slack)
 
 
