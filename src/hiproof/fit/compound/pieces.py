@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import shapely
 
@@ -13,21 +15,34 @@ BEYOND_M = 1.0  # leaves at the rim of the plan reach so far beyond it: the outl
 THIN_M = 0.08  # pieces narrower than this on average go to their neighbour
 CLAMP_M = 0.4  # no height leaves the range of the points by more
 
+Rows = tuple[int, ...]
 
-def disjoint_pieces(layout: Layout, plan: Plan, outline: shapely.Polygon) -> list[Piece]:
-    """Pieces that cover `outline` without overlap: leaves with the same planes united, overlays cut out of what lies below."""
+
+@dataclass(frozen=True)
+class RowPiece:
+    """A piece in local coordinates and the rows (k,) of the layout's table its planes came from, -1 for a clamp."""
+
+    piece: Piece
+    rows: np.ndarray
+
+
+def disjoint_pieces(layout: Layout, plan: Plan, outline: shapely.Polygon) -> list[RowPiece]:
+    """Pieces that cover `outline` without overlap: leaves of the same planes united, overlays cut out of what lies below."""
     regions = [
-        (planes, polygon)
-        for planes, region in plan_regions(layout, plan)
+        (rows, polygon)
+        for rows, region in plan_regions(layout, plan)
         for polygon in polygons_of(shapely.intersection(shapely.transform(region, plan.frame.xy_local), outline))
     ]
     regions = without_thin(regions)
     low, high = plan.cloud.z.min() - CLAMP_M, plan.cloud.z.max() + CLAMP_M
     z_median = plan.frame.origin[2]
     pieces = []
-    for planes, polygon in regions:
-        piece = Piece(polygon, active_planes(plan.frame.plane_local(planes), polygon))
-        pieces += within_heights(piece, low + z_median, high + z_median)
+    for rows, polygon in regions:
+        rows = np.array(rows)
+        planes = plan.frame.plane_local(layout.table[rows])
+        kept = active_planes(planes, polygon)
+        whole = RowPiece(Piece(polygon, planes[kept]), rows[kept])
+        pieces += within_heights(whole, low + z_median, high + z_median)
     return pieces
 
 
@@ -50,8 +65,8 @@ def leaf_boxes(layout: Layout, plan: Plan) -> list[tuple[int, tuple[float, float
     return boxes
 
 
-def plan_regions(layout: Layout, plan: Plan) -> list[tuple[np.ndarray, shapely.Geometry]]:
-    """Planes (k, 3) and plan region of every set of planes in use, in the building's frame."""
+def plan_regions(layout: Layout, plan: Plan) -> list[tuple[tuple[int, ...], shapely.Geometry]]:
+    """Table rows and plan region of every set of planes in use, in the building's frame."""
     by_rows: dict[tuple[int, ...], list] = {}
 
     def put(holder, region):
@@ -69,8 +84,7 @@ def plan_regions(layout: Layout, plan: Plan) -> list[tuple[np.ndarray, shapely.G
         box = shapely.box(*bounds)
         put(h, box if covered is None else shapely.difference(box, covered))
     return [
-        (layout.table[list(rows)].copy(), regions[0] if len(regions) == 1 else shapely.union_all(regions))
-        for rows, regions in by_rows.items()
+        (rows, regions[0] if len(regions) == 1 else shapely.union_all(regions)) for rows, regions in by_rows.items()
     ]
 
 
@@ -82,50 +96,53 @@ def is_thin(polygon: shapely.Polygon) -> bool:
     return 2.0 * polygon.area < THIN_M * polygon.length or polygon.area < 0.02
 
 
-def without_thin(regions: list[tuple[np.ndarray, shapely.Polygon]]) -> list[tuple[np.ndarray, shapely.Polygon]]:
+def without_thin(regions: list[tuple[Rows, shapely.Polygon]]) -> list[tuple[Rows, shapely.Polygon]]:
     """Give every sliver to the neighbour with which it shares the longest border."""
     thin = [r for r in regions if is_thin(r[1])]
     wide = [r for r in regions if not is_thin(r[1])]
     if not thin or not wide:
         return regions
-    for _, sliver in thin:
+    for own, sliver in thin:
         near = shapely.buffer(sliver, 1e-4, quad_segs=1)
         shared = [shapely.intersection(near, polygon).area for _, polygon in wide]
         best = int(np.argmax(shared))
-        planes, polygon = wide[best]
+        rows, polygon = wide[best]
         merged = polygons_of(shapely.union(polygon, shapely.union(sliver, shapely.intersection(near, polygon))))
         if shared[best] > 0.0 and len(merged) == 1:
-            wide[best] = (planes, merged[0])
+            wide[best] = (rows, merged[0])
         else:
-            wide.append((planes, sliver))
+            wide.append((own, sliver))
     return wide
 
 
-def active_planes(planes: np.ndarray, polygon: shapely.Polygon) -> np.ndarray:
-    """The planes that are not everywhere above some single other one over `polygon`."""
+def active_planes(planes: np.ndarray, polygon: shapely.Polygon) -> list[int]:
+    """Indices of the planes that are not everywhere above some single other one over `polygon`."""
     corners = shapely.get_coordinates(polygon)
     z = corners @ planes[:, :2].T + planes[:, 2]
     kept = list(range(len(planes)))
     for k in range(len(planes)):
         if any(j != k and (z[:, j] <= z[:, k] + 1e-9).all() for j in kept):
             kept.remove(k)
-    return planes[kept]
+    return kept
 
 
-def within_heights(piece: Piece, low: float, high: float) -> list[Piece]:
-    """`piece` with every height held between `low` and `high`: a flat cap above, flat pieces where it would fall below."""
-    planes, polygon = piece.planes, piece.outline
+def within_heights(whole: RowPiece, low: float, high: float) -> list[RowPiece]:
+    """The piece with every height held between `low` and `high`: a flat cap above, flat pieces where it would be below."""
+    planes, rows, polygon = whole.piece.planes, whole.rows, whole.piece.outline
     z = shapely.get_coordinates(polygon) @ planes[:, :2].T + planes[:, 2]
-    if z.max() > high and not where_above(planes, high, polygon).is_empty:
-        planes = active_planes(np.vstack([planes, [0.0, 0.0, high]]), polygon)
+    if z.max() > high and where_above(planes, high, polygon).area > 0.0:
+        planes, rows = np.vstack([planes, [0.0, 0.0, high]]), np.append(rows, -1)
+        kept = active_planes(planes, polygon)
+        planes, rows = planes[kept], rows[kept]
     if z.min() >= low:
-        return [Piece(polygon, planes)]
+        return [RowPiece(Piece(polygon, planes), rows)]
     above = where_above(planes, low, polygon)
-    below = shapely.difference(polygon, above)
+    found = []
+    for part in polygons_of(above):
+        kept = active_planes(planes, part)
+        found.append(RowPiece(Piece(part, planes[kept]), rows[kept]))
     flat = np.array([[0.0, 0.0, low]])
-    return [Piece(p, active_planes(planes, p)) for p in polygons_of(above)] + [
-        Piece(p, flat) for p in polygons_of(below)
-    ]
+    return found + [RowPiece(Piece(p, flat), np.array([-1])) for p in polygons_of(shapely.difference(polygon, above))]
 
 
 def where_above(planes: np.ndarray, height: float, polygon: shapely.Polygon) -> shapely.Geometry:

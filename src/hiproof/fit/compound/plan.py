@@ -37,8 +37,14 @@ class PlanFrame:
 
     def plane_local(self, planes: np.ndarray) -> np.ndarray:
         """Planes (k, 3) over u, v as planes over local x, y."""
-        slopes = planes[:, :2] @ self.rotation
-        return np.column_stack([slopes, planes[:, 2] + self.origin[2] - slopes @ self.origin[:2]])
+        local = planes @ self.plane_map().T
+        local[:, 2] += self.origin[2]
+        return local
+
+    def plane_map(self) -> np.ndarray:
+        """The linear part (3, 3) of `plane_local` on (a, b, c)."""
+        slopes = self.rotation.T
+        return np.block([[slopes, np.zeros((2, 1))], [-self.origin[None, :2] @ slopes, np.ones((1, 1))]])
 
 
 @dataclass(frozen=True)

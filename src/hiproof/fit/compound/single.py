@@ -1,0 +1,96 @@
+"""The one primitive of the single road (`fit_roof`), put on the compound's scale so that the two can be compared."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ...errors import FitError
+from ...model import Part, Piece
+from ...primitives import get
+from ...settings import Settings
+from ..single import fit_roof
+from .layout import OVERLAYS, Layout, is_alive
+from .plan import Plan
+
+PART_COST, PARAMETER_COST = (
+    0.5,
+    0.45,
+)  # units of complexity: a level plane 0.95, a slope 1.4, a gable or hip by its heights
+SIMPLE_HOLDERS = 2
+
+
+@dataclass(frozen=True)
+class SinglePrimitive:
+    """One primitive over the whole outline: its part in local coordinates, `objective` in points, types' posterior."""
+
+    part: Part
+    objective: float
+    unexplained: float
+    types: dict[str, float]
+
+
+def is_simple(layout: Layout) -> bool:
+    """Whether the compound found so little structure that one primitive may explain the roof as well."""
+    return layout.count[OVERLAYS] == 0 and int(is_alive(layout).sum()) <= SIMPLE_HOLDERS
+
+
+def single_primitive(
+    points_local: np.ndarray,
+    outline: shapely.Polygon,
+    plan: Plan,
+    evidence: float,
+    settings: Settings,
+    type_log_prior: dict[str, float] | None,
+    weights: np.ndarray | None,
+) -> SinglePrimitive | None:
+    """`fit_roof` under the given outline, judged as a layout is; None where it fails."""
+    try:
+        fit = fit_roof(points_local, outline=outline, settings=settings, weights=weights, type_log_prior=type_log_prior)
+    except FitError:
+        return None
+    part = moved(fit.part, fit.global_translation)
+    tau = settings.compound.tolerance_m
+    uv = np.column_stack([plan.cloud.u, plan.cloud.v])
+    residual = plan.cloud.z + plan.frame.origin[2] - height_of(part, plan.frame.xy_local(uv))
+    ghosts = (
+        height_of(part, plan.frame.xy_local(np.column_stack([plan.ghosts.u, plan.ghosts.v]))) - plan.frame.origin[2]
+    )
+    beyond = (ghosts < plan.ghosts.low) | (ghosts > plan.ghosts.high)
+    parameters = 1 + len(get(part.type).bounds)
+    cost = np.minimum((residual / tau) ** 2, 1.0).sum() + plan.ghosts.weight[beyond].sum()
+    objective = float(cost + evidence * (PART_COST + PARAMETER_COST * parameters))
+    return SinglePrimitive(part, objective, float(np.mean(np.abs(residual) > tau)), posterior(fit.bics))
+
+
+def moved(part: Part, shift: np.ndarray) -> Part:
+    """The part moved by `shift` (3,)."""
+    pieces = []
+    for piece in part.pieces:
+        planes = piece.planes.copy()
+        planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
+        pieces.append(Piece(shapely.transform(piece.outline, lambda xy: xy + shift[:2]), planes))
+    return dataclasses.replace(part, pieces=tuple(pieces), translation=part.translation + shift)
+
+
+def height_of(part: Part, xy: np.ndarray) -> np.ndarray:
+    """Height (n,) of the part at `xy` (n, 2), continued beyond its rectangle; a saw-tooth by the nearest tooth."""
+    if len(part.pieces) == 1:
+        return part.pieces[0].height_at(xy)
+    c, s = math.cos(part.kappa), math.sin(part.kappa)
+    across = (xy - part.translation[:2]) @ np.array([-s, c])
+    width = part.parameters["width"]
+    tooth = np.clip(np.floor((across / width + 0.5) * len(part.pieces)), 0, len(part.pieces) - 1).astype(int)
+    heights = np.stack([piece.height_at(xy) for piece in part.pieces])
+    return heights[tooth, np.arange(len(xy))]
+
+
+def posterior(bics: dict[str, float]) -> dict[str, float]:
+    """Probability of each type from its BIC."""
+    best = min(bics.values())
+    weights = {name: math.exp(-0.5 * min(bic - best, 1400.0)) for name, bic in bics.items() if math.isfinite(bic)}
+    return {name: weight / sum(weights.values()) for name, weight in weights.items()}
