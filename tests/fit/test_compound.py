@@ -5,6 +5,7 @@ import pytest
 import shapely
 
 from hiproof.errors import FitError
+from hiproof.fit import fit_roof
 from hiproof.fit.compound import fit_building
 from hiproof.model import Roof
 
@@ -63,7 +64,7 @@ def test_pieces_cover_the_outline_once_and_stay_near_the_points(name, points_wan
     outline = OUTLINES[name]
     points = sampled(lambda x, y: 5.0 + np.where(x + y > 6.0, 2.0, 0.1 * x), outline, density=60.0)[:points_wanted]
     fit = fit_building(points, outline)
-    outlines = [piece.outline for part in fit.roof_parts for piece in part.pieces]
+    outlines = [piece.outline.intersection(outline) for part in fit.roof_parts for piece in part.pieces]
     assert sum(polygon.area for polygon in outlines) == pytest.approx(outline.area, rel=1e-6)
     assert shapely.union_all(outlines).symmetric_difference(outline).area < 1e-6 * outline.area
     corners = np.concatenate([shapely.get_coordinates(polygon) for polygon in outlines])
@@ -138,3 +139,20 @@ def test_repeated_points_and_points_on_a_line_are_survived():
     for points in (line, np.repeat(line[:1], 30, axis=0), np.vstack([line, line])):
         fit = fit_building(points, HOUSE)
         assert height_of(fit, points[:, :2]) == pytest.approx(points[:, 2], abs=0.05)
+
+
+def test_a_single_gable_comes_out_as_from_the_single_primitive_road():
+    points = sampled(lambda x, y: 8.0 - 0.9 * np.abs(y - 3.5), HOUSE)
+    part = fit_building(points, HOUSE).roof_parts[0]
+    alone = fit_roof(points, outline=HOUSE)
+    assert part.type == alone.type == "gable"
+    assert part.parameters == alone.parameters
+    assert part.kappa == alone.kappa
+
+
+def test_parts_are_named_by_the_catalogue_with_parameters_and_deviations():
+    parts = {part.type: part for part in fit_building(sampled(gable_with_shed, HOUSE), HOUSE).roof_parts}
+    assert set(parts) == {"gable", "flat"}
+    assert parts["gable"].parameters["height"] == pytest.approx(0.9 * 3.5, abs=0.05)
+    assert 0.0 < parts["gable"].sigma["height"] < 0.05
+    assert parts["flat"].translation[2] == pytest.approx(3.0, abs=0.02)

@@ -15,6 +15,7 @@ from ...primitives import get
 from ...settings import Settings
 from ..single import fit_roof
 from .layout import OVERLAYS, Layout, is_alive
+from .pieces import CLAMP_M, polygons_of, where_above
 from .plan import Plan
 
 PART_COST, PARAMETER_COST = (
@@ -54,6 +55,8 @@ def single_primitive(
     except FitError:
         return None
     part = moved(fit.part, fit.global_translation)
+    if not stays_within(part, outline, plan):
+        return None
     tau = settings.compound.tolerance_m
     uv = np.column_stack([plan.cloud.u, plan.cloud.v])
     residual = plan.cloud.z + plan.frame.origin[2] - height_of(part, plan.frame.xy_local(uv))
@@ -65,6 +68,17 @@ def single_primitive(
     cost = np.minimum((residual / tau) ** 2, 1.0).sum() + plan.ghosts.weight[beyond].sum()
     objective = float(cost + evidence * (PART_COST + PARAMETER_COST * parameters))
     return SinglePrimitive(part, objective, float(np.mean(np.abs(residual) > tau)), posterior(fit.bics))
+
+
+def stays_within(part: Part, outline: shapely.Polygon, plan: Plan) -> bool:
+    """Whether no height over the outline leaves the range of the points by more than the clamp of pieces allows."""
+    low, high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min() - CLAMP_M, plan.cloud.z.max() + CLAMP_M))
+    for piece in part.pieces:
+        for polygon in polygons_of(shapely.intersection(piece.outline, outline)):
+            too_low = piece.height_at(shapely.get_coordinates(polygon)).min() < low
+            if too_low or where_above(piece.planes, high, polygon).area > 0.0:
+                return False
+    return True
 
 
 def moved(part: Part, shift: np.ndarray) -> Part:
