@@ -8,9 +8,11 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from .classify import classify
 from .convert import convert
 from .evaluate import evaluate
 from .report import report
+from .train import train
 
 app = typer.Typer(
     name="hiproof",
@@ -124,5 +126,5 @@ def load(
     raise typer.Exit(run(folder, database, prefix))
 
 
-for command in (evaluate, report, convert):
+for command in (evaluate, report, convert, classify, train):
     app.command()(command)
