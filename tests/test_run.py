@@ -6,8 +6,10 @@ import signal
 import subprocess
 import sys
 import time
+import warnings
 
 import numpy as np
+import pyogrio
 import pytest
 import shapely
 from typer.testing import CliRunner
@@ -226,6 +228,21 @@ def test_without_a_ground_class_the_lowest_points_are_named(tmp_path):
     path = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
     assert b"lowest points around the building" in (tmp_path / "out" / "buildings.city.jsonl").read_bytes()
+
+
+@pytest.mark.parametrize(("of_cloud", "of_footprints"), [("EPSG:7415", None), (None, "EPSG:28992"), (None, None)])
+def test_the_output_carries_the_reference_system_that_any_input_names(of_cloud, of_footprints, tmp_path):
+    town = make_town(houses=1)
+    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification, of_cloud)
+    ids, geometry = np.array(["house-0"], object), shapely.to_wkb(np.array(list(town.footprints.values()), object))
+    path = tmp_path / "footprints.gpkg"
+    pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Polygon", crs=of_footprints)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
+    header = json.loads((tmp_path / "out" / "buildings.city.jsonl").read_text().splitlines()[0])
+    expected = next((code.split(":")[1] for code in (of_cloud, of_footprints) if code), None)
+    assert header.get("metadata", {}).get("referenceSystem", "/None").rsplit("/", 1)[1] == str(expected)
 
 
 def invoke(*arguments):

@@ -15,11 +15,14 @@ MOST_BUILDINGS_A_TILE = 100
 def make_plan(request, mark: str) -> Plan:
     """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
     from ..read.crs import parse_crs
+    from ..read.footprints import footprint_crs
 
     headers, crs = read_headers(request.clouds)
     crs = parse_crs(request.settings.read.crs) or crs
     if request.footprints:
         jobs = jobs_from_footprints(request, headers, crs)
+        # a cloud that names no CRS is taken to be in the footprints'
+        crs = crs or footprint_crs(request.footprints)
     else:
         jobs = jobs_from_cloud(request)
     return Plan(

@@ -51,6 +51,8 @@ def read_footprints(
 
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
     """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
+    if is_database(path):
+        return parse_crs(read_table(path)[0]["crs"])
     return parse_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
 
 
