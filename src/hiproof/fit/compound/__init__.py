@@ -14,39 +14,22 @@ Every decision lowers one objective: sum over points of min((dz / tau)^2, 1) plu
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import shapely
 
 from ...errors import FitError
 from ...model import Part
 from ...settings import Settings
-from ..outline import estimate_outline
+from .fit import CompoundFit
 from .joint import JointFit, fit_together
 from .layout import evaluate
 from .pieces import RowPiece, disjoint_pieces
 from .plan import Plan, lay_out_plan
 from .recognise import recognised
 from .search import evidence_per_unit, search_layout
-from .single import is_simple, single_primitive
+from .single import fit_alone, is_simple, outline_of_points, single_primitive
 
-
-@dataclass(frozen=True)
-class CompoundFit:
-    """Outcome of `fit_building`, in the frame of the points given.
-
-    `roof_parts` are disjoint in plan and cover `outline`; `objective` is in points (see the package), `types` posterior
-    probabilities where one primitive explains the roof, `points_used` the points inside the outline that counted,
-    `unexplained` the share of them further than the tolerance from the roof.
-    """
-
-    roof_parts: tuple[Part, ...]
-    outline: shapely.Polygon
-    objective: float
-    points_used: int
-    unexplained: float
-    types: dict[str, float] = field(default_factory=dict)
+__all__ = ["CompoundFit", "fit_building"]
 
 
 def fit_building(
@@ -58,36 +41,48 @@ def fit_building(
 ) -> CompoundFit:
     """Fit the roof of one building to `points_local` (n, 3), in metres of a local frame, over `outline` (same frame).
 
-    Without points inside the outline there is nothing to fit: raises FitError. With fewer than four, the roof is flat at
-    their median height. `weights` (n,) are probabilities of being roof: points under one half do not count.
+    Without an outline it is estimated from the points; with one, points outside it do not count. Fewer than four points
+    give a flat roof at their upper median. `weights` (n,) are probabilities of being roof: points under one half do not
+    count; `type_log_prior` (log probability by type) is for the single primitive. Raises FitError where nothing can be
+    fitted: no points inside the outline, or none given and points that span no area.
+
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4)))
+    >>> roof = np.column_stack([x, y, np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)])
+    >>> fit = fit_building(roof, shapely.box(0, 0, 12, 7))
+    >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
+    (['flat', 'gable'], 0.0)
     """
-    points_local = np.asarray(points_local, float).reshape(-1, 3)
-    counts = np.isfinite(points_local).all(axis=1)
-    if weights is not None:
-        counts &= np.asarray(weights) >= 0.5
-        weights = np.asarray(weights, float)[counts]
-    points_local = points_local[counts]
     settings = settings or Settings()
-    options = settings.compound
+    points_local, weights = countable(points_local, weights)
+    alone = None
     if outline is None:
-        outline = estimate_outline(points_local[:, :2])
+        outline, alone = outline_of_points(points_local, settings, type_log_prior, weights)
     plan = lay_out_plan(points_local, outline)
     if len(plan.cloud.u) == 0:
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
-    layout, objective = search_layout(plan, options)
-    evidence = evidence_per_unit(plan.density, options)
-    single = None
+    layout, objective = search_layout(plan, settings.compound)
+    evidence = evidence_per_unit(plan.density, settings.compound)
     if is_simple(layout):
-        single = single_primitive(points_local, outline, plan, evidence, settings, type_log_prior, weights)
-    if single is not None and single.objective <= objective:
-        return CompoundFit(
-            (single.part,), outline, single.objective, len(plan.cloud.u), single.unexplained, single.types
-        )
-    joint = fit_together(layout, plan, options.tolerance_m, evidence)
+        alone = alone or fit_alone(points_local, outline, settings, type_log_prior, weights)
+        single = single_primitive(alone, outline, plan, evidence, settings.compound.tolerance_m)
+        if single is not None and single.objective <= objective:
+            return single.as_fit(outline, len(plan.cloud.u))
+    joint = fit_together(layout, plan, settings.compound.tolerance_m, evidence)
     parts = tuple(part_of(piece, joint, plan) for piece in disjoint_pieces(layout, plan, outline))
     z, _, _ = evaluate(layout, plan.cloud.u, plan.cloud.v)
-    unexplained = float(np.mean(np.abs(plan.cloud.z - z) > options.tolerance_m))
+    unexplained = float(np.mean(np.abs(plan.cloud.z - z) > settings.compound.tolerance_m))
     return CompoundFit(parts, outline, objective, len(z), unexplained)
+
+
+def countable(points: np.ndarray, weights: np.ndarray | None) -> tuple[np.ndarray, np.ndarray | None]:
+    """Finite points (n, 3) that are roof rather than not, and their weights."""
+    points = np.asarray(points, float).reshape(-1, 3)
+    counts = np.isfinite(points).all(axis=1)
+    if weights is None:
+        return points[counts], None
+    weights = np.asarray(weights, float)
+    counts &= weights >= 0.5
+    return points[counts], weights[counts]
 
 
 def part_of(found: RowPiece, joint: JointFit, plan: Plan) -> Part:

@@ -10,10 +10,12 @@ import numpy as np
 import shapely
 
 from ...errors import FitError
-from ...model import Part, Piece
+from ...model import Fit, Part, Piece
 from ...primitives import get
 from ...settings import Settings
+from ..outline import estimate_outline, is_rectangular
 from ..single import fit_roof
+from .fit import CompoundFit
 from .layout import OVERLAYS, Layout, is_alive
 from .pieces import CLAMP_M, polygons_of, where_above
 from .plan import Plan
@@ -34,30 +36,67 @@ class SinglePrimitive:
     unexplained: float
     types: dict[str, float]
 
+    def as_fit(self, outline: shapely.Polygon, points_used: int) -> CompoundFit:
+        return CompoundFit((self.part,), outline, self.objective, points_used, self.unexplained, self.types)
+
 
 def is_simple(layout: Layout) -> bool:
     """Whether the compound found so little structure that one primitive may explain the roof as well."""
     return layout.count[OVERLAYS] == 0 and int(is_alive(layout).sum()) <= SIMPLE_HOLDERS
 
 
-def single_primitive(
+def fit_alone(
     points_local: np.ndarray,
-    outline: shapely.Polygon,
-    plan: Plan,
-    evidence: float,
+    outline: shapely.Polygon | None,
     settings: Settings,
     type_log_prior: dict[str, float] | None,
     weights: np.ndarray | None,
-) -> SinglePrimitive | None:
-    """`fit_roof` under the given outline, judged as a layout is; None where it fails."""
+) -> Fit | None:
+    """`fit_roof` for a whole building; None where it fails."""
     try:
-        fit = fit_roof(points_local, outline=outline, settings=settings, weights=weights, type_log_prior=type_log_prior)
+        return fit_roof(
+            points_local, outline=outline, settings=settings, weights=weights, type_log_prior=type_log_prior
+        )
     except FitError:
+        return None
+
+
+def outline_of_points(
+    points_local: np.ndarray,
+    settings: Settings,
+    type_log_prior: dict[str, float] | None,
+    weights: np.ndarray | None,
+) -> tuple[shapely.Polygon, Fit | None]:
+    """Outline of a building without a footprint, and the single primitive whose rectangle it is, if it is one.
+
+    Raises FitError for points that span no area.
+    """
+    fit = fit_alone(points_local, None, settings, type_log_prior, weights)
+    if fit is None:
+        return estimate_outline(points_local[:, :2]), None
+    rectangle = plan_rectangle(moved(fit.part, fit.global_translation))
+    if is_rectangular(rectangle, points_local[:, :2]):
+        return rectangle, fit
+    return estimate_outline(points_local[:, :2], fit.kappa), None
+
+
+def plan_rectangle(part: Part) -> shapely.Polygon:
+    """The rectangle that a primitive covers, all its teeth together."""
+    half = 0.5 * np.array([part.parameters["length"], part.parameters["width"]])
+    c, s = math.cos(part.kappa), math.sin(part.kappa)
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
+    return shapely.Polygon(corners @ np.array([[c, s], [-s, c]]) + part.translation[:2])
+
+
+def single_primitive(
+    fit: Fit | None, outline: shapely.Polygon, plan: Plan, evidence: float, tau: float
+) -> SinglePrimitive | None:
+    """The fitted primitive judged as a layout is; None without one, or where it leaves the range of the points."""
+    if fit is None:
         return None
     part = moved(fit.part, fit.global_translation)
     if not stays_within(part, outline, plan):
         return None
-    tau = settings.compound.tolerance_m
     uv = np.column_stack([plan.cloud.u, plan.cloud.v])
     residual = plan.cloud.z + plan.frame.origin[2] - height_of(part, plan.frame.xy_local(uv))
     ghosts = (
