@@ -21,8 +21,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=Path("out/experiments"), help="folder for the files")
     parser.add_argument("--seed", type=int, default=2020)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
+    parser.add_argument(
+        "--paper-share", type=float, default=1.0, help="share of the fits made with the paper's objective"
+    )
     given = parser.parse_args(arguments)
-    options = Options(given.quick, given.data, given.seed, 1 if given.quick else given.jobs)
+    options = Options(given.quick, given.data, given.seed, 1 if given.quick else given.jobs, given.paper_share)
     # One thread a process: the work is shared out by processes, and small matrices only lose by more threads. NumPy reads
     # this when it is first imported, with the experiment.
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):

@@ -16,8 +16,8 @@ def run(options: Options) -> Result:
     tables, pictures = [], {}
     samples, verdicts = judged_samples(options)
     for name in samples:
-        psd = {m: np.array([verdict.psd_mean for verdict in verdicts[name][m]]) for m in METHODS}
-        iou = {m: np.array([verdict.iou for verdict in verdicts[name][m]]) for m in METHODS}
+        psd = {m: np.array([verdict.psd_mean for verdict in verdicts[name][m].values()]) for m in METHODS}
+        iou = {m: np.array([verdict.iou for verdict in verdicts[name][m].values()]) for m in METHODS}
         tables.append(percentiles(f"{name}: mean PSD of a roof, m", psd))
         tables.append(percentiles(f"{name}: outline IoU", iou))
         stem = "fig6_" + name.split()[0].lower()

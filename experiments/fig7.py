@@ -21,10 +21,18 @@ def run(options: Options) -> Result:
     rows = []
     for method in OBJECTIVES:
         for primitive in PRIMITIVES:
-            work = [(method, primitive, options.seed, roof) for roof in range(roofs)]
+            chosen = [roof for roof in range(roofs) if options.covers(method, roof)]
+            work = [(method, primitive, options.seed, roof) for roof in chosen]
             found = np.array(in_parallel(errors_of_roof, work, options.jobs))
             psd, height = found.T
-            row = (method, primitive, roofs, float(psd.mean()), float(np.percentile(psd, 90)), float(np.median(height)))
+            row = (
+                method,
+                primitive,
+                len(work),
+                float(psd.mean()),
+                float(np.percentile(psd, 90)),
+                float(np.median(height)),
+            )
             rows.append(row)
     note = (
         "Metres. The surface's error is against the true heights over the true outline; its median over roofs is given."

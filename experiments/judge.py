@@ -47,13 +47,15 @@ def judge(method: str, sample: RoofSample) -> Verdict:
 
 
 @lru_cache(maxsize=1)
-def judged_samples(options: Options) -> tuple[dict[str, list[RoofSample]], dict[str, dict[str, list[Verdict]]]]:
-    """All data sets at hand, and their verdicts by method in the order of the samples; kept for the next to ask."""
+def judged_samples(options: Options) -> tuple[dict[str, list[RoofSample]], dict[str, dict[str, dict[int, Verdict]]]]:
+    """All data sets at hand, and for each the verdicts by method and sample index; kept for the next to ask."""
     samples = named_samples(options)
-    verdicts = {
-        name: {m: in_parallel(judge, [(m, sample) for sample in roofs], options.jobs) for m in METHODS}
-        for name, roofs in samples.items()
-    }
+    verdicts: dict = {name: {} for name in samples}
+    for name, roofs in samples.items():
+        for method in METHODS:
+            chosen = [i for i in range(len(roofs)) if options.covers(method, i)]
+            found = in_parallel(judge, [(method, roofs[i]) for i in chosen], options.jobs)
+            verdicts[name][method] = dict(zip(chosen, found, strict=True))
     return samples, verdicts
 
 

@@ -40,7 +40,11 @@ def run(options: Options) -> Result:
     rows = []
     for what, levels in AXES.items():
         for level in levels[-1:] if options.quick else levels:
-            work = [(what, level, kind, options.seed, roof) for kind in KINDS for roof in range(roofs)]
+            work = [
+                (what, level, kind, options.seed, roof, tuple(m for m in METHODS if options.covers(m, roof)))
+                for kind in KINDS
+                for roof in range(roofs)
+            ]
             outcomes = in_parallel(errors_of_roof, work, options.jobs)
             rows.append((what, level, *figures(outcomes)))
     table = Table("Errors of width, length, height (and ridge length)", COLUMNS, rows, NOTE)
@@ -60,21 +64,23 @@ def figures(outcomes: list[dict]) -> tuple:
     """RMSE and median of the absolute dimension errors of each method, and RANSAC's missed share."""
     cells: list[float | None] = []
     for method in METHODS:
-        errors = np.concatenate([outcome[method] for outcome in outcomes])
+        errors = np.concatenate([outcome.get(method, [math.nan]) for outcome in outcomes])
         errors = errors[np.isfinite(errors)]
         cells += [float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))] if len(errors) else [None, None]
     missed = [outcome["missed"] for outcome in outcomes if outcome["missed"] is not None]
     return (*cells, float(np.mean(missed)) if missed else None)
 
 
-def errors_of_roof(what: str, level: float, kind: str, seed: int, roof: int) -> dict:
+def errors_of_roof(
+    what: str, level: float, kind: str, seed: int, roof: int, methods: tuple[str, ...] = METHODS
+) -> dict:
     """Dimension errors (k,) by method (NaN without a fit), and the share of faces RANSAC misses."""
     rng = np.random.default_rng([seed, roof, KINDS.index(kind), 99])
     building = random_building(rng, kind)
     points, outline = troubled(building, what, level, rng)
     truth = building.roof.parts[0].parameters
     outcome: dict = {}
-    for method in METHODS:
+    for method in methods:
         fit = fit_model(method, points, (kind,), outline).fit if len(points) > 3 else None
         outcome[method] = np.array([fit.parameters[name] - v if fit else math.nan for name, v in truth.items()])
     outcome["missed"] = missed_share(points, building) if available() else None

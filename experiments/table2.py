@@ -32,11 +32,11 @@ def run(options: Options) -> Result:
     return Result("residuals and outlines", data, tuple(tables), remarks="\n\n".join(filter(None, remarks)))
 
 
-def rows_of(method: str, samples: Sequence[RoofSample], verdicts: Sequence[Verdict]) -> list[tuple]:
+def rows_of(method: str, samples: Sequence[RoofSample], verdicts: dict[int, Verdict]) -> list[tuple]:
     """Overall, then by true type where it is known, else by the type the method chose."""
-    groups: dict[str, list[Verdict]] = {"all": list(verdicts)}
-    for sample, verdict in zip(samples, verdicts, strict=True):
-        groups.setdefault(sample.type or verdict.type, []).append(verdict)
+    groups: dict[str, list[Verdict]] = {"all": list(verdicts.values())}
+    for index, verdict in verdicts.items():
+        groups.setdefault(samples[index].type or verdict.type, []).append(verdict)
     return [(method, kind, *figures(groups[kind])) for kind in ("all", *sorted(groups.keys() - {"all"}))]
 
 
@@ -57,9 +57,9 @@ def figures(verdicts: Sequence[Verdict]) -> tuple:
     )
 
 
-def unexplained(name: str, verdicts: Sequence[Verdict]) -> str:
+def unexplained(name: str, verdicts: dict[int, Verdict]) -> str:
     """Which roofs no single primitive fits."""
-    far = [i for i, verdict in enumerate(verdicts) if not verdict.psd_mean <= UNEXPLAINED_M]
+    far = [i for i, verdict in verdicts.items() if not verdict.psd_mean <= UNEXPLAINED_M]
     if not far:
         return f"{name}: a single primitive fits every roof within {UNEXPLAINED_M} m in the mean."
     listed = ", ".join(map(str, far[:40])) + (" ..." if len(far) > 40 else "")

@@ -46,6 +46,8 @@ def run(options: Options) -> Result:
 def errors_of_type(method: str, kind: str, options: Options) -> list[dict[str, float]]:
     """One record a fit: errors of theta, theta_p and place, and their bounds."""
     trials = TRIALS if method == "likelihood" or kind in PUBLISHED else TRIALS_OF_SLOW
+    if method == "paper":
+        trials = max(1, round(trials * options.paper_share))
     roofs, trials = (2, 2) if options.quick else (ROOFS, trials)
     work = [(method, kind, options.seed, roof, trials) for roof in range(roofs)]
     return [record for records in in_parallel(errors_of_roof, work, options.jobs) for record in records]

@@ -7,7 +7,16 @@ from typing import Annotated
 
 import typer
 
-SHOWN = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "share_within_20cm_inner", "outline_iou")
+SHOWN = {
+    "psd_mean": "PSD",
+    "psd_std": "std",
+    "rmse": "RMSE",
+    "p95": "p95",
+    "share_within_20cm": "<0.2 m",
+    "share_within_20cm_inner": "inner",
+    "outline_iou": "IoU",
+}
+COMPARED = {"ref_ridge_height_m": "ridge", "ref_slope_deg": "slope", "ref_volume_relative": "volume"}
 
 
 def evaluate(
@@ -36,8 +45,8 @@ def print_summary(summary: dict, has_reference: bool) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    columns = SHOWN + (("ref_ridge_height_m", "ref_slope_deg", "ref_volume_relative") if has_reference else ())
-    table = Table("type", "buildings", *columns, title="mean over buildings")
+    columns = SHOWN | (COMPARED if has_reference else {})
+    table = Table("type", "buildings", *columns.values(), title="mean over buildings")
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]
         table.add_row(kind, str(figures["buildings"]), *("" if mean is None else f"{mean:.3f}" for mean in means))

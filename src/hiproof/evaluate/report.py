@@ -112,9 +112,10 @@ def distributions(run: EvaluatedRun) -> str:
 
 
 def worst_buildings(run: EvaluatedRun) -> str:
-    """The twenty models farthest from their points by RMSE, each with its pictures."""
+    """The twenty models that explain the least of their points, facades aside (of equals the larger RMSE first)."""
     rmse = np.array([figures.quality.rmse for figures in run.figures], float)
-    ranked = [int(i) for i in np.argsort(-rmse, kind="stable") if np.isfinite(rmse[i])][:WORST]
+    share = np.array([figures.share_within_20cm_inner for figures in run.figures], float)
+    ranked = [int(i) for i in np.lexsort((-rmse, share)) if np.isfinite(rmse[i])][:WORST]
     return "".join(worst_card(run, i) for i in ranked) or "<p>No points were given, so there are no residuals.</p>"
 
 

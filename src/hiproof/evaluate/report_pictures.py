@@ -30,7 +30,7 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     if not len(values):
         return f"<figure><figcaption>{escape(heading)}: no figures</figcaption></figure>"
     low, high = float(values.min()), float(np.percentile(values, 98))
-    high = high if high > low else low + 1e-3
+    high = max(high, low + 1e-3)
     counts, edges = np.histogram(np.clip(values, low, high), bins=bins, range=(low, high))
     step, top = WIDTH / bins, HEIGHT - 40
     bars = "".join(
@@ -42,12 +42,17 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     middle = float(np.median(values))
     x = WIDTH * (np.clip(middle, low, high) - low) / (high - low)
     axis = (
-        f'<text x="0" y="{top + 16}">{low:.3g}</text><text x="{WIDTH}" y="{top + 16}" text-anchor="end">{high:.3g}</text>'
+        f'<text x="0" y="{top + 16}">{short(low)}</text>'
+        f'<text x="{WIDTH}" y="{top + 16}" text-anchor="end">{short(high)}</text>'
         f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{top}" class="median"/>'
-        f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {middle:.3g}, mean {values.mean():.3g}</text>'
+        f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, mean {short(values.mean())}</text>'
     )
     body = f'<svg viewBox="0 -4 {WIDTH} {HEIGHT}" class="histogram" role="img">{bars}{axis}</svg>'
     return f"<figure>{body}<figcaption>{escape(heading)}</figcaption></figure>"
+
+
+def short(value: float) -> str:
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
 def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, roof_type: str) -> str:

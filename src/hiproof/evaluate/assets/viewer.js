@@ -26,7 +26,7 @@ class Viewer {
     }
     const empty = !isFinite(low[0]);
     this.target = empty ? [0, 0, 0] : low.map((v, k) => (v + high[k]) / 2);
-    this.distance = empty ? 10 : Math.max(8, 1.15 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
+    this.distance = empty ? 10 : Math.max(8, 0.9 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
     this.azimuth = -0.6; this.elevation = 0.75;
   }
 
