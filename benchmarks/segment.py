@@ -59,11 +59,12 @@ class Opinion:
 
     network: dict[str, float]
     bics: dict[str, float]
+    points: int
     fit_alone: str | None
 
     @property
     def combined(self) -> str:
-        return next(iter(combine(self.network, self.bics))) if self.bics else max(self.network, key=self.network.get)
+        return next(iter(combine(self.network, self.bics, self.points)))
 
     @property
     def network_alone(self) -> str:
@@ -74,7 +75,8 @@ def opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
     """Network alone, fit alone on all points, and the evidence of the fit to the network's roof points."""
     found = segment(points, Settings().replace({"fit": {"types": types}}))
     alone, informed = fitted(points, types), fitted(points, types, found.weights)
-    return Opinion(found.types, informed.bics if informed else {}, alone.type if alone else None)
+    bics, used = (informed.bics, informed.points_used) if informed else ({}, 0)
+    return Opinion(found.types, bics, used, alone.type if alone else None)
 
 
 def fitted(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
@@ -220,10 +222,8 @@ def calibrate(count: int) -> None:
         said = [(truth, opinion(points)) for truth, points in simulated(count, density, TEST_SEED + 1)]
         truth = np.array([TYPES.index(name) for name, _ in said])
         line = []
-        for exponent in (0.0, 0.003, 0.01, 0.03, 0.1, 0.3, 1.0, 100.0):
-            told = [
-                next(iter(combine(o.network, o.bics, 1.0, exponent))) if o.bics else o.network_alone for _, o in said
-            ]
+        for exponent in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 1.0):
+            told = [next(iter(combine(o.network, o.bics, o.points, exponent))) for _, o in said]
             scores = Scores.of(truth, np.array([TYPES.index(name) for name in told]), TYPES)
             line.append(f"{exponent:g}: {percent(scores.balanced_accuracy)}")
         print(f"{density:g} points/m2  " + "  ".join(line), flush=True)

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from hiproof.segment import combine, fit_prior
+from hiproof.segment import combine, fit_prior, most_probable
 from hiproof.segment.posterior import EVIDENCE_EXPONENT, SMALLEST_PRIOR
 
 TYPES = {"gable": 0.6, "hip": 0.3, "flat": 0.1}
 
 
 def test_equal_evidence_leaves_the_prior():
-    posterior = combine(TYPES, dict.fromkeys(TYPES, 100.0), prior_exponent=1.0)
+    posterior = combine(TYPES, dict.fromkeys(TYPES, 100.0))
     assert posterior == pytest.approx(TYPES)
 
 
@@ -49,7 +49,39 @@ def test_a_zero_probability_is_bounded_so_that_evidence_can_undo_it():
 
 
 def test_types_without_evidence_or_without_prior():
-    assert combine(TYPES, {}) == TYPES
-    assert set(combine(TYPES, {"gable": 1.0, "cone": 1.0})) == {"gable", "cone"}
-    assert set(combine(TYPES, {"gable": 1.0, "hip": float("inf")})) == {"gable"}
-    assert sum(combine(TYPES, {"gable": float("inf"), "hip": float("nan")}).values()) == pytest.approx(1.0)
+    assert combine(TYPES, {}) == pytest.approx(TYPES)
+    assert combine(TYPES, {"gable": float("inf"), "hip": float("nan")}) == pytest.approx(TYPES)
+    assert set(combine(TYPES, {"gable": 1.0, "cone": 1.0})) == {*TYPES, "cone"}
+    assert combine({}, {"gable": 10.0, "hip": 10.0}) == pytest.approx({"gable": 0.5, "hip": 0.5})
+    assert combine({}, {}) == {}
+
+
+def test_a_type_the_fit_gave_up_is_worse_than_all_it_kept_but_not_impossible():
+    bics = {"gable": 0.0, "hip": 20.0}
+    even = dict.fromkeys(TYPES, 1 / 3)
+    assert list(combine(even, bics, points=200)) == ["gable", "hip", "flat"]
+    assert next(iter(combine({"flat": 0.99, "gable": 0.005, "hip": 0.005}, bics, points=200))) == "flat"
+    more, fewer = combine(even, bics, points=2000)["flat"], combine(even, bics, points=20)["flat"]
+    assert more < fewer
+
+
+class FakeFit:
+    """What `most_probable` needs of a fit."""
+
+    points_used = 100
+
+    def __init__(self, names):
+        self.type, self.bics = (names[0], {names[0]: 50.0}) if names else ("gable", {"gable": 0.0, "hip": 8.0})
+
+
+def test_most_probable_fits_again_only_where_the_network_overrules_the_evidence():
+    asked = []
+
+    def fit(names):
+        asked.append(names)
+        return FakeFit(names)
+
+    found, posterior = most_probable(fit, {"gable": 0.9, "hip": 0.1})
+    assert found.type == "gable" == next(iter(posterior)) and asked == [()]
+    found, posterior = most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert found.type == "hip" == next(iter(posterior)) and asked == [(), (), ("hip",)]
