@@ -12,7 +12,7 @@ import shapely
 
 from .errors import CompositionError, FitError
 from .frames import LocalFrame
-from .model import Building, Footprint, Part, Piece, Roof, Solid
+from .model import Building, Fit, Footprint, Part, Piece, Roof, Solid
 from .settings import Settings
 from .status import Status
 
@@ -143,16 +143,18 @@ def fit_several(
 def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
     """One primitive for the whole building (paper section 3.2)."""
     from .fit import fit_roof
+    from .segment import most_probable
 
-    found = fit_roof(
-        points, outline=outline, settings=settings, weights=recognised.weights, type_log_prior=recognised.log_prior
-    )
+    def fit(types: tuple[str, ...]) -> Fit:
+        return fit_roof(points, types or None, outline, settings=settings, weights=recognised.weights)
+
+    found, types = most_probable(fit, recognised.types)
     shift = found.global_translation
     part = dataclasses.replace(
         found.part, translation=found.part.translation + shift, pieces=tuple(moved(p, shift) for p in found.part.pieces)
     )
     outline = shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
-    return Fitted((part,), outline, found.value, posterior(found.bics))
+    return Fitted((part,), outline, found.value, types)
 
 
 def moved(piece: Piece, shift: np.ndarray) -> Piece:
@@ -160,14 +162,6 @@ def moved(piece: Piece, shift: np.ndarray) -> Piece:
     planes = piece.planes.copy()
     planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
     return Piece(shapely.transform(piece.outline, lambda xy: xy + shift[:2]), planes)
-
-
-def posterior(bics: dict[str, float]) -> dict[str, float]:
-    """Probabilities by type from their BIC (exp(-BIC / 2), normalised)."""
-    best = min(bics.values(), default=0.0)
-    weights = {name: math.exp(-0.5 * min(bic - best, 1400.0)) for name, bic in bics.items() if math.isfinite(bic)}
-    total = sum(weights.values())
-    return {name: weight / total for name, weight in weights.items()}
 
 
 def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:

@@ -1,13 +1,14 @@
-"""Houses for training, closer to real ones than the tests' clean types: annexes, and hips that are nearly pyramids."""
+"""Houses for training, closer to real ones than the tests' clean types: annexes, short ridges, one-sided hips."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from ..model import Part
-from ..simulate.roofs import SimBuilding, assemble, random_building
+from ..simulate.roofs import SimBuilding, assemble, random_building, random_parameters
 from ..simulate.shapes import make_part
 
 ANNEX_TYPES = ("flat", "monopitch", "gable", "hip")
@@ -17,11 +18,13 @@ OVERLAP_M = 0.05
 
 def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:
     """A building of roof `type`; `annex_share` of them have one or two smaller parts (porch, extension, cross wing)
-    at their sides, and a quarter of the hips a short ridge. The type stays the main roof's."""
+    at their sides, a quarter of the hips a short ridge, a tenth of the gables one hipped end. The type stays the main roof's."""
     building = random_building(rng, type)
     main = building.roof.parts[0]
     if type == "hip" and rng.random() < 0.25:
         main = with_short_ridge(rng, main)
+    if type == "gable" and rng.random() < 0.1:
+        main = hipped_at_one_end(rng, main)
     count = 1 + int(rng.random() < 0.3) if rng.random() < annex_share else 0
     annexes = tuple(annex(rng, main) for _ in range(count))
     return assemble((main, *annexes), "annexed" if annexes else "single", building.roof.frame.origin)
@@ -33,6 +36,16 @@ def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
     length = hip.parameters["length"] - hip.parameters["ridge_length"] + ridge
     parameters = hip.parameters | {"length": length, "ridge_length": ridge}
     return make_part("hip", parameters, hip.kappa, hip.translation)
+
+
+def hipped_at_one_end(rng: np.random.Generator, gable: Part) -> Part:
+    """A roof with a hip at one end and a gable wall at the other. It is called a gable: RoofN3D's hips are "two-sided",
+    and the catalogue has nothing nearer."""
+    hip = make_part("hip", random_parameters(rng, "hip"), gable.kappa, gable.translation)
+    piece = hip.pieces[0]
+    rise_along_ridge = piece.planes[:, :2] @ (math.cos(hip.kappa), math.sin(hip.kappa))
+    planes = np.delete(piece.planes, np.argmax(rise_along_ridge), axis=0)
+    return replace(hip, type="gable", pieces=(replace(piece, planes=planes),))
 
 
 def annex(rng: np.random.Generator, main: Part) -> Part:

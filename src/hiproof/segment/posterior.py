@@ -30,13 +30,14 @@ def combine(
     `types` the network's probability by type, `bics` by type from `Fit.bics` (lower is better, on the scale of twice a
     negative log-likelihood, without a prior in them) of a fit to `points` points; posterior proportional to
     prior * exp(-BIC / 2)^b. A type the fit gave up gets the least BIC at which it does; one the network does not know
-    the mean prior. Without finite `bics` the prior is the posterior, and without `types` the evidence alone counts.
+    the mean prior; one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the posterior, and without `types` the evidence alone counts.
 
     >>> combine({"gable": 0.5, "hip": 0.5}, {"gable": 100.0, "hip": 260.0})["gable"] > 0.9
     True
     """
     known = {name: bic for name, bic in bics.items() if np.isfinite(bic)}
-    names = list(types) + [name for name in known if name not in types]
+    names = [name for name in types if types[name] > 0 or name in known]
+    names += [name for name in known if name not in types]
     if not known or not types:
         evidence_exponent = 1.0 if not types else 0.0
         names = names if types else list(known)
@@ -54,8 +55,7 @@ def combine(
 def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str, float]:
     """Natural logarithm of the network's probability of each of `names` (all of `types` by default), bounded below.
 
-    A network may be wrong with confidence; no evidence could undo a prior of zero. A type that was ruled out on
-    purpose (probability 0 exactly) is bounded too: who restricts the network's types restricts the fit's as well.
+    A network may be wrong with confidence; no evidence could undo a prior of zero.
     """
     mean_prior = 1.0 / max(len(types), 1)
     return {name: float(np.log(max(types.get(name, mean_prior), SMALLEST_PRIOR))) for name in names or tuple(types)}
