@@ -38,13 +38,15 @@ from .plan import MIN_STRUCTURE_POINTS, Plan
 
 ROUNDS, SETTLING_ROUNDS = 2, 1
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
+MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 POOL_POINTS = 1000  # the planes are looked for on at most so many points, evenly spread
 SEEDS, PAIRS_PER_SEED = 150, 2
 
 
 def evidence_per_unit(density: float, settings) -> float:
     """Points that one unit of complexity must explain: a fixed area's worth, and never fewer than a floor."""
-    return max(settings.evidence_points, settings.evidence_area_m2 * density)
+    area = settings.evidence_area_m2 * (MAIN_ROOF_FACTOR if settings.detail == "main" else 1.0)
+    return max(settings.evidence_points, area * density)
 
 
 def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
@@ -65,7 +67,8 @@ def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
         if value < best_value:
             best, best_value = layout, value
         pool, gables = with_layout(layout, pool, gables)
-    cover_outliers(best, plan, tau, evidence)
+    if settings.detail == "full":
+        cover_outliers(best, plan, tau, evidence)
     polish(best, cloud, ghosts, tau, evidence)
     for _ in range(SETTLING_ROUNDS):
         settle(best, cloud, ghosts, grid, tau, evidence)

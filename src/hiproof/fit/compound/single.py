@@ -24,6 +24,7 @@ PART_COST, PARAMETER_COST = (
     0.5,
     0.45,
 )  # units of complexity: a level plane 0.95, a slope 1.4, a gable or hip by its heights
+TOOTH_PARAMETERS = 3  # each further tooth of a saw-tooth is a step and a plane
 SIMPLE_HOLDERS = 2
 
 
@@ -103,7 +104,7 @@ def single_primitive(
         height_of(part, plan.frame.xy_local(np.column_stack([plan.ghosts.u, plan.ghosts.v]))) - plan.frame.origin[2]
     )
     beyond = (ghosts < plan.ghosts.low) | (ghosts > plan.ghosts.high)
-    parameters = 1 + len(get(part.type).bounds)
+    parameters = 1 + len(get(part.type).bounds) + TOOTH_PARAMETERS * (len(part.pieces) - 1)
     cost = np.minimum((residual / tau) ** 2, 1.0).sum() + plan.ghosts.weight[beyond].sum()
     objective = float(cost + evidence * (PART_COST + PARAMETER_COST * parameters))
     return SinglePrimitive(part, objective, float(np.mean(np.abs(residual) > tau)), posterior(fit.bics))
