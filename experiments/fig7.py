@@ -57,11 +57,18 @@ def errors_of_roof(method: str, primitive: str, seed: int, roof: int) -> tuple[f
     return float(model.psd(points).mean()), float(np.sqrt(np.nanmean(away**2)))
 
 
+def unequal_slopes(building) -> bool:
+    """Whether the eaves are level with each other, so that the slopes differ (of equal slopes the gable gets the planes)."""
+    return abs(building.parameters["eave_step"]) < 0.2
+
+
 def section(seed: int):
-    """Points and both fits, seen along the ridge."""
+    """Points and both fits of a roof with unequal slopes, seen along the ridge."""
     from .charts import new_figure
 
-    building, points = roof_and_points(seed, 0)
+    building, points = next(
+        drawn for drawn in (roof_and_points(seed, roof) for roof in range(100)) if unequal_slopes(drawn[0])
+    )
     part = building.roof.parts[0]
     across = np.array([-np.sin(part.kappa), np.cos(part.kappa)])
     centre = part.translation[:2] + building.roof.frame.origin[:2]
