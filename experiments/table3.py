@@ -73,7 +73,9 @@ def errors_of_roof(method: str, kind: str, seed: int, roof: int, trials: int) ->
 
 def record_of(primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds: dict[str, float]) -> dict[str, float]:
     """Errors of `found` against `truth` (theta (9,)), each name with its `bound:` beside it."""
-    truth = same_way_round(primitive, truth, found)
+    twin = same_way_round(primitive, truth, found)
+    if twin is not truth:
+        truth, bounds = twin, bounds | {"q1": bounds["q2"], "q2": bounds["q1"]}
     names = THETA_NAMES[: primitive.theta_size]
     errors = dict(zip(names, (found - truth)[: len(names)], strict=True))
     period = math.pi if primitive.half_turn_symmetric else 2 * math.pi
@@ -126,16 +128,17 @@ def error_row(kind: str, errors: dict) -> tuple:
     return tuple(row)
 
 
-BOUND_COLUMNS = ("type", "parameter", "kind", "bound", *(f"{method}: RMSE / bound" for method in OBJECTIVES))
+BOUND_COLUMNS = ("type", "parameter", "kind", "bound", *(f"{method}: RMS of error / bound" for method in OBJECTIVES))
 BOUND_NOTE = (
     "q0 is the height of the ridge, top or eave, q1 to q3 are slopes (and the fraction of an asymmetric ridge, the height of "
     "a break or hip). Their bound is Cramer and Rao's for normal errors of the same variance; that of half_width and "
-    "half_length is the sampling limit of uniform points (experiments/cramer_rao.py). Ratios just below 1 are chance."
+    "half_length is the sampling limit of uniform points (experiments/cramer_rao.py). Ratios just below 1 are chance; those of "
+    "kappa lie below because the edges tell the rotation too, which the bound leaves out."
 )
 
 
 def bound_rows(kind: str, errors: dict) -> list[tuple]:
-    """One row a parameter: the root mean square bound over the roofs, and each method's RMSE over it."""
+    """One row a parameter: the root mean square bound over the roofs, and each method's errors in units of their bounds."""
     rows = []
     names = THETA_NAMES[2 : CATALOGUE[kind].theta_size]
     for name in names:
@@ -150,10 +153,11 @@ def bound_rows(kind: str, errors: dict) -> list[tuple]:
 
 
 def ratio(records: Sequence[dict[str, float]], name: str) -> float | None:
+    """Root mean square over the fits of error / bound: 1 at the bound, each roof counting the same."""
     if not records:
         return None
     errors, bounds = (np.array([record[key] for record in records]) for key in (name, f"bound:{name}"))
-    return float(np.sqrt(np.mean(errors**2) / np.mean(bounds**2)))
+    return float(np.sqrt(np.mean((errors / bounds) ** 2)))
 
 
 def picture(kinds: Sequence[str], errors: dict):
