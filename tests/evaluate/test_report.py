@@ -156,6 +156,16 @@ def test_a_run_without_points_is_reported_too(tmp_path):
     assert "no residuals" in page and "no points given" in page
 
 
+def test_of_too_many_buildings_the_worst_are_shown_and_all_are_counted(run):
+    many = run.only([0, 2, 2, 2, 2, 1, 2, 2, 2, 2])
+    page = report_html(many, most_shown=4)
+    data = json.loads(re.search(r'<script id="data"[^>]*>(.*?)</script>', page)[1])
+    ids = [building["id"] for building in data["buildings"]]
+    assert {"house-1", "block 2"} <= set(ids) and len(ids) <= 4
+    assert "10 buildings" in page and f"show {len(ids)} of them" in page
+    assert f'data-select="{ids.index("block 2")}"' in page
+
+
 def test_an_empty_run_makes_a_page(tmp_path):
     head = {"type": "CityJSON", "version": "2.0", "CityObjects": {}, "vertices": []}
     (tmp_path / "buildings.city.jsonl").write_text(json.dumps(head) + "\n")

@@ -23,6 +23,9 @@ from .report_pictures import building_pictures, histogram
 from .run import EvaluatedRun
 
 WORST = 20
+MOST_SHOWN = 10_000
+"""Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow."""
+
 DISTRIBUTIONS = (
     ("psd_mean", "mean distance of a building's points", "m"),
     ("p95", "95th percentile of the distances", "m"),
@@ -34,27 +37,31 @@ DISTRIBUTIONS = (
 TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "share_within_20cm_inner", "outline_iou")
 
 
-def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof") -> None:
+def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> None:
     """Write the page to `path`. Raises OutputError when the file cannot be written."""
     from ..write.files import atomic_file
 
-    page = report_html(run, title)
+    page = report_html(run, title, most_shown)
     with atomic_file(path) as file:
         file.write(page.encode())
 
 
-def report_html(run: EvaluatedRun, title: str = "hiproof") -> str:
-    """The page as text."""
+def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> str:
+    """The page as text. Tables and distributions count every building; of more than `most_shown`, map and 3D view show
+    the worst and an even selection of the others."""
+    worst = worst_indices(run)
+    shown = shown_indices(run, worst, most_shown)
+    places = run.only(shown)
     sections = {
         "title": escape(title),
         "style": asset("report.css"),
-        "lead": lead(run),
+        "lead": lead(run, len(shown)),
         "statuses": status_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
-        "worst": worst_buildings(run),
+        "worst": worst_buildings(run, worst, shown),
         "record": f"<pre>{escape(json.dumps(run.record, indent=1, ensure_ascii=False))}</pre>",
-        "data": embedded(report_data(run, places_on_map(run))),
+        "data": embedded(report_data(places, places_on_map(places))),
         "script": asset("viewer.js") + asset("report.js"),
     }
     page = asset("report.html")
@@ -72,15 +79,15 @@ def embedded(data: Any) -> str:
     return json.dumps(data, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
 
 
-def lead(run: EvaluatedRun) -> str:
-    """The sentence at the top."""
+def lead(run: EvaluatedRun, shown: int) -> str:
+    """The sentences at the top."""
     version = run.record.get("hiproof") or run.record.get("version") or __version__
     modelled = sum(model.solid is not None for model in run.models)
     points = sum(map(len, run.points))
     measured = f"measured against {points:,} points" if points else "no points given: residuals are those of the run"
-    return (
-        f"{len(run.models):,} buildings, {modelled:,} with a model, {measured}. Made by hiproof {escape(str(version))}."
-    )
+    part = f" Map and 3D view show {shown:,} of them." if shown < len(run.models) else ""
+    made = f"Made by hiproof {escape(str(version))}."
+    return f"{len(run.models):,} buildings, {modelled:,} with a model, {measured}.{part} {made}"
 
 
 def status_table(run: EvaluatedRun) -> str:
@@ -111,15 +118,30 @@ def distributions(run: EvaluatedRun) -> str:
     return "".join(histogram(np.array([row[name] for row in rows]), title, unit) for name, title, unit in DISTRIBUTIONS)
 
 
-def worst_buildings(run: EvaluatedRun) -> str:
+def worst_indices(run: EvaluatedRun) -> list[int]:
     """The twenty models that explain the least of their points, facades aside (of equals the larger RMSE first)."""
     rmse = np.array([figures.quality.rmse for figures in run.figures], float)
     share = np.array([figures.share_within_20cm_inner for figures in run.figures], float)
-    ranked = [int(i) for i in np.lexsort((-rmse, share)) if np.isfinite(rmse[i])][:WORST]
-    return "".join(worst_card(run, i) for i in ranked) or "<p>No points were given, so there are no residuals.</p>"
+    return [int(i) for i in np.lexsort((-rmse, share)) if np.isfinite(rmse[i])][:WORST]
 
 
-def worst_card(run: EvaluatedRun, index: int) -> str:
+def shown_indices(run: EvaluatedRun, worst: list[int], most: int) -> list[int]:
+    """Indices in order: all buildings, or the worst and an even selection of all."""
+    count = len(run.models)
+    if count <= most:
+        return list(range(count))
+    even = np.linspace(0, count - 1, max(most - len(worst), 0)).astype(int)
+    return sorted({*even.tolist(), *worst})
+
+
+def worst_buildings(run: EvaluatedRun, worst: list[int], shown: list[int]) -> str:
+    """A card for each of the worst; a click selects it by its place among the shown."""
+    place = {index: position for position, index in enumerate(shown)}
+    cards = "".join(worst_card(run, index, place[index]) for index in worst)
+    return cards or "<p>No points were given, so there are no residuals.</p>"
+
+
+def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
     model, points, quality = run.models[index], run.points[index], run.figures[index].quality
     origin = model.solid.vertices.min(axis=0)
     pictures = building_pictures(model.solid.moved(-origin), points - origin, psd(model.solid, points), model.roof_type)
@@ -127,4 +149,4 @@ def worst_card(run: EvaluatedRun, index: int) -> str:
         f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, RMSE {quality.rmse:.2f} m, "
         f"{100 * quality.share_within_20cm:.0f} % of {quality.points} points within 0.2 m"
     )
-    return f'<figure class="worst" data-select="{index}">{pictures}<figcaption>{text}</figcaption></figure>'
+    return f'<figure class="worst" data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'

@@ -31,6 +31,12 @@ class EvaluatedRun:
     record: dict[str, Any]
     footprints: tuple[shapely.Geometry | None, ...] = ()
 
+    def only(self, indices: Sequence[int]) -> EvaluatedRun:
+        """The same run with only these buildings."""
+        columns = (self.models, self.points, self.figures, self.footprints or (None,) * len(self.models))
+        models, points, figures, footprints = (tuple(column[i] for i in indices) for column in columns)
+        return EvaluatedRun(models, points, figures, self.record, footprints)
+
 
 def evaluate_run(
     folder: Path, clouds: Sequence[str] = (), footprints: str | None = None, reference: str | None = None
