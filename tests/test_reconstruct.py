@@ -1,0 +1,193 @@
+"""Laws of one building's road from points to solid: it moves with the points, and bad points get a status, not a crash."""
+
+import numpy as np
+import pytest
+import shapely
+import shapely.affinity
+
+import hiproof
+from hiproof import Status
+from hiproof.compose import check_solid, volume
+from hiproof.settings import Settings
+from tiny_town import gable
+
+PLAIN = Settings.from_dict({"segment": {"enabled": False}})
+FOOTPRINT = shapely.box(0, 0, 12, 8)
+
+
+def gable_points(n=700, seed=0, noise=0.03):
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform((0, 0), (12, 8), (n, 2))
+    z = gable(xy[:, 0], xy[:, 1], 8.0, 12.0, 5.0, 3.0)
+    return np.column_stack([xy, z + rng.normal(0, noise, n)])
+
+
+class Slope:
+    """Terrain that rises to the east and ends at x = 30."""
+
+    source = "a slope"
+
+    def height_at(self, xy):
+        return np.where(xy[:, 0] < 30, 0.1 * xy[:, 0] - 1.0, np.nan)
+
+
+def heights_of(building):
+    return np.sort(building.solid.vertices[:, 2])
+
+
+def test_a_gable_becomes_a_valid_gable():
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT, Slope(), PLAIN)
+    assert building.status is Status.MODELLED
+    assert building.type == "gable"
+    assert check_solid(building.solid) == ()
+    assert volume(building.solid) == pytest.approx(12 * 8 * (5 + 1.5 + 1.0), rel=0.01)
+    assert building.z_ground == pytest.approx(-1.0)
+    assert building.ground_source == "a slope"
+    (line,) = building.terrain_intersection
+    assert np.ptp(line[:, 2]) == pytest.approx(1.2)
+    assert building.quality.share_within_20cm > 0.99
+    assert building.parts[0].parameters["width"] == pytest.approx(8.0, abs=0.05)
+
+
+@pytest.mark.parametrize("footprint", [FOOTPRINT, None])
+def test_the_answer_does_not_depend_on_the_order_or_repetition_of_points(footprint):
+    points = gable_points()
+    shuffled = np.random.default_rng(1).permutation(np.concatenate([points, points[:50]]))
+    one, other = (hiproof.reconstruct(p, footprint, settings=PLAIN) for p in (points, shuffled))
+    assert np.array_equal(one.solid.vertices, other.solid.vertices)
+
+
+def test_the_answer_moves_with_the_points():
+    shift = np.array([251_000.0, 6_700_000.0, -250.0])
+    here = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
+    there = hiproof.reconstruct(
+        gable_points() + shift, shapely.transform(FOOTPRINT, lambda xy: xy + shift[:2]), settings=PLAIN
+    )
+    assert there.type == here.type
+    assert there.solid.vertices - shift == pytest.approx(here.solid.vertices, abs=2e-3)
+
+
+def test_a_turned_building_is_the_same_building():
+    turn = shapely.affinity.rotate
+    angle = 33.0
+    c, s = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+    points = gable_points()
+    turned = np.column_stack([points[:, :2] @ np.array([[c, s], [-s, c]]), points[:, 2]])
+    here = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
+    there = hiproof.reconstruct(turned, turn(FOOTPRINT, angle, origin=(0, 0)), settings=PLAIN)
+    assert there.type == here.type
+    assert heights_of(there) == pytest.approx(heights_of(here), abs=0.05)
+
+
+def test_without_terrain_the_assumption_is_named():
+    assert "assumed" in hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).ground_source
+
+
+def test_terrain_that_does_not_cover_the_building_is_an_assumption_too():
+    far = shapely.affinity.translate(FOOTPRINT, 100, 0)
+    building = hiproof.reconstruct(gable_points() + (100, 0, 0), far, Slope(), PLAIN)
+    assert building.status is Status.MODELLED
+    assert "assumed" in building.ground_source
+
+
+def test_terrain_above_the_eaves_still_gives_a_valid_solid():
+    class Above:
+        source = "a wrong terrain model"
+
+        def height_at(self, xy):
+            return np.full(len(xy), 50.0)
+
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT, Above(), PLAIN)
+    assert building.solid is not None
+    assert check_solid(building.solid) == ()
+
+
+@pytest.mark.parametrize(
+    ("points", "footprint", "status"),
+    [
+        (np.zeros((0, 3)), FOOTPRINT, Status.NO_POINTS),
+        (np.zeros((0, 3)), None, Status.NO_POINTS),
+        (gable_points() + (500, 0, 0), FOOTPRINT, Status.NO_POINTS),
+        (np.full((50, 3), np.nan), FOOTPRINT, Status.NO_POINTS),
+        (gable_points(), shapely.Polygon(), Status.BAD_FOOTPRINT),
+        (gable_points(), shapely.Polygon([(0, 0), (5, 0), (10, 0)]), Status.BAD_FOOTPRINT),
+        (np.tile([[3.0, 3.0, 5.0]], (40, 1)), None, Status.NO_ROOF),
+        (np.linspace((0, 0, 5), (9, 9, 5), 40), None, Status.NO_ROOF),
+        (gable_points(3), None, Status.NO_ROOF),
+    ],
+)
+def test_points_that_are_no_roof_get_a_status(points, footprint, status):
+    building = hiproof.reconstruct(points, footprint, settings=PLAIN)
+    assert building.status is status
+    assert building.solid is None
+    assert building.detail
+
+
+@pytest.mark.parametrize(
+    "points",
+    [
+        *(gable_points(n) for n in (1, 2, 3, 4, 5)),
+        np.tile([[3.0, 3.0, 5.0]], (40, 1)),
+        np.linspace((1, 1, 5), (7, 7, 5), 40),
+        np.column_stack([np.full(30, 4.0), np.full(30, 4.0), np.linspace(0, 9, 30)]),
+    ],
+    ids=["1", "2", "3", "4", "5", "coincident", "collinear", "a pole"],
+)
+def test_few_or_degenerate_points_in_a_footprint_become_a_simple_valid_model(points):
+    building = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
+    assert building.status.is_model
+    assert check_solid(building.solid) == ()
+    roof = building.solid.vertices[:, 2].max()
+    assert points[:, 2].min() - 0.5 <= roof <= points[:, 2].max() + 0.5
+
+
+def test_not_finite_points_are_left_out():
+    points = gable_points()
+    dirty = np.concatenate([points, [[np.nan, 1, 1], [1, np.inf, 1], [1, 1, -np.inf]]])
+    one, other = (hiproof.reconstruct(p, FOOTPRINT, settings=PLAIN) for p in (points, dirty))
+    assert np.array_equal(one.solid.vertices, other.solid.vertices)
+
+
+def test_a_roof_that_cannot_be_composed_falls_back_to_a_flat_block_and_says_so(monkeypatch):
+    from hiproof import stages
+    from hiproof.errors import CompositionError
+
+    compose = stages.checked_solid
+
+    def refuses_slopes(roof, z_ground, settings):
+        if any(piece.planes[:, :2].any() for piece in roof.pieces):
+            raise CompositionError("planted")
+        return compose(roof, z_ground, settings)
+
+    monkeypatch.setattr(stages, "checked_solid", refuses_slopes)
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
+    assert building.status is Status.SIMPLIFIED
+    assert "planted" in building.detail
+    assert check_solid(building.solid) == ()
+    assert building.type == "flat"
+
+
+def test_a_cloud_that_is_no_roof_is_called_poor():
+    rng = np.random.default_rng(5)
+    points = np.column_stack([rng.uniform((0, 0), (12, 8), (300, 2)), rng.uniform(0, 15, 300)])
+    assert hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN).status is Status.POOR_FIT
+
+
+@pytest.mark.parametrize("objective", ["likelihood", "paper"])
+def test_one_primitive_by_either_objective(objective):
+    settings = PLAIN.replace({"fit": {"parts": "one", "objective": objective, "types": ["gable", "flat"]}})
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
+    assert building.type == "gable"
+    assert check_solid(building.solid) == ()
+
+
+def test_the_network_adds_its_opinion():
+    building = hiproof.reconstruct(gable_points(), FOOTPRINT)
+    assert building.type == "gable"
+    assert sum(building.types.values()) == pytest.approx(1.0)
+
+
+def test_a_footprint_with_attributes_keeps_them():
+    footprint = hiproof.Footprint("house", FOOTPRINT, {"street": "Main"})
+    building = hiproof.reconstruct(gable_points(), footprint, settings=PLAIN)
+    assert (building.id, building.attributes) == ("house", {"street": "Main"})
