@@ -2,7 +2,9 @@
 
     plan       the building's own frame, the points that count, grid, ghosts of unseen roof
     kernels    compiled: planes and gables that explain rectangles of points, the exact partition by dynamic programming
-    layout     compiled: cuts, leaves and overlays as arrays; refine, overlay, polish
+    layout     compiled: cuts, leaves and overlays as arrays, their height and objective
+    refine     compiled: cuts move, leaves are refitted, overlays cover outliers
+    polish     compiled: what does not pay goes, planes that nearly agree become one
     search     these in order: pool -> partition -> refine -> overlays -> polish
     joint      all planes refitted to all points together, with the regularities the evidence allows
     pieces     layout -> disjoint pieces over the outline

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 from numba import njit
 
-from .kernels import Cloud, Ghosts, is_symmetric_gable
+from .kernels import MAX_SLOPE, Cloud, Ghosts, is_symmetric_gable
 from .layout import MAX_TABLE, Layout, evaluate, is_alive, objective
 from .plan import Plan
 
@@ -182,7 +182,8 @@ def solved(
         planes[np.abs(planes) < 1e-12] = 0.0
         layout.table[rows] = planes
     value = objective(layout, cloud, ghosts, tau, evidence)
-    if np.isfinite(value) and value <= limit:
+    steepest = np.hypot(layout.table[rows, 0], layout.table[rows, 1]).max()
+    if np.isfinite(value) and value <= limit and steepest <= max(MAX_SLOPE, np.hypot(before[:, 0], before[:, 1]).max()):
         return value, True
     layout.table[rows] = before
     return limit, False

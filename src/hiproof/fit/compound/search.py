@@ -20,21 +20,10 @@ from .kernels import (
     primitives,
     without_twins,
 )
-from .layout import (
-    HOLDERS,
-    OVERLAYS,
-    Layout,
-    add_overlay,
-    empty_layout,
-    evaluate,
-    grow_tree,
-    objective,
-    polish,
-    refine,
-    settle,
-    single_plane_layout,
-)
+from .layout import HOLDERS, Layout, empty_layout, evaluate, grow_tree, objective, single_plane_layout
 from .plan import MIN_STRUCTURE_POINTS, Plan
+from .polish import polish
+from .refine import add_overlay, refine, settle
 
 ROUNDS, SETTLING_ROUNDS = 2, 1
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
@@ -143,4 +132,3 @@ def cover_outliers(layout: Layout, plan: Plan, tau: float, evidence: float) -> N
         candidates = hypotheses(unexplained, SEEDS, PAIRS_PER_SEED)
         if not add_overlay(layout, cloud, few, plan.grid, candidates, tau, evidence):
             return
-    assert layout.count[OVERLAYS] <= len(layout.overlays)
