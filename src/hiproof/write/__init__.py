@@ -11,7 +11,7 @@ from .cityjson import CityJSONWriter, write_cityjson
 from .files import atomic, atomic_file
 from .parameters import ParametersWriter, read_parameters, write_parameters
 from .roof_figures import RoofFigures, roof_figures
-from .run_files import write_all
+from .run_files import Fragments, fragments, join_fragments, write_all
 from .writer import BuildingWriter
 
 __all__ = [
@@ -19,11 +19,14 @@ __all__ = [
     "BuildingWriter",
     "CityGMLWriter",
     "CityJSONWriter",
+    "Fragments",
     "ParametersWriter",
     "RoofFigures",
     "atomic",
     "atomic_file",
     "building_attributes",
+    "fragments",
+    "join_fragments",
     "read_parameters",
     "roof_figures",
     "write_all",

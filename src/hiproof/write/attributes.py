@@ -27,6 +27,7 @@ from .writer import BuildingWriter
 LAYER = "buildings"
 ROWS_AT_ONCE = 1000
 RESERVED = ("fid", "geom")
+Row = tuple[bytes | None, dict[str, Any]]  # the outline as WKB, the values by column
 TEXT = (f"{OWN}roof_type", f"{OWN}ground_source")
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
@@ -59,15 +60,13 @@ class AttributesWriter(BuildingWriter):
         self.waiting = stack.enter_context(scratch(self.path))
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        values = building_attributes(building, figures or figures_of(building), self.prefix)
-        row = {
-            "id": plain_text(building.id),
-            **{f"{n}_input" if n.lower() == "id" else n: v for n, v in values.items()},
-        }
-        for name, value in row.items():
+        self.put(table_row(building, figures or figures_of(building), self.prefix))
+
+    def put(self, row: Row) -> None:
+        """Write a building that `table_row` made, here or in another process."""
+        for name, value in row[1].items():
             self.kinds.setdefault(name, set()).add(kind_of(value))
-        outline = plan_outline(building)
-        pickle.dump((None if outline is None else shapely.to_wkb(outline), row), self.waiting)
+        pickle.dump(row, self.waiting)
         self.count += 1
 
     def finish(self) -> None:
@@ -76,7 +75,7 @@ class AttributesWriter(BuildingWriter):
         for number, rows in enumerate(self.batches()):
             self.write_rows(rows, kinds, append=number > 0)
 
-    def batches(self) -> Iterator[list[tuple[bytes | None, dict[str, Any]]]]:
+    def batches(self) -> Iterator[list[Row]]:
         """The waiting rows, some thousands at a time; one empty batch if there are none."""
         left = self.count
         while True:
@@ -110,6 +109,14 @@ class AttributesWriter(BuildingWriter):
             raise OutputError(
                 f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions and the space left"
             ) from error
+
+
+def table_row(building: Building, figures: RoofFigures | None, prefix: str = PREFIX) -> Row:
+    """The outline of `building` as WKB (None where it is unknown) and its attributes by column."""
+    values = building_attributes(building, figures, prefix)
+    named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in values.items()}
+    outline = plan_outline(building)
+    return None if outline is None else shapely.to_wkb(outline), {"id": plain_text(building.id), **named}
 
 
 @contextmanager

@@ -11,6 +11,7 @@ import math
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,8 @@ GENERIC = {int: f"{GEN}intAttribute", float: f"{GEN}doubleAttribute", str: f"{GE
 GENERIC_VALUE = f"{GEN}value"
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 WIDEST = -123456789.1234
+# lxml declares all namespaces again on every building's element; the root's declarations are enough
+OPENING = b"<core:cityObjectMember"
 
 
 def write_citygml(
@@ -83,16 +86,14 @@ class CityGMLWriter(BuildingWriter):
         self.file.write(b" " * self.envelope_length)
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        figures = figures or figures_of(building)
-        if figures is not None:
-            self.low = np.minimum(self.low, building.solid.vertices.min(axis=0))
-            self.high = np.maximum(self.high, building.solid.vertices.max(axis=0))
-        for line in terrain_lines(building):
-            self.low, self.high = np.minimum(self.low, line.min(axis=0)), np.maximum(self.high, line.max(axis=0))
-        attributes = building_attributes(building, figures, self.prefix)
         name = self.names.take(gml_name(building.id))
-        self.xml.write("\n")
-        self.xml.write(city_object_member(building, figures, attributes, name, self.creation_date))
+        self.put(gml_member(building, figures or figures_of(building), name, self.prefix, self.creation_date))
+
+    def put(self, member: Member) -> None:
+        """Write a building that `gml_member` made, here or in another process."""
+        self.low, self.high = np.minimum(self.low, member.low), np.maximum(self.high, member.high)
+        self.xml.flush()
+        self.file.write(b"\n" + member.text)
 
     def finish(self) -> None:
         self.xml.write("\n")
@@ -110,6 +111,35 @@ class CityGMLWriter(BuildingWriter):
         etree.SubElement(box, f"{GML}lowerCorner").text = " ".join(positions(low[None]))
         etree.SubElement(box, f"{GML}upperCorner").text = " ".join(positions(high[None]))
         return etree.tostring(bounded_by)
+
+
+@dataclass(frozen=True)
+class Member:
+    """One building as XML text, and its extent (3,) in world metres; infinite and reversed where it has none."""
+
+    text: bytes
+    low: np.ndarray
+    high: np.ndarray
+
+
+def gml_member(
+    building: Building,
+    figures: RoofFigures | None,
+    name: str,
+    prefix: str = PREFIX,
+    creation_date: datetime.date | None = None,
+) -> Member:
+    """The cityObjectMember of `building`, whose gml:ids end in `name`; the root's namespaces are taken as declared."""
+    attributes = building_attributes(building, figures, prefix)
+    element = city_object_member(building, figures, attributes, name, creation_date)
+    text = etree.tostring(element, encoding="utf-8", xml_declaration=False)
+    lines = terrain_lines(building)
+    if figures is not None:
+        lines = [*lines, building.solid.vertices]
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for line in lines:
+        low, high = np.minimum(low, line.min(axis=0)), np.maximum(high, line.max(axis=0))
+    return Member(OPENING + text[text.index(b">") :], low, high)
 
 
 def city_object_member(

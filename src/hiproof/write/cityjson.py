@@ -11,6 +11,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -50,13 +51,18 @@ class CityJSONWriter(BuildingWriter):
     """Incremental form of `write_cityjson`."""
 
     def __init__(
-        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, scale_m: float = SCALE_M
+        self,
+        path: str | os.PathLike,
+        crs: Any = None,
+        prefix: str = PREFIX,
+        scale_m: float = SCALE_M,
+        translate: np.ndarray | None = None,
     ) -> None:
         super().__init__(path)
         self.is_document = str(path).endswith(".json")
         self.reference_system = reference_system(crs)
         self.prefix, self.scale_m = prefix, scale_m
-        self.translate: np.ndarray | None = None
+        self.translate = translate
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.ids = UniqueNames()
         self.vertex_count = 0
@@ -71,18 +77,21 @@ class CityJSONWriter(BuildingWriter):
         figures = figures or figures_of(building)
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale_m)
-        geometry = building_geometry(building, figures, vertices, self.prefix)
-        city_object: dict[str, Any] = {"type": "Building"}
-        if geometry:
-            city_object["geographicalExtent"] = self.extended_by(vertices)
-        city_object["attributes"] = building_attributes(building, figures, self.prefix)
-        if geometry:
-            city_object["geometry"] = geometry
         if self.is_document:
+            city_object, extent = city_object_of(building, figures, vertices, self.prefix)
+            self.widen(extent)
             self.add_to_document(name, city_object, vertices)
         else:
-            feature = {"type": "CityJSONFeature", "id": name, "CityObjects": {name: city_object}}
-            self.file.write(dump({**feature, "vertices": vertices.grid}) + b"\n")
+            self.put(feature_line(building, figures, name, vertices, self.prefix))
+
+    def put(self, feature: Feature) -> None:
+        """Write a building that `feature_line` made, here or in another process, about this file's `translate`."""
+        self.widen(feature.extent)
+        self.file.write(feature.line)
+
+    def widen(self, extent: list[float] | None) -> None:
+        if extent is not None:
+            self.low, self.high = np.minimum(self.low, extent[:3]), np.maximum(self.high, extent[3:])
 
     def origin_for(self, building: Building) -> np.ndarray:
         """The file's offset (3,), settled by the first building that has coordinates."""
@@ -90,15 +99,8 @@ class CityJSONWriter(BuildingWriter):
             corner = first_corner(building)
             if corner is None:
                 return np.zeros(3)
-            self.translate = np.append(np.floor(corner[:2] / GRID_M) * GRID_M, 0.0)
+            self.translate = offset_of(corner[:2])
         return self.translate
-
-    def extended_by(self, vertices: Vertices) -> list[float]:
-        """Extent of one building, the whole file's being widened by it."""
-        grid = np.array(vertices.grid)
-        low, high = (edge * self.scale_m + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0)))
-        self.low, self.high = np.minimum(self.low, low), np.maximum(self.high, high)
-        return [metres(v) for v in (*low, *high)]
 
     def add_to_document(self, name: str, city_object: dict[str, Any], vertices: Vertices) -> None:
         for geometry in city_object.get("geometry", ()):
@@ -136,6 +138,42 @@ class CityJSONWriter(BuildingWriter):
         if self.is_document:
             return dump(head)[:-1] + b',"CityObjects":{'
         return dump({**head, "CityObjects": {}, "vertices": []})
+
+
+@dataclass(frozen=True)
+class Feature:
+    """One building as a line of a CityJSONSeq, and its extent (low x y z, high x y z), None where it has none."""
+
+    line: bytes
+    extent: list[float] | None
+
+
+def offset_of(corner_xy: np.ndarray) -> np.ndarray:
+    """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole kilometres, so that it seldom moves."""
+    return np.append(np.floor(np.asarray(corner_xy) / GRID_M) * GRID_M, 0.0)
+
+
+def feature_line(
+    building: Building, figures: RoofFigures | None, name: str, vertices: Vertices, prefix: str = PREFIX
+) -> Feature:
+    """The CityJSONFeature of `building` under the id `name`; `vertices` are empty, about the file's offset."""
+    city_object, extent = city_object_of(building, figures, vertices, prefix)
+    feature = {"type": "CityJSONFeature", "id": name, "CityObjects": {name: city_object}, "vertices": vertices.grid}
+    return Feature(dump(feature) + b"\n", extent)
+
+
+def city_object_of(
+    building: Building, figures: RoofFigures | None, vertices: Vertices, prefix: str
+) -> tuple[dict[str, Any], list[float] | None]:
+    """The CityObject and its extent, None where it has no geometry; its vertices go to `vertices`."""
+    geometry = building_geometry(building, figures, vertices, prefix)
+    attributes = building_attributes(building, figures, prefix)
+    if not geometry:
+        return {"type": "Building", "attributes": attributes}, None
+    grid = np.array(vertices.grid)
+    low, high = (edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0)))
+    extent = [metres(v) for v in (*low, *high)]
+    return {"type": "Building", "geographicalExtent": extent, "attributes": attributes, "geometry": geometry}, extent
 
 
 def shifted(boundaries: Any, count: int) -> Any:

@@ -69,7 +69,15 @@ class ParametersWriter(BuildingWriter):
     """Incremental form of `write_parameters`."""
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        self.file.write(dump(building_record(building)) + b"\n")
+        self.put(parameters_line(building))
+
+    def put(self, line: bytes) -> None:
+        """Write a building that `parameters_line` made, here or in another process."""
+        self.file.write(line)
+
+
+def parameters_line(building: Building) -> bytes:
+    return dump(building_record(building)) + b"\n"
 
 
 def building_record(building: Building) -> dict[str, Any]:

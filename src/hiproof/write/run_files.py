@@ -1,4 +1,8 @@
-"""The four files of a run, written in one pass over the buildings."""
+"""The four files of a run, written in one pass over the buildings.
+
+A building's text is the same in whichever process it is made: `fragments` makes it for all files at once, in a worker,
+and `join_fragments` only puts texts one after the other.
+"""
 
 from __future__ import annotations
 
@@ -6,6 +10,7 @@ import dataclasses
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +18,13 @@ import numpy as np
 
 from ..model import Building
 from ..status import Status
-from .attributes import AttributesWriter
+from .attributes import AttributesWriter, Row, table_row
 from .building_attributes import figures_of
-from .citygml import CityGMLWriter
-from .cityjson import CityJSONWriter
-from .parameters import ParametersWriter
+from .citygml import CityGMLWriter, Member, gml_member
+from .cityjson import SCALE_M, CityJSONWriter, Feature, feature_line
+from .cityjson_geometry import Vertices
+from .geoparquet import GeoParquetWriter
+from .parameters import ParametersWriter, parameters_line
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
@@ -48,6 +55,51 @@ def write_all(folder: str | os.PathLike, buildings: Iterable[Building], crs: Any
             for writer in writers:
                 writer.add(building, figures)
     return broken
+
+
+@dataclass(frozen=True)
+class Fragments:
+    """One building as each file of a run holds it."""
+
+    gml: Member
+    cityjson: Feature
+    parameters: bytes
+    row: Row
+
+
+def fragments(asked: Building, names: tuple[str, str], translate: np.ndarray) -> tuple[Building, Fragments]:
+    """The texts of one building, `names` being its CityJSON id and its gml:id, and the building they tell of.
+
+    `translate` (3,) is the offset of the CityJSON file. A solid that cannot be measured is left out, as in `write_all`.
+    """
+    building, figures = measured(asked)
+    feature = feature_line(building, figures, names[0], Vertices(translate, SCALE_M))
+    member = gml_member(building, figures, names[1])
+    return building, Fragments(member, feature, parameters_line(building), table_row(building, figures))
+
+
+def join_fragments(
+    folder: str | os.PathLike, parts: Iterable[Fragments], translate: np.ndarray, crs: Any = None, parquet: bool = False
+) -> None:
+    """Write the files of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
+
+    `parquet` adds buildings.parquet, the table once more as GeoParquet. Raises OutputError when the folder cannot be
+    written.
+    """
+    folder = Path(folder)
+    with ExitStack() as stack:
+        gml = stack.enter_context(CityGMLWriter(folder / "buildings.gml", crs))
+        cityjson = stack.enter_context(CityJSONWriter(folder / "buildings.city.jsonl", crs, translate=translate))
+        parameters = stack.enter_context(ParametersWriter(folder / "parameters.jsonl"))
+        tables = [stack.enter_context(AttributesWriter(folder / "buildings.gpkg", crs))]
+        if parquet:
+            tables.append(stack.enter_context(GeoParquetWriter(folder / "buildings.parquet", crs)))
+        for part in parts:
+            gml.put(part.gml)
+            cityjson.put(part.cityjson)
+            parameters.put(part.parameters)
+            for table in tables:
+                table.put(part.row)
 
 
 def measured(building: Building) -> tuple[Building, RoofFigures | None]:

@@ -1,0 +1,61 @@
+"""buildings.parquet: the attribute table as GeoParquet 1.0, for data frames and columnar databases (needs pyarrow)."""
+
+from __future__ import annotations
+
+import json
+import os
+from typing import Any
+
+from ..errors import InputError
+from .attributes import AttributesWriter, Row, column_kind, column_names
+from .building_attributes import PREFIX
+
+GEOMETRY = "geometry"
+
+
+class GeoParquetWriter(AttributesWriter):
+    """Incremental writer of the same rows as the GeoPackage's; raises InputError where pyarrow is missing."""
+
+    def __init__(self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX) -> None:
+        import_pyarrow()
+        super().__init__(path, crs, prefix)
+
+    def finish(self) -> None:
+        import pyarrow.parquet
+
+        kinds = {name: column_kind(name, found, self.prefix) for name, found in self.kinds.items()} or {"id": str}
+        schema = self.schema(kinds)
+        self.waiting.seek(0)
+        with pyarrow.parquet.ParquetWriter(self.hidden, schema, compression="zstd") as file:
+            for rows in self.batches():
+                file.write_table(pyarrow.Table.from_arrays(arrays(rows, kinds, schema), schema=schema))
+
+    def schema(self, kinds: dict[str, type]) -> Any:
+        """Arrow's schema of the columns `kinds` and the geometry, with GeoParquet's description of the latter."""
+        import pyarrow
+        from pyproj import CRS
+
+        types = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+        fields = [pyarrow.field(name, types[kind]) for name, kind in zip(column_names(kinds), kinds.values())]
+        crs = None if self.plan_wkt is None else CRS.from_wkt(self.plan_wkt).to_json_dict()
+        geometry = {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"], "crs": crs}
+        geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
+        return pyarrow.schema([*fields, pyarrow.field(GEOMETRY, pyarrow.binary())], {"geo": json.dumps(geo)})
+
+
+def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:
+    """Arrow arrays of `rows`, the outlines last."""
+    import pyarrow
+
+    columns = [
+        pyarrow.array([None if (v := row.get(name)) is None else kind(v) for _, row in rows], type)
+        for (name, kind), type in zip(kinds.items(), schema.types)
+    ]
+    return [*columns, pyarrow.array([outline for outline, _ in rows], schema.types[-1])]
+
+
+def import_pyarrow() -> None:
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError as error:
+        raise InputError("expected the extra `city` for GeoParquet; try: pip install 'hiproof[city]'") from error
