@@ -8,9 +8,10 @@ import pytest
 import shapely
 
 from hiproof.city.executors import InProcess, Processes, WorkerLost
+from hiproof.city.ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
 from hiproof.city.ledger import Ledger
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
-from hiproof.city.sort import in_any_box, lowest_in_cells
+from hiproof.city.sort import Reach
 
 
 def jobs_at(xy):
@@ -31,12 +32,51 @@ def test_a_building_without_area_is_still_owned():
     assert list(cut_into_tiles(jobs, 250.0, 100).values()) == [(0,)]
 
 
-def test_points_in_boxes_equal_the_plain_test():
+def test_points_within_reach_equal_the_plain_test():
     rng = np.random.default_rng(1)
     xy = rng.uniform(-20, 60, (2000, 2))
-    boxes = np.array([neighbourhood(job, 3.0) for job in jobs_at(rng.uniform(0, 40, (5, 2)))])
-    plain = np.array([any((p >= b[:2]).all() and (p < b[2:]).all() for b in boxes) for p in xy])
-    assert np.array_equal(in_any_box(xy, boxes), plain)
+    jobs = jobs_at(rng.uniform(0, 40, (5, 2)))
+    roof, terrain = (np.array([neighbourhood(job, reach) for job in jobs]) for reach in (0.0, 3.0))
+
+    def plain(boxes):
+        return np.array([any((p >= b[:2]).all() and (p < b[2:]).all() for b in boxes) for p in xy])
+
+    bits = Reach(roof, terrain).bits(xy)
+    assert np.array_equal(bits & 1 > 0, plain(roof))
+    assert np.array_equal(bits & 2 > 0, plain(terrain))
+
+
+def sloped_ground(rng, n=20000, size=100.0):
+    xy = rng.uniform(0, size, (n, 2))
+    return np.column_stack([xy, 0.1 * xy[:, 0] - 0.05 * xy[:, 1] + rng.normal(0, 0.02, n)])
+
+
+def test_ground_around_a_building_follows_the_slope_under_it():
+    rng = np.random.default_rng(4)
+    ground = sloped_ground(rng)
+    hidden = ((ground[:, :2] > 40) & (ground[:, :2] < 52)).all(axis=1)
+    terrain = GroundAround(ground_cells(ground[~hidden]), np.array([30, 30, 62, 62]))
+    border = shapely.get_coordinates(shapely.segmentize(shapely.box(40.5, 40.5, 51.5, 51.5), 1.0))
+    assert np.abs(terrain.height_at(border) - border @ (0.1, -0.05)).max() < 0.06
+    assert np.isnan(terrain.height_at(np.array([[500.0, 0.0]]))).all()
+
+
+@pytest.mark.parametrize("around", [GroundAround, LowestAround])
+def test_ground_of_a_building_ignores_what_lies_outside_its_box(around):
+    rng = np.random.default_rng(5)
+    ground = sloped_ground(rng)
+    box = np.array([20.0, 20.0, 50.0, 50.0])
+    inside = ((ground[:, :2] >= box[:2]) & (ground[:, :2] < box[2:])).all(axis=1)
+    xy = rng.uniform(31, 40, (50, 2))
+    whole = around(ground_cells(ground), box).height_at(xy)
+    twice = rng.permutation(np.concatenate([ground[inside], ground[inside][:500]]))
+    assert np.array_equal(whole, around(ground_cells(twice), box).height_at(xy))
+
+
+def test_ground_without_points_is_unknown():
+    box = np.array([0.0, 0.0, 10.0, 10.0])
+    for around in (GroundAround, LowestAround):
+        assert np.isnan(around(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))).all()
 
 
 def test_lowest_points_do_not_depend_on_how_they_are_cut():

@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, OutputError
@@ -281,15 +282,10 @@ def test_check_finds_a_broken_solid(files, finished, tmp_path):
         (["status", "{out}"], "ledger"),
     ],
 )
-def test_wrong_usage_gets_one_sentence_and_exit_code_2(arguments, expected, files, tmp_path):
+def test_wrong_usage_gets_one_sentence_and_exit_code_2(arguments, expected, files, tmp_path, monkeypatch, capsys):
     filled = [a.format(cloud=files[0], out=tmp_path) for a in arguments]
-    got = subprocess.run(
-        [sys.executable, "-m", "hiproof", *filled],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": "src"},
-        check=False,
-    )
-    assert got.returncode == 2
-    assert expected in got.stderr
-    assert "Traceback" not in got.stderr
+    monkeypatch.setattr(sys, "argv", ["hiproof", *filled])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert expected in capsys.readouterr().err

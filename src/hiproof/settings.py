@@ -82,6 +82,16 @@ class ReconstructSettings:
 
 
 @dataclass(frozen=True)
+class CitySettings:
+    """[city] many buildings."""
+
+    max_points_a_building: int = setting(
+        20000, "a building with more points is thinned to so many, evenly and by a fixed rule", "", 1000, 10**7
+    )
+    parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `city`)")
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings by section; immutable, comparable, and written beside every run.
 
@@ -97,6 +107,7 @@ class Settings:
     compound: CompoundSettings = field(default_factory=CompoundSettings)
     compose: ComposeSettings = field(default_factory=ComposeSettings)
     reconstruct: ReconstructSettings = field(default_factory=ReconstructSettings)
+    city: CitySettings = field(default_factory=CitySettings)
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:

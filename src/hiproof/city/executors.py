@@ -1,7 +1,8 @@
 """Where tasks run: in this process, in processes of this machine, or on a Dask cluster. One verb: `run`.
 
 `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that dies does not end the
-run: its tasks come back with a `WorkerLost`, and the caller decides whether to try them again.
+run: its tasks come back with a `WorkerLost`, and the caller decides whether to try them again. `isolated()` is an
+executor whose worker's death harms nobody else. Tasks are taken from their iterable only when a worker is near.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Any
 
-from ..errors import InputError
+from ..errors import InputError, OutputError
+
+CONNECT_S = 20
 
 
 class WorkerLost(Exception):
@@ -30,6 +33,9 @@ class InProcess:
                 yield task, function(*task), None
             except Exception as error:
                 yield task, None, error
+
+    def isolated(self) -> Processes:
+        return Processes(1)
 
     def close(self) -> None:
         pass
@@ -80,6 +86,9 @@ class Processes:
             yield task, None if error else future.result(), WorkerLost("a worker process died") if lost else error
         running.clear()
 
+    def isolated(self) -> Processes:
+        return Processes(1)
+
     def close(self) -> None:
         if self.pool is not None:
             self.pool.shutdown(wait=True, cancel_futures=True)
@@ -99,28 +108,48 @@ def leave_with_parent(parent: int) -> None:
 
 
 class Dask:
-    """A Dask cluster at `address`; its workers must see the same files (a shared file system)."""
+    """A Dask cluster at `address`; its workers must have hiproof installed and see the same files (a shared file system)."""
 
     def __init__(self, address: str):
         try:
             from distributed import Client
         except ImportError as error:
             raise InputError("expected the extra `city` for --scheduler; try: pip install 'hiproof[city]'") from error
+        self.address = address
         try:
-            self.client = Client(address, timeout="20s")
+            self.client = Client(address, timeout=CONNECT_S)
         except (OSError, ValueError) as error:
             raise InputError(f"expected a Dask scheduler at {address}, got: {error}; check the address") from error
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
         from distributed import as_completed
+
+        waiting, running, finished = iter(tasks), {}, as_completed()
+        while True:
+            threads = sum(self.client.nthreads().values())
+            while len(running) < max(2 * threads, 2) and (task := next(waiting, None)) is not None:
+                future = self.client.submit(function, *task, pure=False)
+                running[future] = task
+                finished.add(future)
+            if not running:
+                return
+            future = next(finished)
+            task = running.pop(future)
+            yield task, *self.outcome(future)
+
+    def outcome(self, future: Any) -> tuple[Any, Exception | None]:
+        """(result, error). Dask has tried a task whose worker died on other workers before it gives up with KilledWorker."""
         from distributed.scheduler import KilledWorker
 
-        futures = {self.client.submit(function, *task, pure=False, retries=0): task for task in tasks}
-        for future in as_completed(list(futures)):
-            error = future.exception()
-            lost = isinstance(error, KilledWorker)
-            result = None if error else future.result()
-            yield futures.pop(future), result, WorkerLost("a worker process died") if lost else error
+        if future.status == "cancelled":
+            raise OutputError(f"lost the Dask scheduler at {self.address}; the same command goes on from here")
+        error = future.exception()
+        if isinstance(error, KilledWorker):
+            return None, WorkerLost("a worker process died")
+        return (None, error) if error else (future.result(), None)
+
+    def isolated(self) -> Dask:
+        return Dask(self.address)
 
     def close(self) -> None:
         self.client.close()

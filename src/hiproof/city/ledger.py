@@ -14,7 +14,7 @@ SCHEMA = """
 create table if not exists run (key text primary key, value text);
 create table if not exists task (
     name text primary key, kind text, position integer, buildings integer, state text default 'open',
-    attempts integer default 0, message text default '', finished real);
+    losses integer default 0, message text default '', finished real);
 create table if not exists building (
     position integer primary key, id text, task text, status text, type text, detail text, share real, psd real,
     seconds real);
@@ -22,11 +22,14 @@ create table if not exists building (
 
 
 class Ledger:
-    """The run's memory in `folder`. States of a task: open, done, failed (its input cannot be used), lost (gave up)."""
+    """The run's memory at `path`. States of a task: open, running, done, failed (its input cannot be used).
+
+    `losses` counts how often the process died that worked on the task. sqlite3's errors pass through.
+    """
 
     def __init__(self, path: Path, read_only: bool = False):
-        mode = "?mode=ro" if read_only else ""
-        self.database = sqlite3.connect(f"file:{path}{mode}", uri=True, isolation_level=None, timeout=60)
+        address = Path(path).absolute().as_uri() + ("?mode=ro" if read_only else "")
+        self.database = sqlite3.connect(address, uri=True, isolation_level=None, timeout=60)
         if not read_only:
             self.database.execute("pragma journal_mode=wal")
             self.database.execute("pragma synchronous=normal")
@@ -53,11 +56,23 @@ class Ledger:
         sql = "select name from task where kind = ? and state = 'open' order by position"
         return [name for (name,) in self.database.execute(sql, (kind,))]
 
-    def attempt(self, names: list[str]) -> None:
-        self.database.executemany("update task set attempts = attempts + 1 where name = ?", [(n,) for n in names])
+    def start(self, name: str) -> None:
+        self.database.execute("update task set state = 'running' where name = ?", (name,))
 
-    def attempts(self, name: str) -> int:
-        return self.database.execute("select attempts from task where name = ?", (name,)).fetchone()[0]
+    def lose(self, name: str) -> None:
+        """The process that worked on the task died."""
+        self.database.execute("update task set state = 'open', losses = losses + 1 where name = ?", (name,))
+
+    def reopen(self) -> None:
+        """What was running when the main process ended was lost with it."""
+        self.database.execute("update task set state = 'open', losses = losses + 1 where state = 'running'")
+
+    def interrupt(self) -> None:
+        """The main process ends in order: what was running is open again, and no loss."""
+        self.database.execute("update task set state = 'open' where state = 'running'")
+
+    def losses(self, name: str) -> int:
+        return self.database.execute("select losses from task where name = ?", (name,)).fetchone()[0]
 
     def finish(self, name: str, state: str, message: str = "", outcomes: list[tuple] = ()) -> None:
         """Close a task together with its buildings' (position, id, status, type, detail, share, psd, seconds) rows."""
@@ -68,13 +83,8 @@ class Ledger:
         self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
         self.database.execute("commit")
 
-    def unwritten(self, ids: list[str]) -> None:
-        """Buildings whose solid no format could hold are internal errors after all."""
-        sql = "update building set status = 'internal_error', detail = 'its solid could not be written' where id = ?"
-        self.database.executemany(sql, [(id,) for id in ids])
-
     def tasks(self) -> list[tuple]:
-        sql = "select name, kind, buildings, state, attempts, message, finished from task order by kind, position"
+        sql = "select name, kind, buildings, state, losses, message, finished from task order by kind, position"
         return self.database.execute(sql).fetchall()
 
     def counts(self, column: str) -> dict[str, int]:

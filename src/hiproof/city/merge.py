@@ -1,4 +1,4 @@
-"""Join the tiles' buildings into the output files, in plan order, one tile in memory at a time."""
+"""Join the texts that the workers made into the output files, in plan order, one tile in memory at a time."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ import pickle
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..model import Building
+from ..write.run_files import Fragments, join_fragments
 from .plan import Plan
 
-
-def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> list[str]:
-    """Write buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg, each whole or not at all.
-
-    Returns the ids of buildings whose solid could not be written; they appear without it.
-    """
-    from ..write import write_all
-
-    return write_all(out, buildings_of(plan, state, progress), plan.crs())
+FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg", "buildings.parquet")
 
 
-def buildings_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Building]:
+def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
+    """Write the files of the run, each whole or not at all, and remove what a killed merge left unfinished."""
+    for name in FILES:
+        for leftover in out.glob(f".{name}-*"):
+            leftover.unlink(missing_ok=True)
+    join_fragments(out, parts_of(plan, state, progress), plan.translate, plan.crs(), plan.settings.city.parquet)
+
+
+def parts_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
     for number, tile in enumerate(plan.tiles):
         progress("merge", number, len(plan.tiles))
         yield from pickle.loads((state / "tiles" / f"{tile}.pickle").read_bytes())

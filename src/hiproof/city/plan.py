@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import json
 import math
 import pickle
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +18,9 @@ from .. import __version__
 from ..errors import InputError
 from ..model import Footprint
 from ..settings import Settings
+from ..write.building_attributes import plain_text
+from ..write.cityjson import offset_of
+from ..write.naming import UniqueNames, gml_name
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,11 @@ class Job:
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything a worker needs to know; pickled once into the run's folder."""
+    """Everything a worker needs to know; pickled once into the run's folder.
+
+    `names` are the CityJSON id and the gml:id of those buildings whose own id will not do; `translate` is the offset of
+    the CityJSON file. Both are settled here, so that a building's text does not depend on what is written before it.
+    """
 
     clouds: tuple[str, ...]
     jobs: tuple[Job, ...]
@@ -40,6 +48,11 @@ class Plan:
     terrain: str | None
     settings: Settings
     fingerprint: str
+    names: dict[int, tuple[str, str]] = field(default_factory=dict)
+    translate: np.ndarray = field(default_factory=lambda: np.zeros(3))
+
+    def names_of(self, job: Job) -> tuple[str, str]:
+        return self.names.get(job.index) or (job.id, gml_name(job.id))
 
     def crs(self) -> Any:
         """The output's reference system, None where no input names one."""
@@ -53,6 +66,32 @@ class Plan:
     @staticmethod
     def load(path: Path) -> Plan:
         return pickle.loads(path.read_bytes())
+
+
+def load_plan(folder: Path) -> Plan:
+    """The plan of the run whose state is in `folder`, read once a process."""
+    path = folder / "plan.pickle"
+    return loaded_plan(path, path.stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=1)
+def loaded_plan(path: Path, stamp: int) -> Plan:
+    return Plan.load(path)
+
+
+def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
+    """Names in CityJSON and CityGML of the jobs that cannot go by their own id there, or where two ids would meet."""
+    json_names, gml_names, unusual = UniqueNames(), UniqueNames(), {}
+    for job in jobs:
+        pair = json_names.take(plain_text(job.id)), gml_names.take(gml_name(job.id))
+        if pair != (job.id, gml_name(job.id)):
+            unusual[job.index] = pair
+    return unusual
+
+
+def offset_of_jobs(jobs: tuple[Job, ...]) -> np.ndarray:
+    """The CityJSON file's offset (3,), from the first area that is one."""
+    return next((offset_of(job.area.bounds[:2]) for job in jobs if not job.area.is_empty), np.zeros(3))
 
 
 def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str, tuple[int, ...]]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import shapely
 
 from ..errors import InputError
-from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints
+from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 
 TILE_M = 250.0
 MOST_BUILDINGS_A_TILE = 100
@@ -26,14 +28,21 @@ def make_plan(request, mark: str) -> Plan:
     else:
         jobs = jobs_from_cloud(request)
     return Plan(
-        clouds=request.clouds,
+        clouds=tuple(map(absolute, request.clouds)),
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, MOST_BUILDINGS_A_TILE),
         crs_wkt=crs.to_wkt() if crs is not None else None,
-        terrain=request.terrain,
+        terrain=absolute(request.terrain) if request.terrain else None,
         settings=request.settings,
         fingerprint=mark,
+        names=unusual_names(jobs),
+        translate=offset_of_jobs(jobs),
     )
+
+
+def absolute(name: str) -> str:
+    """A path that means the same to a worker started elsewhere; addresses stay as they are."""
+    return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
 
 
 def read_headers(clouds: tuple[str, ...]) -> tuple[list, object]:

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import json
 import shutil
+import sqlite3
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -19,10 +21,11 @@ from .ledger import Ledger
 from .merge import merge
 from .plan import Plan, fingerprint
 from .prepare import make_plan
+from .quarantine import run_alone, solve_in_quarantine
 from .solve import solve_tile
 from .sort import sort_cloud
 
-MOST_ATTEMPTS = 3
+MOST_LOSSES = 3
 Progress = Callable[[str, int, int], None]
 
 
@@ -70,9 +73,9 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
     so far stays, and the same call goes on from there.
     """
     clock = Clock()
-    state = open_state(request.out)
-    ledger = Ledger(state / "ledger.sqlite")
     executor = make_executor(request.jobs, request.scheduler)
+    state = open_state(request.out)
+    ledger = open_ledger(state, request.restart)
     try:
         plan = resume_or_plan(request, state, ledger)
         clock.lap("plan")
@@ -82,15 +85,39 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
         work_off(ledger, executor, "solve", solve_tile, state, progress)
         clock.lap("solve")
         if ledger.get("merged") != "yes":
-            ledger.unwritten(merge(plan, state, request.out, progress))
+            merge(plan, state, Path(request.out), progress)
         summary = summarise(request, ledger, clock)
         write_run_record(request, plan, summary)
         ledger.set(merged="yes")
         clean(state)
         return summary
+    except sqlite3.OperationalError as error:
+        raise OutputError(
+            f"expected to write the ledger in {state}, got: {error}; free some space, the same command then goes on"
+        ) from error
     finally:
         executor.close()
+        with suppress(sqlite3.Error):
+            ledger.interrupt()
         ledger.close()
+
+
+def open_ledger(state: Path, restart: bool) -> Ledger:
+    """The ledger of a run; one that is damaged or of another version is dropped where the run begins anew."""
+    path = state / "ledger.sqlite"
+    try:
+        ledger = Ledger(path)
+        ledger.reopen()
+    except sqlite3.Error as error:
+        if restart:
+            for end in ("", "-wal", "-shm"):
+                path.with_name(path.name + end).unlink(missing_ok=True)
+            return open_ledger(state, False)
+        raise OutputError(
+            f"expected the ledger of a run of this version in {state}, got: {error}; begin anew with --restart, or "
+            "choose another --out"
+        ) from error
+    return ledger
 
 
 class Clock:
@@ -151,27 +178,35 @@ def forget(state: Path, ledger: Ledger) -> None:
 
 
 def work_off(ledger: Ledger, executor, kind: str, function: Callable, state: Path, progress: Progress) -> None:
-    """Run all open tasks of a kind; a task whose worker dies is tried again, then in quarantine."""
+    """Run all open tasks of a kind; one whose process dies is tried again, and after MOST_LOSSES alone."""
     total = len([row for row in ledger.tasks() if row[1] == kind])
     while names := ledger.open_tasks(kind):
-        ledger.attempt(names)
         done = total - len(names)
         progress(kind, done, total)
-        for task, result, error in executor.run(function, [task_arguments(kind, name, state) for name in names]):
+        suspects = [name for name in names if ledger.losses(name) >= MOST_LOSSES]
+        for name in suspects:
+            work_off_alone(ledger, executor, kind, name, function, state)
+        tasks = started(ledger, kind, [name for name in names if name not in set(suspects)], state)
+        for task, result, error in executor.run(function, tasks):
             name = f"{kind}:{task[1]}"
-            if isinstance(error, WorkerLost):
-                if ledger.attempts(name) >= MOST_ATTEMPTS:
-                    quarantine(ledger, executor, kind, name, function, task)
-                    done += 1
+            if isinstance(error, (WorkerLost, MemoryError)):
+                ledger.lose(name)
                 continue
             done += 1
             record(ledger, kind, name, result, error)
             progress(kind, done, total)
 
 
+def started(ledger: Ledger, kind: str, names: list[str], state: Path) -> Iterator[tuple]:
+    """The tasks' arguments, each entered as running when an executor takes it."""
+    for name in names:
+        ledger.start(name)
+        yield task_arguments(kind, name, state)
+
+
 def task_arguments(kind: str, name: str, state: Path) -> tuple:
     key = name.split(":", 1)[1]
-    return (str(state), int(key) if kind == "sort" else key)
+    return (str(state.absolute()), int(key) if kind == "sort" else key)
 
 
 def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None) -> None:
@@ -187,22 +222,17 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
         raise error
 
 
-def quarantine(ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple) -> None:
-    """A task that keeps killing its worker: find the buildings that do it, one by one, and leave them out."""
-    if kind == "sort":
-        ledger.finish(
-            name, "failed", "the process died each time it read this file; not enough memory, or a damaged file"
-        )
-        return
-    state, tile = task[:2]
-    members = Plan.load(Path(state) / "plan.pickle").tiles[tile]
-    deadly = []
-    for index in members:
-        others = tuple(i for i in members if i != index)
-        for _, _, error in executor.run(function, [(state, tile, others)]):
-            if isinstance(error, WorkerLost):
-                deadly.append(index)
-    for _, result, error in executor.run(function, [(state, tile, tuple(deadly))]):
+def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, state: Path) -> None:
+    """A task whose process died again and again, in a process of its own; see quarantine.py."""
+    task = task_arguments(kind, name, state)
+    if kind == "solve":
+        result, error = solve_in_quarantine(executor, function, *task)
+    else:
+        result, error = run_alone(executor, function, task)
+    if isinstance(error, (WorkerLost, MemoryError)):
+        died = "the process died each time it read this file; not enough memory, or a damaged file"
+        ledger.finish(name, "failed", died)
+    else:
         record(ledger, kind, name, result, error)
 
 

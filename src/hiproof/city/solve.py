@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import pickle
+import threading
 import time
 import traceback
 from pathlib import Path
@@ -11,20 +13,37 @@ from pathlib import Path
 import numpy as np
 
 from ..model import Building
-from ..read.terrain import Terrain, TerrainChain, lowest_points, read_terrain, terrain_from_points
+from ..read.assign import PointGrid
+from ..read.terrain import Terrain, TerrainChain, read_terrain
+from ..read.thin import thin_to_count, without_repeats
 from ..reconstruct import reconstruct
-from ..stages import distinct
 from ..status import Status
 from ..write.files import atomic_file
-from .plan import Job, Plan, neighbourhood
-from .sort import GROUND_REACH_M, load_points
+from ..write.run_files import Fragments, fragments
+from .ground import GROUND_REACH_M, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from .plan import Job, Plan, load_plan, neighbourhood
+from .sort import load_points
 
 
-@functools.lru_cache(maxsize=2)
-def shared(folder: str, stamp: int) -> tuple[Plan, Terrain | None]:
-    """The plan and its terrain model, once a process (`stamp` is the plan file's time)."""
-    plan = Plan.load(Path(folder) / "plan.pickle")
-    return plan, read_terrain(plan.terrain, plan.crs()) if plan.terrain else None
+class Surroundings:
+    """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
+
+    def __init__(self, points: dict[str, np.ndarray], model: Terrain | None):
+        self.roof, self.model = points["roof"], model
+        self.grid = PointGrid(self.roof)
+        self.ground = ground_cells(points["ground"])
+        self.low = Cells(lowest_in_cells(points["low"]))
+
+    def roof_of(self, job: Job) -> np.ndarray:
+        """Roof points (n, 3) inside the job's area; a point that stands in two files comes twice."""
+        return self.roof[self.grid.inside(job.area)]
+
+    def terrain_of(self, job: Job) -> TerrainChain | None:
+        """The terrain model, else the ground points in the whole-metre box around the building, else the lowest points."""
+        if job.area.is_empty:
+            return None
+        box = neighbourhood(job, GROUND_REACH_M)
+        return TerrainChain([self.model, GroundAround(self.ground, box), LowestAround(self.low, box)])
 
 
 def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tuple]:
@@ -34,46 +53,57 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
     Returns a row a building for the ledger: (position, id, status, type, detail, share, psd, seconds).
     """
     root = Path(folder)
-    plan, terrain = shared(folder, (root / "plan.pickle").stat().st_mtime_ns)
-    points = load_points(root, tile)
-    owner = points["roof"][:, 3]
-    buildings, rows = [], []
+    plan = load_plan(root)
+    surroundings = Surroundings(
+        load_points(root, tile), terrain_model(plan.terrain, plan.crs_wkt, threading.get_ident())
+    )
+    parts, rows = [], []
     for index in plan.tiles[tile]:
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
-            building = Building(job.id, Status.INTERNAL_ERROR, "the process died while it worked on this building")
+            building, part = failed(plan, job, "the process died while it worked on this building")
         else:
-            building = solve_one(plan, job, points["roof"][owner == index, :3], points, terrain)
-        buildings.append(building)
+            building, part = solve_one(plan, job, surroundings)
+        parts.append(part)
         rows.append(ledger_row(index, building, time.perf_counter() - start))
     with atomic_file(root / "tiles" / f"{tile}.pickle") as file:
-        pickle.dump(buildings, file, protocol=5)
+        pickle.dump(parts, file, protocol=5)
     return rows
 
 
-def solve_one(plan: Plan, job: Job, roof: np.ndarray, around: dict[str, np.ndarray], model: Terrain | None) -> Building:
-    """One building, whatever happens: an exception becomes its status."""
+@functools.lru_cache(maxsize=32)
+def terrain_model(path: str | None, crs_wkt: str | None, thread: int) -> Terrain | None:
+    """The terrain model, opened once a thread: GDAL's data sets are not to be shared."""
+    from pyproj import CRS
+
+    return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None) if path else None
+
+
+def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Building, Fragments]:
+    """One building and its texts, whatever happens: an exception becomes its status.
+
+    Only MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone.
+    """
     try:
-        terrain = None if job.area.is_empty else terrain_around(job, around, model)
-        return reconstruct(roof, job.footprint, terrain, plan.settings, id=job.id)
+        points, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
+        used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
+        building = reconstruct(used, job.footprint, surroundings.terrain_of(job), plan.settings, id=job.id)
+        if len(used) < len(points) and building.status is Status.MODELLED:
+            detail = f"{building.status.value}; fitted to {len(used)} of its {len(points)} points"
+            building = dataclasses.replace(building, detail=detail)
+        return fragments(building, plan.names_of(job), plan.translate)
+    except MemoryError:
+        raise
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
-        detail = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
-        attributes = job.footprint.attributes if job.footprint else {}
-        return Building(job.id, Status.INTERNAL_ERROR, detail, footprint=job.area, attributes=attributes)
+        return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
 
 
-def terrain_around(job: Job, around: dict[str, np.ndarray], model: Terrain | None) -> TerrainChain:
-    """The terrain model, else the ground points in the whole-metre box around the building, else the lowest points."""
-    xmin, ymin, xmax, ymax = neighbourhood(job, GROUND_REACH_M)
-    ground, low = (
-        points[(points[:, :2] >= (xmin, ymin)).all(axis=1) & (points[:, :2] < (xmax, ymax)).all(axis=1)]
-        for points in (around["ground"], around["low"])
-    )
-    # a point that stands in two overlapping files counts once
-    ground = distinct(ground)
-    found = [model, terrain_from_points(ground) if len(ground) else None, lowest_points(low) if len(low) else None]
-    return TerrainChain(found)
+def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:
+    """A building that hiproof failed on, with what the input said of it."""
+    attributes = job.footprint.attributes if job.footprint else {}
+    building = Building(job.id, Status.INTERNAL_ERROR, detail, footprint=job.area, attributes=attributes)
+    return fragments(building, plan.names_of(job), plan.translate)
 
 
 def ledger_row(position: int, building: Building, seconds: float) -> tuple:

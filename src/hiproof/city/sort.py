@@ -1,97 +1,132 @@
-"""Read each point file once, in chunks, and leave for each work tile the points its buildings need.
+"""Read each point file once, in chunks, and leave for each work tile the points its buildings may need.
 
-Roof points are those of the building classes inside a building's area; terrain points those of the ground classes in the
-whole-metre box around it; of all others (noise excepted) the lowest a cell is kept, in case there is no ground class.
-What a building gets depends on its own area alone, not on tiles, files or chunks.
+Roof points are those of the building classes in the whole-metre box of a building; terrain points those of the ground
+classes in the wider box around it; of all others (noise excepted) the lowest a cell is kept, in case there is no ground
+class. What a building gets out of them depends on its own area alone, not on tiles, files or chunks.
 """
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 import shapely
 
+from ..model import PointCloud
 from ..read.assign import PointGrid
 from ..read.pointcloud import iter_points
-from ..read.thin import rank_in_cells
 from ..write.files import atomic_file
-from .plan import Plan, neighbourhood
+from .ground import GROUND_REACH_M, lowest_in_cells
+from .plan import Plan, load_plan, neighbourhood
 
-GROUND_REACH_M = 10.0
 NOISE_CLASSES = (7, 18)
 KINDS = ("roof", "ground", "low")
+ROOF, GROUND, OTHER, NOISE = range(4)
+SQUARE_M = 50.0  # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
+HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
+QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its points
 
 
-class Chunks:
-    """Collects the points of one file by work tile."""
+@dataclass(frozen=True)
+class Reach:
+    """Where the points of a tile's buildings may lie: whole-metre boxes (m, 4) of the areas and of their surroundings."""
 
-    def __init__(self, plan: Plan):
-        self.plan = plan
-        self.areas = [job.area for job in plan.jobs]
-        self.tree = shapely.STRtree(self.areas)
-        self.tile_of_job = {job: tile for tile, members in plan.tiles.items() for job in members}
-        self.boxes = {
-            tile: np.array([neighbourhood(plan.jobs[i], GROUND_REACH_M) for i in members if not self.areas[i].is_empty])
-            for tile, members in plan.tiles.items()
-        }
+    roof_boxes: np.ndarray
+    terrain_boxes: np.ndarray
+
+    @cached_property
+    def bounds(self) -> np.ndarray:
+        """(xmin, ymin, xmax, ymax) of all boxes."""
+        return np.concatenate([self.terrain_boxes[:, :2].min(axis=0), self.terrain_boxes[:, 2:].max(axis=0)])
+
+    @cached_property
+    def mask(self) -> np.ndarray:
+        """A byte a whole-metre cell (columns, rows): bit 0 in a roof box, bit 1 in a terrain box."""
+        low, high = self.bounds[:2], self.bounds[2:]
+        mask = np.zeros((high - low).astype(int), np.uint8)
+        for bit, boxes in ((1, self.roof_boxes), (2, self.terrain_boxes)):
+            for xmin, ymin, xmax, ymax in (boxes - np.tile(low, 2)).astype(int):
+                mask[xmin:xmax, ymin:ymax] |= bit
+        return mask
+
+    def bits(self, xy: np.ndarray) -> np.ndarray:
+        """The mask (n,) at `xy` (n, 2), 0 outside the bounds; upper sides of boxes are excluded."""
+        cell = np.floor(xy - self.bounds[:2]).astype(np.int64)
+        inside = ((cell >= 0) & (cell < self.mask.shape)).all(axis=1)
+        cell[~inside] = 0
+        return np.where(inside, self.mask[cell[:, 0], cell[:, 1]], 0)
+
+
+def reach_of(plan: Plan, tile: str) -> Reach | None:
+    """Reach of a tile's buildings, None where none has an area."""
+    jobs = [plan.jobs[i] for i in plan.tiles[tile] if not plan.jobs[i].area.is_empty]
+    if not jobs:
+        return None
+    # a border on a whole metre belongs to the area: one metre more on the upper sides
+    roof = np.array([neighbourhood(job, 0.0) for job in jobs]) + (0.0, 0.0, 1.0, 1.0)
+    return Reach(roof, np.array([neighbourhood(job, GROUND_REACH_M) for job in jobs]))
+
+
+class Gatherer:
+    """Collects the points of one file by work tile and writes them to `folder`, as often as memory asks for it."""
+
+    def __init__(self, plan: Plan, folder: Path, number: int):
+        self.folder, self.number, self.read = folder, number, plan.settings.read
+        reaches = {tile: reach_of(plan, tile) for tile in plan.tiles}
+        self.reaches = {tile: reach for tile, reach in reaches.items() if reach is not None}
+        self.names = list(self.reaches)
+        self.tree = shapely.STRtree(shapely.box(*np.array([r.bounds for r in self.reaches.values()]).reshape(-1, 4).T))
         self.found: dict[str, dict[str, list[np.ndarray]]] = {}
         self.classes: Counter[int] = Counter()
+        self.points = self.held = self.flushes = 0
 
-    def add(self, xyz: np.ndarray, classification: np.ndarray | None) -> None:
-        if not len(xyz):
-            return
-        if classification is None:
-            classification = np.zeros(len(xyz), np.uint8)
-        self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classification)) if n})
-        read = self.plan.settings.read
-        is_roof = np.isin(classification, read.building_classes)
-        is_ground = np.isin(classification, read.ground_classes)
-        is_other = ~(is_roof | is_ground | np.isin(classification, NOISE_CLASSES))
-        self.add_roof(xyz[is_roof])
-        self.add_terrain("ground", xyz[is_ground])
-        self.add_terrain("low", lowest_in_cells(xyz[is_other]))
+    def add(self, cloud: PointCloud) -> None:
+        """Take from a chunk what any tile needs."""
+        self.points += len(cloud)
+        classes = cloud.classification if cloud.classification is not None else np.zeros(len(cloud), np.uint8)
+        self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
+        kinds = self.kind_of_class()[classes]
+        grid = PointGrid(cloud.xyz, SQUARE_M)
+        extent = shapely.box(*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))
+        for tile in (self.names[i] for i in np.sort(self.tree.query(extent))):
+            reach = self.reaches[tile]
+            candidates = grid.candidates(reach.bounds)
+            bits = reach.bits(cloud.xyz[candidates, :2])
+            wanted = bits > 0
+            candidates, bits = candidates[wanted], bits[wanted]
+            kind = kinds[candidates]
+            self.keep(tile, "roof", cloud.xyz[candidates[(kind == ROOF) & (bits & 1 > 0)]])
+            self.keep(tile, "ground", cloud.xyz[candidates[(kind == GROUND) & (bits & 2 > 0)]])
+            self.keep(tile, "low", lowest_in_cells(cloud.xyz[candidates[(kind == OTHER) & (bits & 2 > 0)]]))
+        if self.held > HELD_POINTS:
+            self.flush()
 
-    def add_roof(self, xyz: np.ndarray) -> None:
-        """Roof points with the number of their building in a fourth column."""
-        if not len(xyz):
-            return
-        grid = PointGrid(xyz[:, :2])
-        for job in np.sort(self.tree.query(shapely.box(*xyz[:, :2].min(0), *xyz[:, :2].max(0)))).tolist():
-            members = grid.inside(self.areas[job])
-            if len(members):
-                self.keep(self.tile_of_job[job], "roof", np.column_stack([xyz[members], np.full(len(members), job)]))
-
-    def add_terrain(self, kind: str, xyz: np.ndarray) -> None:
-        if not len(xyz):
-            return
-        low, high = xyz[:, :2].min(0), xyz[:, :2].max(0)
-        for tile, boxes in self.boxes.items():
-            if len(boxes) and (boxes[:, :2].min(0) <= high).all() and (boxes[:, 2:].max(0) >= low).all():
-                self.keep(tile, kind, xyz[in_any_box(xyz[:, :2], boxes)])
+    def kind_of_class(self) -> np.ndarray:
+        """ROOF, GROUND, OTHER or NOISE (256,) by LAS class; a class that is both counts as roof."""
+        kinds = np.full(256, OTHER, np.uint8)
+        for classes, kind in (
+            (NOISE_CLASSES, NOISE),
+            (self.read.ground_classes, GROUND),
+            (self.read.building_classes, ROOF),
+        ):
+            kinds[list(classes)] = kind
+        return kinds
 
     def keep(self, tile: str, kind: str, points: np.ndarray) -> None:
         if len(points):
             self.found.setdefault(tile, {}).setdefault(kind, []).append(points)
+            self.held += len(points)
 
-
-def lowest_in_cells(xyz: np.ndarray) -> np.ndarray:
-    """The lowest height of each whole-metre cell, at the cell's centre: the lowest of lowest is the same however cut."""
-    lowest = rank_in_cells(xyz, 1.0, np.zeros_like)
-    return np.column_stack([np.floor(lowest[:, :2]) + 0.5, lowest[:, 2]])
-
-
-def in_any_box(xy: np.ndarray, boxes: np.ndarray) -> np.ndarray:
-    """Which points (n, 2) lie in at least one of the whole-metre boxes (m, 4), upper sides excluded."""
-    low, high = boxes[:, :2].min(0), boxes[:, 2:].max(0)
-    wanted = np.zeros((high - low).astype(int), bool)
-    for xmin, ymin, xmax, ymax in (boxes - np.tile(low, 2)).astype(int):
-        wanted[xmin:xmax, ymin:ymax] = True
-    inside = np.all((xy >= low) & (xy < high), axis=1)
-    cell = np.floor(xy[inside] - low).astype(int)
-    inside[inside] = wanted[cell[:, 0], cell[:, 1]]
-    return inside
+    def flush(self) -> None:
+        """Write what is held, a file a tile; done again after a kill it writes the same files."""
+        for tile, found in sorted(self.found.items()):
+            with atomic_file(self.folder / tile / f"{self.number}-{self.flushes}.npz") as file:
+                np.savez(file, **{kind: np.concatenate(arrays) for kind, arrays in found.items()})
+        self.found, self.held, self.flushes = {}, 0, self.flushes + 1
 
 
 def sort_cloud(folder: str, number: int) -> dict:
@@ -100,32 +135,54 @@ def sort_cloud(folder: str, number: int) -> dict:
     Chunks read before a damaged file breaks off are kept; the InputError is raised after they are on disk.
     """
     root = Path(folder)
-    plan = Plan.load(root / "plan.pickle")
-    chunks, broken, points = Chunks(plan), None, 0
+    plan = load_plan(root)
+    gatherer, broken = Gatherer(plan, root / "points", number), None
     try:
-        for cloud in iter_points(plan.clouds[number]):
-            points += len(cloud)
-            chunks.add(cloud.xyz, cloud.classification)
+        for cloud in wanted_points(plan.clouds[number], list(gatherer.reaches.values())):
+            gatherer.add(cloud)
+    except MemoryError:
+        raise
     except Exception as error:
         broken = error
-    for tile, found in sorted(chunks.found.items()):
-        save_points(root / "points" / tile / f"{number}.npz", found)
+    gatherer.flush()
     if broken is not None:
         raise broken
-    return {"points": points, "classes": dict(chunks.classes)}
+    return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
-def save_points(path: Path, found: dict[str, list[np.ndarray]]) -> None:
-    with atomic_file(path) as file:
-        np.savez(file, **{kind: np.concatenate(arrays) for kind, arrays in found.items()})
+def wanted_points(path: str, reaches: list[Reach]) -> Iterator[PointCloud]:
+    """All chunks of a file; of one with a spatial index (COPC) only the boxes that hold buildings' surroundings.
+
+    The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
+    are decoded twice. A point on a border may come twice, as in files that overlap.
+    """
+    from ..read.las import is_copc
+    from ..read.pointcloud import file_kind, read_header
+
+    if not reaches or file_kind(path) != "las" or not is_copc(path):
+        yield from iter_points(path)
+        return
+    xmin, ymin, _, xmax, ymax, _ = read_header(path).bounds
+    tree = shapely.STRtree(shapely.box(*np.array([reach.bounds for reach in reaches]).T))
+    for x in np.arange(np.floor(xmin / QUERY_M), np.floor(xmax / QUERY_M) + 1) * QUERY_M:
+        for y in np.arange(np.floor(ymin / QUERY_M), np.floor(ymax / QUERY_M) + 1) * QUERY_M:
+            square = (x, y, x + QUERY_M, y + QUERY_M)
+            if len(near := tree.query(shapely.box(*square))):
+                bounds = np.array([reaches[i].bounds for i in near])
+                low, high = (
+                    np.maximum(square[:2], bounds[:, :2].min(axis=0)),
+                    np.minimum(square[2:], bounds[:, 2:].max(axis=0)),
+                )
+                yield from iter_points(path, box=(*low, *high))
 
 
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
-    """Points of a work tile from all files, by kind: "roof" (n, 4) with the building's number, "ground", "low" (n, 3)."""
-    parts = [np.load(path) for path in sorted((root / "points" / tile).glob("*.npz"))]
-    return {
-        kind: np.concatenate(
-            [part[kind] for part in parts if kind in part] or [np.zeros((0, 4 if kind == "roof" else 3))]
-        )
-        for kind in KINDS
-    }
+    """Points (n, 3) of a work tile from all files, by kind: "roof", "ground", "low"."""
+    # a name that starts with a dot is what a killed worker left unfinished
+    files = sorted(path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith("."))
+    found: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in KINDS}
+    for path in files:
+        with np.load(path) as part:
+            for kind in part.files:
+                found[kind].append(part[kind])
+    return {kind: np.concatenate(arrays) for kind, arrays in found.items()}

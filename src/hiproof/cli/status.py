@@ -2,19 +2,24 @@
 
 from __future__ import annotations
 
+import sqlite3
 from pathlib import Path
 
 from ..city.ledger import Ledger
 from ..errors import InputError
+
+CLOSED = ("done", "failed")
 
 
 def run(folder: Path) -> int:
     path = folder / ".hiproof" / "ledger.sqlite"
     if not path.is_file():
         raise InputError(f"expected the output folder of a run, got {folder}, which has no ledger; check the path")
-    ledger = Ledger(path, read_only=True)
-    for line in describe(ledger):
-        print(line)
+    try:
+        for line in describe(Ledger(path, read_only=True)):
+            print(line)
+    except sqlite3.DatabaseError as error:
+        raise InputError(f"expected the ledger of a run at {path}, got: {error}; it may be damaged") from error
     return 0
 
 
@@ -24,9 +29,9 @@ def describe(ledger: Ledger) -> list[str]:
     lines = []
     for kind, what in (("sort", "point files read"), ("solve", "work tiles solved")):
         rows = [row for row in tasks if row[1] == kind]
-        lines.append(f"{what}: {sum(row[3] != 'open' for row in rows)} of {len(rows)}")
+        lines.append(f"{what}: {sum(row[3] in CLOSED for row in rows)} of {len(rows)}")
     solve = [row for row in tasks if row[1] == "solve"]
-    total, done = sum(row[2] for row in solve), [row for row in solve if row[3] != "open"]
+    total, done = sum(row[2] for row in solve), [row for row in solve if row[3] in CLOSED]
     finished = sum(row[2] for row in done)
     lines.append(f"buildings done: {finished} of {total}")
     times = sorted(row[6] for row in done)

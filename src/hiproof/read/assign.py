@@ -30,7 +30,8 @@ class PointGrid:
         cells = (np.floor(self.xy / cell_m) - self.origin).astype(np.int64)
         self.columns = int(cells[:, 0].max()) + 1 if len(cells) else 1
         self.rows = int(cells[:, 1].max()) + 1 if len(cells) else 1
-        keys = cells[:, 1] * self.columns + cells[:, 0]
+        # sorted as 16 bits where they fit: numpy then counts instead of comparing
+        keys = (cells[:, 1] * self.columns + cells[:, 0]).astype(np.min_scalar_type(self.rows * self.columns))
         self.order = np.argsort(keys, kind="stable")
         self.keys = keys[self.order]
 

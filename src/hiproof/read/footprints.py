@@ -18,8 +18,8 @@ from ..model import Footprint
 from ..settings import Settings
 from .crs import parse_crs, require_metres, same_horizontal
 from .database import is_database, read_table
-from .las import is_url
 from .polygons import simple_polygons
+from .remote import is_url
 
 ID_NAMES = (
     *("id", "building_id", "identificatie", "identificatiebagpnd", "gml_id", "gmlid", "fid", "osm_id", "egid"),
@@ -60,7 +60,7 @@ def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.n
     """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and attribute columns."""
     if is_database(path):
         return read_table(path)
-    if not is_url(path) and "://" not in str(path) and not str(path).startswith(("/vsi", "PG:")):
+    if not is_url(path) and not str(path).startswith(("/vsi", "PG:")):
         if not Path(path).exists():
             raise InputError(f"expected footprints at {path}, got no such file; check the path")
         if Path(path).is_file() and Path(path).stat().st_size == 0:

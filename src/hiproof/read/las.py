@@ -1,4 +1,4 @@
-"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk."""
+"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk; by path or by address (see remote.py)."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import laspy
 import numpy as np
 
 from ..errors import InputError, InputWarning
+from .remote import opened
 
 Chunk = tuple[np.ndarray, np.ndarray | None]  # xyz (n, 3) float64, classification (n,) uint8 or None
 EVLR_HEADER_BYTES = 60
@@ -38,15 +39,13 @@ def explained(path: str | Path) -> Iterator[None]:
 def read_las_header(path: str | Path) -> laspy.LasHeader:
     """The header of a LAS, LAZ or COPC file. Raises InputError when it cannot be read."""
     refuse_missing_records(path)
-    with explained(path), laspy.open(path) as reader:
+    with explained(path), opened(path) as file, laspy.open(file) as reader:
         return reader.header
 
 
 def refuse_missing_records(path: str | Path) -> None:
     """Raise InputError where LAS 1.4's extended records reach beyond the file: laspy would read on, billions of times."""
-    if is_url(path):
-        return
-    with explained(path), open(path, "rb") as file:
+    with explained(path), opened(path) as file:
         head = file.read(247)
         size = file.seek(0, 2)
         if len(head) < 247 or head[25] < 4:
@@ -75,7 +74,11 @@ def las_chunks(path: str | Path, chunk_points: int, box: tuple[float, float, flo
     selection = laspy.DecompressionSelection
     wanted = selection.base() | selection.Z | selection.CLASSIFICATION | selection.FLAGS
     found = 0
-    with explained(path), laspy.open(path, decompression_selection=wanted, read_evlrs=False) as reader:
+    with (
+        explained(path),
+        opened(path) as file,
+        laspy.open(file, decompression_selection=wanted, read_evlrs=False) as reader,
+    ):
         expected = reader.header.point_count
         for record in reader.chunk_iterator(chunk_points):
             found += len(record)
@@ -88,21 +91,15 @@ def las_chunks(path: str | Path, chunk_points: int, box: tuple[float, float, flo
 
 
 def is_copc(path: str | Path) -> bool:
-    """Whether the file is cloud-optimised: the first VLR is COPC's by its standard. URLs are taken for such files."""
-    if is_url(path):
-        return True
-    with open(path, "rb") as file:
+    """Whether the file is cloud-optimised: the first VLR is COPC's by its standard."""
+    with explained(path), opened(path) as file:
         head = file.read(400)
     return head[375 + 2 : 375 + 6] == b"copc"
 
 
-def is_url(path: str | Path) -> bool:
-    return str(path).startswith(("http://", "https://"))
-
-
 def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chunk:
     refuse_missing_records(path)
-    with explained(path), laspy.CopcReader.open(str(path)) as reader:
+    with explained(path), opened(path) as file, laspy.CopcReader.open(file) as reader:
         low, high = reader.header.mins[2], reader.header.maxs[2]
         bounds = laspy.copc.Bounds(np.array([box[0], box[1], low]), np.array([box[2], box[3], high]))
         return decode(reader.query(bounds), path)

@@ -16,6 +16,7 @@ from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
 from .crs import parse_crs, require_metres, same_horizontal
+from .remote import is_url
 
 LAS_SUFFIXES = (".las", ".laz")
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
@@ -102,12 +103,12 @@ def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
     files: dict[str, str | Path] = {}
     for path in paths:
         for file in expand_path(path):
-            files.setdefault(str(file) if las.is_url(file) else str(Path(file).resolve()), file)
+            files.setdefault(str(file) if is_url(file) else str(Path(file).resolve()), file)
     return list(files.values())
 
 
 def expand_path(path: str | Path) -> list[str | Path]:
-    if las.is_url(path):
+    if is_url(path):
         return [path]
     folder = Path(path)
     if folder.is_dir():
@@ -125,7 +126,7 @@ def expand_path(path: str | Path) -> list[str | Path]:
 
 def file_kind(path: str | Path) -> str:
     """ "las", "ply" or "text", from the first bytes and the ending. Raises InputError for anything else."""
-    if las.is_url(path):
+    if is_url(path):
         return "las"
     try:
         with open(path, "rb") as file:

@@ -18,6 +18,39 @@ def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     return rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2)
 
 
+def thin_to_count(xyz: np.ndarray, most: int) -> np.ndarray:
+    """At most `most` of the points (n, 3): those whose coordinates' hashes are the lowest, in the order they came in.
+
+    A hash is as good as a draw, so density falls evenly, but it depends on the point alone: the same set of points
+    leaves the same ones, however it was cut and whatever order it came in.
+    """
+    if len(xyz) <= most:
+        return xyz
+    return xyz[np.sort(np.argsort(hashes(xyz), kind="stable")[:most])]
+
+
+def without_repeats(xyz: np.ndarray) -> np.ndarray:
+    """The points (n, 3) each once, in the order of their hashes: what stands in two overlapping files counts once.
+
+    >>> len(without_repeats(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.2, 0.2, 1.0]])))
+    2
+    """
+    ordered = xyz[np.argsort(hashes(xyz))]
+    return ordered[np.r_[True, np.any(ordered[1:] != ordered[:-1], axis=1)]] if len(ordered) else ordered
+
+
+def hashes(xyz: np.ndarray) -> np.ndarray:
+    """A 64-bit hash (n,) of each point's coordinates (splitmix64's mixing steps, Steele et al. 2014)."""
+    bits = np.ascontiguousarray(np.asarray(xyz, float)[:, :3]).view(np.uint64)
+    mixed = np.zeros(len(bits), np.uint64)
+    for column in bits.T:
+        mixed = (mixed ^ column) + np.uint64(0x9E3779B97F4A7C15)
+        mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        mixed ^= mixed >> np.uint64(31)
+    return mixed
+
+
 def rank_in_cells(xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     """One point a cell, its height the one of `rank(counts)` among the cell's heights in ascending order."""
     if not len(xyz):

@@ -36,7 +36,9 @@ class GeoParquetWriter(AttributesWriter):
         from pyproj import CRS
 
         types = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
-        fields = [pyarrow.field(name, types[kind]) for name, kind in zip(column_names(kinds), kinds.values())]
+        fields = [
+            pyarrow.field(name, types[kind]) for name, kind in zip(column_names(kinds), kinds.values(), strict=True)
+        ]
         crs = None if self.plan_wkt is None else CRS.from_wkt(self.plan_wkt).to_json_dict()
         geometry = {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"], "crs": crs}
         geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
@@ -49,7 +51,7 @@ def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:
 
     columns = [
         pyarrow.array([None if (v := row.get(name)) is None else kind(v) for _, row in rows], type)
-        for (name, kind), type in zip(kinds.items(), schema.types)
+        for (name, kind), type in zip(kinds.items(), schema.types, strict=False)
     ]
     return [*columns, pyarrow.array([outline for outline, _ in rows], schema.types[-1])]
 

@@ -1,0 +1,46 @@
+"""Files by address: whatever fsspec knows (http, https, s3, gs, ...), read in ranges as far as the server allows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from ..errors import InputError
+
+BLOCK_BYTES = 1 << 20
+
+
+def is_url(path: str | Path) -> bool:
+    """Whether `path` is an address rather than a file of this machine.
+
+    >>> is_url("https://example.org/tile.laz"), is_url("tiles/a.laz")
+    (True, False)
+    """
+    return "://" in str(path)
+
+
+@contextmanager
+def opened(path: str | Path) -> Iterator[BinaryIO]:
+    """A seekable binary file at a path or an address. Raises InputError where an address cannot be opened."""
+    with open_address(str(path)) if is_url(path) else Path(path).open("rb") as file:
+        yield file
+
+
+def open_address(url: str) -> BinaryIO:
+    fsspec = import_fsspec()
+    try:
+        return fsspec.open(url, "rb", block_size=BLOCK_BYTES).open()
+    except ImportError as error:
+        raise InputError(f"expected what fsspec needs to open {url}, got: {error}; install it") from error
+    except Exception as error:  # each of fsspec's file systems raises errors of its own
+        raise InputError(f"expected a point cloud at {url}, got: {error or type(error).__name__}; check it") from error
+
+
+def import_fsspec() -> Any:
+    try:
+        import fsspec
+    except ImportError as error:
+        raise InputError("expected the extra `city` for files by address; try: pip install 'hiproof[city]'") from error
+    return fsspec

@@ -1,0 +1,71 @@
+"""Stand-ins for `solve_tile` that worker processes can import: one that costs nothing, and some that go wrong."""
+
+import os
+import resource
+import signal
+from pathlib import Path
+
+import numpy as np
+
+from hiproof.city import solve
+from hiproof.model import Building, Quality
+from hiproof.status import Status
+
+DEADLY = "house-2"
+
+
+def counted(points, footprint, terrain, settings, id):
+    """No roof, but everything that a building's neighbours, tile or files could change: its points and its ground."""
+    points = np.unique(points, axis=0)
+    corner = np.array([footprint.polygon.bounds[:2]])
+    ground = float(terrain.height_at(corner)[0])
+    quality = Quality(points=len(points), rmse=float(points.sum()) if len(points) else float("nan"))
+    return Building(id, Status.NO_POINTS, f"{len(points)} points", None, None, quality, ground, terrain.source)
+
+
+def solve_with(reconstruct, folder, tile, avoid):
+    original, solve.reconstruct = solve.reconstruct, reconstruct
+    try:
+        return solve.solve_tile(folder, tile, avoid)
+    finally:
+        solve.reconstruct = original
+
+
+def solve_quickly(folder, tile, avoid=()):
+    return solve_with(counted, folder, tile, avoid)
+
+
+def solve_killed_once(folder, tile, avoid=()):
+    """The worker that first comes to the deadly building is killed, as if from outside."""
+
+    def reconstruct(points, footprint, terrain, settings, id):
+        mark = Path(folder) / "killed"
+        if id == DEADLY and not mark.exists():
+            mark.touch()
+            os.kill(os.getpid(), signal.SIGKILL)
+        return counted(points, footprint, terrain, settings, id)
+
+    return solve_with(reconstruct, folder, tile, avoid)
+
+
+def solve_deadly(folder, tile, avoid=()):
+    """One building kills every worker that tries it."""
+
+    def reconstruct(points, footprint, terrain, settings, id):
+        if id == DEADLY:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return counted(points, footprint, terrain, settings, id)
+
+    return solve_with(reconstruct, folder, tile, avoid)
+
+
+def solve_hungry(folder, tile, avoid=()):
+    """One building wants more memory than the worker may have."""
+
+    def reconstruct(points, footprint, terrain, settings, id):
+        if id == DEADLY:
+            resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.getrlimit(resource.RLIMIT_AS)[1]))
+            np.ones(1 << 30)
+        return counted(points, footprint, terrain, settings, id)
+
+    return solve_with(reconstruct, folder, tile, avoid)

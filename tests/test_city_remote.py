@@ -1,0 +1,79 @@
+"""A run whose inputs are addresses: served on the loopback address, read in ranges, the same models as from files."""
+
+import numpy as np
+import pytest
+import rasterio
+from rasterio.transform import from_origin
+
+import planted
+from hiproof.city import run as city_run
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.errors import InputError
+from hiproof.read.pointcloud import read_points
+from range_server import serving
+from read.test_pointcloud import write_copc
+from tiny_town import make_town, write_town
+
+pytest.importorskip("aiohttp", reason="needs fsspec[http], part of the extra `city`")
+RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
+
+
+@pytest.fixture
+def served(tmp_path):
+    """A folder, its address, and the file that lists the ranges asked for."""
+    folder, log = tmp_path / "served", tmp_path / "ranges"
+    folder.mkdir()
+    log.touch()
+    with serving(folder, log) as address:
+        yield folder, address, log
+
+
+def write_terrain(path, town):
+    low, high = town.xyz.min(axis=0) - 20, town.xyz.max(axis=0) + 20
+    columns, rows = np.ceil(high[:2] - low[:2]).astype(int)
+    heights = np.full((rows, columns), 1.5, np.float32)
+    with rasterio.open(
+        path, "w", driver="GTiff", width=columns, height=rows, count=1, dtype="float32", crs="EPSG:28992",
+        transform=from_origin(low[0], high[1], 1, 1),
+    ) as file:  # fmt: skip
+        file.write(heights, 1)
+    return path
+
+
+def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(served, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    folder, address, log = served
+    town = make_town()
+    cloud, footprints = write_town(folder, town)
+    terrain = write_terrain(folder / "terrain.tif", town)
+    reconstruct_area(Request((str(cloud),), tmp_path / "files", str(footprints), str(terrain)))
+    remote = Request(
+        (f"{address}/cloud.laz",), tmp_path / "remote", f"{address}/footprints.geojson", f"{address}/terrain.tif"
+    )
+    reconstruct_area(remote)
+    for name in RECORDS:
+        assert (tmp_path / "remote" / name).read_bytes() == (tmp_path / "files" / name).read_bytes()
+    assert {line.split()[0] for line in log.read_text().splitlines()} >= {"/cloud.laz", "/terrain.tif"}
+    assert b"terrain model terrain.tif" in (tmp_path / "remote" / "parameters.jsonl").read_bytes()
+
+
+def test_copc_by_address_is_read_in_ranges(served, tmp_path):
+    folder, address, log = served
+    town = make_town()
+    write_copc(folder / "a.copc.laz", town.xyz, town.classification)
+    cloud = read_points(f"{address}/a.copc.laz", box=(*town.xyz[:, :2].min(axis=0), *town.xyz[:, :2].max(axis=0)))
+    assert len(cloud) == len(town.xyz)
+    assert "/a.copc.laz" in log.read_text()
+
+
+def test_an_address_that_answers_with_nothing_gets_one_sentence(served):
+    _, address, _ = served
+    with pytest.raises(InputError, match=r"missing\.laz"):
+        read_points(f"{address}/missing.laz")
+
+
+def test_an_address_of_something_else_gets_one_sentence(served):
+    folder, address, _ = served
+    (folder / "page.laz").write_text("<html>not a cloud</html>" * 50)
+    with pytest.raises(InputError, match=r"page\.laz"):
+        read_points(f"{address}/page.laz")

@@ -1,0 +1,181 @@
+"""What a city run does when workers die, memory or disk ends, or a building is too much: the others come out the same."""
+
+import errno
+import json
+import sqlite3
+
+import numpy as np
+import pytest
+
+import planted
+from hiproof.city import run as city_run
+from hiproof.city.ledger import Ledger
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.errors import OutputError
+from hiproof.read.thin import thin_to_count, without_repeats
+from hiproof.settings import Settings
+from hiproof.write import files as output_files
+from tiny_town import make_town, write_cloud, write_footprints, write_town
+
+RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
+
+
+def records(out):
+    return {name: (out / name).read_bytes() for name in RECORDS}
+
+
+def by_id(out):
+    return {row["id"]: row for row in map(json.loads, (out / "parameters.jsonl").read_text().splitlines())}
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory):
+    return [str(path) for path in write_town(tmp_path_factory.mktemp("town"))]
+
+
+@pytest.fixture(autouse=True)
+def small_tiles(monkeypatch):
+    monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 2)
+
+
+@pytest.fixture(scope="module")
+def undisturbed(files, tmp_path_factory):
+    out = tmp_path_factory.mktemp("undisturbed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(city_run, "solve_tile", planted.solve_quickly)
+        reconstruct_area(Request((files[0],), out, files[1]))
+    return records(out), by_id(out)
+
+
+def test_a_worker_killed_from_outside_changes_no_byte(files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
+    reconstruct_area(Request((files[0],), tmp_path, files[1], jobs=2))
+    assert (tmp_path / ".hiproof" / "killed").exists()
+    assert records(tmp_path) == undisturbed[0]
+
+
+@pytest.mark.parametrize("solve", [planted.solve_deadly, planted.solve_hungry], ids=["kills", "eats memory"])
+def test_a_building_that_ends_its_process_is_left_out_alone(solve, files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", solve)
+    monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
+    monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
+    summary = reconstruct_area(Request((files[0],), tmp_path, files[1], jobs=2))
+    assert summary.exit_code == 1
+    assert [id for id, _ in summary.failures] == [planted.DEADLY]
+    rows = by_id(tmp_path)
+    assert "process died" in rows.pop(planted.DEADLY)["detail"]
+    assert rows == {id: row for id, row in undisturbed[1].items() if id != planted.DEADLY}
+
+
+def test_losses_with_the_main_process_lead_to_quarantine(files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    request = Request((files[0],), tmp_path, files[1])
+
+    def killed(step, done, total):
+        if step == "solve" and done == 1:
+            raise SystemExit
+
+    with pytest.raises(SystemExit):
+        reconstruct_area(request, killed)
+    database = sqlite3.connect(tmp_path / ".hiproof" / "ledger.sqlite")
+    database.execute("update task set losses = 3 where kind = 'solve' and state = 'open'")
+    database.commit()
+    alone = []
+    original = city_run.solve_in_quarantine
+    monkeypatch.setattr(city_run, "solve_in_quarantine", lambda *a: alone.append(a[-1]) or original(*a))
+    reconstruct_area(request)
+    assert len(alone) == 1
+    assert records(tmp_path) == undisturbed[0]
+
+
+def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    request = Request((files[0],), tmp_path, files[1])
+    original, written = output_files.OutputFile.write, []
+
+    def full(self, data):
+        written.append(len(data))
+        if len(written) > 8:
+            raise output_files.output_error(self.path, OSError(errno.ENOSPC, "No space left on device"))
+        return original(self, data)
+
+    monkeypatch.setattr(output_files.OutputFile, "write", full)
+    with pytest.raises(OutputError, match="disk is full"):
+        reconstruct_area(request)
+    monkeypatch.setattr(output_files.OutputFile, "write", original)
+    reconstruct_area(request)
+    assert records(tmp_path) == undisturbed[0]
+
+
+def test_unfinished_files_of_a_killed_worker_are_not_read(files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+
+    def litter(step, done, total):
+        if step == "solve" and done == 0:
+            for folder in (tmp_path / ".hiproof" / "points").iterdir():
+                (folder / ".0-0.npz-1-abcd.npz").write_bytes(b"cut off")
+            (tmp_path / ".buildings.gml-1-abcd.gml").write_bytes(b"cut off")
+
+    reconstruct_area(Request((files[0],), tmp_path, files[1]), litter)
+    assert records(tmp_path) == undisturbed[0]
+    assert not [path for path in tmp_path.iterdir() if path.name.startswith(".buildings")]
+
+
+def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(files, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    (tmp_path / ".hiproof").mkdir()
+    (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(b"not a database, but long enough to look like one" * 9)
+    with pytest.raises(OutputError, match="--restart"):
+        reconstruct_area(Request((files[0],), tmp_path, files[1]))
+    assert reconstruct_area(Request((files[0],), tmp_path, files[1], restart=True)).buildings == 4
+
+
+def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    monkeypatch.setattr("hiproof.city.sort.HELD_POINTS", 1000)
+    monkeypatch.setattr("hiproof.read.pointcloud.CHUNK_POINTS", 3000)
+    town, rng = make_town(), np.random.default_rng(5)
+    middle = np.median(town.xyz[:, 0])
+    clouds = []
+    for name, wanted in (("b", town.xyz[:, 0] < middle + 15), ("a", town.xyz[:, 0] > middle - 15)):
+        members = rng.permutation(np.flatnonzero(wanted))
+        clouds.append(str(write_cloud(tmp_path / f"{name}.laz", town.xyz[members], town.classification[members])))
+    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
+    assert records(tmp_path / "out") == undisturbed[0]
+
+
+def test_a_building_with_too_many_points_is_thinned_and_says_so(files, tmp_path):
+    settings = Settings.from_dict({"city": {"max_points_a_building": 1000}, "fit": {"parts": "one", "types": ["flat"]}})
+    town = make_town(houses=1, density=20.0)
+    cloud, footprints = write_town(tmp_path, town)
+    reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints), settings=settings))
+    row = by_id(tmp_path / "out")["house-0"]
+    assert row["points"] == 1000
+    if row["status"] == "modelled":
+        assert "fitted to 1000 of its" in row["detail"]
+
+
+def test_thinning_depends_on_the_set_of_points_alone():
+    rng = np.random.default_rng(6)
+    points = rng.uniform(0, 50, (5000, 3))
+    kept = thin_to_count(points, 700)
+    again = thin_to_count(without_repeats(np.concatenate([points, points[:900]])[rng.permutation(5900)]), 700)
+    assert {tuple(p) for p in kept} == {tuple(p) for p in again}
+    assert len(kept) == 700
+    # evenly: each quarter of the area keeps about a quarter
+    quarters = np.bincount((kept[:, 0] > 25) * 2 + (kept[:, 1] > 25))
+    assert (abs(quarters - 175) < 60).all()
+
+
+def test_the_ledger_tells_losses_from_orderly_ends(tmp_path):
+    ledger = Ledger(tmp_path / "ledger.sqlite")
+    ledger.add_tasks([("solve:a", "solve", 0, 2), ("solve:b", "solve", 1, 1)])
+    ledger.start("solve:a")
+    assert ledger.open_tasks("solve") == ["solve:b"]
+    ledger.interrupt()
+    assert ledger.losses("solve:a") == 0
+    ledger.start("solve:a")
+    ledger.reopen()
+    assert ledger.losses("solve:a") == 1
+    assert ledger.open_tasks("solve") == ["solve:a", "solve:b"]
