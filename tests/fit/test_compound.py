@@ -7,7 +7,9 @@ import shapely
 from hiproof.errors import FitError
 from hiproof.fit import fit_roof
 from hiproof.fit.compound import fit_building
+from hiproof.fit.outline import iou
 from hiproof.model import Roof
+from hiproof.settings import Settings
 
 
 def sampled(height, outline, density=8.0, noise=0.03, seed=0):
@@ -156,3 +158,40 @@ def test_parts_are_named_by_the_catalogue_with_parameters_and_deviations():
     assert parts["gable"].parameters["height"] == pytest.approx(0.9 * 3.5, abs=0.05)
     assert 0.0 < parts["gable"].sigma["height"] < 0.05
     assert parts["flat"].translation[2] == pytest.approx(3.0, abs=0.02)
+
+
+def test_equal_monopitches_in_a_row_are_one_saw_tooth():
+    hall = shapely.box(0, 0, 12, 15)
+    fit = fit_building(sampled(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall), hall)
+    assert [part.type for part in fit.roof_parts] == ["shed"]
+    assert fit.roof_parts[0].parameters["teeth"] == 3
+
+
+def test_detail_main_leaves_a_dormer_out():
+    def with_dormer(x, y):
+        return np.where((abs(x - 6) < 0.9) & (y > 1.0) & (y < 3.0), 8.0, 8.0 - 0.9 * np.abs(y - 3.5))
+
+    points = sampled(with_dormer, HOUSE)
+    main = fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": "main"}}))
+    assert len(main.roof_parts) == 1
+    assert len(fit_building(points, HOUSE).roof_parts) > 1
+
+
+def test_without_an_outline_the_plan_is_estimated():
+    points = sampled(gable_with_shed, HOUSE)
+    fit = fit_building(points)
+    assert iou(fit.outline, HOUSE) > 0.9
+    assert fit.unexplained < 0.1
+
+
+def test_points_on_a_line_without_an_outline_are_an_error_with_a_sentence():
+    line = np.column_stack([np.arange(9.0), np.arange(9.0), np.full(9, 4.0)])
+    with pytest.raises(FitError, match="expected points that span an area"):
+        fit_building(line)
+
+
+def test_improbable_points_do_not_count():
+    points = sampled(gable_with_shed, HOUSE)
+    tree = sampled(lambda x, y: 12.0 + 0.0 * x, shapely.box(1, 1, 3, 3))
+    weights = np.r_[np.ones(len(points)), np.zeros(len(tree))]
+    assert fit_building(np.vstack([points, tree]), HOUSE, weights=weights).unexplained < 0.02

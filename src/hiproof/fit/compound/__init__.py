@@ -8,7 +8,8 @@
     search     these in order: pool -> partition -> refine -> overlays -> polish
     joint      all planes refitted to all points together, with the regularities the evidence allows
     pieces     layout -> disjoint pieces over the outline
-    recognise  piece -> part of the catalogue with its parameters
+    recognise  piece -> type of the catalogue with its parameters
+    parts      piece -> part; equal monopitches in a row -> one saw-tooth
     single     the one primitive of `fit_roof`, where it explains the roof as well
 
 Every decision lowers one objective: sum over points of min((dz / tau)^2, 1) plus `evidence` points a unit of complexity.
@@ -20,14 +21,13 @@ import numpy as np
 import shapely
 
 from ...errors import FitError
-from ...model import Part
 from ...settings import Settings
 from .fit import CompoundFit
-from .joint import JointFit, fit_together
+from .joint import fit_together
 from .layout import evaluate
-from .pieces import RowPiece, disjoint_pieces
-from .plan import Plan, lay_out_plan
-from .recognise import recognised
+from .parts import assembled_parts
+from .pieces import disjoint_pieces
+from .plan import lay_out_plan
 from .search import evidence_per_unit, search_layout
 from .single import fit_alone, is_simple, outline_of_points, single_primitive
 
@@ -70,7 +70,7 @@ def fit_building(
         if single is not None and single.objective <= objective:
             return single.as_fit(outline, len(plan.cloud.u))
     joint = fit_together(layout, plan, settings.compound.tolerance_m, evidence)
-    parts = tuple(part_of(piece, joint, plan) for piece in disjoint_pieces(layout, plan, outline))
+    parts = assembled_parts(disjoint_pieces(layout, plan, outline), joint, plan)
     z, _, _ = evaluate(layout, plan.cloud.u, plan.cloud.v)
     unexplained = float(np.mean(np.abs(plan.cloud.z - z) > settings.compound.tolerance_m))
     return CompoundFit(parts, outline, objective, len(z), unexplained)
@@ -85,11 +85,3 @@ def countable(points: np.ndarray, weights: np.ndarray | None) -> tuple[np.ndarra
     weights = np.asarray(weights, float)
     counts &= weights >= 0.5
     return points[counts], weights[counts]
-
-
-def part_of(found: RowPiece, joint: JointFit, plan: Plan) -> Part:
-    """The piece as a part of the catalogue, with standard deviations where all its planes were fitted."""
-    if (found.rows < 0).any():
-        return recognised(found.piece)
-    to_local = np.kron(np.eye(len(found.rows)), plan.frame.plane_map())
-    return recognised(found.piece, to_local @ joint.covariance_of(found.rows) @ to_local.T)

@@ -26,7 +26,7 @@ from .kernels import (
 MAX_HOLDERS = 96
 MAX_NODES = 2 * MAX_HOLDERS
 MAX_TABLE = MAX_HOLDERS * MAX_PLANES
-MAX_OVERLAYS = 6
+MAX_OVERLAYS = 12
 
 # axis[n]: -1 a leaf, 0 a cut at u = at[n], 1 at v = at[n]; child[n]: below and above the cut; holder[n]: of a leaf.
 # plane_of[h, k], planes_of[h]: rows of `table` and their number. rect[h] = (u0, u1, v0, v1) of an overlay's holder.
