@@ -68,12 +68,15 @@ def distributions(values: dict[str, np.ndarray], label: str, top: float):
         numbers = np.asarray(numbers, float)
         numbers = numbers[np.isfinite(numbers)]
         colour = colour_of(name, i)
-        left.hist(np.clip(numbers, 0, top), bins, histtype="step", color=colour, label=name, linewidth=1.6)
+        shares = np.full(len(numbers), 1 / max(len(numbers), 1))
+        left.hist(
+            np.clip(numbers, 0, top), bins, weights=shares, histtype="step", color=colour, label=name, linewidth=1.6
+        )
         right.plot(np.sort(numbers), np.linspace(0, 1, len(numbers)), color=colour, label=name)
     right.set_xlim(0, top)
     for axis in (left, right):
         axis.set_xlabel(label)
-    left.set_ylabel("roofs")
+    left.set_ylabel("share of roofs")
     right.set_ylabel("share of roofs at or below")
     left.legend()
     return figure
