@@ -80,5 +80,7 @@ def test_what_cannot_be_trained_on_is_refused(tmp_path):
     if not torch.cuda.is_available():
         with pytest.raises(SettingsError, match="CUDA"):
             train("simulated", tmp_path, TrainSettings(**{**vars(TINY), "device": "cuda"}))
+    with pytest.raises(SettingsError, match="epoch of at least"):
+        train("simulated", tmp_path, TrainSettings(**{**vars(TINY), "epoch": 1}))
     with pytest.raises(SettingsError, match="auto, cpu, cuda"):
         train("simulated", tmp_path, TrainSettings(**{**vars(TINY), "device": "tpu"}))

@@ -15,10 +15,11 @@ from .batch import example_batch
 from .network import RoofNetwork
 
 
-def export(network: RoofNetwork, path: str | Path, details: dict[str, str] | None = None) -> Path:
-    """Write `network` as ONNX to `path`, with its types, layout and the temperature of its probabilities inside.
+def export(network: RoofNetwork, path: str | Path) -> Path:
+    """Write `network` as ONNX to `path`, with its types and layout inside.
 
-    Weights keep their names, so that they can be read back from the file. The graph takes the arrays of `segment.arrange.Arrangement`, flat over any number of buildings.
+    Weights keep their names, so that they can be read back from the file. The graph takes the arrays of
+    `segment.arrange.Arrangement`, flat over any number of buildings.
     """
     import onnx
 
@@ -38,7 +39,6 @@ def export(network: RoofNetwork, path: str | Path, details: dict[str, str] | Non
         "types": json.dumps(network.settings.types),
         "layout": json.dumps(dataclasses.asdict(network.settings.layout)),
         "features": json.dumps(FEATURES),
-        **(details or {}),
     }
     onnx.helper.set_model_props(model, metadata)
     onnx.save(model, path)

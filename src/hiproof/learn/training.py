@@ -56,12 +56,17 @@ class TrainSettings:
 def train(data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print) -> Path:
     """Train the network on `data` and write weights, curve, model card and checkpoints to the folder `out`.
 
-    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up three quarters).
+    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 85 %).
     A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX file of the best epoch.
     Raises InputError for data that cannot be used, OutputError for a folder that cannot be written, SettingsError for
-    a device that is not there.
+    a device that is not there or an epoch too short.
     """
     settings = settings or TrainSettings()
+    if settings.epoch < 2 * settings.views or settings.batch < 2:
+        raise SettingsError(
+            f"expected an epoch of at least {2 * settings.views} clouds in batches of 2 or more, got {settings.epoch} "
+            f"in batches of {settings.batch}"
+        )
     source = open_source(data, settings.types, settings.seed)
     folder = writable_folder(out)
     torch.set_num_threads(settings.threads)
@@ -108,11 +113,14 @@ class Trainer:
         self.history.append({"epoch": self.epoch, "loss": float(np.mean(losses))})
 
     def batches(self):
-        """Yield the epoch's batches: fresh clouds first, then the same again in another order and other symmetries."""
+        """Yield the epoch's batches: fresh clouds first, then the same again in another order and other symmetries.
+
+        A last batch of a single cloud is left out: it has no statistics to normalise by.
+        """
         settings = self.settings
         fresh = settings.epoch // settings.views
         clouds = []
-        for index in range(0, fresh, settings.batch):
+        for index in range(0, fresh - 1, settings.batch):
             batch = [
                 self.training_cloud(self.epoch * fresh + i) for i in range(index, min(index + settings.batch, fresh))
             ]
@@ -121,7 +129,7 @@ class Trainer:
         rng = np.random.default_rng([settings.seed, 19, self.epoch])
         for _ in range(settings.views - 1):
             order = rng.permutation(fresh)
-            for index in range(0, fresh, settings.batch):
+            for index in range(0, fresh - 1, settings.batch):
                 yield [turned(clouds[i], rng) for i in order[index : index + settings.batch]]
 
     def training_cloud(self, index: int):

@@ -65,7 +65,6 @@ class Model:
     session: object
     types: tuple[str, ...]
     layout: Layout
-    temperature: float
 
 
 def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentation:
@@ -90,7 +89,7 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
     point_logits, type_logits = run(model, [arranged])
     barred = barred_types(model, settings.fit.types)
     point_probability = softmax(point_logits[: arranged.sampled] + np.append(barred, 0.0))
-    type_probability = softmax(type_logits[0] / model.temperature + barred)
+    type_probability = softmax(type_logits[0] + barred)
     labels, not_roof = carried_back(point_probability, xyz[arranged.chosen[: arranged.sampled]], xyz)
     return Segmentation(labels, not_roof, dict(zip(model.types, map(float, type_probability), strict=True)))
 
@@ -199,7 +198,7 @@ def load(weights: str, device: str = "cpu") -> Model:
     layout = json.loads(metadata["layout"])
     layout["levels"] = tuple(layout["levels"])
     types = tuple(json.loads(metadata["types"]))
-    return Model(session, types, Layout(**layout), float(metadata.get("temperature", 1.0)))
+    return Model(session, types, Layout(**layout))
 
 
 def first_line(error: Exception) -> str:
