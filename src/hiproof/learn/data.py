@@ -80,7 +80,11 @@ class Scanned:
 
     @property
     def description(self) -> str:
-        return f"{len(self.shapes)} real shapes of {self.path.name} under the simulated scanner, seed {self.seed}"
+        held_out = sum(shape.held_out for shape in self.shapes)
+        return (
+            f"{len(self.shapes) - held_out} real shapes of {self.path.name} under the simulated scanner "
+            f"({held_out} held out by building), seed {self.seed}"
+        )
 
     def sample(self, role: int, index: int) -> Sample:
         rng = np.random.default_rng([self.seed, 11, role, index])
