@@ -1,6 +1,6 @@
 """Compound roofs on a real town: solids for every footprint at four densities, measured against all points.
 
-usage: python benchmarks/delft.py [--data ../shared/data/delft] [--tools ../shared/tools] [--shares 1 0.5 0.25 0.125]
+usage: python -m benchmarks.delft [--data ../shared/data/delft] [--tools ../shared/tools] [--shares 1 0.5 0.25 0.125]
 
 Fits and composes every footprint of the folder's `footprints.gpkg` from its `*.laz` (class 6), thinned as
 `thin_cloud.py` does, writes the solids as CityJSONSeq and lets `roof_residuals.py` measure them on the full cloud.

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from .kernels import (
@@ -28,6 +30,7 @@ from .refine import add_overlay, refine, settle
 ROUNDS, SETTLING_ROUNDS = 2, 1
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
+SEARCH_POINTS = 4000
 POOL_POINTS = 1000  # the planes are looked for on at most so many points, evenly spread
 SEEDS, PAIRS_PER_SEED = 150, 2
 
@@ -39,30 +42,48 @@ def evidence_per_unit(density: float, settings) -> float:
 
 
 def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
-    """Layout of the roof over `plan` and its objective (points)."""
+    """Layout of the roof over `plan` and its objective (points).
+
+    Structure is searched on at most SEARCH_POINTS points, evenly spread; the last rounds of settling see all of them.
+    """
     evidence, tau = evidence_per_unit(plan.density, settings), settings.tolerance_m
-    cloud, grid, ghosts = plan.cloud, plan.grid, plan.ghosts
-    if len(cloud.u) < MIN_STRUCTURE_POINTS:
-        layout = single_plane_layout((0.0, 0.0, upper_median(cloud.z)))
-        return layout, objective(layout, cloud, ghosts, tau, evidence)
+    if len(plan.cloud.u) < MIN_STRUCTURE_POINTS:
+        layout = single_plane_layout((0.0, 0.0, upper_median(plan.cloud.z)))
+    else:
+        few = thinned_plan(plan, SEARCH_POINTS)
+        layout = searched(few, tau, evidence_per_unit(few.density, settings), settings.detail == "full")
+        for _ in range(SETTLING_ROUNDS):
+            settle(layout, plan.cloud, plan.ghosts, plan.grid, tau, evidence)
+            polish(layout, plan.cloud, plan.ghosts, tau, evidence)
+    return layout, objective(layout, plan.cloud, plan.ghosts, tau, evidence)
+
+
+def searched(plan: Plan, tau: float, evidence: float, with_overlays: bool) -> Layout:
+    """Pool, partition and refinement twice, the better kept; then overlays and the polish."""
     pool, gables = propose(plan, tau, evidence)
     best, best_value = None, np.inf
     for _ in range(ROUNDS):
-        pool = without_twins(pool, cloud)
+        pool = without_twins(pool, plan.cloud)
         layout = partition(plan, pool, gables, tau, evidence)
         for last in (False, False, True):
-            refine(layout, cloud, grid, pool[:0] if last else pool, tau, evidence)
-        value = objective(layout, cloud, ghosts, tau, evidence)
+            refine(layout, plan.cloud, plan.grid, pool[:0] if last else pool, tau, evidence)
+        value = objective(layout, plan.cloud, plan.ghosts, tau, evidence)
         if value < best_value:
             best, best_value = layout, value
         pool, gables = with_layout(layout, pool, gables)
-    if settings.detail == "full":
+    if with_overlays:
         cover_outliers(best, plan, tau, evidence)
-    polish(best, cloud, ghosts, tau, evidence)
-    for _ in range(SETTLING_ROUNDS):
-        settle(best, cloud, ghosts, grid, tau, evidence)
-        polish(best, cloud, ghosts, tau, evidence)
-    return best, objective(best, cloud, ghosts, tau, evidence)
+    polish(best, plan.cloud, plan.ghosts, tau, evidence)
+    return best
+
+
+def thinned_plan(plan: Plan, most: int) -> Plan:
+    """`plan` with at most `most` points; ghosts weigh as many points as their area then holds."""
+    share = min(1.0, most / len(plan.cloud.u))
+    if share == 1.0:
+        return plan
+    ghosts = plan.ghosts._replace(weight=plan.ghosts.weight * share)
+    return replace(plan, cloud=thinned(plan.cloud, most), ghosts=ghosts, density=plan.density * share)
 
 
 def upper_median(z: np.ndarray) -> float:
