@@ -214,7 +214,7 @@ def new_york() -> str | None:
             settings = Settings().replace({"fit": {"parts": parts}, "segment": {"enabled": enabled}})
             distances = [roof_distance(cloud, face > 0, settings) for cloud, face in zip(clouds, faces, strict=True)]
             figures = (np.mean(distances), np.median(distances), np.percentile(distances, 90))
-            rows.append((parts, "with" if enabled else "without", *(f"{figure:.3f} m" for figure in figures)))
+            rows.append((parts, "with" if enabled else "without", *(f"{figure:.4f} m" for figure in figures)))
     return table(("parts", "network", "mean", "median", "90th percentile"), rows)
 
 

@@ -1,14 +1,16 @@
 """The shipped network: what it must recognise, what it may not depend on, and what it refuses."""
 
 import tracemalloc
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from hiproof.errors import FitError, InputError, SettingsError
+from hiproof.fit import fit_roof
 from hiproof.primitives.catalogue import CATALOGUE
-from hiproof.segment import NOT_ROOF, segment
+from hiproof.segment import NOT_ROOF, most_probable, segment
 from hiproof.segment.arrange import rotated
 from hiproof.segment.inference import SHIPPED_WEIGHTS, carried_back, load
 from hiproof.settings import Settings
@@ -85,6 +87,20 @@ def test_labelled_real_roofs():
         if AS_GABLE.get(told[path.name], told[path.name]) != path.parent.name
     ]
     assert len(wrong) <= 2, wrong
+
+
+def test_labelled_real_roofs_with_the_fits_evidence():
+    if not REAL_ROOFS.is_dir():
+        pytest.skip("needs ../shared/data/roofn3d/labelled")
+    right = 0
+    for path in sorted(REAL_ROOFS.glob("*/*.pts")):
+        points = np.loadtxt(path)[:, :3]
+        found = segment(points)
+        fit = partial(fit_roof, points, weights=found.weights)
+        chosen, posterior = most_probable(lambda types, fit=fit: fit(types=types or None), found.types)
+        assert chosen.type == next(iter(posterior))
+        right += AS_GABLE.get(chosen.type, chosen.type) == path.parent.name
+    assert right >= 11
 
 
 def test_labels_are_carried_back_from_the_nearest_samples():

@@ -237,7 +237,12 @@ class Trainer:
         path = export(self.averaged.cpu(), self.folder / "roof_types.onnx")
         made_by = {"device": device_name(self.device), "hours": round(self.seconds / 3600, 2)}
         write_card(
-            self.folder, self.source.description, asdict(self.settings) | {"types": self.source.types}, self.history, self.best["epoch"], made_by
+            self.folder,
+            self.source.description,
+            asdict(self.settings) | {"types": self.source.types},
+            self.history,
+            self.best["epoch"],
+            made_by,
         )
         return path
 

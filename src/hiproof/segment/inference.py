@@ -70,9 +70,10 @@ class Model:
 def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentation:
     """Roof type, and roof or not, of every point of one building, and the probabilities of the building's type.
 
-    `points` (n, 3) metres, any frame and order, n >= 10; the answer does not change when they turn about Z. A cloud
-    beyond the network's size is thinned to farthest points and its labels are carried back to all points. Types outside
-    `settings.fit.types` get probability 0: the paper's three-type configuration is `("pyramid", "gable", "hip")`.
+    `points` (n, 3) metres, any frame and order, n >= 10; but for rounding, the answer does not change when they turn
+    about Z. A cloud beyond the network's size is thinned to farthest points and its labels are carried back to all
+    points. Types outside `settings.fit.types` get probability 0: the paper's three-type configuration is
+    `("pyramid", "gable", "hip")`.
 
     Raises FitError for points no roof can be told from (fewer than 10, all in one place, not finite), InputError for
     an array of another shape or weights that are missing or of another kind, SettingsError for a device not there.
