@@ -1,0 +1,222 @@
+"""A simulated city through the whole program: speed, workers, size, memory, kills, damaged input; prints one table.
+
+usage: python -m benchmarks.city [--work FOLDER] [--buildings 300] [--large N] [--kills N] [--kill-buildings 40]
+                                 [--delft ../shared/data/delft]
+
+Cities are made once in the folder and used again. Rates are buildings a CPU second of one core, everything from reading to
+the written files included, in a process that has run once before (imports and compiled code loaded); wall times stand
+beside them, and tell little on a machine that has other work. `--large` adds the run whose cost a building is compared
+with the small one's, `--kills` random kill -9 of the main process and its workers.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import shapely
+
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.compose import check_solid
+from hiproof.read import read_footprints, read_header
+from hiproof.read.solids import read_solids
+from hiproof.simulate import demo_files
+from hiproof.simulate.city import City, write_city
+
+RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
+
+
+@dataclass(frozen=True)
+class Cost:
+    """One run: CPU seconds of the main process and of its workers, wall seconds, peak memory of any process in MB."""
+
+    buildings: int
+    main_s: float
+    workers_s: float
+    wall_s: float
+    peak_mb: float
+
+    @property
+    def cpu_s(self) -> float:
+        return self.main_s + self.workers_s
+
+    def line(self) -> str:
+        return (
+            f"{self.buildings / self.cpu_s:.1f} buildings/CPU s, {1000 * self.cpu_s / self.buildings:.1f} ms a building "
+            f"(main {self.main_s:.1f} s, workers {self.workers_s:.1f} s, wall {self.wall_s:.1f} s, {self.peak_mb:.0f} MB)"
+        )
+
+
+def city_files(work: Path, buildings: int) -> tuple[list[str], str]:
+    """Clouds and footprints of a simulated city, made where they are not there yet."""
+    folder = work / f"city{buildings}"
+    if not (folder / "complete").exists():
+        shutil.rmtree(folder, ignore_errors=True)
+        for tile in write_city(folder, City(buildings)):
+            print(f"  simulated {tile['tile']}: {tile['buildings']} buildings, {tile['points']} points", flush=True)
+        (folder / "complete").touch()
+    return sorted(str(path) for path in (folder / "tiles").glob("*.laz")), str(folder / "footprints.gpkg")
+
+
+def measured(clouds: list[str], footprints: str, out: Path, jobs: int = 1) -> Cost:
+    """Cost of a run in a fresh process that has done the demo's neighbourhood before."""
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
+        return pool.submit(warm_run, clouds, footprints, out, jobs).result()
+
+
+def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int) -> Cost:
+    demo = demo_files()
+    warm_up = Request((str(demo["cloud"]),), out.with_name("warm-up"), str(demo["footprints"]), restart=True)
+    reconstruct_area(warm_up)
+    before, started = used(), time.perf_counter()
+    summary = reconstruct_area(Request(tuple(clouds), out, footprints, jobs=jobs, restart=True))
+    wall, after = time.perf_counter() - started, used()
+    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
+    return Cost(summary.buildings, after[0] - before[0], after[1] - before[1], wall, peak)
+
+
+def used() -> tuple[float, float]:
+    """CPU seconds of this process and of its ended children."""
+    usages = (resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
+    return tuple(usage.ru_utime + usage.ru_stime for usage in usages)
+
+
+def outcomes(out: Path, asked: int) -> str:
+    """How many solids are valid, and how many buildings have no outcome."""
+    rows = [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+    solids = [solid for _, solid in read_solids(out / "buildings.city.jsonl")]
+    valid = sum(not check_solid(solid, planarity_m=0.01) for solid in solids)
+    statuses = ", ".join(f"{sum(r['status'] == s for r in rows)} {s}" for s in sorted({r["status"] for r in rows}))
+    return f"{valid} of {len(solids)} solids valid; {asked - len(rows)} without outcome; {statuses}"
+
+
+def killed_run(clouds: list[str], footprints: str, out: Path, whole: Path, kills: int, seed: int = 1) -> str:
+    """Run with two workers, killed `kills` times at random moments, each time going on; compare with `whole`."""
+    draw, done, starts, of_main = random.Random(seed), 0, 0, 0
+    shutil.rmtree(out, ignore_errors=True)
+    command = [sys.executable, "-m", "hiproof", "reconstruct", *clouds, "--footprints", footprints, "--out", str(out)]
+    while True:
+        main = subprocess.Popen([*command, "--jobs", "2"], stdout=subprocess.DEVNULL)
+        starts += 1
+        while done < kills and main.poll() is None:
+            time.sleep(draw.uniform(1.0, 25.0))
+            workers = children(main.pid)
+            victim = draw.choice([main.pid, *workers])
+            if main.poll() is None:
+                os.kill(victim, signal.SIGKILL)
+                done, of_main = done + 1, of_main + (victim == main.pid)
+        if main.wait() >= 0:
+            break
+    same = all((out / name).read_bytes() == (whole / name).read_bytes() for name in RECORDS)
+    verdict = "byte-identical" if same else "DIFFERENT"
+    return f"{done} kills ({of_main} of the main process), {starts} starts, exit code {main.returncode}: {verdict}"
+
+
+def children(pid: int) -> list[int]:
+    """Processes started by `pid` that run Python code of ours, from the process table."""
+    try:
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+        return [int(c) for c in text.split() if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+    except OSError:
+        return []
+
+
+def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> str:
+    """One tile cut off, 1 % of the polygons self-crossing, 1 % more away from all points; the rest is compared."""
+    folder, out = work / "damaged", work / "out-damaged"
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir()
+    bad = Path(clouds[-1])
+    cut = folder / bad.name
+    cut.write_bytes(bad.read_bytes()[: bad.stat().st_size // 2])
+    xmin, ymin, _, xmax, ymax, _ = read_header(bad).bounds
+    lost = shapely.box(xmin - 15, ymin - 15, xmax + 15, ymax + 15)
+    asked = read_footprints(footprints)
+    broken = set(range(0, len(asked), 100))
+    shapes = [crossed(f.polygon) if i in broken else f.polygon for i, f in enumerate(asked)]
+    empty = [shapely.box(xmax + 1e4 + 20 * i, ymax, xmax + 1e4 + 20 * i + 10, ymax + 10) for i in range(len(broken))]
+    ids = [f.id for f in asked] + [f"empty-{i}" for i in range(len(empty))]
+    layer = folder / "footprints.gpkg"
+    meta = pyogrio.read_info(footprints)
+    pyogrio.raw.write(
+        layer, shapely.to_wkb(np.array([*shapes, *empty], object)), [np.array(ids, object)], ["id"],
+        geometry_type="Polygon", crs=meta["crs"], driver="GPKG",
+    )  # fmt: skip
+    summary = reconstruct_area(Request((*clouds[:-1], str(cut)), out, str(layer), restart=True))
+    rows, before = ({r["id"]: r for r in read_rows(folder)} for folder in (out, whole))
+    unharmed = [f.id for i, f in enumerate(asked) if i not in broken and not lost.intersects(f.polygon)]
+    different = sum(rows.get(id) != before[id] for id in unharmed)
+    named = [Path(name).name for name, _ in summary.broken_inputs]
+    return (
+        f"exit code {summary.exit_code}, named {named}; {len(unharmed)} buildings away from the damage, {different} of them "
+        f"changed; {summary.by_status.get('no_points', 0)} without points of {len(empty)} planted"
+    )
+
+
+def crossed(polygon: shapely.Polygon) -> shapely.Polygon:
+    """The polygon with two neighbouring corners exchanged: its border crosses itself."""
+    xy = shapely.get_coordinates(polygon.exterior)[:-1]
+    xy[[1, 2]] = xy[[2, 1]]
+    return shapely.Polygon(xy)
+
+
+def read_rows(out: Path) -> list[dict]:
+    return [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+
+
+def show(name: str, text: str) -> None:
+    print(f"| {name} | {text} |", flush=True)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--work", type=Path, default=Path("/tmp/hiproof-city"), help="folder for cities and results")
+    parser.add_argument("--buildings", type=int, default=300)
+    parser.add_argument("--large", type=int, default=0, help="buildings of the large city, 0: none")
+    parser.add_argument("--kills", type=int, default=0, help="how many random kills")
+    parser.add_argument("--kill-buildings", type=int, default=40)
+    parser.add_argument("--delft", type=Path, default=Path("../shared/data/delft"))
+    args = parser.parse_args()
+    args.work.mkdir(parents=True, exist_ok=True)
+    print("| measure | got |\n| --- | --- |", flush=True)
+    if args.delft.is_dir():
+        delft = sorted(map(str, args.delft.glob("*.laz"))), str(args.delft / "footprints.gpkg")
+        show("Delft, one process", measured(*delft, args.work / "out-delft").line())
+    clouds, footprints = city_files(args.work, args.buildings)
+    out = args.work / "out-one"
+    one = measured(clouds, footprints, out)
+    show("simulated city, one process", one.line())
+    show("outcomes", outcomes(out, len(read_footprints(footprints))))
+    two = measured(clouds, footprints, args.work / "out-two", jobs=2)
+    show("the same, two workers", two.line())
+    same = all((out / name).read_bytes() == (args.work / "out-two" / name).read_bytes() for name in RECORDS)
+    bound = one.cpu_s / (two.main_s + two.workers_s / 2)
+    show("two workers against one", f"wall {one.wall_s / two.wall_s:.2f}, by CPU time {bound:.2f}; same bytes: {same}")
+    show("damaged input", damaged_run(clouds, footprints, args.work, out))
+    if args.large:
+        large = measured(*city_files(args.work, args.large), args.work / "out-large")
+        ratio = large.cpu_s / large.buildings / (one.cpu_s / one.buildings)
+        show(f"{args.large} buildings", f"{large.line()}; cost a building against {args.buildings}: {ratio:.2f}")
+    if args.kills:
+        files = city_files(args.work, args.kill_buildings)
+        whole = args.work / "out-whole"
+        reconstruct_area(Request(tuple(files[0]), whole, files[1], restart=True))
+        show("random kills", killed_run(*files, args.work / "out-killed", whole, args.kills))
+
+
+if __name__ == "__main__":
+    main()
