@@ -60,7 +60,7 @@ class AttributesWriter(BuildingWriter):
         self.waiting = stack.enter_context(scratch(self.path))
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        self.put(table_row(building, figures or figures_of(building), self.prefix))
+        self.put(table_row(building, building_attributes(building, figures or figures_of(building), self.prefix)))
 
     def put(self, row: Row) -> None:
         """Write a building that `table_row` made, here or in another process."""
@@ -111,10 +111,9 @@ class AttributesWriter(BuildingWriter):
             ) from error
 
 
-def table_row(building: Building, figures: RoofFigures | None, prefix: str = PREFIX) -> Row:
+def table_row(building: Building, attributes: dict[str, Any]) -> Row:
     """The outline of `building` as WKB (None where it is unknown) and its attributes by column."""
-    values = building_attributes(building, figures, prefix)
-    named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in values.items()}
+    named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in attributes.items()}
     outline = plan_outline(building)
     return None if outline is None else shapely.to_wkb(outline), {"id": plain_text(building.id), **named}
 

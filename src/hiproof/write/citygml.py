@@ -86,8 +86,10 @@ class CityGMLWriter(BuildingWriter):
         self.file.write(b" " * self.envelope_length)
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
+        figures = figures or figures_of(building)
+        attributes = building_attributes(building, figures, self.prefix)
         name = self.names.take(gml_name(building.id))
-        self.put(gml_member(building, figures or figures_of(building), name, self.prefix, self.creation_date))
+        self.put(gml_member(building, figures, attributes, name, self.creation_date))
 
     def put(self, member: Member) -> None:
         """Write a building that `gml_member` made, here or in another process."""
@@ -125,12 +127,11 @@ class Member:
 def gml_member(
     building: Building,
     figures: RoofFigures | None,
+    attributes: dict[str, Any],
     name: str,
-    prefix: str = PREFIX,
     creation_date: datetime.date | None = None,
 ) -> Member:
     """The cityObjectMember of `building`, whose gml:ids end in `name`; the root's namespaces are taken as declared."""
-    attributes = building_attributes(building, figures, prefix)
     element = city_object_member(building, figures, attributes, name, creation_date)
     text = etree.tostring(element, encoding="utf-8", xml_declaration=False)
     lines = terrain_lines(building)

@@ -77,12 +77,13 @@ class CityJSONWriter(BuildingWriter):
         figures = figures or figures_of(building)
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale_m)
+        attributes = building_attributes(building, figures, self.prefix)
         if self.is_document:
-            city_object, extent = city_object_of(building, figures, vertices, self.prefix)
+            city_object, extent = city_object_of(building, figures, attributes, vertices, self.prefix)
             self.widen(extent)
             self.add_to_document(name, city_object, vertices)
         else:
-            self.put(feature_line(building, figures, name, vertices, self.prefix))
+            self.put(feature_line(building, figures, attributes, name, vertices, self.prefix))
 
     def put(self, feature: Feature) -> None:
         """Write a building that `feature_line` made, here or in another process, about this file's `translate`."""
@@ -154,20 +155,24 @@ def offset_of(corner_xy: np.ndarray) -> np.ndarray:
 
 
 def feature_line(
-    building: Building, figures: RoofFigures | None, name: str, vertices: Vertices, prefix: str = PREFIX
+    building: Building,
+    figures: RoofFigures | None,
+    attributes: dict[str, Any],
+    name: str,
+    vertices: Vertices,
+    prefix: str = PREFIX,
 ) -> Feature:
     """The CityJSONFeature of `building` under the id `name`; `vertices` are empty, about the file's offset."""
-    city_object, extent = city_object_of(building, figures, vertices, prefix)
+    city_object, extent = city_object_of(building, figures, attributes, vertices, prefix)
     feature = {"type": "CityJSONFeature", "id": name, "CityObjects": {name: city_object}, "vertices": vertices.grid}
     return Feature(dump(feature) + b"\n", extent)
 
 
 def city_object_of(
-    building: Building, figures: RoofFigures | None, vertices: Vertices, prefix: str
+    building: Building, figures: RoofFigures | None, attributes: dict[str, Any], vertices: Vertices, prefix: str
 ) -> tuple[dict[str, Any], list[float] | None]:
     """The CityObject and its extent, None where it has no geometry; its vertices go to `vertices`."""
     geometry = building_geometry(building, figures, vertices, prefix)
-    attributes = building_attributes(building, figures, prefix)
     if not geometry:
         return {"type": "Building", "attributes": attributes}, None
     grid = np.array(vertices.grid)

@@ -19,7 +19,7 @@ import numpy as np
 from ..model import Building
 from ..status import Status
 from .attributes import AttributesWriter, Row, table_row
-from .building_attributes import figures_of
+from .building_attributes import building_attributes, figures_of
 from .citygml import CityGMLWriter, Member, gml_member
 from .cityjson import SCALE_M, CityJSONWriter, Feature, feature_line
 from .cityjson_geometry import Vertices
@@ -73,9 +73,10 @@ def fragments(asked: Building, names: tuple[str, str], translate: np.ndarray) ->
     `translate` (3,) is the offset of the CityJSON file. A solid that cannot be measured is left out, as in `write_all`.
     """
     building, figures = measured(asked)
-    feature = feature_line(building, figures, names[0], Vertices(translate, SCALE_M))
-    member = gml_member(building, figures, names[1])
-    return building, Fragments(member, feature, parameters_line(building), table_row(building, figures))
+    attributes = building_attributes(building, figures)
+    feature = feature_line(building, figures, attributes, names[0], Vertices(translate, SCALE_M))
+    member = gml_member(building, figures, attributes, names[1])
+    return building, Fragments(member, feature, parameters_line(building), table_row(building, attributes))
 
 
 def join_fragments(
