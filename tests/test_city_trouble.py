@@ -15,6 +15,7 @@ from hiproof.errors import OutputError
 from hiproof.read.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
 from hiproof.write import files as output_files
+from read.test_pointcloud import write_copc
 from tiny_town import make_town, write_cloud, write_footprints, write_town
 
 RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
@@ -179,3 +180,13 @@ def test_the_ledger_tells_losses_from_orderly_ends(tmp_path):
     ledger.reopen()
     assert ledger.losses("solve:a") == 1
     assert ledger.open_tasks("solve") == ["solve:a", "solve:b"]
+
+
+def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
+    town = make_town()
+    cloud = write_copc(tmp_path / "cloud.copc.laz", town.xyz, town.classification)
+    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
+    assert by_id(tmp_path / "out") == undisturbed[1]

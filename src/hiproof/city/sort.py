@@ -7,8 +7,9 @@ class. What a building gets out of them depends on its own area alone, not on ti
 
 from __future__ import annotations
 
+import functools
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -18,16 +19,19 @@ import shapely
 
 from ..model import PointCloud
 from ..read.assign import PointGrid
-from ..read.pointcloud import iter_points
+from ..read.las import is_copc
+from ..read.pointcloud import file_kind, iter_points, read_header
+from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import GROUND_REACH_M, lowest_in_cells
-from .plan import Plan, load_plan, neighbourhood
+from .plan import Plan, load_plan
 
 NOISE_CLASSES = (7, 18)
 KINDS = ("roof", "ground", "low")
 ROOF, GROUND, OTHER, NOISE = range(4)
 SQUARE_M = 50.0  # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
 HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
+MASKS_KEPT = 200  # of 100 kB each
 QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its points
 
 
@@ -61,25 +65,44 @@ class Reach:
         return np.where(inside, self.mask[cell[:, 0], cell[:, 1]], 0)
 
 
-def reach_of(plan: Plan, tile: str) -> Reach | None:
-    """Reach of a tile's buildings, None where none has an area."""
-    jobs = [plan.jobs[i] for i in plan.tiles[tile] if not plan.jobs[i].area.is_empty]
-    if not jobs:
-        return None
-    # a border on a whole metre belongs to the area: one metre more on the upper sides
-    roof = np.array([neighbourhood(job, 0.0) for job in jobs]) + (0.0, 0.0, 1.0, 1.0)
-    return Reach(roof, np.array([neighbourhood(job, GROUND_REACH_M) for job in jobs]))
+class Reaches:
+    """Reach of every work tile that has an area to gather points for, found by place; made once a process."""
+
+    def __init__(self, plan: Plan):
+        bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
+        low, high = bounds[:, :2], bounds[:, 2:]
+        # a border on a whole metre belongs to the area: one metre more on the upper sides
+        self.roof_boxes = np.hstack([np.floor(low), np.ceil(high) + 1.0])
+        self.terrain_boxes = np.hstack([np.floor(low - GROUND_REACH_M), np.ceil(high + GROUND_REACH_M)])
+        has_area = np.isfinite(bounds[:, 0])
+        members = {tile: [i for i in own if has_area[i]] for tile, own in plan.tiles.items()}
+        self.members = {tile: own for tile, own in members.items() if own}
+        self.names = list(self.members)
+        boxes = [self.terrain_boxes[own] for own in self.members.values()]
+        self.bounds = np.array([[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]).reshape(-1, 4)
+        self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
+
+    def near(self, box: Sequence[float]) -> list[str]:
+        """Names, in plan order, of the tiles whose reach meets `box` (xmin, ymin, xmax, ymax)."""
+        return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
+
+    def of(self, tile: str) -> Reach:
+        own = self.members[tile]
+        return Reach(self.roof_boxes[own], self.terrain_boxes[own])
+
+
+@functools.lru_cache(maxsize=1)
+def reaches_of(root: Path, stamp: int) -> Reaches:
+    """Reaches of the plan in `root`, whose file has the time `stamp`."""
+    return Reaches(load_plan(root))
 
 
 class Gatherer:
     """Collects the points of one file by work tile and writes them to `folder`, as often as memory asks for it."""
 
-    def __init__(self, plan: Plan, folder: Path, number: int):
-        self.folder, self.number, self.read = folder, number, plan.settings.read
-        reaches = {tile: reach_of(plan, tile) for tile in plan.tiles}
-        self.reaches = {tile: reach for tile, reach in reaches.items() if reach is not None}
-        self.names = list(self.reaches)
-        self.tree = shapely.STRtree(shapely.box(*np.array([r.bounds for r in self.reaches.values()]).reshape(-1, 4).T))
+    def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
+        self.folder, self.number, self.read = folder, number, read
+        self.reach_of, self.near = functools.lru_cache(maxsize=MASKS_KEPT)(reaches.of), reaches.near
         self.found: dict[str, dict[str, list[np.ndarray]]] = {}
         self.classes: Counter[int] = Counter()
         self.points = self.held = self.flushes = 0
@@ -91,9 +114,8 @@ class Gatherer:
         self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
         kinds = self.kind_of_class()[classes]
         grid = PointGrid(cloud.xyz, SQUARE_M)
-        extent = shapely.box(*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))
-        for tile in (self.names[i] for i in np.sort(self.tree.query(extent))):
-            reach = self.reaches[tile]
+        for tile in self.near((*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))):
+            reach = self.reach_of(tile)
             candidates = grid.candidates(reach.bounds)
             bits = reach.bits(cloud.xyz[candidates, :2])
             wanted = bits > 0
@@ -135,10 +157,10 @@ def sort_cloud(folder: str, number: int) -> dict:
     Chunks read before a damaged file breaks off are kept; the InputError is raised after they are on disk.
     """
     root = Path(folder)
-    plan = load_plan(root)
-    gatherer, broken = Gatherer(plan, root / "points", number), None
+    plan, reaches = load_plan(root), reaches_of(root, (root / "plan.pickle").stat().st_mtime_ns)
+    gatherer, broken = Gatherer(reaches, plan.settings.read, root / "points", number), None
     try:
-        for cloud in wanted_points(plan.clouds[number], list(gatherer.reaches.values())):
+        for cloud in wanted_points(plan.clouds[number], reaches):
             gatherer.add(cloud)
     except MemoryError:
         raise
@@ -150,30 +172,23 @@ def sort_cloud(folder: str, number: int) -> dict:
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
-def wanted_points(path: str, reaches: list[Reach]) -> Iterator[PointCloud]:
+def wanted_points(path: str, reaches: Reaches) -> Iterator[PointCloud]:
     """All chunks of a file; of one with a spatial index (COPC) only the boxes that hold buildings' surroundings.
 
     The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
     are decoded twice. A point on a border may come twice, as in files that overlap.
     """
-    from ..read.las import is_copc
-    from ..read.pointcloud import file_kind, read_header
-
-    if not reaches or file_kind(path) != "las" or not is_copc(path):
+    if file_kind(path) != "las" or not is_copc(path):
         yield from iter_points(path)
         return
     xmin, ymin, _, xmax, ymax, _ = read_header(path).bounds
-    tree = shapely.STRtree(shapely.box(*np.array([reach.bounds for reach in reaches]).T))
     for x in np.arange(np.floor(xmin / QUERY_M), np.floor(xmax / QUERY_M) + 1) * QUERY_M:
         for y in np.arange(np.floor(ymin / QUERY_M), np.floor(ymax / QUERY_M) + 1) * QUERY_M:
             square = (x, y, x + QUERY_M, y + QUERY_M)
-            if len(near := tree.query(shapely.box(*square))):
-                bounds = np.array([reaches[i].bounds for i in near])
-                low, high = (
-                    np.maximum(square[:2], bounds[:, :2].min(axis=0)),
-                    np.minimum(square[2:], bounds[:, 2:].max(axis=0)),
-                )
-                yield from iter_points(path, box=(*low, *high))
+            near = np.array([reaches.of(tile).bounds for tile in reaches.near(square)])
+            if len(near):
+                low, high = near[:, :2].min(axis=0), near[:, 2:].max(axis=0)
+                yield from iter_points(path, box=(*np.maximum(square[:2], low), *np.minimum(square[2:], high)))
 
 
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
