@@ -44,7 +44,10 @@ class PlanFrame:
     def plane_map(self) -> np.ndarray:
         """The linear part (3, 3) of `plane_local` on (a, b, c)."""
         slopes = self.rotation.T
-        return np.block([[slopes, np.zeros((2, 1))], [-self.origin[None, :2] @ slopes, np.ones((1, 1))]])
+        full = np.eye(3)
+        full[:2, :2] = slopes
+        full[2, :2] = -self.origin[:2] @ slopes
+        return full
 
 
 @dataclass(frozen=True)

@@ -27,28 +27,34 @@ def recognised(piece: Piece, covariance: np.ndarray | None = None) -> Part:
 
     `covariance` (3 k, 3 k) of the piece's plane coefficients gives the standard deviations of the parameters.
     """
-    for name, theta in proposals(piece.planes, piece.outline):
+    for name, rule, start, theta in proposals(piece.planes, piece.outline):
         if is_same_surface(name, theta, piece):
             theta_p, kappa, translation = get(name).from_theta(theta)
-            sigma = standard_deviations(name, piece, covariance)
+            sigma = {} if covariance is None else standard_deviations(name, rule, start, piece, covariance)
             return Part(name, (piece,), theta_p, kappa, translation, sigma)
     return Part("free", (piece,), translation=np.array([*shapely.get_coordinates(piece.outline.centroid)[0], 0.0]))
 
 
-def proposals(planes: np.ndarray, outline: shapely.Polygon) -> Iterator[tuple[str, np.ndarray]]:
-    """(type, theta) of every rule that applies, theta canonical."""
+def proposals(planes: np.ndarray, outline: shapely.Polygon) -> Iterator[tuple[str, Callable, float, np.ndarray]]:
+    """(type, its rule, the direction it was tried in, canonical theta) of every rule that applies."""
     for name, rule in RULES.get(len(planes), ()):
-        steep = planes[np.argmax(np.hypot(planes[:, 0], planes[:, 1]))]
+        steep = planes[np.argmax(planes[:, 0] ** 2 + planes[:, 1] ** 2)]
         level = math.hypot(steep[0], steep[1]) < LEVEL_SLOPE
         across = longest_edge_normal(outline) if level else math.atan2(steep[1], steep[0])
         for turn in (0.0, 0.5 * math.pi):
             kappa = across - 0.5 * math.pi + turn
-            plan, local = in_own_frame(planes, outline, kappa)
-            q = rule(local, plan[1], plan[0])
-            if q is not None:
-                centre = plan[2:]
-                theta = np.array([*centre, kappa, plan[0], plan[1], *q, *[0.0] * (4 - len(q))])
-                yield name, get(name).canonical_theta(theta)
+            plan, to_own = own_frame(outline, kappa)
+            theta = theta_of(name, rule, planes @ to_own.T, plan, kappa)
+            if theta is not None:
+                yield name, rule, kappa, theta
+
+
+def theta_of(name: str, rule: Callable, local: np.ndarray, plan: tuple[float, ...], kappa: float) -> np.ndarray | None:
+    """Canonical theta (9,) by `rule` from planes over u, v and the plan (V, U, cx, cy); None where it does not apply."""
+    q = rule(local, plan[1], plan[0])
+    if q is None:
+        return None
+    return get(name).canonical_theta(np.array([*plan[2:], kappa, *plan[:2], *q, *[0.0] * (4 - len(q))]))
 
 
 def longest_edge_normal(outline: shapely.Polygon) -> float:
@@ -57,15 +63,16 @@ def longest_edge_normal(outline: shapely.Polygon) -> float:
     return math.atan2(longest[1], longest[0]) + 0.5 * math.pi
 
 
-def in_own_frame(planes: np.ndarray, outline: shapely.Polygon, kappa: float) -> tuple[tuple[float, ...], np.ndarray]:
-    """(V, U, cx, cy) of the outline's rectangle in direction `kappa`, and the planes over u, v about its centre."""
-    turn = np.array([[math.cos(kappa), math.sin(kappa)], [-math.sin(kappa), math.cos(kappa)]])
+def own_frame(outline: shapely.Polygon, kappa: float) -> tuple[tuple[float, ...], np.ndarray]:
+    """(V, U, cx, cy) of the outline's rectangle in direction `kappa`, and the map (3, 3) of planes to u, v about it."""
+    c, s = math.cos(kappa), math.sin(kappa)
+    turn = np.array([[c, s], [-s, c]])
     uv = shapely.get_coordinates(outline) @ turn.T
     low, high = uv.min(axis=0), uv.max(axis=0)
-    centre = turn.T @ (0.5 * (low + high))
-    slopes = planes[:, :2] @ turn.T
+    centre = 0.5 * (low + high) @ turn
     half = 0.5 * (high - low)
-    return (half[1], half[0], *centre), np.column_stack([slopes, planes[:, 2] + planes[:, :2] @ centre])
+    to_own = np.array([[c, s, 0.0], [-s, c, 0.0], [centre[0], centre[1], 1.0]])
+    return (half[1], half[0], centre[0], centre[1]), to_own
 
 
 def is_same_surface(name: str, theta: np.ndarray, piece: Piece) -> bool:
@@ -79,28 +86,31 @@ def is_same_surface(name: str, theta: np.ndarray, piece: Piece) -> bool:
     return bool(np.abs(primitive.height_at(theta, xy) - piece.height_at(xy)).max() < SAME_M)
 
 
-def standard_deviations(name: str, piece: Piece, covariance: np.ndarray | None) -> dict[str, float]:
-    """Standard deviation of each parameter and of T_L's height, by the delta method with numeric derivatives."""
-    if covariance is None:
-        return {}
+def standard_deviations(
+    name: str, rule: Callable, kappa: float, piece: Piece, covariance: np.ndarray
+) -> dict[str, float]:
+    """Standard deviation of each parameter and of T_L's height by the delta method, direction and plan held."""
+    plan, to_own = own_frame(piece.outline, kappa)
+    local = piece.planes @ to_own.T
 
-    def parameters(planes: np.ndarray) -> np.ndarray | None:
-        for other, theta in proposals(planes, piece.outline):
-            if other == name:
-                theta_p, _, translation = get(name).from_theta(theta)
-                return np.array([*theta_p.values(), translation[2]])
-        return None
+    def parameters(planes: np.ndarray) -> np.ndarray:
+        theta = theta_of(name, rule, planes, plan, kappa)
+        if theta is None:
+            return centre
+        theta_p, _, translation = get(name).from_theta(theta)
+        return np.array([*theta_p.values(), translation[2]])
 
-    centre = parameters(piece.planes)
-    jacobian = np.zeros((len(centre), piece.planes.size))
-    for k in range(piece.planes.size):
-        moved = piece.planes.copy()
+    centre = np.zeros(0)
+    centre = parameters(local)
+    jacobian = np.zeros((len(centre), local.size))
+    for k in range(local.size):
+        moved = local.copy()
         moved.flat[k] += 1e-5
-        value = parameters(moved)
-        jacobian[:, k] = 0.0 if value is None else (value - centre) / 1e-5
-    variance = np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian)
+        jacobian[:, k] = (parameters(moved) - centre) / 1e-5
+    turned = np.kron(np.eye(len(local)), to_own)
+    variance = ((jacobian @ (turned @ covariance @ turned.T)) * jacobian).sum(axis=1)
     names = [*get(name).parameters, "t_z"]
-    return {n: math.sqrt(max(v, 0.0)) for n, v in zip(names, variance, strict=True) if v > 0.0}
+    return {n: math.sqrt(v) for n, v in zip(names, variance, strict=True) if v > 0.0}
 
 
 # --- rules: planes (k, 3) over u, v about the rectangle's centre, half extents U and V -> q of the type, or None ------
