@@ -184,6 +184,7 @@ def test_one_primitive_by_either_objective(objective):
 def test_the_network_adds_its_opinion():
     building = hiproof.reconstruct(gable_points(), FOOTPRINT)
     assert building.type == "gable"
+    assert sum(building.recognised.values()) == pytest.approx(1.0)
     assert sum(building.types.values()) == pytest.approx(1.0)
 
 

@@ -187,7 +187,7 @@ class Building:
 
     `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for
     this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
-    lines. `types` are posterior probabilities by roof type where a choice was made. `footprint` (world) and `attributes`
+    lines. `recognised` are the network's probabilities by roof type, `types` those after the fits, where a choice was made. `footprint` (world) and `attributes`
     are the input's own.
     """
 
@@ -201,6 +201,7 @@ class Building:
     ground_source: str = ""
     terrain_intersection: tuple[np.ndarray, ...] = ()
     objective: float = float("nan")
+    recognised: dict[str, float] = field(default_factory=dict)
     types: dict[str, float] = field(default_factory=dict)
     footprint: shapely.Polygon | None = None
     attributes: dict[str, Any] = field(default_factory=dict)

@@ -42,6 +42,7 @@ def reconstruct(
     frame = LocalFrame.around(points)
     points, outline = frame.to_local(points), stages.to_local(outline, frame)
     recognised = stages.recognise(points, settings)
+    building = dataclasses.replace(building, recognised=recognised.types)
     fitted = stages.fit(points, outline, recognised, settings)
     if not fitted.parts:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)

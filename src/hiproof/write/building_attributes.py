@@ -71,11 +71,14 @@ def hiproof_attributes(building: Building) -> dict[str, Any]:
     """Our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
+    recognised = max(building.recognised, key=building.recognised.get, default=None)
     return {
         "status": building.status.code,
         "detail": building.detail or building.status.value,
         "roof_type": kind,
         "roof_type_probability": None if probability is None else rounded(probability),
+        "network_type": recognised,
+        "network_type_probability": None if recognised is None else rounded(building.recognised[recognised]),
         "parts": len(building.parts),
         "points": int(quality.points),
         "psd_mean": rounded(quality.psd_mean),

@@ -27,8 +27,8 @@ def write_parameters(path: str | os.PathLike, buildings: Iterable[Building]) -> 
     """Write one JSON object a building to `path`; raises OutputError when it cannot be written.
 
     Keys: id, status, detail, type, theta_p (metres, by name), kappa (rad), T_L, T_G (metres), sigma (standard
-    deviations by name), objective, points, residuals, types (probability by roof type), z_ground, ground_source,
-    parts. theta_p, kappa, T_L and sigma on top are those of the largest part. A part has type, theta_p, kappa, T_L,
+    deviations by name), objective, points, residuals, recognised and types (probability by roof type from the network,
+    and after the fits), z_ground, ground_source, parts. theta_p, kappa, T_L and sigma on top are those of the largest part. A part has type, theta_p, kappa, T_L,
     sigma and pieces, a piece `outline` (rings, outer first) and `planes` (a, b, c of z = a x + b y + c), both
     relative to T_G. What cannot be told is null.
     """
@@ -100,6 +100,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "density": number(quality.density),
         "nodata_share": number(quality.nodata_share),
         "unexplained_area_m2": number(quality.unexplained_area_m2),
+        "recognised": by_name(building.recognised),
         "types": by_name(building.types),
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
