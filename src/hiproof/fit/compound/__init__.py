@@ -11,6 +11,7 @@
     recognise  piece -> type of the catalogue with its parameters
     parts      piece -> part; equal monopitches in a row -> one saw-tooth
     single     the one primitive of `fit_roof`, where it explains the roof as well
+    wings      L, T, U and cross plans: whole primitives over overlapping rectangles, where they explain it as well
 
 Every decision lowers one objective: sum over points of min((dz / tau)^2, 1) plus `evidence` points a unit of complexity.
 """
@@ -30,6 +31,7 @@ from .pieces import disjoint_pieces
 from .plan import lay_out_plan
 from .search import evidence_per_unit, search_layout
 from .single import fit_alone, is_simple, outline_of_points, single_primitive
+from .wings import fit_wings
 
 __all__ = ["CompoundFit", "fit_building"]
 
@@ -69,6 +71,10 @@ def fit_building(
         single = single_primitive(alone, outline, plan, evidence, settings.compound.tolerance_m)
         if single is not None and single.objective <= objective:
             return single.as_fit(outline, len(plan.cloud.u))
+    else:
+        wings = fit_wings(outline, plan, evidence, objective, settings)
+        if wings is not None:
+            return wings
     joint = fit_together(layout, plan, settings.compound.tolerance_m, evidence)
     parts = assembled_parts(disjoint_pieces(layout, plan, outline), joint, plan)
     z, _, _ = evaluate(layout, plan.cloud.u, plan.cloud.v)

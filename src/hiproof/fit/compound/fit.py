@@ -13,7 +13,7 @@ from ...model import Part
 class CompoundFit:
     """Outcome of `fit_building`, in the frame of the points given.
 
-    `roof_parts` are disjoint in plan and cover `outline`; `objective` is in points (see the package), `types` posterior
+    `roof_parts` cover `outline`, disjoint in plan or, where wings cross, overlapping; `objective` is in points (see the package), `types` posterior
     probabilities where one primitive explains the roof, `points_used` the points inside the outline that counted,
     `unexplained` the share of them further than the tolerance from the roof.
     """
