@@ -1,7 +1,7 @@
 """A simulated city through the whole program: speed, workers, size, memory, kills, damaged input; prints one table.
 
 usage: python -m benchmarks.city [--work FOLDER] [--buildings 300] [--large N] [--kills N] [--kill-buildings 40]
-                                 [--delft ../shared/data/delft]
+                                 [--large-flat N] [--delft ../shared/data/delft]
 
 Cities are made once in the folder and used again. Rates are buildings a CPU second of one core, everything from reading to
 the written files included, in a process that has run once before (imports and compiled code loaded); wall times stand
@@ -34,9 +34,12 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.read import read_footprints, read_header
 from hiproof.read.solids import read_solids
+from hiproof.settings import Settings
 from hiproof.simulate import demo_files
 from hiproof.simulate.city import City, write_city
 
+DEFAULTS = Settings()
+FLAT = Settings.from_dict({"fit": {"parts": "one", "types": ["flat"]}, "segment": {"enabled": False}})
 RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 
 
@@ -72,18 +75,18 @@ def city_files(work: Path, buildings: int) -> tuple[list[str], str]:
     return sorted(str(path) for path in (folder / "tiles").glob("*.laz")), str(folder / "footprints.gpkg")
 
 
-def measured(clouds: list[str], footprints: str, out: Path, jobs: int = 1) -> Cost:
+def measured(clouds: list[str], footprints: str, out: Path, jobs: int = 1, settings: Settings = DEFAULTS) -> Cost:
     """Cost of a run in a fresh process that has done the demo's neighbourhood before."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
-        return pool.submit(warm_run, clouds, footprints, out, jobs).result()
+        return pool.submit(warm_run, clouds, footprints, out, jobs, settings).result()
 
 
-def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int) -> Cost:
+def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int, settings: Settings) -> Cost:
     demo = demo_files()
-    warm_up = Request((str(demo["cloud"]),), out.with_name("warm-up"), str(demo["footprints"]), restart=True)
-    reconstruct_area(warm_up)
+    warm_up = out.with_name("warm-up")
+    reconstruct_area(Request((str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True))
     before, started = used(), time.perf_counter()
-    summary = reconstruct_area(Request(tuple(clouds), out, footprints, jobs=jobs, restart=True))
+    summary = reconstruct_area(Request(tuple(clouds), out, footprints, settings=settings, jobs=jobs, restart=True))
     wall, after = time.perf_counter() - started, used()
     peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
     return Cost(summary.buildings, after[0] - before[0], after[1] - before[1], wall, peak)
@@ -186,6 +189,7 @@ def main() -> None:
     parser.add_argument("--work", type=Path, default=Path("/tmp/hiproof-city"), help="folder for cities and results")
     parser.add_argument("--buildings", type=int, default=300)
     parser.add_argument("--large", type=int, default=0, help="buildings of the large city, 0: none")
+    parser.add_argument("--large-flat", type=int, default=0, help="buildings of a city run without fitting, 0: none")
     parser.add_argument("--kills", type=int, default=0, help="how many random kills")
     parser.add_argument("--kill-buildings", type=int, default=40)
     parser.add_argument("--delft", type=Path, default=Path("../shared/data/delft"))
@@ -212,6 +216,9 @@ def main() -> None:
         large = measured(*city_files(args.work, args.large), args.work / "out-large")
         ratio = large.cpu_s / large.buildings / (one.cpu_s / one.buildings)
         show(f"{args.large} buildings", f"{large.line()}; cost a building against {args.buildings}: {ratio:.2f}")
+    for buildings in filter(None, (args.buildings, args.large_flat)):
+        flat = measured(*city_files(args.work, buildings), args.work / "out-flat", settings=FLAT)
+        show(f"{buildings} buildings, all but fitting and recognising", flat.line())
     if args.kills:
         files = city_files(args.work, args.kill_buildings)
         whole = args.work / "out-whole"
