@@ -28,5 +28,6 @@ def run(options: Options) -> Result:
 
 
 def percentiles(title: str, values: dict[str, np.ndarray]) -> Table:
-    rows = [(method, *map(float, np.nanpercentile(numbers, SHARES))) for method, numbers in values.items()]
+    known = {method: numbers[np.isfinite(numbers)] for method, numbers in values.items()}
+    rows = [(method, *map(float, np.percentile(numbers, SHARES))) for method, numbers in known.items() if len(numbers)]
     return Table(title, ("method", *(f"p{share}" for share in SHARES)), rows)

@@ -22,6 +22,8 @@ def run(options: Options) -> Result:
     for method in OBJECTIVES:
         for primitive in PRIMITIVES:
             chosen = [roof for roof in range(roofs) if options.covers(method, roof)]
+            if not chosen:
+                continue
             work = [(method, primitive, options.seed, roof) for roof in chosen]
             found = np.array(in_parallel(errors_of_roof, work, options.jobs))
             psd, height = found.T
