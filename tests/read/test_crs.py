@@ -8,7 +8,8 @@ from pyproj import CRS
 import hiproof.read.columns
 import hiproof.read.crs
 from hiproof.errors import InputError
-from hiproof.read.crs import combine, parse_crs, require_metres, same_horizontal, srs_name, vertical_crs
+from hiproof.read.crs import combine, parse_crs, require_metres, same_horizontal, vertical_crs
+from hiproof.write.naming import srs_name
 
 
 @pytest.mark.parametrize("module", [hiproof.read.crs, hiproof.read.columns])

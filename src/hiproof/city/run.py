@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import __version__
-from ..errors import HiproofError, InputError, OutputError
+from ..errors import InputError, OutputError
 from ..settings import Settings
 from ..write.files import atomic
 from .executors import WorkerLost, make_executor
@@ -307,6 +307,3 @@ def clean(state: Path) -> None:
     """Remove what a finished run no longer needs; the ledger and the plan stay for `status` and for a repeated call."""
     for name in ("tiles", "points"):
         shutil.rmtree(state / name, ignore_errors=True)
-
-
-__all__ = ["HiproofError", "Request", "Summary", "reconstruct_area"]

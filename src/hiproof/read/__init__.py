@@ -17,7 +17,7 @@ _HOME = {
     **dict.fromkeys(("split_buildings", "FoundBuilding", "adapted_gap"), "split"),
     **dict.fromkeys(("estimate_outline", "plan_density"), "outline"),
     **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
-    **dict.fromkeys(("srs_name", "same_horizontal", "combine", "parse_crs"), "crs"),
+    **dict.fromkeys(("same_horizontal", "combine", "parse_crs"), "crs"),
 }
 __all__ = sorted(_HOME)
 

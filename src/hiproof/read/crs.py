@@ -63,28 +63,6 @@ def epsg_code(crs: CRS) -> int | None:
     return int(authority[1]) if authority else None
 
 
-def srs_name(crs: CRS | None) -> str | None:
-    """URN for `srsName` attributes and CityJSON; None where the CRS is unknown or has no EPSG number.
-
-    >>> srs_name(CRS("EPSG:7415"))
-    'urn:ogc:def:crs:EPSG::7415'
-    >>> srs_name(combine(CRS("EPSG:28992"), CRS("EPSG:5709")))
-    'urn:ogc:def:crs:EPSG::7415'
-    >>> srs_name(combine(CRS("EPSG:25832"), CRS("EPSG:5709")))
-    'urn:ogc:def:crs,crs:EPSG::25832,crs:EPSG::5709'
-    """
-    if crs is None:
-        return None
-    code = epsg_code(crs)
-    if code is not None:
-        return f"urn:ogc:def:crs:EPSG::{code}"
-    if crs.is_compound:
-        codes = [epsg_code(part) for part in crs.sub_crs_list]
-        if all(codes):
-            return "urn:ogc:def:crs," + ",".join(f"crs:EPSG::{code}" for code in codes)
-    return None
-
-
 def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
     """Compound CRS of a plan and a height system; `horizontal` alone where it has heights already or none are given."""
     if horizontal is None or vertical is None or vertical_crs(horizontal) is not None:

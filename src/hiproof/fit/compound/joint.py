@@ -1,7 +1,7 @@
 """All parts together: the planes of every part refitted to all points in one weighted least-squares problem with ties.
 
 The unknowns are the coefficients of all planes in use. A structure (level, along an axis, opposite slopes of a gable) and a
-regularity (equal slopes, equal ridges, equal eaves) are linear constraints on them; the fit moves in their null space. A
+regularity (equal slopes, equal ridges) are linear constraints on them; the fit moves in their null space. A
 regularity is kept when the objective rises by less than the evidence that one parameter costs.
 """
 
