@@ -41,9 +41,10 @@ def test_points_within_reach_equal_the_plain_test():
     def plain(boxes):
         return np.array([any((p >= b[:2]).all() and (p < b[2:]).all() for b in boxes) for p in xy])
 
-    bits = Reach(roof, terrain).bits(xy)
-    assert np.array_equal(bits & 1 > 0, plain(roof))
-    assert np.array_equal(bits & 2 > 0, plain(terrain))
+    some = rng.permutation(len(xy))[:1500]
+    bits = Reach(roof, terrain).bits(xy, some)
+    assert np.array_equal(bits & 1 > 0, plain(roof)[some])
+    assert np.array_equal(bits & 2 > 0, plain(terrain)[some])
 
 
 def sloped_ground(rng, n=20000, size=100.0):

@@ -19,6 +19,7 @@ import shapely
 
 from ..model import PointCloud
 from ..read.assign import PointGrid
+from ..read.cell_kernel import mask_at
 from ..read.las import is_copc
 from ..read.pointcloud import file_kind, iter_points, read_header
 from ..settings import ReadSettings
@@ -57,12 +58,9 @@ class Reach:
                 mask[xmin:xmax, ymin:ymax] |= bit
         return mask
 
-    def bits(self, xy: np.ndarray) -> np.ndarray:
-        """The mask (n,) at `xy` (n, 2), 0 outside the bounds; upper sides of boxes are excluded."""
-        cell = np.floor(xy - self.bounds[:2]).astype(np.int64)
-        inside = ((cell >= 0) & (cell < self.mask.shape)).all(axis=1)
-        cell[~inside] = 0
-        return np.where(inside, self.mask[cell[:, 0], cell[:, 1]], 0)
+    def bits(self, xy: np.ndarray, index: np.ndarray) -> np.ndarray:
+        """The mask (k,) at the points `xy[index]` of (n, 2 or more), 0 outside the bounds; boxes exclude upper sides."""
+        return mask_at(self.mask, xy, index, *self.bounds[:2])
 
 
 class Reaches:
@@ -114,10 +112,10 @@ class Gatherer:
         self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
         kinds = self.kind_of_class()[classes]
         grid = PointGrid(cloud.xyz, SQUARE_M)
-        for tile in self.near((*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))):
+        for tile in self.near(grid.bounds):
             reach = self.reach_of(tile)
             candidates = grid.candidates(reach.bounds)
-            bits = reach.bits(cloud.xyz[candidates, :2])
+            bits = reach.bits(cloud.xyz, candidates)
             wanted = bits > 0
             candidates, bits = candidates[wanted], bits[wanted]
             kind = kinds[candidates]

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
 import numpy as np
 import shapely
 
 from ..model import Footprint
+from .cell_kernel import cell_keys
+from .thin import cell_range
 
 CELL_M = 4.0
 
@@ -24,16 +27,19 @@ class PointGrid:
 
     def __init__(self, xy: np.ndarray, cell_m: float = CELL_M):
         """Index `xy` (n, 2 or more; further columns are ignored), world or local metres, all finite."""
-        self.xy = np.ascontiguousarray(np.asarray(xy, float)[:, :2])
-        self.cell_m = cell_m
-        self.origin = np.floor(self.xy.min(axis=0) / cell_m) if len(self.xy) else np.zeros(2)
-        cells = (np.floor(self.xy / cell_m) - self.origin).astype(np.int64)
-        self.columns = int(cells[:, 0].max()) + 1 if len(cells) else 1
-        self.rows = int(cells[:, 1].max()) + 1 if len(cells) else 1
+        self.xy, self.cell_m = np.ascontiguousarray(xy, float), float(cell_m)
+        self.origin, (self.columns, self.rows) = cell_range(self.xy, cell_m) if len(self.xy) else ((0, 0), (1, 1))
+        keys = cell_keys(self.xy, self.cell_m, *self.origin, self.columns)
         # sorted as 16 bits where they fit: numpy then counts instead of comparing
-        keys = (cells[:, 1] * self.columns + cells[:, 0]).astype(np.min_scalar_type(self.rows * self.columns))
+        keys = keys.astype(np.min_scalar_type(self.rows * self.columns))
         self.order = np.argsort(keys, kind="stable")
         self.keys = keys[self.order]
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """The box (xmin, ymin, xmax, ymax) of all cells."""
+        x, y = self.origin
+        return tuple(self.cell_m * side for side in (x, y, x + self.columns, y + self.rows))
 
     def candidates(self, bounds: Sequence[float]) -> np.ndarray:
         """Indices of the points in the cells that the box (xmin, ymin, xmax, ymax) meets."""
@@ -47,7 +53,7 @@ class PointGrid:
         return np.concatenate([self.order[start:stop] for start, stop in zip(starts, stops, strict=True)])
 
     def cell_range(self, low: float, high: float, axis: int) -> tuple[int, int]:
-        return tuple(int(np.floor(value / self.cell_m) - self.origin[axis]) for value in (low, high))
+        return tuple(math.floor(value / self.cell_m) - self.origin[axis] for value in (low, high))
 
     def inside(self, polygon: shapely.Polygon) -> np.ndarray:
         """Ascending indices of the points inside `polygon` or on its border."""
@@ -55,8 +61,7 @@ class PointGrid:
             return np.empty(0, np.int64)
         found = self.candidates(polygon.bounds)
         shapely.prepare(polygon)
-        xy = self.xy[found]
-        return np.sort(found[shapely.intersects_xy(polygon, xy[:, 0], xy[:, 1])])
+        return np.sort(found[shapely.intersects_xy(polygon, self.xy[found, 0], self.xy[found, 1])])
 
     def within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
         """Ascending indices of the points at most `distance_m` from `polygon` or inside it."""

@@ -71,11 +71,13 @@ def iter_points(path: str | Path, chunk_points: int = CHUNK_POINTS, box: Box | N
         chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(Path(path), chunk_points)
     dropped = 0
     for xyz, classes in chunks:
-        finite = np.isfinite(xyz).all(axis=1)
-        dropped += len(xyz) - int(finite.sum())
-        keep = finite if box is None else finite & in_box(xyz, box)
+        keep = np.isfinite(xyz)
         if not keep.all():
-            xyz, classes = xyz[keep], None if classes is None else classes[keep]
+            keep = keep.all(axis=1)
+            dropped += len(xyz) - int(keep.sum())
+            xyz, classes = chosen(xyz, classes, keep)
+        if box is not None:
+            xyz, classes = chosen(xyz, classes, in_box(xyz, box))
         if len(xyz):
             yield PointCloud(xyz, classes, None, (str(path),))
     if dropped:
@@ -174,6 +176,10 @@ def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
     return np.concatenate(
         [np.zeros(len(c), np.uint8) if c.classification is None else c.classification for c in clouds]
     )
+
+
+def chosen(xyz: np.ndarray, classes: np.ndarray | None, keep: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+    return xyz[keep], None if classes is None else classes[keep]
 
 
 def in_box(xyz: np.ndarray, box: Box) -> np.ndarray:

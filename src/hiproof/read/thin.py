@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
+from .cell_kernel import cell_keys, is_first
+
 UNITS_PER_M = 10_000  # sums and comparisons run on whole tenths of a millimetre: integers do not mind their order
+MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cells
 
 
 def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
@@ -30,13 +34,13 @@ def thin_to_count(xyz: np.ndarray, most: int) -> np.ndarray:
 
 
 def without_repeats(xyz: np.ndarray) -> np.ndarray:
-    """The points (n, 3) each once, in the order of their hashes: what stands in two overlapping files counts once.
+    """The points (n, 3) each once, in the order they came in: what stands in two overlapping files counts once.
 
     >>> len(without_repeats(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.2, 0.2, 1.0]])))
     2
     """
-    ordered = xyz[np.argsort(hashes(xyz))]
-    return ordered[np.r_[True, np.any(ordered[1:] != ordered[:-1], axis=1)]] if len(ordered) else ordered
+    xyz = np.ascontiguousarray(xyz, float)
+    return xyz[is_first(xyz, hashes(xyz))]
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
@@ -55,16 +59,33 @@ def rank_in_cells(xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], n
     """One point a cell, its height the one of `rank(counts)` among the cell's heights in ascending order."""
     if not len(xyz):
         return np.empty((0, 3))
-    cells = np.floor(xyz[:, :2] / cell_m).astype(np.int64)
-    low = cells.min(axis=0)
-    columns = int(cells[:, 0].max() - low[0]) + 1
-    keys = (cells[:, 1] - low[1]) * columns + (cells[:, 0] - low[0])
-    occupied, cell_of, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    corner = (np.column_stack([occupied % columns, occupied // columns]) + low) * cell_m
-    units = np.rint((xyz[:, :2] - corner[cell_of]) * UNITS_PER_M)
-    mean = np.column_stack([np.bincount(cell_of, units[:, axis]) for axis in (0, 1)]) / counts[:, None]
+    xyz, cell_m = np.ascontiguousarray(xyz, float), float(cell_m)
+    low, size = cell_range(xyz, cell_m)
+    keys = cell_keys(xyz, cell_m, *low, size[0])
+    occupied, cell_of, counts = occupied_cells(keys, size[0] * size[1])
+    corner = (np.column_stack([occupied % size[0], occupied // size[0]]) + low) * cell_m
+    units = [np.rint((xyz[:, axis] - corner[cell_of, axis]) * UNITS_PER_M) for axis in (0, 1)]
+    mean = np.column_stack([np.bincount(cell_of, values) for values in units]) / counts[:, None]
     heights = np.rint(xyz[:, 2] * UNITS_PER_M).astype(np.int64)
     lowest, span = heights.min(), int(np.ptp(heights)) + 1
     ascending = np.sort(cell_of * span + (heights - lowest)) % span + lowest  # cell by cell
     chosen = np.cumsum(counts) - counts + np.minimum(rank(counts), counts - 1)
     return np.column_stack([corner + mean / UNITS_PER_M, ascending[chosen] / UNITS_PER_M])
+
+
+def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
+    """The first cell (column, row) of the world's grid that holds one of `xy` (n, 2 or more), n > 0, and the (columns, rows)."""
+    low = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
+    high = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
+    return (low[0], low[1]), (high[0] - low[0] + 1, high[1] - low[1] + 1)
+
+
+def occupied_cells(keys: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """np.unique of `keys` (n,) below `cells`, with inverse and counts; by a table where that is not much larger."""
+    if cells > MOST_CELLS_A_POINT * len(keys):
+        return np.unique(keys, return_inverse=True, return_counts=True)
+    counts = np.bincount(keys)
+    occupied = np.flatnonzero(counts)
+    number = np.empty(len(counts), np.int64)
+    number[occupied] = np.arange(len(occupied))
+    return occupied, number[keys], counts[occupied]
