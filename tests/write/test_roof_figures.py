@@ -60,6 +60,19 @@ def test_a_valley_is_no_ridge():
     assert np.isnan(roof_figures(solid).h_ridge)
 
 
+@pytest.mark.parametrize("width", [0.1, 1 / 3, 7.7])
+def test_half_the_roof_at_a_level_is_enough_for_it(width):
+    low, high = (
+        prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 3),
+        prism([[(0, 0), (width, 0), (width, 4), (0, 4)]], 0, 6),
+    )
+    faces = low.of_kind(ROOF) + tuple(
+        Face(tuple(tuple(i + 8 for i in r) for r in f.rings), ROOF) for f in high.of_kind(ROOF)
+    )
+    for order in (faces, faces[::-1]):
+        assert roof_figures(Solid(np.vstack([low.vertices, high.vertices]), order)).h_50p == 3.0
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_percentiles_match_a_fine_grid(seed):
     rng = np.random.default_rng(seed)
@@ -94,7 +107,7 @@ def sampled_roof(solid, steps):
 
 
 def test_many_levels_are_searched_exactly():
-    """A staircase of more levels than are looked at in one go: its percentiles are steps 350 and 490 of 700."""
+    """A staircase of many levels: its percentiles are steps 350 and 490 of 700."""
     steps = 700
     vertices = [(x + dx, y, x * 0.01) for x in range(steps) for dx, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
     faces = tuple(Face((tuple(range(4 * i, 4 * i + 4)),), ROOF) for i in range(steps))

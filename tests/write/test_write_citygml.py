@@ -6,11 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from lxml import etree
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
 from hiproof.write.citygml import NAMESPACES, CityGMLWriter, write_citygml
 from hiproof.write.naming import gml_name
+from hiproof.write.xml_text import xml_attribute, xml_text
 
 SCHEMA = Path(__file__).parents[3] / "shared" / "schemas" / "citygml2" / "CityGML.xsd"
 GML_ID, HREF = f"{{{NAMESPACES['gml']}}}id", f"{{{NAMESPACES['xlink']}}}href"
@@ -61,6 +64,23 @@ def test_strange_attributes_are_valid(tmp_path, schema):
     root = written(tmp_path, [modelled(box(), "\x02", attributes=strange)])
     schema.assertValid(root.getroottree())
     assert found(root, "//gen:stringAttribute[@name='flag']/gen:value/text()") == ["true"]
+
+
+def test_the_text_is_what_lxml_would_print(tmp_path):
+    strange = {'a & <b> "c"': "\r\n\t & <ö> 'x'\u2028\x85", "ü": -0.5}
+    root = written(tmp_path, [*street(), modelled(courtyard(), "<&\"'>\x07ß", attributes=strange)])
+    text = (tmp_path / "a.gml").read_bytes()
+    assert etree.tostring(root, encoding="utf-8") == text.partition(b"\n")[2]
+
+
+@given(st.text(max_size=12))
+def test_any_text_comes_back_from_xml(text):
+    known = "".join(
+        c if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd" or c > "\uffff" else "\ufffd"
+        for c in text
+    )
+    element = etree.fromstring(f'<a b="{xml_attribute(text)}">{xml_text(text)}</a>')
+    assert (element.get("b"), element.text or "") == (known, known)
 
 
 def test_every_building_is_there(tmp_path):

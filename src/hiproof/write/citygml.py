@@ -1,7 +1,8 @@
 """CityGML 2.0: a streamed CityModel of LoD2 buildings.
 
-Each building is built as one small tree, written and dropped, so a city needs no more memory than a street. The
+Each building becomes one piece of text, written and dropped, so a city needs no more memory than a street. The
 envelope stands before the buildings but is known only after them: its place is left blank and filled in at the end.
+All ids in the text are names by XML's rules already; what comes from outside is escaped where it enters.
 """
 
 from __future__ import annotations
@@ -15,30 +16,26 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from lxml import etree
 
 from ..model import GROUND, ROOF, WALL, Building, Face
 from .building_attributes import PREFIX, building_attributes, figures_of, ground_height, rounded
-from .naming import UniqueNames, gml_name, srs_name, xml_text
+from .naming import UniqueNames, gml_name, srs_name
 from .roof_codes import roof_type_code
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
+from .xml_text import xml_attribute, xml_text
 
 NAMESPACES = {
-    "core": "http://www.opengis.net/citygml/2.0",
     "bldg": "http://www.opengis.net/citygml/building/2.0",
+    "core": "http://www.opengis.net/citygml/2.0",
     "gen": "http://www.opengis.net/citygml/generics/2.0",
     "gml": "http://www.opengis.net/gml",
     "xlink": "http://www.w3.org/1999/xlink",
 }
-CORE, BLDG, GEN, GML, XLINK = (f"{{{uri}}}" for uri in NAMESPACES.values())
 ROOF_TYPE_CODES = "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml"
-GENERIC = {int: f"{GEN}intAttribute", float: f"{GEN}doubleAttribute", str: f"{GEN}stringAttribute"}
-GENERIC_VALUE = f"{GEN}value"
+GENERIC = {int: "gen:intAttribute", float: "gen:doubleAttribute", str: "gen:stringAttribute"}
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 WIDEST = -123456789.1234
-# lxml declares all namespaces again on every building's element; the root's declarations are enough
-OPENING = b"<core:cityObjectMember"
 
 
 def write_citygml(
@@ -76,11 +73,8 @@ class CityGMLWriter(BuildingWriter):
         self.names = UniqueNames()
 
     def begin(self, stack: ExitStack) -> None:
-        self.xml = stack.enter_context(etree.xmlfile(self.file, encoding="utf-8"))
-        self.xml.write_declaration()
-        stack.enter_context(self.xml.element(f"{CORE}CityModel", nsmap=NAMESPACES))
-        self.xml.write("\n")
-        self.xml.flush()
+        declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
+        self.file.write(f"<?xml version='1.0' encoding='utf-8'?>\n<core:CityModel {declared}>\n".encode())
         self.envelope_at = self.file.tell()
         self.envelope_length = len(self.envelope(np.full(3, WIDEST), np.full(3, WIDEST)))
         self.file.write(b" " * self.envelope_length)
@@ -94,12 +88,10 @@ class CityGMLWriter(BuildingWriter):
     def put(self, member: Member) -> None:
         """Write a building that `gml_member` made, here or in another process."""
         self.low, self.high = np.minimum(self.low, member.low), np.maximum(self.high, member.high)
-        self.xml.flush()
         self.file.write(b"\n" + member.text)
 
     def finish(self) -> None:
-        self.xml.write("\n")
-        self.xml.flush()
+        self.file.write(b"\n</core:CityModel>")
         if np.isfinite(self.low).all():
             end = self.file.tell()
             self.file.seek(self.envelope_at)
@@ -107,12 +99,12 @@ class CityGMLWriter(BuildingWriter):
             self.file.seek(end)
 
     def envelope(self, low: np.ndarray, high: np.ndarray) -> bytes:
-        bounded_by = etree.Element(f"{GML}boundedBy", nsmap={"gml": NAMESPACES["gml"]})
-        attributes = {} if self.srs_name is None else {"srsName": self.srs_name}
-        box = etree.SubElement(bounded_by, f"{GML}Envelope", attributes, srsDimension="3")
-        etree.SubElement(box, f"{GML}lowerCorner").text = " ".join(positions(low[None]))
-        etree.SubElement(box, f"{GML}upperCorner").text = " ".join(positions(high[None]))
-        return etree.tostring(bounded_by)
+        srs = "" if self.srs_name is None else f' srsName="{xml_attribute(self.srs_name)}"'
+        lower, upper = positions(np.array([low, high]))
+        return (
+            f'<gml:boundedBy><gml:Envelope srsDimension="3"{srs}><gml:lowerCorner>{lower}</gml:lowerCorner>'
+            f"<gml:upperCorner>{upper}</gml:upperCorner></gml:Envelope></gml:boundedBy>"
+        ).encode()
 
 
 @dataclass(frozen=True)
@@ -132,15 +124,14 @@ def gml_member(
     creation_date: datetime.date | None = None,
 ) -> Member:
     """The cityObjectMember of `building`, whose gml:ids end in `name`; the root's namespaces are taken as declared."""
-    element = city_object_member(building, figures, attributes, name, creation_date)
-    text = etree.tostring(element, encoding="utf-8", xml_declaration=False)
+    text = city_object_member(building, figures, attributes, name, creation_date)
     lines = terrain_lines(building)
     if figures is not None:
         lines = [*lines, building.solid.vertices]
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for line in lines:
         low, high = np.minimum(low, line.min(axis=0)), np.maximum(high, line.max(axis=0))
-    return Member(OPENING + text[text.index(b">") :], low, high)
+    return Member(text.encode(), low, high)
 
 
 def city_object_member(
@@ -149,36 +140,34 @@ def city_object_member(
     attributes: dict[str, Any],
     name: str,
     creation_date: datetime.date | None = None,
-) -> etree._Element:
+) -> str:
     """One bldg:Building, its children in the schema's order; all its gml:ids end in `name`, unique in the file."""
-    member = etree.Element(f"{CORE}cityObjectMember", nsmap=NAMESPACES)
-    element = etree.SubElement(member, f"{BLDG}Building", {f"{GML}id": f"bldg-{name}"})
-    etree.SubElement(element, f"{GML}name").text = xml_text(building.id)
+    text = [f'<core:cityObjectMember><bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
     if creation_date is not None:
-        etree.SubElement(element, f"{CORE}creationDate").text = creation_date.isoformat()
-    for key, value in attributes.items():
-        add_generic_attribute(element, key, value)
+        text.append(f"<core:creationDate>{creation_date.isoformat()}</core:creationDate>")
+    text += [generic_attribute(key, value) for key, value in attributes.items()]
     code = roof_type_code(building)
     if code is not None:
-        etree.SubElement(element, f"{BLDG}roofType", codeSpace=ROOF_TYPE_CODES).text = code
+        text.append(f'<bldg:roofType codeSpace="{ROOF_TYPE_CODES}">{code}</bldg:roofType>')
+    polygon_ids = [] if figures is None else surface_ids(building.solid.faces, name)
     if figures is not None:
         height = figures.h_max - min(ground_height(building, figures), figures.h_base)
-        etree.SubElement(element, f"{BLDG}measuredHeight", uom="m").text = f"{height:.4f}"
-        polygon_ids = surface_ids(building.solid.faces, name)
-        add_solid(element, polygon_ids, name)
-    add_terrain_intersection(element, terrain_lines(building))
+        text.append(f'<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>')
+        text.append(solid_text(polygon_ids, name))
+    text.append(terrain_intersection(terrain_lines(building)))
     if figures is not None:
-        add_boundary_surfaces(element, building, figures, polygon_ids)
-    return member
+        text += boundary_surfaces(building, figures, polygon_ids)
+    text.append("</bldg:Building></core:cityObjectMember>")
+    return "".join(text)
 
 
-def add_generic_attribute(element: etree._Element, name: str, value: Any) -> None:
+def generic_attribute(name: str, value: Any) -> str:
     """A gen:*Attribute of the value's kind; None is left out."""
     if value is None:
-        return
+        return ""
+    tag = GENERIC.get(type(value), GENERIC[str])
     text = str(value).lower() if isinstance(value, bool) else xml_text(value)
-    attribute = etree.SubElement(element, GENERIC.get(type(value), GENERIC[str]), name=xml_text(name))
-    etree.SubElement(attribute, GENERIC_VALUE).text = text
+    return f'<{tag} name="{xml_attribute(name)}"><gen:value>{text}</gen:value></{tag}>'
 
 
 def surface_ids(faces: tuple[Face, ...], name: str) -> list[str]:
@@ -191,14 +180,13 @@ def surface_ids(faces: tuple[Face, ...], name: str) -> list[str]:
     return ids
 
 
-def add_solid(element: etree._Element, polygon_ids: list[str], name: str) -> None:
+def solid_text(polygon_ids: list[str], name: str) -> str:
     """The closed shell, made of the boundary surfaces' own polygons."""
-    lod2 = etree.SubElement(element, f"{BLDG}lod2Solid")
-    solid = etree.SubElement(lod2, f"{GML}Solid", {f"{GML}id": f"solid-{name}"})
-    exterior = etree.SubElement(solid, f"{GML}exterior")
-    shell = etree.SubElement(exterior, f"{GML}CompositeSurface")
-    for polygon_id in polygon_ids:
-        etree.SubElement(shell, f"{GML}surfaceMember", {f"{XLINK}href": f"#poly-{polygon_id}"})
+    members = "".join(f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids)
+    return (
+        f'<bldg:lod2Solid><gml:Solid gml:id="solid-{name}"><gml:exterior><gml:CompositeSurface>{members}'
+        "</gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod2Solid>"
+    )
 
 
 def terrain_lines(building: Building) -> list[np.ndarray]:
@@ -206,40 +194,50 @@ def terrain_lines(building: Building) -> list[np.ndarray]:
     return [line for line in building.terrain_intersection if len(line) > 1 and np.isfinite(line).all()]
 
 
-def add_terrain_intersection(element: etree._Element, lines: list[np.ndarray]) -> None:
+def terrain_intersection(lines: list[np.ndarray]) -> str:
     """The lines (m, 3) along which the building meets the terrain."""
     if not lines:
-        return
-    lod2 = etree.SubElement(element, f"{BLDG}lod2TerrainIntersection")
-    curves = etree.SubElement(lod2, f"{GML}MultiCurve")
-    for line in lines:
-        curve = etree.SubElement(curves, f"{GML}curveMember")
-        add_positions(etree.SubElement(curve, f"{GML}LineString"), positions(line))
+        return ""
+    members = "".join(
+        f"<gml:curveMember><gml:LineString>{position_list(positions(line))}</gml:LineString></gml:curveMember>"
+        for line in lines
+    )
+    return f"<bldg:lod2TerrainIntersection><gml:MultiCurve>{members}</gml:MultiCurve></bldg:lod2TerrainIntersection>"
 
 
-def add_boundary_surfaces(
-    element: etree._Element, building: Building, figures: RoofFigures, polygon_ids: list[str]
-) -> None:
+def boundary_surfaces(building: Building, figures: RoofFigures, polygon_ids: list[str]) -> list[str]:
     """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth in degrees."""
     place = positions(building.solid.vertices)
+    surfaces = []
     for index, (face, polygon_id) in enumerate(zip(building.solid.faces, polygon_ids, strict=True)):
-        bounded_by = etree.SubElement(element, f"{BLDG}boundedBy")
-        surface = etree.SubElement(bounded_by, f"{BLDG}{face.kind}", {f"{GML}id": polygon_id})
-        if face.kind == ROOF:
-            for key, angle in (("slope", figures.face_slope_deg[index]), ("azimuth", figures.face_azimuth_deg[index])):
-                if math.isfinite(angle):
-                    add_generic_attribute(surface, key, rounded(angle, 3))
-        lod2 = etree.SubElement(surface, f"{BLDG}lod2MultiSurface")
-        member = etree.SubElement(etree.SubElement(lod2, f"{GML}MultiSurface"), f"{GML}surfaceMember")
-        polygon = etree.SubElement(member, f"{GML}Polygon", {f"{GML}id": f"poly-{polygon_id}"})
-        for number, ring in enumerate(face.rings):
-            bound = etree.SubElement(polygon, f"{GML}interior" if number else f"{GML}exterior")
-            closed = [place[vertex] for vertex in (*ring, ring[0])]
-            add_positions(etree.SubElement(bound, f"{GML}LinearRing"), closed)
+        tag = f"bldg:{face.kind}"
+        angles = angle_attributes(figures, index) if face.kind == ROOF else ""
+        surfaces.append(
+            f'<bldg:boundedBy><{tag} gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
+            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{polygon_rings(face, place)}</gml:Polygon>'
+            f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
+        )
+    return surfaces
 
 
-def add_positions(element: etree._Element, place: list[str]) -> None:
-    etree.SubElement(element, f"{GML}posList", srsDimension="3").text = " ".join(place)
+def angle_attributes(figures: RoofFigures, index: int) -> str:
+    """Slope and azimuth of roof face `index`, as far as they are known."""
+    angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
+    return "".join(generic_attribute(key, rounded(angle, 3)) for key, angle in angles.items() if math.isfinite(angle))
+
+
+def polygon_rings(face: Face, place: list[str]) -> str:
+    """The rings of a face, `place` being the vertices' coordinates as text."""
+    text = ""
+    for number, ring in enumerate(face.rings):
+        bound = "gml:interior" if number else "gml:exterior"
+        closed = position_list([place[vertex] for vertex in (*ring, ring[0])])
+        text += f"<{bound}><gml:LinearRing>{closed}</gml:LinearRing></{bound}>"
+    return text
+
+
+def position_list(place: list[str]) -> str:
+    return f'<gml:posList srsDimension="3">{" ".join(place)}</gml:posList>'
 
 
 def positions(xyz: np.ndarray) -> list[str]:

@@ -6,7 +6,6 @@ import re
 from typing import Any
 
 NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
-NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 def gml_name(building_id: str) -> str:
@@ -16,12 +15,6 @@ def gml_name(building_id: str) -> str:
     'NL.IMBAG.Pand.05031_2f_a_20_b'
     """
     return NOT_IN_NAME.sub(lambda match: f"_{ord(match[0]):x}_", str(building_id))
-
-
-def xml_text(value: Any) -> str:
-    """`value` as text without the control characters XML cannot hold."""
-    text = str(value)
-    return text if text.isascii() and text.isprintable() else NOT_IN_XML.sub("\ufffd", text)
 
 
 class UniqueNames:

@@ -14,7 +14,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Building, Part, Piece
-from .building_attributes import plain_text, rounded
+from .building_attributes import plain_text
 from .json_text import dump
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
@@ -136,8 +136,8 @@ def by_name(values: dict[str, float]) -> dict[str, float | None]:
 
 def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
     """A rounded number; None for NaN and infinities, which JSON does not know."""
-    return rounded(value, digits) if math.isfinite(value) else None
+    return round(float(value), digits) + 0.0 if math.isfinite(value) else None  # + 0.0: minus zero is zero
 
 
 def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float | None]:
-    return [number(value, digits) for value in np.asarray(values, float).tolist()]
+    return [round(v, digits) + 0.0 if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]

@@ -10,12 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 
 from ..model import GROUND, ROOF, Solid
 
 LEVEL_RIDGE_M = 0.05  # ends of a ridge differ in height by less
 FLAT_SLOPE_DEG = 3.0  # a face below drains but does not slope to the eye; it has no azimuth worth telling
-LEVELS_AT_ONCE = 64  # bounds the memory of the search for a percentile
+LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is level
 
 
 @dataclass(frozen=True)
@@ -79,7 +80,7 @@ def roof_figures(solid: Solid) -> RoofFigures:
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     roof = is_roof[face_of]
     z, plan = np.sort(corners[roof, :, 2], axis=1), normal[roof, 2] / 2
-    h_50p, h_70p = area_percentiles(z, plan, (0.5, 0.7)) + origin[2]
+    h_50p, h_70p = (level_of_share(share, z, plan) + origin[2] for share in (0.5, 0.7))
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
@@ -136,52 +137,53 @@ def base_height(solid: Solid) -> float:
     return float(solid.vertices[ground or slice(None), 2].min())
 
 
-def area_percentiles(z: np.ndarray, plan: np.ndarray, shares: tuple[float, ...]) -> np.ndarray:
-    """Levels below which the given shares of the roof's plan area lie.
+@njit(cache=True)
+def area_below(level, z, plan):
+    """Plan area of the triangles with sorted heights `z` (t, 3) and signed plan areas `plan` (t,) at or below `level`."""
+    area = 0.0
+    for t in range(len(z)):
+        low, middle, high = z[t, 0], z[t, 1], z[t, 2]
+        if high - low < LEVEL_TRIANGLE_M:
+            area += plan[t] if low <= level else 0.0
+            continue
+        lower, upper = max(middle - low, 1e-12), max(high - middle, 1e-12)
+        rising = min(max(level - low, 0.0), lower) ** 2 / lower
+        falling = upper - min(max(high - level, 0.0), upper) ** 2 / upper
+        area += plan[t] * (rising + falling) / (lower + upper)
+    return area
 
-    `z` (t, 3) sorted corner heights and `plan` (t,) signed plan areas of triangles. Between corner heights the area
-    below a level is quadratic in the level, at the height of a level triangle it jumps: both are solved exactly.
+
+@njit(cache=True)
+def level_of_share(share, z, plan):
+    """The level that `share` of the roof's plan area lies below; triangles as in `area_below`.
+
+    Between corner heights the area below a level is quadratic in the level, at the height of a level triangle it jumps:
+    both are solved exactly.
     """
-    level = z[:, 2] - z[:, 0] < 1e-9
-    steps, slopes = (z[level, 0], plan[level]), (z[~level], plan[~level])
-    targets = np.asarray(shares) * plan.sum()
-    knots = np.unique(z)
-    return np.array([level_of_area(target, knots, steps, slopes) for target in targets])
-
-
-def level_of_area(target: float, knots: np.ndarray, steps: tuple, slopes: tuple) -> float:
-    """Lowest level with at least `target` area at or below it; `knots` are the distinct corner heights in order."""
+    target = share * plan.sum()
+    enough = target * (1 - 1e-12)  # so that rounding does not decide where the share ends just at a level part
+    knots = np.unique(z.ravel())
     low, high = 0, len(knots) - 1
+    if area_below(knots[low], z, plan) >= enough:
+        return knots[low]
     while high - low > 1:
-        probes = np.unique(np.linspace(low, high, min(high - low + 1, LEVELS_AT_ONCE)).astype(int))
-        below = step_area(knots[probes], *steps) + sloped_area(knots[probes], *slopes)
-        above = int(np.argmax(below >= target)) if (below >= target).any() else len(probes) - 1
-        low, high = probes[max(above - 1, 0)], probes[max(above, 1)]
-    z_low, z_high = knots[low], knots[high]
-    already = float(step_area(knots[low : low + 1], *steps)[0])
-    c0, middle, c1 = sloped_area(np.array([z_low, 0.5 * (z_low + z_high), z_high]), *slopes)
-    if already + c0 >= target:
-        return float(z_low)
-    if already + c1 < target:
-        return float(z_high)
-    curvature = 2 * (c0 + c1 - 2 * middle)
-    linear, missing = c1 - c0 - curvature, target - already - c0
+        between = (low + high) // 2
+        if area_below(knots[between], z, plan) >= enough:
+            high = between
+        else:
+            low = between
+    span = knots[high] - knots[low]
+    start, middle = area_below(knots[low], z, plan), area_below(knots[low] + 0.5 * span, z, plan)
+    end = 0.0  # just below the upper knot, so without the triangles that lie level in it
+    for t in range(len(z)):
+        if z[t, 0] < knots[high]:
+            end += area_below(knots[high], z[t : t + 1], plan[t : t + 1])
+    if end < enough:
+        return knots[high]
+    curvature = 2 * (start + end - 2 * middle)
+    linear, missing = end - start - curvature, target - start
     t = 2 * missing / (linear + np.sqrt(max(linear**2 + 4 * curvature * missing, 0.0)))
-    return float(z_low + min(t, 1.0) * (z_high - z_low))
-
-
-def step_area(levels: np.ndarray, z: np.ndarray, plan: np.ndarray) -> np.ndarray:
-    """Plan area (m,) of level triangles at heights `z` (t,) that lie at or below each of `levels` (m,)."""
-    return (levels[:, None] >= z) @ plan
-
-
-def sloped_area(levels: np.ndarray, z: np.ndarray, plan: np.ndarray) -> np.ndarray:
-    """Plan area (m,) of sloped triangles with sorted heights `z` (t, 3) below each of `levels` (m,)."""
-    z0, z1, z2 = z.T
-    lower, upper = np.maximum(z1 - z0, 1e-12), np.maximum(z2 - z1, 1e-12)
-    rising = np.clip(levels[:, None] - z0, 0.0, lower) ** 2 / lower
-    falling = upper - np.clip(z2 - levels[:, None], 0.0, upper) ** 2 / upper
-    return (rising + falling) @ (plan / (lower + upper))
+    return knots[low] + min(t, 1.0) * span
 
 
 def ridge_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float:
