@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.evaluate.metrics import iou, nodata_share, plan_outline, psd, quality, unexplained_area
+from hiproof.evaluate.metrics import iou, nodata_share, percentile, plan_outline, psd, quality, unexplained_area
 from hiproof.model import GROUND, ROOF, WALL, Face, Solid
 
 
@@ -65,6 +65,25 @@ def test_cells_across_the_origin_are_told_apart():
     xy = np.array([[-0.5, -0.5], [0.5, -0.5], [-0.5, 0.5], [0.5, 0.5]])
     assert nodata_share(xy, shapely.box(-1, -1, 1, 1)) == 0
     assert unexplained_area(xy, np.ones(4)) == 4
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_cells_are_counted_as_one_by_one(seed):
+    rng = np.random.default_rng(seed)
+    outline = shapely.MultiPoint(rng.uniform(-9, 9, (8, 2))).convex_hull
+    xyz, dz = rng.uniform(-12, 12, (150, 3)), rng.uniform(0, 1, 150)
+    own = {}
+    for (x, y, _), off in zip(xyz, dz, strict=True):
+        own.setdefault((math.floor(x), math.floor(y)), []).append(off > 0.5)
+    cells = [(x, y) for x in range(-10, 10) for y in range(-10, 10) if outline.covers(shapely.Point(x + 0.5, y + 0.5))]
+    assert nodata_share(xyz, outline) == pytest.approx(np.mean([cell not in own for cell in cells]))
+    assert unexplained_area(xyz, dz) == sum(np.mean(away) > 0.5 for away in own.values())
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 20, 21, 400])
+def test_percentiles_are_those_of_numpy(count):
+    values = np.random.default_rng(count).normal(0, 1, count)
+    assert percentile(values, 0.95) == pytest.approx(np.percentile(values, 95), rel=1e-14)
 
 
 def test_figures_do_not_depend_on_the_order_of_points():

@@ -42,6 +42,14 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     return _nearest_vertical(points, *_flattened(polygons))
 
 
+def surface_and_vertical_distances(
+    points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
+) -> tuple[np.ndarray, np.ndarray]:
+    """`point_surface_distances` and `vertical_distances` of the same points and polygons."""
+    points, flattened = _checked_points(points), _flattened(polygons)
+    return _nearest(points, *flattened), _nearest_vertical(points, *flattened)
+
+
 def _checked_points(points: np.ndarray) -> np.ndarray:
     points = np.ascontiguousarray(points, float)
     if points.ndim != 2 or points.shape[1] != 3:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
 import shapely
 
 from ..model import ROOF, Fit, Quality, Solid
-from .distance import point_surface_distances, vertical_distances
+from ..read.cell_kernel import cell_keys
+from ..read.thin import cell_range, occupied_cells
+from .distance import point_surface_distances, surface_and_vertical_distances
 
 NEAR_M = 0.2
 """A point within this vertical distance of the roof counts as explained well (the field's share within 20 cm)."""
@@ -69,47 +72,52 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
     if has_outline:
         figures["outline_iou"] = iou(plan_outline(polygons), outline)
         figures["density"] = len(points) / outline.area
-        figures["nodata_share"] = nodata_share(points[:, :2], outline)
+        figures["nodata_share"] = nodata_share(points, outline)
     if len(points) and polygons:
-        distances = point_surface_distances(points, polygons)
-        dz = vertical_distances(points, polygons)
+        distances, dz = surface_and_vertical_distances(points, polygons)
         figures |= {
             "psd_mean": float(distances.mean()),
             "psd_std": float(distances.std()),
             "rmse": float(np.sqrt(np.mean(distances**2))),
-            "p95": float(np.percentile(distances, 95)),
+            "p95": percentile(distances, 0.95),
             "share_within_20cm": float(np.mean(dz < NEAR_M)),
-            "unexplained_area_m2": unexplained_area(points[:, :2], dz),
+            "unexplained_area_m2": unexplained_area(points, dz),
         }
     return Quality(points=len(points), **figures)
 
 
+def percentile(values: np.ndarray, share: float) -> float:
+    """The level that `share` of `values` (n,) lie below, linear between two values; NumPy's own takes ten times as long."""
+    place = share * (len(values) - 1)
+    low = int(place)
+    below, above = np.partition(values, (low, min(low + 1, len(values) - 1)))[[low, min(low + 1, len(values) - 1)]]
+    return float(above - (above - below) * (1 - (place - low)))
+
+
 def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2); NaN without cells."""
+    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2 or 3); NaN without cells."""
     west, south, east, north = np.array(outline.bounds) / CELL_M
-    columns, rows = np.arange(np.floor(west), np.ceil(east)), np.arange(np.floor(south), np.ceil(north))
-    x, y = (axis.ravel() for axis in np.meshgrid(columns, rows))
+    west, south = math.floor(west), math.floor(south)
+    columns, rows = math.ceil(east) - west, math.ceil(north) - south
+    row, column = np.divmod(np.arange(rows * columns), columns)
     shapely.prepare(outline)
-    inside = shapely.intersects_xy(outline, (x + 0.5) * CELL_M, (y + 0.5) * CELL_M)
-    if not inside.any():
+    wanted = shapely.intersects_xy(outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M)
+    if not wanted.any():
         return float("nan")
-    seen = _cell_keys(xy)
-    wanted = _cell_keys(np.column_stack([x[inside] + 0.5, y[inside] + 0.5]) * CELL_M)
-    return float(1 - np.isin(wanted, seen).mean())
+    column, row = np.floor(xy[:, 0] / CELL_M) - west, np.floor(xy[:, 1] / CELL_M) - south
+    near = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
+    seen = np.zeros(rows * columns, bool)
+    seen[(row[near] * columns + column[near]).astype(np.int64)] = True
+    return float(1 - seen[wanted].mean())
 
 
 def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
-    """Area (m2) of the 1 m cells most of whose points lie more than half a metre vertically off the roof."""
-    _, cell = np.unique(_cell_keys(xy), return_inverse=True)
-    total = np.bincount(cell)
+    """Area (m2) of the 1 m cells of `xy` (n, 2 or 3) most of whose points lie more than half a metre off the roof."""
+    xy = np.ascontiguousarray(xy, float)
+    low, (columns, rows) = cell_range(xy, CELL_M)
+    _, cell, total = occupied_cells(cell_keys(xy, CELL_M, *low, columns), columns * rows)
     away = np.bincount(cell, weights=dz > UNEXPLAINED_M)
     return float(np.count_nonzero(away > total / 2) * CELL_M**2)
-
-
-def _cell_keys(xy: np.ndarray) -> np.ndarray:
-    """One integer a 1 m cell, so that cells can be compared and counted."""
-    column, row = np.floor(np.asarray(xy) / CELL_M).astype(np.int64).T
-    return (column << 32) ^ (row & 0xFFFFFFFF)
 
 
 def _observed_outline(points: np.ndarray) -> shapely.Polygon | None:
