@@ -28,7 +28,8 @@ LOWEST_WALL_M = 0.1
 
 @dataclass(frozen=True)
 class Recognised:
-    """What the network says: a weight (n,) a point (1 roof, 0 not), and probabilities by roof type; empty without it."""
+    """What the network says: probabilities by roof type, empty without it, and a weight (n,) a point (1 roof, 0 not)
+    for a fit of one primitive; a fit of several weighs all points alike."""
 
     weights: np.ndarray | None = None
     types: dict[str, float] = field(default_factory=dict)
@@ -114,7 +115,8 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
         found = segment(points, settings)
     except FitError:
         return Recognised()
-    return Recognised(found.weights, found.types, fit_prior(found.types))
+    weights = found.weights if settings.fit.parts == "one" or settings.fit.objective == "paper" else None
+    return Recognised(weights, found.types, fit_prior(found.types))
 
 
 def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:

@@ -8,9 +8,10 @@ import pytest
 
 from hiproof.errors import InputError
 from hiproof.learn.data import TEST, TRAINING, VALIDATION, open_source
-from hiproof.learn.houses import training_house
+from hiproof.learn.houses import lengthened, resized, training_house, without_a_corner
 from hiproof.learn.shapes import read_shapes
 from hiproof.simulate import ROOF_TYPES
+from hiproof.simulate.roofs import random_building
 
 DEN_HAAG = Path(__file__).parents[2] / ".." / "shared" / "data" / "denhaag" / "DenHaag_01.city.json"
 
@@ -58,6 +59,36 @@ def test_an_annexed_house_keeps_its_type(type):
         house = training_house(np.random.default_rng(seed), type, annex_share=1.0)
         assert house.type == type and len(house.roof.parts) >= 2
         assert house.outline.geom_type == "Polygon"
+
+
+@pytest.mark.parametrize("type", ROOF_TYPES)
+def test_varied_houses_are_whole_and_keep_their_type(type):
+    for seed in range(30):
+        house = training_house(np.random.default_rng([3, seed]), type, annex_share=0.3)
+        assert house.type == type and house.outline.geom_type == "Polygon" and house.outline.area > 1.0
+
+
+def test_a_cut_corner_leaves_a_convex_plan_under_the_same_planes():
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        part = random_building(rng, "hip").roof.parts[0]
+        before, after = part.pieces[0], without_a_corner(rng, part).pieces[0]
+        assert 0.5 * before.outline.area < after.outline.area < before.outline.area
+        assert after.outline.within(before.outline.buffer(1e-9))
+        assert after.outline.convex_hull.area == pytest.approx(after.outline.area)
+        np.testing.assert_array_equal(before.planes, after.planes)
+
+
+def test_a_resized_part_keeps_its_shape_and_a_lengthened_one_its_ends():
+    rng = np.random.default_rng(0)
+    hip = random_building(rng, "hip").roof.parts[0]
+    longer = lengthened(rng, hip).parameters
+    assert longer["length"] - longer["ridge_length"] == pytest.approx(
+        hip.parameters["length"] - hip.parameters["ridge_length"]
+    )
+    smaller = resized(rng, hip).parameters
+    ratios = {name: smaller[name] / hip.parameters[name] for name in smaller}
+    assert ratios["length"] == pytest.approx(ratios["width"]) and ratios["height"] <= ratios["width"] <= 1.0
 
 
 def test_boxes_of_a_cityjson_are_scanned_and_split(tmp_path):

@@ -6,11 +6,12 @@ import pytest
 torch = pytest.importorskip("torch", reason="needs the extra `train` (torch)")
 onnx = pytest.importorskip("onnx", reason="needs the extra `train` (onnx)")
 
-from hiproof.learn.augment import AugmentSettings, symmetric, varied  # noqa: E402
+from hiproof.errors import InputError  # noqa: E402
+from hiproof.learn.augment import ACROSS, ALONG, AugmentSettings, symmetric, varied  # noqa: E402
 from hiproof.learn.batch import network_inputs  # noqa: E402
-from hiproof.learn.export import export  # noqa: E402
-from hiproof.learn.network import NetworkSettings, RoofNetwork, turn_matrices  # noqa: E402
-from hiproof.segment.arrange import TURNED_PAIRS, Layout, arrange  # noqa: E402
+from hiproof.learn.export import export, read_weights  # noqa: E402
+from hiproof.learn.network import NetworkSettings, RoofNetwork  # noqa: E402
+from hiproof.segment.arrange import Layout, arrange  # noqa: E402
 from hiproof.segment.inference import SHIPPED_WEIGHTS, load, run  # noqa: E402
 from hiproof.simulate import training_sample  # noqa: E402
 
@@ -56,28 +57,16 @@ def test_onnx_equals_torch_for_the_shipped_weights():
     """The shipped file's own weights, put back into a PyTorch network, give the same logits."""
     model = load(str(SHIPPED_WEIGHTS))
     network = RoofNetwork(NetworkSettings(types=model.types, layout=model.layout)).eval()
-    stored = {
-        tensor.name: onnx.numpy_helper.to_array(tensor) for tensor in onnx.load(SHIPPED_WEIGHTS).graph.initializer
-    }
-    missing, _ = network.load_state_dict(
-        {k: torch.tensor(v) for k, v in named_weights(network, stored).items()}, strict=False
-    )
-    assert not [name for name in missing if not name.endswith("num_batches_tracked")]
+    read_weights(network, SHIPPED_WEIGHTS)
     assert largest_difference(network, SHIPPED_WEIGHTS, clouds(4, model.layout, start=40)) < 1e-4
 
 
-def named_weights(network, stored):
-    """The file's tensors by the network's names; `export` keeps both the same."""
-    return {name: stored[name] for name in network.state_dict() if name in stored}
-
-
-def test_a_quarter_turn_changes_nothing():
-    network, arranged = tiny_network(), clouds(2, start=30)
-    inputs = network_inputs(arranged, TINY.layout)
-    turned = (inputs[0] @ turn_matrices()[1], *inputs[1:])
-    with torch.no_grad():
-        for before, after in zip(network(*inputs), network(*turned), strict=True):
-            torch.testing.assert_close(before, after, atol=1e-5, rtol=0)
+def test_weights_of_another_network_or_none_are_refused(tmp_path):
+    tiny = export(tiny_network(), tmp_path / "tiny.onnx")
+    (tmp_path / "broken.onnx").write_bytes(tiny.read_bytes()[:500])
+    for path in (SHIPPED_WEIGHTS, tmp_path / "broken.onnx", tmp_path / "none.onnx"):
+        with pytest.raises(InputError, match="weights of such a network"):
+            read_weights(RoofNetwork(TINY), path)
 
 
 def test_repeated_points_of_a_small_cloud_change_nothing_for_the_others():
@@ -97,12 +86,17 @@ def test_gradient_reaches_every_weight():
     assert all(parameter.grad is not None and parameter.grad.abs().sum() > 0 for parameter in network.parameters())
 
 
-def test_symmetric_keeps_lengths_and_heights():
-    features = clouds(1)[0].features
-    changed = symmetric(features, np.random.default_rng(3))
-    for x, y in TURNED_PAIRS:
-        np.testing.assert_allclose(np.hypot(*changed[:, [x, y]].T), np.hypot(*features[:, [x, y]].T), rtol=1e-5)
-    np.testing.assert_array_equal(changed[:, [2, 5, 6, 7, 10]], features[:, [2, 5, 6, 7, 10]])
+def test_symmetric_mirrors_along_and_across_and_nothing_else():
+    features, seen = clouds(1)[0].features, set()
+    for seed in range(20):
+        signs = symmetric(features, np.random.default_rng(seed)) / np.where(features == 0, 1, features)
+        assert np.isin(signs[features != 0], (-1, 1)).all()
+        along, across = (np.sign(signs[features[:, columns[0]] != 0, columns[0]][0]) for columns in (ALONG, ACROSS))
+        expected = np.ones(features.shape[1])
+        expected[list(ALONG)], expected[list(ACROSS)] = along, across
+        np.testing.assert_array_equal(np.where(features == 0, expected, signs), np.tile(expected, (len(features), 1)))
+        seen.add((along, across))
+    assert len(seen) == 4
 
 
 def test_varied_keeps_labels_with_their_points():

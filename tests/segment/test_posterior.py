@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from hiproof.segment import combine, fit_prior, most_probable
-from hiproof.segment.posterior import EVIDENCE_EXPONENT, SMALLEST_PRIOR
+from hiproof.segment.posterior import EVIDENCE_EXPONENT, OUTLIER_DISTANCE_M, SMALLEST_PRIOR, expected_distance
 
 TYPES = {"gable": 0.6, "hip": 0.3, "flat": 0.1}
 
@@ -70,11 +70,12 @@ class FakeFit:
 
     points_used = 100
 
-    def __init__(self, names):
+    def __init__(self, names, noise_m=0.05, outlier_share=0.0):
         self.type, self.bics = (names[0], {names[0]: 50.0}) if names else ("gable", {"gable": 0.0, "hip": 8.0})
+        self.noise_m, self.outlier_share = noise_m, outlier_share
 
 
-def test_most_probable_fits_again_only_where_the_network_overrules_the_evidence():
+def test_most_probable_fits_again_only_where_the_network_disagrees_with_the_evidence():
     asked = []
 
     def fit(names):
@@ -85,3 +86,18 @@ def test_most_probable_fits_again_only_where_the_network_overrules_the_evidence(
     assert found.type == "gable" == next(iter(posterior)) and asked == [()]
     found, posterior = most_probable(fit, {"gable": 0.01, "hip": 0.99})
     assert found.type == "hip" == next(iter(posterior)) and asked == [(), (), ("hip",)]
+
+
+@pytest.mark.parametrize("worse", [{"noise_m": 0.09}, {"outlier_share": 0.05}])
+def test_a_named_type_far_from_the_points_is_not_built(worse):
+    def fit(names):
+        return FakeFit(names, **(worse if names else {}))
+
+    found, posterior = most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert next(iter(posterior)) == "hip" and found.type == "gable"
+
+
+def test_expected_distance_is_the_mean_over_noise_and_outliers():
+    drawn = np.abs(np.random.default_rng(0).normal(0, 0.05, 100_000))
+    assert expected_distance(FakeFit(())) == pytest.approx(drawn.mean(), rel=0.01)
+    assert expected_distance(FakeFit((), outlier_share=1.0)) == OUTLIER_DISTANCE_M

@@ -1,55 +1,99 @@
-"""Sampling and arrangement: the compiled paths equal plain NumPy, and the input follows the points."""
+"""Sampling and arrangement: the compiled path equals plain NumPy, and the input follows the points."""
 
 import numpy as np
 import pytest
 
-from hiproof.segment.arrange import Layout, arrange, canonical_direction, local_surface, rotated
-from hiproof.segment.sampling import ball_neighbours, farthest_point_order, thin_to_grid
+from hiproof.segment.arrange import Layout, arrange
+from hiproof.segment.sampling import BALL_FACTOR, FEATURES, SURFACE_NEIGHBOURS, arranged, thin_to_grid
 from hiproof.simulate import training_sample
 
-LAYOUT = Layout(points=64, levels=(32, 16, 8), neighbours=8)
+COUNT, LEVELS, GROUP = 64, (32, 16, 8), 8
+LAYOUT = Layout(points=COUNT, levels=LEVELS, neighbours=GROUP)
 
 
-def some_cloud(seed=0):
-    return training_sample(np.random.default_rng(seed))[0]
+def some_cloud(seed=0, count=200):
+    return centred(training_sample(np.random.default_rng(seed))[0][:count])
+
+
+def centred(xyz):
+    return np.ascontiguousarray(xyz - xyz.mean(axis=0))
+
+
+def turned(xyz, angle):
+    c, s = np.cos(angle), np.sin(angle)
+    return xyz @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def distances(a, b):
+    return np.sqrt(((a[:, None] - b) ** 2).sum(axis=2))
 
 
 def slow_farthest_points(xyz, count):
     chosen = [int(np.argmax(((xyz - xyz.mean(axis=0)) ** 2).sum(axis=1)))]
     while len(chosen) < count:
-        distance = ((xyz[:, None] - xyz[chosen]) ** 2).sum(axis=2).min(axis=1)
-        chosen.append(int(np.argmax(distance)))
+        chosen.append(int(np.argmax(distances(xyz, xyz[chosen]).min(axis=1))))
     return chosen
 
 
-def test_farthest_points_equal_the_slow_oracle():
-    xyz = some_cloud()[:200]
-    order, radius = farthest_point_order(xyz, 50)
-    assert order.tolist() == slow_farthest_points(xyz, 50)
-    covered = np.sqrt(((xyz[:, None] - xyz[order]) ** 2).sum(axis=2).min(axis=1).max())
-    assert radius[-1] == pytest.approx(covered)
+def slow_surface(xyz, i):
+    """Normal, roughness, convexity and offset over reach of point `i`, by the eigenvectors of its neighbours."""
+    away = distances(xyz[i : i + 1], xyz)[0]
+    nearest = np.argsort(away)[:SURFACE_NEIGHBOURS]
+    mean = xyz[nearest].mean(axis=0)
+    values, vectors = np.linalg.eigh(np.cov(xyz[nearest].T, bias=True))
+    normal = vectors[:, 0] * (-1 if vectors[2, 0] < 0 else 1)
+    return normal, np.sqrt(max(values[0], 0)), (xyz[i] - mean) @ normal, (mean - xyz[i])[:2] / away[nearest[-1]]
 
 
-def test_farthest_points_of_few_points_are_all_of_them():
-    order, _ = farthest_point_order(some_cloud()[:20], 64)
-    assert sorted(order.tolist()) == list(range(20))
+@pytest.mark.parametrize("seed", range(3))
+def test_choice_and_surfaces_equal_the_slow_oracle(seed):
+    xyz = some_cloud(seed)
+    order, features, *_ = arranged(xyz, COUNT, *LEVELS, GROUP)
+    assert order.tolist() == slow_farthest_points(xyz, COUNT)
+    for row, i in enumerate(order):
+        normal, roughness, convexity, offset = slow_surface(xyz, i)
+        told = dict(zip(FEATURES, features[row], strict=True))
+        assert told["normal_z"] == pytest.approx(normal[2], abs=1e-5)
+        assert told["roughness"] == pytest.approx(min(roughness / 0.2, 5), abs=1e-4)
+        if normal[2] > 1e-6:
+            assert told["convexity"] == pytest.approx(np.clip(convexity / 0.2, -5, 5), abs=1e-4)
+        assert np.hypot(told["offset_x"], told["offset_y"]) == pytest.approx(np.hypot(*offset), abs=1e-5)
 
 
-def test_ball_neighbours_equal_the_slow_oracle():
-    xyz = some_cloud(1)[:150]
-    centres, radius = xyz[:30], 1.5
-    index, distance = ball_neighbours(centres, xyz, 8, radius)
-    for s, centre in enumerate(centres):
-        true = np.sqrt(((xyz - centre) ** 2).sum(axis=1))
-        expected = np.sort(true)[:8]
-        np.testing.assert_allclose(distance[s], np.where(expected <= radius, expected, expected[0]), atol=1e-12)
-        np.testing.assert_allclose(true[index[s]], distance[s], atol=1e-12)
+def slow_groups(xyz, centres, sources, count, radius):
+    """Sorted distances of the nearest `count` within `radius`, the nearest repeated where there are fewer."""
+    away = np.sort(distances(xyz[np.arange(centres) % len(xyz)], xyz[:sources]), axis=1)[:, :count]
+    away = np.pad(away, ((0, 0), (0, count - away.shape[1])), constant_values=np.inf)
+    return np.where(away <= radius, away, away[:, :1])
 
 
-def test_missing_neighbours_repeat_the_nearest():
-    sources = np.array([[0.0, 0, 0], [1, 0, 0]])
-    index, _ = ball_neighbours(np.array([[5.0, 0, 0]]), sources, 4, 0.1)
-    assert index.tolist() == [[1, 1, 1, 1]]
+@pytest.mark.parametrize("count", [200, 40, 12])
+def test_neighbourhoods_equal_the_slow_oracle(count):
+    xyz = some_cloud(1, count)
+    order, _, groups, radii, ups, weights = arranged(xyz, COUNT, *LEVELS, GROUP)
+    found, chosen = len(order), xyz[order]
+    for above, level, index, radius in zip((COUNT, *LEVELS), LEVELS, groups, radii, strict=False):
+        cover = distances(xyz, chosen[:level]).min(axis=1).max()
+        assert radius == pytest.approx(BALL_FACTOR * max(cover, 1e-3), rel=1e-5)
+        centres = chosen[np.arange(level) % found]
+        told = np.sqrt(((chosen[index] - centres[:, None]) ** 2).sum(axis=2))
+        expected = slow_groups(chosen, level, min(above, found), GROUP, BALL_FACTOR * max(cover, 1e-3))
+        np.testing.assert_allclose(told, expected, atol=1e-9)
+    for target, source, index, weight in (
+        (LEVELS[0], LEVELS[2], ups[0], weights[0]),
+        (COUNT, LEVELS[0], *ups[1:], weights[1]),
+    ):
+        away = slow_groups(chosen, target, min(source, found), 3, np.inf)
+        np.testing.assert_allclose(weight, (1 / (away + 1e-3)) / (1 / (away + 1e-3)).sum(axis=1)[:, None], rtol=1e-4)
+        assert index.max() < source
+
+
+def test_few_points_are_all_chosen_and_repeated():
+    xyz = some_cloud(0, 20)
+    arrangement = arrange(xyz, LAYOUT)
+    assert sorted(arrangement.chosen[:20].tolist()) == list(range(20)) and arrangement.sampled == 20
+    np.testing.assert_array_equal(arrangement.chosen[20:40], arrangement.chosen[:20])
+    np.testing.assert_array_equal(arrangement.features[20:40], arrangement.features[:20])
 
 
 def test_thinning_to_a_grid_keeps_the_extent_and_bounds_the_count():
@@ -65,7 +109,7 @@ def test_thinning_does_not_depend_on_the_chunk():
     assert thin_to_grid(xyz, 500, chunk=700).tolist() == thin_to_grid(xyz, 500).tolist()
 
 
-@pytest.mark.parametrize("shape", [(9, 3), (25, 3), (70, 3), (3000, 3)])
+@pytest.mark.parametrize("shape", [(1, 3), (9, 3), (25, 3), (70, 3), (3000, 3)])
 def test_arrangement_has_the_layouts_shapes(shape):
     arranged = arrange(np.random.default_rng(2).uniform(0, 10, shape), LAYOUT)
     assert arranged.features.shape == (64, 11) and np.isfinite(arranged.features).all()
@@ -75,27 +119,40 @@ def test_arrangement_has_the_layouts_shapes(shape):
     np.testing.assert_allclose(arranged.up_weights[0].sum(axis=1), 1.0, rtol=1e-5)
 
 
-def test_normals_of_a_plane_are_its_normal():
+def test_a_tilted_plane_has_its_normal_everywhere_and_falls_along_an_axis():
     xy = np.random.default_rng(3).uniform(0, 10, (200, 2))
-    surface = local_surface(np.column_stack([xy, xy @ (0.5, -0.2)]))
-    normal = np.array([-0.5, 0.2, 1.0]) / np.linalg.norm([-0.5, 0.2, 1.0])
-    np.testing.assert_allclose(surface.normals, np.tile(normal, (200, 1)), atol=1e-6)
-    assert surface.roughness.max() < 1e-6
+    features = arrange(np.column_stack([xy, xy @ (0.5, -0.2)]), LAYOUT).features
+    level, steep = 1 / np.sqrt(1.29), np.sqrt(0.29 / 1.29)
+    np.testing.assert_allclose(features[:, 5], level, atol=1e-6)
+    np.testing.assert_allclose(np.abs(features[:, 3:5]).max(axis=1), steep, atol=1e-6)
+    np.testing.assert_allclose(np.abs(features[:, 3:5]).min(axis=1), 0.0, atol=1e-6)
+    assert features[:, 3:5].sum() > 0 and features[:, 6].max() < 1e-4
 
 
-@pytest.mark.parametrize("angle", [0.3, 1.9, -2.5])
-def test_canonical_direction_turns_with_the_points_modulo_a_quarter(angle):
-    xyz = some_cloud(4)
-    before = canonical_direction(local_surface(xyz))
-    after = canonical_direction(local_surface(rotated(xyz, angle)))
-    assert np.exp(4j * (after - before - angle)) == pytest.approx(1.0, abs=1e-6)
+@pytest.mark.parametrize("angle", [0.3, 1.9, -2.5, np.pi / 2, np.pi])
+def test_features_do_not_change_when_the_points_turn(angle):
+    xyz = some_cloud(4, 400)
+    before, after = arrange(xyz, LAYOUT), arrange(turned(xyz, angle), LAYOUT)
+    np.testing.assert_array_equal(before.chosen, after.chosen)
+    np.testing.assert_allclose(before.features, after.features, atol=1e-4)
 
 
-@pytest.mark.parametrize("bad", ["same", "line", "duplicates"])
+def test_the_first_axis_is_the_long_one():
+    rng = np.random.default_rng(6)
+    xy = rng.uniform((0, 0), (14, 6), (300, 2))
+    gable = np.column_stack([xy, 3 - 0.6 * abs(xy[:, 1] - 3)])
+    for angle in (0.0, 0.7, 2.0):
+        spread = arrange(turned(gable, angle), LAYOUT).features[:, :2].std(axis=0)
+        assert spread[0] > 1.5 * spread[1]
+
+
+@pytest.mark.parametrize("bad", ["same", "line", "upright", "duplicates"])
 def test_degenerate_clouds_give_finite_features(bad):
     xyz = np.zeros((40, 3))
     if bad == "line":
         xyz[:, 0] = np.arange(40)
+    if bad == "upright":
+        xyz[:, 2] = np.arange(40)
     if bad == "duplicates":
         xyz = np.repeat(np.random.default_rng(5).uniform(0, 5, (4, 3)), 10, axis=0)
     assert np.isfinite(arrange(xyz, LAYOUT).features).all()

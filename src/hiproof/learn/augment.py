@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..segment.arrange import TURNED_PAIRS
-
 FEWEST_KEPT = 30
+ALONG, ACROSS = (0, 3, 8), (1, 4, 9)
+"""Columns of the features that change sign when a building is mirrored along or across its own first axis."""
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,9 @@ def varied(xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settin
 
 
 def symmetric(features: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    """Arranged features (N, 11) after a random quarter turn and, every second time, a reflection in plan."""
+    """Arranged features (N, 11) mirrored along and across the building, each every second time."""
     features = features.copy()
-    turn, mirrored = rng.integers(4), rng.random() < 0.5
-    c, s = ((1, 0), (0, 1), (-1, 0), (0, -1))[turn]
-    for i, j in TURNED_PAIRS:
-        x, y = features[:, i].copy(), features[:, j] * (-1 if mirrored else 1)
-        features[:, i], features[:, j] = c * x - s * y, s * x + c * y
+    for columns in (ALONG, ACROSS):
+        if rng.random() < 0.5:
+            features[:, columns] *= -1
     return features

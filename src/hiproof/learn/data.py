@@ -18,8 +18,8 @@ from .shapes import Shape, read_shapes
 
 DENSITY = (1.0, 20.0)
 POINTS = (60, 1500)
-ANNEX_SHARE = 0.3
-FIRST_SOURCE_SHARE = 0.85
+ANNEX_SHARE = 0.35
+FIRST_SOURCE_SHARE = 0.7
 TRAINING, VALIDATION, TEST = 1, 2, 3
 
 

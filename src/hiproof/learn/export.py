@@ -9,8 +9,9 @@ from pathlib import Path
 
 import torch
 
-from ..segment.arrange import FEATURES
+from ..errors import InputError
 from ..segment.inference import FORMAT, INPUT_NAMES, OUTPUT_NAMES
+from ..segment.sampling import FEATURES
 from .batch import example_batch
 from .network import RoofNetwork
 
@@ -43,3 +44,24 @@ def export(network: RoofNetwork, path: str | Path) -> Path:
     onnx.helper.set_model_props(model, metadata)
     onnx.save(model, path)
     return path
+
+
+def read_weights(network: RoofNetwork, path: str | Path) -> None:
+    """Put the weights of an ONNX file that `export` wrote into `network`.
+
+    Raises InputError for a file that cannot be read or is of a network of other types or sizes.
+    """
+    import onnx
+
+    try:
+        tensors = onnx.load(path).graph.initializer
+        stored = {tensor.name: torch.tensor(onnx.numpy_helper.to_array(tensor)) for tensor in tensors}
+        own = {name: stored.get(name, value) for name, value in network.state_dict().items()}
+        if missing := [name for name, _ in network.named_parameters() if name not in stored]:
+            raise ValueError(f"it has no {missing[0]}")
+        network.load_state_dict(own)
+    except Exception as error:
+        raise InputError(
+            f"expected {path} to hold the weights of such a network, got: {str(error).splitlines()[0]}; "
+            "name a file that `hiproof train` wrote for the same types, or start from random weights"
+        ) from error

@@ -1,4 +1,5 @@
-"""Houses for training, closer to real ones than the tests' clean types: annexes, short ridges, one-sided hips."""
+"""Houses for training, closer to real ones than the tests' clean types: annexes, rows, sheds, cut corners, one-sided
+hips."""
 
 from __future__ import annotations
 
@@ -6,36 +7,78 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import shapely
 
 from ..model import Part
 from ..simulate.roofs import SimBuilding, assemble, random_building, random_parameters
 from ..simulate.shapes import make_part
 
 ANNEX_TYPES = ("flat", "monopitch", "gable", "hip")
+LENGTHS = ("length", "ridge_length", "top_length")
+HEIGHTS = ("height", "hip_height", "break_height", "eave_step")
+COUNTS = ("teeth",)
 LOWEST_EAVE_M = 2.2
 OVERLAP_M = 0.05
 
 
 def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:
-    """A building of roof `type`; `annex_share` of them have one or two smaller parts (porch, extension, cross wing)
-    at their sides, a quarter of the hips a short ridge, a tenth of the gables one hipped end. The type stays the main roof's."""
+    """A building of roof `type`: small, long, low and cut by a party wall as real ones are; `annex_share` of them have
+    one or two smaller parts (porch, extension, cross wing) at their sides. The type stays the main roof's."""
     building = random_building(rng, type)
     main = building.roof.parts[0]
-    if type == "hip" and rng.random() < 0.25:
-        main = with_short_ridge(rng, main)
     if type == "gable" and rng.random() < 0.1:
         main = hipped_at_one_end(rng, main)
+    else:
+        if type == "hip" and rng.random() < 0.3:
+            main = with_short_ridge(rng, main)
+        elif type != "pyramid" and rng.random() < 0.2:
+            main = lengthened(rng, main)
+        if rng.random() < 0.3:
+            main = resized(rng, main)
     count = 1 + int(rng.random() < 0.3) if rng.random() < annex_share else 0
     annexes = tuple(annex(rng, main) for _ in range(count))
+    if type != "shed" and not annexes and rng.random() < 0.15:
+        main = without_a_corner(rng, main)
     return assemble((main, *annexes), "annexed" if annexes else "single", building.roof.frame.origin)
 
 
 def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
-    """A hip whose ridge is a tenth to a quarter of its width."""
-    ridge = hip.parameters["width"] * rng.uniform(0.1, 0.25)
+    """A hip whose ridge is a sixteenth to a quarter of its width."""
+    ridge = hip.parameters["width"] * rng.uniform(0.06, 0.25)
     length = hip.parameters["length"] - hip.parameters["ridge_length"] + ridge
     parameters = hip.parameters | {"length": length, "ridge_length": ridge}
     return make_part("hip", parameters, hip.kappa, hip.translation)
+
+
+def lengthened(rng: np.random.Generator, part: Part) -> Part:
+    """A part as long as a row or a barn: half a width to three widths longer."""
+    more = part.parameters["width"] * rng.uniform(0.5, 3.0)
+    parameters = {name: value + more * (name in LENGTHS) for name, value in part.parameters.items()}
+    return make_part(part.type, parameters, part.kappa, part.translation)
+
+
+def resized(rng: np.random.Generator, part: Part) -> Part:
+    """A part down to two fifths of its size (a shed, a garage), and lower than that yet by up to a half."""
+    size = rng.uniform(0.4, 1.0)
+    lower = size * rng.uniform(0.5, 1.0)
+    factors = dict.fromkeys(HEIGHTS, lower) | dict.fromkeys(COUNTS, 1.0)
+    parameters = {name: value * factors.get(name, size) for name, value in part.parameters.items()}
+    return make_part(part.type, parameters, part.kappa, part.translation)
+
+
+def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
+    """A part of one piece on a plot whose border, oblique to the roof, cuts off a corner."""
+    angle = part.kappa + rng.integers(4) * math.pi / 2 + math.radians(rng.uniform(25.0, 65.0))
+    normal, along = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+    piece = part.pieces[0]
+    corners = np.asarray(piece.outline.exterior.coords) @ normal
+    middle = np.array(piece.outline.centroid.coords[0])
+    reach = corners.max() - middle @ normal
+    border, far = middle + normal * reach * rng.uniform(0.55, 0.9), 100.0
+    beyond = shapely.Polygon(
+        [border - far * along, border + far * (normal - along), border + far * (normal + along), border + far * along]
+    )
+    return replace(part, pieces=(replace(piece, outline=piece.outline.difference(beyond)),))
 
 
 def hipped_at_one_end(rng: np.random.Generator, gable: Part) -> Part:

@@ -1,12 +1,12 @@
 """PointNet++ for roofs: four set abstractions, two feature propagations, a head for points and one for the building.
 
 After Qi et al., "PointNet++" (2017), single-scale grouping, with the relative positions divided by the ball's radius as
-in Qian et al., "PointNeXt" (2022). Sampling and grouping happen outside (`segment.arrange`), so that the graph is a few
-gathers and products. A quarter turn about Z is free: in evaluation the four turns of the canonical frame go through the
-network together and their logits are averaged.
+in Qian et al., "PointNeXt" (2022). Sampling and grouping happen outside (`segment.arrange`), in the building's own axes,
+so that the graph is a few gathers and products.
 
-Tensors are flat over buildings: a batch of B clouds of N points is (B N, O, C) with O turns, and group indices count
-rows of that flat tensor, so the same graph serves one building and many.
+Tensors are flat over buildings: a batch of B clouds of N points is (B N, C), and group indices count rows of that flat
+tensor, so the same graph serves one building and many. All sizes but B are constants of the graph: reading them off the
+tensors would take more nodes than the arithmetic.
 """
 
 from __future__ import annotations
@@ -16,9 +16,8 @@ from dataclasses import dataclass, field
 import torch
 from torch import nn
 
-from ..segment.arrange import FEATURES, POSITION_SCALE, TURNED_PAIRS, Layout
-
-QUARTER_TURNS = 4
+from ..segment.arrange import Layout
+from ..segment.sampling import FEATURES, POSITION_SCALE
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class NetworkSettings:
 
 
 class Dense(nn.Module):
-    """Linear layer, batch normalisation and ReLU over the last axis."""
+    """Linear layer, batch normalisation and ReLU over rows."""
 
     def __init__(self, inputs: int, outputs: int):
         super().__init__()
@@ -41,7 +40,7 @@ class Dense(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x):
-        return torch.relu(normalised(self.norm, self.linear(x)))
+        return torch.relu(self.norm(self.linear(x)))
 
 
 class SetAbstraction(nn.Module):
@@ -60,10 +59,10 @@ class SetAbstraction(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x, position, centres, group):
-        """Features (rows, O, C) and positions over the radius (rows, O, 3) to the centres' features (S, O, outputs)."""
+        """Features (rows, C) and positions over the radius (rows, 3) to the centres' features (S, outputs)."""
         source = self.features(x) + self.position(position)
         grouped = torch.relu(gathered(source, group) - self.position(centres).unsqueeze(1))
-        return torch.relu(normalised(self.norm, self.second(grouped).max(dim=1)[0]))
+        return torch.relu(self.norm(self.second(grouped).max(dim=1)[0]))
 
 
 class FeaturePropagation(nn.Module):
@@ -78,9 +77,9 @@ class FeaturePropagation(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, coarse, fine, index, weight):
-        """Coarse (rows, O, C) and fine features (S, O, D), interpolation `index`, `weight` (S, 3): (S, O, outputs)."""
-        joined = interpolated(self.coarse(coarse), index, weight) + self.fine(fine)
-        return torch.relu(normalised(self.norm, joined))
+        """Coarse (rows, C) and fine features (S, D), interpolation `index`, `weight` (S, 3): (S, outputs)."""
+        joined = (gathered(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(dim=1) + self.fine(fine)
+        return torch.relu(self.norm(joined))
 
 
 class GlobalAbstraction(nn.Module):
@@ -89,10 +88,11 @@ class GlobalAbstraction(nn.Module):
     def __init__(self, inputs: int, hidden: int, outputs: int):
         super().__init__()
         self.first, self.second = Dense(inputs + 3, hidden), Dense(hidden, outputs)
+        self.outputs = outputs
 
     def forward(self, x, position, size: int):
         y = self.second(self.first(torch.cat([x, position], dim=-1)))
-        return y.reshape(-1, size, *y.shape[1:]).max(dim=1)[0]
+        return y.reshape(-1, size, self.outputs).max(dim=1)[0]
 
 
 class RoofNetwork(nn.Module):
@@ -114,62 +114,27 @@ class RoofNetwork(nn.Module):
         self.dropout = nn.Dropout(settings.dropout)
         self.point_head = nn.Linear(up[1], classes + 1)
         self.type_head = nn.Sequential(Dense(inputs[4], 96), nn.Dropout(settings.dropout), nn.Linear(96, classes))
-        self.register_buffer("turns", turn_matrices())
         self.register_buffer("metres", torch.tensor(POSITION_SCALE))
 
     def forward(self, features, group1, group2, group3, radii, up_index1, up_index2, up_weight1, up_weight2):
         """See `segment.arrange.Arrangement`; `features` (B N, 11), indices into flat rows, `radii` (B, 3).
 
-        Returns point logits (B N, types + 1) and type logits (B, types), averaged over the quarter turns in evaluation;
-        in training no turn is applied (the loader draws one).
+        Returns point logits (B N, types + 1) and type logits (B, types).
         """
-        turns = self.turns[:1] if self.training else self.turns
-        x = torch.einsum("nc,ocd->nod", features, turns)
         sizes = (self.settings.layout.points, *self.settings.layout.levels)
-        metres = x[:, :, :3] * self.metres
-        levels, position = [x], metres
+        levels, position = [features], features[:, :3] * self.metres
         for i, (layer, group) in enumerate(zip(self.down, (group1, group2, group3), strict=True)):
-            scaled = over_radius(position, radii[:, i], sizes[i])
-            centres = first_rows(scaled, sizes[i], sizes[i + 1])
-            levels.append(layer(levels[-1], scaled, centres, group))
-            position = first_rows(position, sizes[i], sizes[i + 1])
+            scaled = position.reshape(-1, sizes[i], 3) / radii[:, i].reshape(-1, 1, 1)
+            centres = scaled[:, : sizes[i + 1]].reshape(-1, 3)
+            levels.append(layer(levels[-1], scaled.reshape(-1, 3), centres, group))
+            position = position.reshape(-1, sizes[i], 3)[:, : sizes[i + 1]].reshape(-1, 3)
         building = self.everything(levels[3], position / 10.0, sizes[3])
-        coarse = torch.cat([levels[3], building.repeat_interleave(sizes[3], dim=0)], dim=-1)
-        middle = self.up[0](coarse, levels[1], up_index1, up_weight1)
+        around = building.unsqueeze(1).expand(-1, sizes[3], -1).reshape(-1, self.everything.outputs)
+        middle = self.up[0](torch.cat([levels[3], around], dim=-1), levels[1], up_index1, up_weight1)
         fine = self.up[1](middle, levels[0], up_index2, up_weight2)
-        return self.point_head(self.dropout(fine)).mean(dim=1), self.type_head(building).mean(dim=1)
-
-
-def normalised(norm: nn.BatchNorm1d, x):
-    """Batch normalisation over the last axis, whatever the axes before it."""
-    return norm(x.reshape(-1, x.shape[-1])).reshape(x.shape)
+        return self.point_head(self.dropout(fine)), self.type_head(building)
 
 
 def gathered(x, index):
-    """Rows of `x` (rows, O, C) by `index` (S, K): (S, K, O, C)."""
-    return x.index_select(0, index.reshape(-1)).reshape(*index.shape, *x.shape[1:])
-
-
-def interpolated(x, index, weight):
-    """Weighted mean of the rows of `x` (rows, O, C) named by `index` (S, 3)."""
-    return (gathered(x, index) * weight.unsqueeze(-1).unsqueeze(-1)).sum(dim=1)
-
-
-def first_rows(x, size: int, kept: int):
-    """The first `kept` of each building's `size` rows: farthest-point samples are prefixes of one another."""
-    return x.reshape(-1, size, *x.shape[1:])[:, :kept].reshape(-1, *x.shape[1:])
-
-
-def over_radius(position, radius, size: int):
-    """Positions (B size, O, 3) divided by their building's radius (B,)."""
-    grouped = position.reshape(-1, size, *position.shape[1:])
-    return (grouped / radius.reshape(-1, 1, 1, 1)).reshape(position.shape)
-
-
-def turn_matrices():
-    """(4, 11, 11): a row of features times matrix k is that row after k quarter turns about Z."""
-    turns = torch.eye(len(FEATURES)).repeat(QUARTER_TURNS, 1, 1)
-    for k, (c, s) in enumerate(((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))):
-        for x, y in TURNED_PAIRS:
-            turns[k, x, x], turns[k, x, y], turns[k, y, x], turns[k, y, y] = c, s, -s, c
-    return turns
+    """Rows of `x` (rows, C) by `index` (S, K): (S, K, C)."""
+    return x[index]

@@ -23,7 +23,7 @@ from .augment import AugmentSettings, symmetric, varied
 from .batch import network_inputs
 from .card import write_card, write_curve
 from .data import TRAINING, VALIDATION, Sample, Source, open_source
-from .export import export
+from .export import export, read_weights
 from .network import NetworkSettings, RoofNetwork
 
 
@@ -32,7 +32,8 @@ class TrainSettings:
     """How to train: `samples` clouds are shown in all, each made one `views` times, `epoch` between validations.
 
     A validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the share `warm_up` and
-    falls as a cosine; `average` is the running average's memory a step.
+    falls as a cosine; `average` is the running average's memory a step. `start` names an ONNX file of this kind whose
+    weights to begin with, such as the shipped one, instead of random ones.
     """
 
     types: tuple[str, ...] = ()
@@ -49,6 +50,7 @@ class TrainSettings:
     seed: int = 1
     threads: int = 1
     device: str = "auto"
+    start: str = ""
     layout: Layout = field(default_factory=Layout)
     augment: AugmentSettings = field(default_factory=AugmentSettings)
 
@@ -56,7 +58,7 @@ class TrainSettings:
 def train(data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print) -> Path:
     """Train the network on `data` and write weights, curve, model card and checkpoints to the folder `out`.
 
-    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 85 %).
+    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 70 %).
     A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX file of the best epoch.
     Raises InputError for data that cannot be used, OutputError for a folder that cannot be written, SettingsError for
     a device that is not there or an epoch too short.
@@ -90,6 +92,8 @@ class Trainer:
         self.device = chosen_device(settings.device)
         network = NetworkSettings(types=source.types, layout=settings.layout)
         self.network = RoofNetwork(network).to(self.device)
+        if settings.start:
+            read_weights(self.network, settings.start)
         self.averaged = RoofNetwork(network).to(self.device).eval()
         self.averaged.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.AdamW(self.network.parameters(), settings.rate, weight_decay=settings.decay)

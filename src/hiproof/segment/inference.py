@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from ..errors import FitError, InputError, SettingsError
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
 
-FORMAT = "hiproof-roof-types-1"
+FORMAT = "hiproof-roof-types-2"
 INPUT_NAMES = (
     "features", "group1", "group2", "group3", "radii", "up_index1", "up_index2", "up_weight1", "up_weight2",
 )  # fmt: skip
@@ -25,6 +25,8 @@ OUTPUT_NAMES = ("point_logits", "type_logits")
 SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "roof_types.onnx"
 NOT_ROOF = -1
 FEWEST_POINTS = 10
+# A roof point left out costs a fit more than a point of a wall left in, which its outliers bear.
+SURELY_NOT_ROOF = 0.8
 CARRIED_NEIGHBOURS = 3
 CARRIED_CHUNK = 200_000
 
@@ -33,13 +35,29 @@ CARRIED_CHUNK = 200_000
 class Segmentation:
     """What the network says of one building's n points.
 
-    `labels` (n,) index of the point's roof type in `types`' order, -1 where it is no roof; `not_roof` (n,) that
-    probability; `types` probability of the building's roof type by name, in the catalogue's order, summing to 1.
+    `types` probability of the building's roof type by name, in the catalogue's order, summing to 1. `probability`
+    (m, types + 1), not-roof last, of the m points `sampled` (m, 3) that the network took of all points `xyz` (n, 3);
+    what is said of each of the n points is carried over from them when it is first asked for.
     """
 
-    labels: np.ndarray
-    not_roof: np.ndarray
     types: dict[str, float]
+    probability: np.ndarray
+    sampled: np.ndarray
+    xyz: np.ndarray
+
+    @cached_property
+    def _of_every_point(self) -> tuple[np.ndarray, np.ndarray]:
+        return carried_back(self.probability, self.sampled, self.xyz)
+
+    @property
+    def labels(self) -> np.ndarray:
+        """(n,) index of the point's roof type in `types`' order, -1 where it is no roof."""
+        return self._of_every_point[0]
+
+    @property
+    def not_roof(self) -> np.ndarray:
+        """(n,) probability that the point is no roof."""
+        return self._of_every_point[1]
 
     @property
     def type(self) -> str:
@@ -53,9 +71,9 @@ class Segmentation:
 
     @property
     def weights(self) -> np.ndarray:
-        """(n,) weight of each point in a fit: 1 on the roof, 0 elsewhere; all 1 where hardly any roof was found."""
-        enough = self.is_roof.sum() >= FEWEST_POINTS
-        return self.is_roof.astype(float) if enough else np.ones(len(self.labels))
+        """(n,) weight of each point in a fit: 0 where it is surely no roof, else 1; all 1 where hardly any is left."""
+        kept = self.not_roof < SURELY_NOT_ROOF
+        return kept.astype(float) if kept.sum() >= FEWEST_POINTS else np.ones(len(kept))
 
 
 @dataclass(frozen=True)
@@ -91,8 +109,8 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
     barred = barred_types(model, settings.fit.types)
     point_probability = softmax(point_logits[: arranged.sampled] + np.append(barred, 0.0))
     type_probability = softmax(type_logits[0] + barred)
-    labels, not_roof = carried_back(point_probability, xyz[arranged.chosen[: arranged.sampled]], xyz)
-    return Segmentation(labels, not_roof, dict(zip(model.types, map(float, type_probability), strict=True)))
+    types = dict(zip(model.types, map(float, type_probability), strict=True))
+    return Segmentation(types, point_probability, xyz[arranged.chosen[: arranged.sampled]], xyz)
 
 
 def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:

@@ -13,10 +13,15 @@ if TYPE_CHECKING:
 # Calibrated on simulated buildings of 2-10 points/m2 and on scanned real shapes (`python -m benchmarks.segment
 # --calibrate`). The evidence is tempered because it counts the points as independent and the roof as exactly of its
 # type, and real roofs are neither.
-EVIDENCE_EXPONENT = 0.05
+EVIDENCE_EXPONENT = 0.1
 SMALLEST_PRIOR = 1e-4
-# A type missing from the BICs was given up by the fit: worse than the best by at least this many nats.
-GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 15.0, 0.04
+# A type missing from the BICs was given up by the fit as far behind. How far is not known, and an annex or a dormer
+# alone can set a type back so much: it counts as this many nats behind the best.
+GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 7.5, 0.02
+# The network may name a roof against the evidence, but a shape that lies farther from the points than the evidence's
+# by more than this is not built: a gable over a house and its porch is named so and fits neither.
+FARTHER_AT_MOST_M = 0.02
+OUTLIER_DISTANCE_M = 1.0
 
 
 def combine(
@@ -29,8 +34,9 @@ def combine(
 
     `types` the network's probability by type, `bics` by type from `Fit.bics` (lower is better, on the scale of twice a
     negative log-likelihood, without a prior in them) of a fit to `points` points; posterior proportional to
-    prior * exp(-BIC / 2)^b. A type the fit gave up gets the least BIC at which it does; one the network does not know
-    the mean prior; one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the posterior, and without `types` the evidence alone counts.
+    prior * exp(-BIC / 2)^b. A type the fit gave up gets a BIC some way behind the best; one the network does not know
+    the mean prior; one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the posterior,
+    and without `types` the evidence alone counts.
 
     >>> combine({"gable": 0.5, "hip": 0.5}, {"gable": 100.0, "hip": 260.0})["gable"] > 0.9
     True
@@ -68,12 +74,23 @@ def fit_prior(types: dict[str, float]) -> dict[str, float]:
 
 
 def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]) -> tuple[Fit, dict[str, float]]:
-    """The fit of the type with the highest posterior, and the posterior by type, best first.
+    """The fit to build, and the posterior by type, best first.
 
-    `fit` fits a roof of the types named (empty: all of them), such as `fit_roof` with its points bound; it is called
-    a second time only where the network overrules the evidence.
+    It is the fit of the type with the highest posterior, unless its roof lies clearly farther from the points than the
+    most evident one: then that. `fit` fits a roof of the types named (empty: all of them), such as `fit_roof` with its
+    points bound; it is called a second time only where the network disagrees with the evidence.
     """
     found = fit(())
     posterior = combine(types, found.bics, found.points_used)
     best = next(iter(posterior))
-    return (found if best == found.type else fit((best,))), posterior
+    if best == found.type:
+        return found, posterior
+    named = fit((best,))
+    farther = expected_distance(named) - expected_distance(found)
+    return (named if farther <= FARTHER_AT_MOST_M else found), posterior
+
+
+def expected_distance(fit: Fit) -> float:
+    """Mean distance (m) of a fit's points from its roof by its own account of noise and outliers."""
+    on_roof = np.sqrt(2 / np.pi) * fit.noise_m  # mean of the absolute value of a normal
+    return (1 - fit.outlier_share) * on_roof + fit.outlier_share * OUTLIER_DISTANCE_M

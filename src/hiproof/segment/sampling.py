@@ -1,81 +1,278 @@
-"""Compiled sampling and grouping: the parts of PointNet++ that choose points and carry no weights."""
+"""Compiled arrangement of a cloud: the parts of PointNet++ that choose, describe and group points and carry no weights.
+
+`arranged` is the one entry; everything it calls is compiled into it, so that a process loads one function.
+"""
 
 from __future__ import annotations
+
+import math
 
 import numba
 import numpy as np
 
+FEATURES = (
+    "x",
+    "y",
+    "z",
+    "normal_x",
+    "normal_y",
+    "normal_z",
+    "roughness",
+    "convexity",
+    "offset_x",
+    "offset_y",
+    "spacing",
+)
+POSITION_SCALE = (10.0, 10.0, 5.0)
+SURFACE_NEIGHBOURS = 10
+BALL_FACTOR = 2.0
+INTERPOLATED = 3
+HARMONIC_WIDTH = math.radians(12.0)
+
 
 @numba.njit(cache=True)
-def farthest_point_order(xyz, count):
-    """Order in which farthest-point sampling visits `xyz` (n, 3): indices (min(count, n),), a prefix a coarser sample.
+def arranged(xyz, count, level1, level2, level3, group_size):
+    """Everything the network takes of a cloud `xyz` (n, 3), metres about an origin near it, n >= 1.
 
-    The first point is the farthest from the centroid, so that the order depends neither on the points' order nor on
-    the frame. Also returns the covering radius after each choice (metres): the largest distance of any point to its
-    nearest chosen one.
-
-    >>> order, radius = farthest_point_order(np.array([[0.0, 0, 0], [1, 0, 0], [5, 0, 0]]), 3)
-    >>> order.tolist(), radius.tolist()
-    ([2, 0, 1], [5.0, 1.0, 0.0])
+    `count` points are chosen, of which each level keeps a prefix; where n is smaller, they repeat from the start.
+    Returns the `order` of the choice (min(count, n),), indices into `xyz`; `features` (count, 11) float32, named by
+    FEATURES; `groups` of the three levels, (level, group_size) indices into the level above; their `radii` (3,) float32,
+    metres; and for the way back (level1, 3) indices into level 3 and (count, 3) into level 1, with their weights.
     """
-    n = len(xyz)
-    count = min(count, n)
-    order = np.empty(count, np.int64)
-    radius = np.empty(count)
-    centre_x, centre_y, centre_z = xyz[:, 0].mean(), xyz[:, 1].mean(), xyz[:, 2].mean()
-    current, farthest = 0, -1.0
-    for i in range(n):
-        d = (xyz[i, 0] - centre_x) ** 2 + (xyz[i, 1] - centre_y) ** 2 + (xyz[i, 2] - centre_z) ** 2
-        if d > farthest:
-            current, farthest = i, d
-    squared = np.full(n, np.inf)
+    x, y, z = xyz[:, 0].copy(), xyz[:, 1].copy(), xyz[:, 2].copy()
+    order, cover, nearest, reach = farthest_points(x, y, z, count)
+    found = len(order)
+    surface = local_surfaces(x, y, z, order, nearest, reach)
+    middle, spacing = np.median(z), math.log(max(cover[found // 2], 1e-3))
+    x, y, z = x[order], y[order], z[order]
+    features = described(x, y, z - middle, surface, spacing, count)
+    balls = BALL_FACTOR * np.maximum(cover, 1e-3)
+    radius1, radius2, radius3 = (
+        balls[min(level1, found) - 1],
+        balls[min(level2, found) - 1],
+        balls[min(level3, found) - 1],
+    )
+    groups = (
+        grouped(x, y, z, level1, min(count, found), group_size, radius1)[0],
+        grouped(x, y, z, level2, min(level1, found), group_size, radius2)[0],
+        grouped(x, y, z, level3, min(level2, found), group_size, radius3)[0],
+    )
+    up1, distance1 = grouped(x, y, z, level1, min(level3, found), INTERPOLATED, np.inf)
+    up2, distance2 = grouped(x, y, z, count, min(level1, found), INTERPOLATED, np.inf)
+    weights = inverse_shares(distance1), inverse_shares(distance2)
+    radii = np.array([radius1, radius2, radius3], np.float32)
+    return order, features, groups, radii, (up1, up2), weights
+
+
+@numba.njit(cache=True)
+def described(x, y, z, surface, spacing, count):
+    """Features (count, 11) of points (s,) and their `surface` (s, 7) in the building's own axes, repeated to `count`."""
+    cosine, sine = canonical_axes(x, y, surface)
+    features = np.empty((count, len(FEATURES)), np.float32)
+    for row in range(count):
+        s = row % len(x)
+        features[row, 0] = (cosine * x[s] + sine * y[s]) / POSITION_SCALE[0]
+        features[row, 1] = (cosine * y[s] - sine * x[s]) / POSITION_SCALE[1]
+        features[row, 2] = z[s] / POSITION_SCALE[2]
+        features[row, 3] = cosine * surface[s, 0] + sine * surface[s, 1]
+        features[row, 4] = cosine * surface[s, 1] - sine * surface[s, 0]
+        features[row, 5] = surface[s, 2]
+        features[row, 6] = min(surface[s, 3] / 0.2, 5.0)
+        features[row, 7] = min(max(surface[s, 4] / 0.2, -5.0), 5.0)
+        features[row, 8] = cosine * surface[s, 5] + sine * surface[s, 6]
+        features[row, 9] = cosine * surface[s, 6] - sine * surface[s, 5]
+        features[row, 10] = spacing
+    return features
+
+
+@numba.njit(cache=True)
+def farthest_points(x, y, z, count):
+    """Farthest-point sampling of n points: a prefix of the order is a coarser sample.
+
+    The first is the farthest from the centroid, so that the order depends neither on the points' order nor on the
+    frame. Returns `order` (min(count, n),); `cover`, the largest distance of any point to its nearest chosen one after
+    each choice (metres); and, as the distances from each choice are known anyway, the indices `nearest` of its
+    SURFACE_NEIGHBOURS nearest points, itself among them, with `reach`, the distance of the farthest of these.
+    """
+    n = len(x)
+    count, keep = min(count, n), min(SURFACE_NEIGHBOURS, n)
+    order, cover = np.empty(count, np.int64), np.empty(count)
+    nearest, reach = np.empty((count, keep), np.int64), np.empty(count)
+    away = (x - x.mean()) ** 2 + (y - y.mean()) ** 2 + (z - z.mean()) ** 2
+    current = np.argmax(away)
+    uncovered = np.full(n, np.inf)
+    bits = uncovered.view(np.int64)  # numbers that are not negative sort like their bits
+    shortest = np.empty(keep)
     for k in range(count):
         order[k] = current
-        x, y, z = xyz[current, 0], xyz[current, 1], xyz[current, 2]
-        current, farthest = 0, -1.0
-        for i in range(n):
-            d = (xyz[i, 0] - x) ** 2 + (xyz[i, 1] - y) ** 2 + (xyz[i, 2] - z) ** 2
-            if d < squared[i]:
-                squared[i] = d
-            if squared[i] > farthest:
-                current, farthest = i, squared[i]
-        radius[k] = np.sqrt(farthest)
-    return order, radius
+        farthest = cover_from(x, y, z, current, away, uncovered, bits)
+        shortest[:] = np.inf
+        last = np.inf
+        # Clouds often come sorted by place: from the point outwards few others are nearer than the last one kept.
+        for start, stop, step in ((current, n, 1), (current - 1, -1, -1)):
+            for i in range(start, stop, step):
+                if away[i] < last:
+                    insert(shortest, nearest[k], keep - 1, away[i], i)
+                    last = shortest[keep - 1]
+        current = 0
+        while bits[current] < farthest:
+            current += 1
+        cover[k], reach[k] = math.sqrt(uncovered[current]), math.sqrt(last)
+    return order, cover, nearest, reach
 
 
 @numba.njit(cache=True)
-def ball_neighbours(centres, sources, count, radius):
-    """The nearest `count` of `sources` (m, 3) within `radius` of each of `centres` (s, 3): indices, distances (s, count).
+def cover_from(x, y, z, current, away, uncovered, bits):
+    """Squared distances of all points from the `current` one into `away`, and into `uncovered` those from the nearest
+    chosen one, the largest of whose `bits` are returned: LLVM compares several integers at a time, but not floats."""
+    cx, cy, cz = x[current], y[current], z[current]
+    for i in range(len(x)):
+        away[i] = (x[i] - cx) ** 2 + (y[i] - cy) ** 2 + (z[i] - cz) ** 2
+    for i in range(len(x)):
+        uncovered[i] = uncovered[i] if uncovered[i] < away[i] else away[i]
+    farthest = bits[0]
+    for i in range(len(x)):
+        farthest = max(farthest, bits[i])
+    return farthest
 
-    Missing neighbours repeat the nearest one, which a maximum over the group does not notice; the nearest source
-    counts even if it lies outside the ball.
 
-    >>> sources = np.array([[0.0, 0, 0], [1, 0, 0], [9, 0, 0]])
-    >>> ball_neighbours(sources[:1], sources, 3, 2.0)[0].tolist()
-    [[0, 1, 0]]
+@numba.njit(cache=True)
+def insert(shortest, indices, place, distance, index):
+    """Put `distance` and `index` into their ascending lists of place + 1, pushing out the last."""
+    while place > 0 and shortest[place - 1] > distance:
+        shortest[place], indices[place] = shortest[place - 1], indices[place - 1]
+        place -= 1
+    shortest[place], indices[place] = distance, index
+
+
+@numba.njit(cache=True)
+def local_surfaces(x, y, z, order, nearest, reach):
+    """What the `nearest` (s, k) points around each of `order` (s,) say, as rows of seven.
+
+    The upward normal of their plane (3), the roughness across it (m), the point's height above their mean along it
+    (convexity, m), and the plan vector to their mean over their `reach` (2): long at the cloud's border.
     """
-    indices = np.empty((len(centres), count), np.int64)
-    distances = np.empty((len(centres), count))
-    squared = np.empty(count)
-    for s in range(len(centres)):
-        found = 0
-        for m in range(len(sources)):
-            d = 0.0
-            for axis in range(3):
-                d += (centres[s, axis] - sources[m, axis]) ** 2
-            if found == count and d >= squared[count - 1]:
-                continue
-            place = min(found, count - 1)
-            while place > 0 and squared[place - 1] > d:
-                squared[place], indices[s, place] = squared[place - 1], indices[s, place - 1]
-                place -= 1
-            squared[place], indices[s, place] = d, m
-            found = min(found + 1, count)
+    surface = np.empty((len(order), 7))
+    for s in range(len(order)):
+        i, k = order[s], nearest.shape[1]
+        mx, my, mz = 0.0, 0.0, 0.0
+        for j in nearest[s]:
+            mx, my, mz = mx + x[j] / k, my + y[j] / k, mz + z[j] / k
+        xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in nearest[s]:
+            dx, dy, dz = x[j] - mx, y[j] - my, z[j] - mz
+            xx, xy, xz = xx + dx * dx / k, xy + dx * dy / k, xz + dx * dz / k
+            yy, yz, zz = yy + dy * dy / k, yz + dy * dz / k, zz + dz * dz / k
+        nx, ny, nz, variance = plane_normal(xx, xy, xz, yy, yz, zz)
+        surface[s, 0], surface[s, 1], surface[s, 2] = nx, ny, nz
+        surface[s, 3] = math.sqrt(max(variance, 0.0))
+        surface[s, 4] = (x[i] - mx) * nx + (y[i] - my) * ny + (z[i] - mz) * nz
+        surface[s, 5], surface[s, 6] = (mx - x[i]) / max(reach[s], 1e-6), (my - y[i]) / max(reach[s], 1e-6)
+    return surface
+
+
+@numba.njit(cache=True)
+def plane_normal(xx, xy, xz, yy, yz, zz):
+    """Upward unit eigenvector of the smallest eigenvalue of a covariance, and that eigenvalue (Smith 1961).
+
+    Points in one place or on a line have no plane: their normal would be a draw of the rounding, so call it vertical.
+    """
+    mean = (xx + yy + zz) / 3
+    aside = xy * xy + xz * xz + yz * yz
+    scale = math.sqrt(((xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * aside) / 6)
+    if scale < 1e-12:
+        return 0.0, 0.0, 1.0, mean
+    a, b, c = (xx - mean) / scale, (yy - mean) / scale, (zz - mean) / scale
+    d, e, f = xy / scale, xz / scale, yz / scale
+    half = (a * (b * c - f * f) - d * (d * c - f * e) + e * (d * f - b * e)) / 2
+    angle = math.acos(min(max(half, -1.0), 1.0)) / 3
+    largest = mean + 2 * scale * math.cos(angle)
+    smallest = mean + 2 * scale * math.cos(angle + 2 * math.pi / 3)
+    if 3 * mean - largest - smallest < 1e-6 * largest + 1e-9:
+        return 0.0, 0.0, 1.0, max(smallest, 0.0)
+    # The eigenvector is normal to the rows of C - smallest: the longest of their cross products is the surest.
+    a, b, c = xx - smallest, yy - smallest, zz - smallest
+    best, nx, ny, nz = 0.0, 0.0, 0.0, 1.0
+    for ux, uy, uz in (
+        (xy * yz - xz * b, xz * xy - a * yz, a * b - xy * xy),
+        (xy * c - xz * yz, xz * xz - a * c, a * yz - xy * xz),
+        (b * c - yz * yz, yz * xz - xy * c, xy * yz - b * xz),
+    ):
+        length = math.sqrt(ux * ux + uy * uy + uz * uz)
+        if length > best:
+            best, nx, ny, nz = length, ux / length, uy / length, uz / length
+    if nz < 0:
+        nx, ny, nz = -nx, -ny, -nz
+    across = xx * nx + xy * ny + xz * nz, xy * nx + yy * ny + yz * nz, xz * nx + yz * ny + zz * nz
+    return nx, ny, nz, across[0] * nx + across[1] * ny + across[2] * nz
+
+
+@numba.njit(cache=True)
+def canonical_axes(x, y, surface):
+    """Cosine and sine of the building's own direction in plan, in the full circle.
+
+    Up to quarter turns it is the four-fold harmonic of the normals' azimuths (slopes and walls both point along a
+    roof's axes; rough neighbourhoods, trees and edges, count less), re-weighted twice; then its first axis is the one
+    along which the points spread more, and points to the side to which the roof falls more.
+    """
+    n = len(surface)
+    weight, azimuth = np.empty(n), np.empty(n)
+    for s in range(n):
+        weight[s] = (surface[s, 0] ** 2 + surface[s, 1] ** 2) * math.exp(-surface[s, 3] / 0.1)
+        azimuth[s] = math.atan2(surface[s, 1], surface[s, 0])
+    kappa = 0.0
+    for turn in range(3):
+        real, imaginary = 0.0, 0.0
+        for s in range(n):
+            aside = azimuth[s] - kappa
+            aside -= math.pi / 2 * round(aside / (math.pi / 2))
+            near = weight[s] if turn == 0 else weight[s] * math.exp(-((aside / HARMONIC_WIDTH) ** 2))
+            real, imaginary = real + near * math.cos(4 * aside), imaginary + near * math.sin(4 * aside)
+        kappa += math.atan2(imaginary, real) / 4
+    cosine, sine = math.cos(kappa), math.sin(kappa)
+    if np.var(cosine * y - sine * x) > np.var(cosine * x + sine * y):
+        cosine, sine = -sine, cosine
+    along = cosine * surface[:, 0].sum() + sine * surface[:, 1].sum()
+    across = cosine * surface[:, 1].sum() - sine * surface[:, 0].sum()
+    if (along if abs(along) > abs(across) else across) < 0:
+        cosine, sine = -cosine, -sine
+    return cosine, sine
+
+
+@numba.njit(cache=True)
+def grouped(x, y, z, centres, sources, count, radius):
+    """The nearest `count` of the first `sources` points within `radius` of each of the first `centres`, which repeat
+    from the start where the points end: indices and distances (centres, count).
+
+    Missing neighbours repeat the nearest one, which a maximum over the group does not notice. Every ball must hold a
+    source, as it does where the centres are among them.
+    """
+    indices, distances = np.zeros((centres, count), np.int64), np.empty((centres, count))
+    away, shortest = np.empty(sources), np.empty(count)
+    for s in range(centres):
+        cx, cy, cz = x[s % len(x)], y[s % len(x)], z[s % len(x)]
+        for m in range(sources):
+            away[m] = (x[m] - cx) ** 2 + (y[m] - cy) ** 2 + (z[m] - cz) ** 2
+        shortest[:] = np.inf
+        last = np.nextafter(radius * radius, np.inf)
+        for m in range(sources):
+            if away[m] < last:
+                insert(shortest, indices[s], count - 1, away[m], m)
+                last = min(last, shortest[count - 1])
         for k in range(count):
-            if k >= found or squared[k] > radius * radius:
-                squared[k], indices[s, k] = squared[0], indices[s, 0]
-            distances[s, k] = np.sqrt(squared[k])
+            if shortest[k] == np.inf:
+                shortest[k], indices[s, k] = shortest[0], indices[s, 0]
+            distances[s, k] = math.sqrt(shortest[k])
     return indices, distances
+
+
+@numba.njit(cache=True)
+def inverse_shares(distances):
+    """Inverse-distance weights (s, k) of a sum of 1."""
+    weights = 1.0 / (distances + 1e-3)
+    for s in range(len(weights)):
+        weights[s] /= weights[s].sum()
+    return weights.astype(np.float32)
 
 
 def thin_to_grid(xyz, count, chunk=500_000):
