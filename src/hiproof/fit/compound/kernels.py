@@ -324,48 +324,82 @@ def pair_slopes(cloud, i, j, out, m):
 
 
 @njit(cache=True)
-def best_rectangle(gain):
-    """Rectangle of cells with the largest sum of `gain` (nu, nv): (sum, i0, i1, j0, j1), half open (Kadane in 2D)."""
+def reach_of_rows(gain, reach):
+    """Fill `reach` (nu + 1,): no rectangle within the rows from i on has a larger sum of `gain` than reach[i]."""
+    reach[-1] = 0.0
+    for i in range(len(gain) - 1, -1, -1):
+        best_run = running = 0.0
+        for j in range(gain.shape[1]):
+            running = max(running + gain[i, j], 0.0)
+            best_run = max(best_run, running)
+        reach[i] = reach[i + 1] + best_run
+
+
+@njit(cache=True)
+def best_rectangle(gain, least, reach, column):
+    """Rectangle of cells with the largest sum of `gain` (nu, nv) above `least`: (sum, i0, i1, j0, j1), half open.
+
+    Kadane in 2D, without the rows that cannot bring more than what is found (`reach` of `reach_of_rows`); `column` (nv,)
+    is room to work in. Where nothing is above `least` the sum is `least` and the rectangle empty.
+    """
     nu, nv = gain.shape
-    best, i0_best, i1_best, j0_best, j1_best = -np.inf, 0, 0, 0, 0
-    column = np.empty(nv)
+    best, i0_best, i1_best, j0_best, j1_best = least, 0, 0, 0, 0
     for i0 in range(nu):
+        if reach[i0] <= best:
+            break
         column[:] = 0.0
         for i1 in range(i0, nu):
-            running, j0 = 0.0, 0
             for j in range(nv):
                 column[j] += gain[i1, j]
-                if running <= 0.0:
-                    running, j0 = column[j], j
-                else:
-                    running += column[j]
-                if running > best:
-                    best, i0_best, i1_best, j0_best, j1_best = running, i0, i1 + 1, j0, j + 1
+            highest = reach[i0] - reach[i1 + 1]
+            if highest > best:
+                highest, running, j0 = -np.inf, 0.0, 0
+                for j in range(nv):
+                    if running <= 0.0:
+                        running, j0 = column[j], j
+                    else:
+                        running += column[j]
+                    highest = max(highest, running)
+                    if running > best:
+                        best, i0_best, i1_best, j0_best, j1_best = running, i0, i1 + 1, j0, j + 1
+            if max(highest, 0.0) + reach[i1 + 1] <= best:
+                break
     return best, i0_best, i1_best, j0_best, j1_best
 
 
 @njit(cache=True)
 def gain_by_cell(cloud, planes, count, current, tau, gain):
-    """Fill `gain` (nu, nv) with the drop of cost that the min of `planes` would bring; returns the sum over gaining points."""
+    """Fill `gain` (nu, nv) with the drop of cost that the min of `planes` would bring."""
     gain[:] = 0.0
-    positive = 0.0
     for q in range(len(cloud.u)):
         z, _ = lower_envelope(planes, count, cloud.u[q], cloud.v[q])
-        g = current[q] - truncated(cloud.z[q] - z, tau)
-        gain[cloud.i[q], cloud.j[q]] += g
-        if g > 0.0:
-            positive += g
-    return positive
+        gain[cloud.i[q], cloud.j[q]] += current[q] - truncated(cloud.z[q] - z, tau)
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def positive_gain(cloud, planes, count, current, tau):
     """Upper bound of what the min of `planes` gains on any rectangle: the sum over the points that gain."""
     total = 0.0
+    if count == 1:
+        a, b, c = planes[0]
+        for q in range(len(cloud.u)):
+            r = (cloud.z[q] - a * cloud.u[q] - b * cloud.v[q] - c) / tau
+            total += max(current[q] - min(r * r, 1.0), 0.0)
+        return total
     for q in range(len(cloud.u)):
         z, _ = lower_envelope(planes, count, cloud.u[q], cloud.v[q])
         total += max(current[q] - truncated(cloud.z[q] - z, tau), 0.0)
     return total
+
+
+@njit(cache=True)
+def most_promising(bounds, tried):
+    """The candidate not yet `tried` with the highest of `bounds`, -1 where all were."""
+    highest, chosen = -np.inf, -1
+    for m in range(len(bounds)):
+        if bounds[m] > highest and not tried[m]:
+            highest, chosen = bounds[m], m
+    return chosen
 
 
 @njit(cache=True)
@@ -378,18 +412,19 @@ def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain)
         if bounds[m] == np.inf:
             bounds[m] = positive_gain(cloud, candidates[m], counts[m], current, tau)
     best, chosen, rectangle = least, -1, (0, 0, 0, 0)
-    for m in np.argsort(-bounds, kind="mergesort"):
-        if bounds[m] <= best:
-            break
-        positive = gain_by_cell(cloud, candidates[m], counts[m], current, tau, gain)
-        bounds[m] = positive
-        if positive <= best:
-            continue
-        score, i0, i1, j0, j1 = best_rectangle(gain)
-        bounds[m] = score
+    reach, column = np.empty(len(gain) + 1), np.empty(gain.shape[1])
+    tried = np.zeros(len(bounds), np.bool_)
+    while True:
+        m = most_promising(bounds, tried)
+        if m < 0 or bounds[m] <= best:
+            return best, chosen, rectangle
+        tried[m] = True
+        gain_by_cell(cloud, candidates[m], counts[m], current, tau, gain)
+        reach_of_rows(gain, reach)
+        score, i0, i1, j0, j1 = best_rectangle(gain, best, reach, column)
+        bounds[m] = min(reach[0], score)
         if score > best:
             best, chosen, rectangle = score, m, (i0, i1, j0, j1)
-    return best, chosen, rectangle
 
 
 @njit(cache=True)

@@ -27,7 +27,7 @@ from .plan import MIN_STRUCTURE_POINTS, Plan
 from .polish import polish
 from .refine import add_overlay, refine, settle
 
-ROUNDS, SETTLING_ROUNDS = 2, 1
+ROUNDS, SETTLING_ROUNDS = 1, 1
 POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 SEARCH_POINTS = 4000
