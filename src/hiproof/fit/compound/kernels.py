@@ -1,4 +1,4 @@
-"""Compiled search for the planes of a roof and for the partition of its plan into rectangles.
+"""Compiled search for the planes of a roof.
 
 Everything runs in the building's frame: u, v (m) along its two main directions, z (m) about the median height. A plane is
 (a, b, c) with z = a u + b v + c. The cost of a point is min((dz / tau)^2, 1): evidence is counted in points, and a point
@@ -367,28 +367,34 @@ def best_rectangle(gain, least, reach, column):
     return best, i0_best, i1_best, j0_best, j1_best
 
 
-@njit(cache=True)
-def gain_by_cell(cloud, planes, count, current, tau, gain):
-    """Fill `gain` (nu, nv) with the drop of cost that the min of `planes` would bring."""
-    gain[:] = 0.0
-    for q in range(len(cloud.u)):
-        z, _ = lower_envelope(planes, count, cloud.u[q], cloud.v[q])
-        gain[cloud.i[q], cloud.j[q]] += current[q] - truncated(cloud.z[q] - z, tau)
-
-
 @njit(cache=True, fastmath=True)
-def positive_gain(cloud, planes, count, current, tau):
-    """Upper bound of what the min of `planes` gains on any rectangle: the sum over the points that gain."""
+def gain_by_point(cloud, planes, count, current, tau, gain):
+    """Fill `gain` (n,) with the drop of cost that the min of `planes` would bring; returns the sum over those that gain."""
+    a, b, c = planes[0]
+    for q in range(len(gain)):
+        gain[q] = a * cloud.u[q] + b * cloud.v[q] + c
+    for k in range(1, count):
+        a, b, c = planes[k]
+        for q in range(len(gain)):
+            gain[q] = min(gain[q], a * cloud.u[q] + b * cloud.v[q] + c)
     total = 0.0
-    if count == 1:
-        a, b, c = planes[0]
-        for q in range(len(cloud.u)):
-            r = (cloud.z[q] - a * cloud.u[q] - b * cloud.v[q] - c) / tau
-            total += max(current[q] - min(r * r, 1.0), 0.0)
-        return total
-    for q in range(len(cloud.u)):
-        z, _ = lower_envelope(planes, count, cloud.u[q], cloud.v[q])
-        total += max(current[q] - truncated(cloud.z[q] - z, tau), 0.0)
+    for q in range(len(gain)):
+        r = (cloud.z[q] - gain[q]) / tau
+        gain[q] = current[q] - min(r * r, 1.0)
+        total += max(gain[q], 0.0)
+    return total
+
+
+@njit(cache=True)
+def gain_by_cell(cloud, gain_of_point, gain):
+    """Fill `gain` (nu, nv) with the sums over each cell's points; returns the sum over the cells that gain."""
+    gain[:] = 0.0
+    for q in range(len(gain_of_point)):
+        gain[cloud.i[q], cloud.j[q]] += gain_of_point[q]
+    total = 0.0
+    for i in range(gain.shape[0]):
+        for j in range(gain.shape[1]):
+            total += max(gain[i, j], 0.0)
     return total
 
 
@@ -406,11 +412,13 @@ def most_promising(bounds, tried):
 def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain):
     """The candidate with the best rectangle, lazily: `bounds` are upper bounds of its gain, and costs only ever fall.
 
-    Returns (gain, candidate or -1, i0, i1, j0, j1) and tightens `bounds` (in place).
+    Ever dearer bounds are tried in turn: the sum over the points that gain, over the cells that gain, over the best run of
+    every row. Returns (gain, candidate or -1, i0, i1, j0, j1) and tightens `bounds` (in place).
     """
+    gain_of_point = np.empty(len(cloud.u))
     for m in range(len(bounds)):
         if bounds[m] == np.inf:
-            bounds[m] = positive_gain(cloud, candidates[m], counts[m], current, tau)
+            bounds[m] = gain_by_point(cloud, candidates[m], counts[m], current, tau, gain_of_point)
     best, chosen, rectangle = least, -1, (0, 0, 0, 0)
     reach, column = np.empty(len(gain) + 1), np.empty(gain.shape[1])
     tried = np.zeros(len(bounds), np.bool_)
@@ -419,7 +427,12 @@ def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain)
         if m < 0 or bounds[m] <= best:
             return best, chosen, rectangle
         tried[m] = True
-        gain_by_cell(cloud, candidates[m], counts[m], current, tau, gain)
+        bounds[m] = gain_by_point(cloud, candidates[m], counts[m], current, tau, gain_of_point)
+        if bounds[m] <= best:
+            continue
+        bounds[m] = gain_by_cell(cloud, gain_of_point, gain)
+        if bounds[m] <= best:
+            continue
         reach_of_rows(gain, reach)
         score, i0, i1, j0, j1 = best_rectangle(gain, best, reach, column)
         bounds[m] = min(reach[0], score)
@@ -609,107 +622,3 @@ def without_twins(pool, cloud):
             kept[n] = plane
             n += 1
     return kept[:n]
-
-
-@njit(cache=True)
-def primitives(pool, gables, gable_counts, cloud, evidence):
-    """Candidates for a rectangle: each plane, each crossing pair of planes as a min, each gable; with their penalty."""
-    n, g = len(pool), len(gables)
-    most = n + n * (n - 1) // 2 + g
-    planes, counts, penalty = np.zeros((most, MAX_PLANES, 3)), np.ones(most, np.int64), np.zeros(most)
-    m = 0
-    for i in range(n):
-        planes[m, 0] = pool[i]
-        penalty[m] = evidence * KIND_COST[kind_of(pool[i])]
-        m += 1
-    for i in range(n):
-        for j in range(i):
-            if (pool[i, 0] - pool[j, 0]) ** 2 + (pool[i, 1] - pool[j, 1]) ** 2 < 0.25**2:
-                continue
-            da, db, dc = pool[i, 0] - pool[j, 0], pool[i, 1] - pool[j, 1], pool[i, 2] - pool[j, 2]
-            below = 0
-            for q in range(len(cloud.u)):
-                below += da * cloud.u[q] + db * cloud.v[q] + dc < 0.0
-            if 0.06 * len(cloud.u) <= below <= 0.94 * len(cloud.u):
-                planes[m, 0], planes[m, 1], counts[m] = pool[i], pool[j], 2
-                penalty[m] = evidence * (KIND_COST[kind_of(pool[i])] + KIND_COST[kind_of(pool[j])])
-                m += 1
-    for k in range(g):
-        planes[m], counts[m] = gables[k], gable_counts[k]
-        penalty[m] = evidence * planes_complexity(gables[k], gable_counts[k])
-        m += 1
-    return planes[:m], counts[:m], penalty[:m]
-
-
-@njit(cache=True)
-def cost_prefix(cloud, ghosts, grid, planes, counts, tau):
-    """Prefix sums (nu + 1, nv + 1, m) over cells of the cost of each primitive, points and ghosts together."""
-    m, nu, nv = len(counts), len(grid.u) - 1, len(grid.v) - 1
-    sums = np.zeros((nu + 1, nv + 1, m))
-    for q in range(len(cloud.u)):
-        row = sums[cloud.i[q] + 1, cloud.j[q] + 1]
-        for k in range(m):
-            z, _ = lower_envelope(planes[k], counts[k], cloud.u[q], cloud.v[q])
-            row[k] += truncated(cloud.z[q] - z, tau)
-    for q in range(len(ghosts.u)):
-        row = sums[ghosts.i[q] + 1, ghosts.j[q] + 1]
-        for k in range(m):
-            z, _ = lower_envelope(planes[k], counts[k], ghosts.u[q], ghosts.v[q])
-            if z < ghosts.low or z > ghosts.high:
-                row[k] += ghosts.weight[q]
-    for a in range(1, nu + 1):
-        running = np.zeros(m)
-        for c in range(1, nv + 1):
-            running += sums[a, c]
-            sums[a, c] = sums[a - 1, c] + running
-    return sums
-
-
-@njit(cache=True, fastmath=True)
-def leaf_costs(sums, penalty, grid):
-    """Cost (nu + 1, nu + 1, nv + 1, nv + 1) of the best primitive on every rectangle of cells [a, b) x [c, d)."""
-    nu, nv, m = sums.shape[0] - 1, sums.shape[1] - 1, sums.shape[2]
-    best_cost = np.empty((nu + 1, nu + 1, nv + 1, nv + 1))
-    strip = np.empty((nv + 1, m))
-    for a in range(nu):
-        for b in range(a + 1, nu + 1):
-            for d in range(nv + 1):
-                for k in range(m):
-                    strip[d, k] = sums[b, d, k] - sums[a, d, k]
-            for c in range(nv):
-                for d in range(c + 1, nv + 1):
-                    best = 1e30
-                    for k in range(m):
-                        cost = penalty[k] + strip[d, k] - strip[c, k]
-                        best = cost if cost < best else best
-                    if grid.u[b] - grid.u[a] < MIN_SIDE_M or grid.v[d] - grid.v[c] < MIN_SIDE_M:
-                        best += 1e3
-                    best_cost[a, b, c, d] = best
-    return best_cost
-
-
-@njit(cache=True)
-def guillotine(cost, cut_u, cut_v):
-    """Exact optimum over all guillotine partitions, by dynamic programming; `cost` becomes the optimum (in place).
-
-    Returns the choice for every rectangle: 0 keep it whole, k > 0 cut at grid line u = k, k < 0 at grid line v = -k.
-    """
-    nu, nv = cost.shape[0] - 1, cost.shape[2] - 1
-    choice = np.zeros(cost.shape, np.int16)
-    for width in range(1, nu + 1):
-        for height in range(1, nv + 1):
-            for a in range(nu - width + 1):
-                b = a + width
-                for c in range(nv - height + 1):
-                    d = c + height
-                    best, how = cost[a, b, c, d], 0
-                    for k in range(a + 1, b):
-                        t = cost[a, k, c, d] + cost[k, b, c, d] + cut_u[k]
-                        if t < best:
-                            best, how = t, k
-                    for k in range(c + 1, d):
-                        t = cost[a, b, c, k] + cost[a, b, k, d] + cut_v[k]
-                        if t < best:
-                            best, how = t, -k
-                    cost[a, b, c, d], choice[a, b, c, d] = best, how
-    return choice

@@ -75,45 +75,6 @@ def add_holder(layout, planes, count):
 
 
 @njit(cache=True)
-def best_primitive(sums, penalty, a, b, c, d):
-    best, chosen = np.inf, 0
-    for k in range(len(penalty)):
-        cost = penalty[k] + sums[b, d, k] - sums[a, d, k] - sums[b, c, k] + sums[a, c, k]
-        if cost < best:
-            best, chosen = cost, k
-    return chosen
-
-
-@njit(cache=True)
-def grow_tree(layout, choice, sums, penalty, planes, counts, grid):
-    """Fill the empty `layout` with the partition that dynamic programming chose; children come after their parent."""
-    boxes = np.zeros((MAX_NODES, 4), np.int64)
-    boxes[0] = (0, len(grid.u) - 1, 0, len(grid.v) - 1)
-    layout.count[NODES] = 1
-    node = 0
-    while node < layout.count[NODES]:
-        a, b, c, d = boxes[node]
-        how = choice[a, b, c, d]
-        first = layout.count[NODES]
-        # Every open node still needs a holder: cut only while there is room for all of them.
-        if how == 0 or first - layout.count[HOLDERS] >= MAX_HOLDERS - 4 or first + 2 > MAX_NODES:
-            k = best_primitive(sums, penalty, a, b, c, d)
-            layout.axis[node] = -1
-            layout.holder[node] = add_holder(layout, planes[k], counts[k])
-        else:
-            axis, k = (0, how) if how > 0 else (1, -how)
-            layout.axis[node] = axis
-            layout.at[node] = grid.u[k] if axis == 0 else grid.v[k]
-            for side in range(2):
-                layout.child[node, side] = first + side
-                boxes[first + side] = (a, b, c, d)
-            boxes[first, 2 * axis + 1] = k
-            boxes[first + 1, 2 * axis] = k
-            layout.count[NODES] += 2
-        node += 1
-
-
-@njit(cache=True)
 def descend(layout, node, u, v):
     """Holder of the leaf under `node` that (u, v) falls into."""
     while layout.axis[node] >= 0:

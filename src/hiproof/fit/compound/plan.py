@@ -15,7 +15,7 @@ from .kernels import Cloud, Ghosts, Grid
 MIN_STRUCTURE_POINTS = 4
 BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this close to the border: facade returns
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
-MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 28
+MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
 GHOST_MARGIN_M = 0.3
 
 

@@ -7,32 +7,24 @@ from dataclasses import replace
 import numpy as np
 
 from .kernels import (
-    CUT,
-    CUT_AT_VERTEX,
-    MAX_PLANES,
     Cloud,
-    cost_prefix,
     gable_pool,
-    guillotine,
     hypotheses,
-    is_symmetric_gable,
-    is_symmetric_hip,
-    leaf_costs,
     plane_pool,
-    primitives,
     without_twins,
 )
-from .layout import HOLDERS, Layout, empty_layout, evaluate, grow_tree, objective, single_plane_layout
+from .layout import Layout, empty_layout, evaluate, objective, single_plane_layout
+from .partition import partition
 from .plan import MIN_STRUCTURE_POINTS, Plan
 from .polish import polish
 from .refine import add_overlay, refine, settle
 
-ROUNDS, SETTLING_ROUNDS = 1, 1
-POOL_PLANES, POOL_GABLES, KEPT_PLANES = 20, 6, 28
+SETTLING_ROUNDS = 1
+POOL_PLANES, POOL_GABLES = 20, 6
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 SEARCH_POINTS = 4000
-POOL_POINTS = 1000  # the planes are looked for on at most so many points, evenly spread
-SEEDS, PAIRS_PER_SEED = 150, 2
+POOL_POINTS = 600  # the planes are looked for on at most so many points, evenly spread
+SEEDS, PAIRS_PER_SEED = 80, 2
 
 
 def evidence_per_unit(density: float, settings) -> float:
@@ -59,22 +51,17 @@ def search_layout(plan: Plan, settings) -> tuple[Layout, float]:
 
 
 def searched(plan: Plan, tau: float, evidence: float, with_overlays: bool) -> Layout:
-    """Pool, partition and refinement twice, the better kept; then overlays and the polish."""
+    """Pool, partition and refinement; then overlays and the polish."""
     pool, gables = propose(plan, tau, evidence)
-    best, best_value = None, np.inf
-    for _ in range(ROUNDS):
-        pool = without_twins(pool, plan.cloud)
-        layout = partition(plan, pool, gables, tau, evidence)
-        for last in (False, False, True):
-            refine(layout, plan.cloud, plan.grid, pool[:0] if last else pool, tau, evidence)
-        value = objective(layout, plan.cloud, plan.ghosts, tau, evidence)
-        if value < best_value:
-            best, best_value = layout, value
-        pool, gables = with_layout(layout, pool, gables)
+    pool = without_twins(pool, plan.cloud)
+    layout = empty_layout()
+    partition(layout, plan.cloud, plan.ghosts, plan.grid, pool, *gables, tau, evidence)
+    for last in (False, False, True):
+        refine(layout, plan.cloud, plan.grid, pool[:0] if last else pool, tau, evidence)
     if with_overlays:
-        cover_outliers(best, plan, tau, evidence)
-    polish(best, plan.cloud, plan.ghosts, tau, evidence)
-    return best
+        cover_outliers(layout, plan, tau, evidence)
+    polish(layout, plan.cloud, plan.ghosts, tau, evidence)
+    return layout
 
 
 def thinned_plan(plan: Plan, most: int) -> Plan:
@@ -109,36 +96,6 @@ def propose(plan: Plan, tau: float, evidence: float) -> tuple[np.ndarray, tuple[
     pool = np.concatenate([pool, np.zeros((1, 3))])
     gables = gable_pool(few, plan.grid, pool, tau, evidence, POOL_GABLES)
     return pool, gables
-
-
-def partition(
-    plan: Plan, pool: np.ndarray, gables: tuple[np.ndarray, np.ndarray], tau: float, evidence: float
-) -> Layout:
-    """The guillotine partition of the plan into primitives of the pools that costs least."""
-    planes, counts, penalty = primitives(pool, *gables, plan.cloud, evidence)
-    sums = cost_prefix(plan.cloud, plan.ghosts, plan.grid, planes, counts, tau)
-    cut_u, cut_v = (
-        evidence * np.where(at_vertex, CUT_AT_VERTEX, CUT)
-        for at_vertex in (plan.grid.at_vertex_u, plan.grid.at_vertex_v)
-    )
-    choice = guillotine(leaf_costs(sums, penalty, plan.grid), cut_u, cut_v)
-    layout = empty_layout()
-    grow_tree(layout, choice, sums, penalty, planes, counts, plan.grid)
-    return layout
-
-
-def with_layout(layout: Layout, pool: np.ndarray, gables: tuple[np.ndarray, np.ndarray]):
-    """The pools with the planes and the symmetric roofs of `layout` put in front."""
-    planes, roofs, counts = [], [], []
-    for h in range(layout.count[HOLDERS]):
-        count = layout.planes_of[h]
-        own = layout.table[layout.plane_of[h, :count]]
-        planes.append(own)
-        if is_symmetric_gable(own, count) or is_symmetric_hip(own, count):
-            roofs.append(np.concatenate([own, np.zeros((MAX_PLANES - count, 3))])[None])
-            counts.append(count)
-    pool = np.concatenate([*planes, pool])[:KEPT_PLANES]
-    return pool, (np.concatenate([*roofs, gables[0]]), np.concatenate([counts, gables[1]]).astype(np.int64))
 
 
 def cover_outliers(layout: Layout, plan: Plan, tau: float, evidence: float) -> None:
