@@ -56,7 +56,7 @@ def searched(plan: Plan, tau: float, evidence: float, with_overlays: bool) -> La
     pool = without_twins(pool, plan.cloud)
     layout = empty_layout()
     partition(layout, plan.cloud, plan.ghosts, plan.grid, pool, *gables, tau, evidence)
-    for last in (False, False, True):
+    for last in (False, True):
         refine(layout, plan.cloud, plan.grid, pool[:0] if last else pool, tau, evidence)
     if with_overlays:
         cover_outliers(layout, plan, tau, evidence)
