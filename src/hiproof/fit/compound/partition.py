@@ -15,8 +15,9 @@ from .kernels import (
     kind_of,
     lower_envelope,
     planes_complexity,
+    truncated,
 )
-from .layout import HOLDERS, MAX_HOLDERS, MAX_NODES, NODES, add_holder
+from .layout import HOLDERS, MAX_HOLDERS, MAX_NODES, NODES, add_holder, ghost_cost
 
 TOO_NARROW = 1e3  # points: what a rectangle narrower than MIN_SIDE_M costs besides
 
@@ -24,7 +25,7 @@ TOO_NARROW = 1e3  # points: what a rectangle narrower than MIN_SIDE_M costs besi
 @njit(cache=True)
 def partition(layout, cloud, ghosts, grid, pool, gables, gable_counts, tau, evidence):
     """Fill the empty `layout` with the cheapest partition into planes of `pool`, mins of two of them, and `gables`."""
-    planes, counts, penalty = primitives(pool, gables, gable_counts, cloud, evidence)
+    planes, counts, penalty = primitives(pool, gables, gable_counts, cloud, ghosts, tau, evidence)
     sums = cost_prefix(cloud, ghosts, grid, planes, counts, tau)
     cut_u = evidence * np.where(grid.at_vertex_u, CUT_AT_VERTEX, CUT)
     cut_v = evidence * np.where(grid.at_vertex_v, CUT_AT_VERTEX, CUT)
@@ -33,8 +34,8 @@ def partition(layout, cloud, ghosts, grid, pool, gables, gable_counts, tau, evid
 
 
 @njit(cache=True)
-def primitives(pool, gables, gable_counts, cloud, evidence):
-    """Candidates for a rectangle: each plane, each crossing pair of planes as a min, each gable; with their penalty."""
+def primitives(pool, gables, gable_counts, cloud, ghosts, tau, evidence):
+    """Candidates for a rectangle: each plane, each pair of planes that may pay as a min, each gable; with their penalty."""
     n, g = len(pool), len(gables)
     most = n + n * (n - 1) // 2 + g
     planes, counts, penalty = np.zeros((most, MAX_PLANES, 3)), np.ones(most, np.int64), np.zeros(most)
@@ -43,23 +44,53 @@ def primitives(pool, gables, gable_counts, cloud, evidence):
         planes[m, 0] = pool[i]
         penalty[m] = evidence * KIND_COST[kind_of(pool[i])]
         m += 1
+    heights, costs = heights_and_costs(pool, cloud, ghosts, tau)
     for i in range(n):
         for j in range(i):
             if (pool[i, 0] - pool[j, 0]) ** 2 + (pool[i, 1] - pool[j, 1]) ** 2 < 0.25**2:
                 continue
-            da, db, dc = pool[i, 0] - pool[j, 0], pool[i, 1] - pool[j, 1], pool[i, 2] - pool[j, 2]
-            below = 0
-            for q in range(len(cloud.u)):
-                below += da * cloud.u[q] + db * cloud.v[q] + dc < 0.0
-            if 0.06 * len(cloud.u) <= below <= 0.94 * len(cloud.u):
+            if may_pay(heights[i], heights[j], costs[i], costs[j], len(cloud.u), penalty[i], penalty[j]):
                 planes[m, 0], planes[m, 1], counts[m] = pool[i], pool[j], 2
-                penalty[m] = evidence * (KIND_COST[kind_of(pool[i])] + KIND_COST[kind_of(pool[j])])
+                penalty[m] = penalty[i] + penalty[j]
                 m += 1
     for k in range(g):
         planes[m], counts[m] = gables[k], gable_counts[k]
         penalty[m] = evidence * planes_complexity(gables[k], gable_counts[k])
         m += 1
     return planes[:m], counts[:m], penalty[:m]
+
+
+@njit(cache=True)
+def heights_and_costs(pool, cloud, ghosts, tau):
+    """Height and cost (k, n + g) of every plane of the pool at the points and, after them, at the ghosts."""
+    n = len(cloud.u)
+    heights, costs = np.empty((len(pool), n + len(ghosts.u))), np.empty((len(pool), n + len(ghosts.u)))
+    for k in range(len(pool)):
+        for q in range(n):
+            heights[k, q] = pool[k, 0] * cloud.u[q] + pool[k, 1] * cloud.v[q] + pool[k, 2]
+            costs[k, q] = truncated(cloud.z[q] - heights[k, q], tau)
+        for q in range(len(ghosts.u)):
+            heights[k, n + q] = pool[k, 0] * ghosts.u[q] + pool[k, 1] * ghosts.v[q] + pool[k, 2]
+            costs[k, n + q] = ghost_cost(ghosts, q, heights[k, n + q])
+    return heights, costs
+
+
+@njit(cache=True)
+def may_pay(heights, other_heights, costs, other_costs, points, price, other_price):
+    """Whether the min of two planes can cost less on some rectangle than either of them alone, each at its price.
+
+    It cannot where what a plane saves while it is the lower one, summed over all points and ghosts, is below that price. Nor
+    is a pair wanted that shows less than 6 % of the points on either side of its crossing.
+    """
+    saved = other_saved = 0.0
+    lower = 0
+    for q in range(len(heights)):
+        if heights[q] < other_heights[q]:
+            saved += max(other_costs[q] - costs[q], 0.0)
+            lower += q < points
+        else:
+            other_saved += max(costs[q] - other_costs[q], 0.0)
+    return saved > price and other_saved > other_price and 0.06 * points <= lower <= 0.94 * points
 
 
 @njit(cache=True)
