@@ -24,6 +24,7 @@ MAX_PLANES = 5  # of one part
 SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
 MIN_SIDE_M = 0.6
 NEIGHBOUR_RADIUS_M = 2.5
+TEMPLATE_POINTS = 150
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
 Grid = namedtuple(
@@ -516,22 +517,22 @@ def symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v,
 
 
 @njit(cache=True)
-def fit_template(cloud, drop, slope, tau):
+def fit_template(z, drop, slope, tau):
     """Robust (height, slope) of z = height - slope * drop (n,), from a start slope; the slope is 0 where it fails."""
-    height = np.median(cloud.z + slope * drop)
+    height = np.median(z + slope * drop)
     for step in range(5):
         scale = tau * (3.0 if step == 0 else 2.0 if step == 1 else 1.5)
         n = sx = sy = sxx = sxy = 0.0
         for i in range(len(drop)):
-            r = (cloud.z[i] - height + slope * drop[i]) / scale
+            r = (z[i] - height + slope * drop[i]) / scale
             w = 1.0 - r * r
             if w > 0.0:
                 w *= w
                 n += w
                 sx += w * drop[i]
-                sy += w * cloud.z[i]
+                sy += w * z[i]
                 sxx += w * drop[i] * drop[i]
-                sxy += w * drop[i] * cloud.z[i]
+                sxy += w * drop[i] * z[i]
         determinant = n * sxx - sx * sx
         if n < 2.0 or determinant < 1e-6:
             return height, 0.0
@@ -544,7 +545,12 @@ def fit_template(cloud, drop, slope, tau):
 
 @njit(cache=True)
 def whole_roofs(cloud, grid, tau):
-    """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, MAX_PLANES, 3) and counts."""
+    """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, MAX_PLANES, 3) and counts.
+
+    Few points do for a start: at most twice TEMPLATE_POINTS of the cloud's are used.
+    """
+    stride = max(1, len(cloud.u) // TEMPLATE_POINTS)
+    u, v, z = cloud.u[::stride].copy(), cloud.v[::stride].copy(), cloud.z[::stride].copy()
     out, counts, m = np.zeros((64, MAX_PLANES, 3)), np.zeros(64, np.int64), 0
     half_u, half_v = 0.5 * (grid.u[-1] - grid.u[0]), 0.5 * (grid.v[-1] - grid.v[0])
     mid_u, mid_v = grid.u[0] + half_u, grid.v[0] + half_v
@@ -552,7 +558,7 @@ def whole_roofs(cloud, grid, tau):
     for shape in range(8):
         shift = (0.0, 0.25, -0.25)[shape % 3] if shape < 6 else 0.0
         centre_u, centre_v = mid_u + shift * half_u * (shape < 3), mid_v + shift * half_v * (shape >= 3)
-        away_u, away_v = np.abs(cloud.u - centre_u), np.abs(cloud.v - centre_v)
+        away_u, away_v = np.abs(u - centre_u), np.abs(v - centre_v)
         ratio, top = 1.0, 0.0
         if shape < 3:
             drop = away_u
@@ -565,7 +571,7 @@ def whole_roofs(cloud, grid, tau):
             top = abs(half_u - half_v)
             drop = np.maximum(away_u - top * (long == 0), away_v - top * (long == 1))
         for start in (0.2, 0.45, 0.8, 1.3):
-            height, slope = fit_template(cloud, drop, start, tau)
+            height, slope = fit_template(z, drop, start, tau)
             if slope == 0.0:
                 continue
             slope_u = slope * ratio if shape < 3 or shape >= 6 else 0.0

@@ -124,13 +124,15 @@ def partition_costs(sums, penalty, grid, cut_u, cut_v):
     """
     nu, nv = len(cut_u) - 1, len(cut_v) - 1
     cost = np.empty((nu + 1, nu + 1, nv + 1, nv + 1))
-    strip = np.empty(nv + 1)
+    cost[:] = np.inf
+    strip = np.zeros((nv + 8) // 8 * 8)
+    room = np.empty((nv, len(strip)))
     for width in range(1, nu + 1):
         for a in range(nu - width + 1):
             b = a + width
             slab = cost[a, b]
             flat = slab.reshape(-1)
-            whole_costs(sums, penalty, grid, a, b, strip, slab)
+            whole_costs(sums, penalty, grid, a, b, strip, room, slab)
             for k in range(a + 1, b):
                 left, right, price = cost[a, k].reshape(-1), cost[k, b].reshape(-1), cut_u[k]
                 for cd in range(len(flat)):
@@ -144,21 +146,25 @@ def partition_costs(sums, penalty, grid, cut_u, cut_v):
 
 
 @njit(cache=True, fastmath=True)
-def whole_costs(sums, penalty, grid, a, b, strip, slab):
-    """Fill `slab` (nv + 1, nv + 1) with the cost of the best primitive on every rectangle [a, b) x [c, d), left whole."""
-    nv = len(strip) - 1
-    slab[:] = np.inf
+def whole_costs(sums, penalty, grid, a, b, strip, room, slab):
+    """Fill `slab` (nv + 1, nv + 1) with the cost of the best primitive on every rectangle [a, b) x [c, d), left whole.
+
+    `strip` (w,) and `room` (nv, w) are to work in: with rows of w, whole eights, the loops need no remainders, which is worth
+    the places they fill in vain.
+    """
+    nv = len(room)
+    room[:] = np.inf
     for m in range(len(penalty)):
         for d in range(nv + 1):
             strip[d] = sums[m, b, d] - sums[m, a, d]
         for c in range(nv):
-            price = penalty[m] - strip[c]
-            for d in range(c + 1, nv + 1):
-                slab[c, d] = min(slab[c, d], price + strip[d])
+            price, row = penalty[m] - strip[c], room[c]
+            for d in range(len(strip)):
+                row[d] = min(row[d], price + strip[d])
     for c in range(nv):
         for d in range(c + 1, nv + 1):
-            if grid.u[b] - grid.u[a] < MIN_SIDE_M or grid.v[d] - grid.v[c] < MIN_SIDE_M:
-                slab[c, d] += TOO_NARROW
+            too_narrow = grid.u[b] - grid.u[a] < MIN_SIDE_M or grid.v[d] - grid.v[c] < MIN_SIDE_M
+            slab[c, d] = room[c, d] + (TOO_NARROW if too_narrow else 0.0)
 
 
 @njit(cache=True)
