@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.compound.kernels import Cloud, Ghosts, Grid, best_rectangle, guillotine, leaf_costs
+from hiproof.fit.compound.kernels import Cloud, Ghosts, Grid, best_rectangle, gain_by_point, reach_of_rows, truncated
 from hiproof.fit.compound.layout import add_holder, complexity, empty_layout, evaluate, single_plane_layout
+from hiproof.fit.compound.partition import grow_tree, may_pay, partition_costs
 from hiproof.fit.compound.plan import grid_lines, signed_depth
 from hiproof.fit.compound.polish import polish
 
@@ -20,12 +21,50 @@ def brute_rectangle(gain):
     )
 
 
+def found_rectangle(gain, least):
+    reach = np.empty(len(gain) + 1)
+    reach_of_rows(gain, reach)
+    return best_rectangle(gain, least, reach, np.empty(gain.shape[1]))
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_best_rectangle_is_that_of_brute_force(seed):
     gain = np.random.default_rng(seed).normal(-0.1, 1.0, (1 + seed % 5, 6))
-    score, i0, i1, j0, j1 = best_rectangle(gain)
+    score, i0, i1, j0, j1 = found_rectangle(gain, -np.inf)
     assert score == pytest.approx(brute_rectangle(gain))
     assert gain[i0:i1, j0:j1].sum() == pytest.approx(score)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_rectangle_is_found_only_above_what_is_asked(seed):
+    gain = np.random.default_rng(seed).normal(-0.1, 1.0, (5, 6))
+    best = brute_rectangle(gain)
+    assert found_rectangle(gain, best - 1e-9)[0] == pytest.approx(best)
+    score, i0, i1, j0, j1 = found_rectangle(gain, best + 1e-9)
+    assert score == best + 1e-9
+    assert (i1 - i0) * (j1 - j0) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_rectangle_reaches_beyond_its_rows(seed):
+    gain = np.random.default_rng(seed).normal(-0.3, 1.0, (4, 5))
+    reach = np.empty(5)
+    reach_of_rows(gain, reach)
+    for first in range(4):
+        assert brute_rectangle(gain[first:]) <= reach[first] + 1e-12
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_the_gain_of_a_min_of_planes_is_the_drop_of_truncated_cost(count):
+    rng = np.random.default_rng(count)
+    u, v, z = rng.uniform(-3.0, 3.0, (3, 60))
+    cell = np.zeros(60, np.int64)
+    planes, current, gain = rng.normal(0.0, 0.5, (5, 3)), rng.random(60), np.empty(60)
+    total = gain_by_point(Cloud(u, v, z, cell, cell), planes, count, current, 0.2, gain)
+    roof = (planes[:count, :1] * u + planes[:count, 1:2] * v + planes[:count, 2:]).min(axis=0)
+    expected = current - np.array([truncated(dz, 0.2) for dz in z - roof])
+    assert gain == pytest.approx(expected)
+    assert total == pytest.approx(expected[expected > 0.0].sum())
 
 
 def brute_partition(box, leaf, cut_u, cut_v):
@@ -52,15 +91,54 @@ def brute_partition(box, leaf, cut_u, cut_v):
 def test_dynamic_programming_finds_the_cheapest_partition(seed):
     rng = np.random.default_rng(seed)
     grid = Grid(np.arange(4.0), np.arange(4.0), np.ones(4, bool), np.ones(4, bool))
-    cells = rng.exponential(1.0, (3, 3, 5))
-    sums = np.zeros((4, 4, 5))
-    sums[1:, 1:] = cells.cumsum(axis=0).cumsum(axis=1)
+    cells = rng.exponential(1.0, (5, 3, 3))
+    sums = np.zeros((5, 4, 4))
+    sums[:, 1:, 1:] = cells.cumsum(axis=1).cumsum(axis=2)
     penalty, cut_u, cut_v = rng.uniform(0.1, 0.6, 5), rng.uniform(0.0, 0.3, 4), rng.uniform(0.0, 0.3, 4)
-    cost = leaf_costs(sums, penalty, grid)
-    assert cost[0, 2, 1, 3] == pytest.approx((cells[0:2, 1:3].sum(axis=(0, 1)) + penalty).min())
-    leaf = cost.copy()
-    guillotine(cost, cut_u, cut_v)
-    assert cost[0, 3, 0, 3] == pytest.approx(brute_partition((0, 3, 0, 3), leaf, cut_u, cut_v))
+    whole = np.full((4, 4, 4, 4), np.nan)
+    for a, b, c, d in np.ndindex(whole.shape):
+        if a < b and c < d:
+            whole[a, b, c, d] = (cells[:, a:b, c:d].sum(axis=(1, 2)) + penalty).min()
+    cost = partition_costs(sums, penalty, grid, cut_u, cut_v)
+    for a, b, c, d in np.argwhere(np.isfinite(whole)):
+        assert cost[a, b, c, d] == pytest.approx(brute_partition((a, b, c, d), whole, cut_u, cut_v))
+    layout = empty_layout()
+    planes, counts = rng.normal(0.0, 1.0, (5, 5, 3)), np.ones(5, np.int64)
+    grow_tree(layout, cost, sums, penalty, planes, counts, grid, cut_u, cut_v)
+    assert cost_of_tree(layout, whole, cut_u, cut_v) == pytest.approx(cost[0, 3, 0, 3])
+
+
+def cost_of_tree(layout, whole, cut_u, cut_v, node=0, box=(0, 3, 0, 3)):
+    """What the leaves and cuts of a grown tree cost together; its grid lines are at whole metres."""
+    if layout.axis[node] < 0:
+        return whole[box]
+    a, b, c, d = box
+    k = int(layout.at[node])
+    low, high = ((a, k, c, d), (k, b, c, d)) if layout.axis[node] == 0 else ((a, b, c, k), (a, b, k, d))
+    price = cut_u[k] if layout.axis[node] == 0 else cut_v[k]
+    below, above = layout.child[node]
+    return (
+        price
+        + cost_of_tree(layout, whole, cut_u, cut_v, below, low)
+        + cost_of_tree(layout, whole, cut_u, cut_v, above, high)
+    )
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_pair_left_out_never_beats_its_planes(seed):
+    rng = np.random.default_rng(seed)
+    costs, others = rng.random((2, 40))
+    heights, other_heights = rng.normal(0.0, 1.0, (2, 40))
+    price, other_price = rng.uniform(0.0, 8.0, 2)
+    if may_pay(heights, other_heights, costs, others, 40, price, other_price):
+        return
+    together = np.where(heights < other_heights, costs, others)
+    if not 0.06 * 40 <= (heights < other_heights).sum() <= 0.94 * 40:
+        return
+    for _ in range(200):
+        some = rng.random(40) < rng.random()
+        pair = together[some].sum() + price + other_price
+        assert pair >= min(costs[some].sum() + price, others[some].sum() + other_price) - 1e-12
 
 
 def two_leaves_and_an_overlay():
