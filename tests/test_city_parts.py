@@ -74,6 +74,31 @@ def test_ground_of_a_building_ignores_what_lies_outside_its_box(around):
     assert np.array_equal(whole, around(ground_cells(twice), box).height_at(xy))
 
 
+@pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
+def test_ground_heights_equal_plain_weighted_planes(share):
+    rng = np.random.default_rng(6)
+    cells, box = ground_cells(sloped_ground(rng, int(4000 * share))), np.array([20.0, 25.0, 60.0, 70.0])
+    known = np.isfinite(cells.z)
+    xyz = np.column_stack([cells.x[known], cells.y[known], cells.z[known]])
+    xyz = xyz[((np.floor(xyz[:, :2]) >= box[:2]) & (np.floor(xyz[:, :2]) < box[2:])).all(axis=1)]
+    for at in rng.uniform(15, 75, (60, 2)):
+        steps = np.abs(np.floor(xyz[:, :2]) - np.floor(at)).max(axis=1)
+        low = np.sort(xyz[steps <= 9, 2])
+        lowest = low[1 if len(low) >= 10 else 0] if len(low) else np.nan
+        assert np.array_equal(LowestAround(cells, box).height_at(at[None]), [lowest], equal_nan=True)
+        reach = next((reach for reach in (2, 5) if (steps <= reach).sum() >= 3), 9)
+        near = xyz[steps <= reach]
+        weight = 1 / (((near[:, :2] - at) ** 2).sum(axis=1) + 0.25)
+        height = np.nan
+        if len(near):
+            mean = weight @ near / weight.sum()
+            offset, rise = near[:, :2] - mean[:2], near[:, 2] - mean[2]
+            moments = (weight[:, None] * offset).T @ offset / weight.sum() + 0.1 * np.eye(2)
+            slope = np.linalg.solve(moments, (weight * rise) @ offset / weight.sum())
+            height = mean[2] + (at - mean[:2]) @ slope
+        assert GroundAround(cells, box).height_at(at[None]) == pytest.approx([height], nan_ok=True)
+
+
 def test_ground_without_points_is_unknown():
     box = np.array([0.0, 0.0, 10.0, 10.0])
     for around in (GroundAround, LowestAround):

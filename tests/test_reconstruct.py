@@ -149,17 +149,15 @@ def test_not_finite_points_are_left_out():
 
 
 def test_a_roof_that_cannot_be_composed_falls_back_to_a_flat_block_and_says_so(monkeypatch):
-    from hiproof import stages
+    from hiproof.compose import compose
     from hiproof.errors import CompositionError
-
-    compose = stages.checked_solid
 
     def refuses_slopes(roof, z_ground, settings):
         if any(piece.planes[:, :2].any() for piece in roof.pieces):
             raise CompositionError("planted")
         return compose(roof, z_ground, settings)
 
-    monkeypatch.setattr(stages, "checked_solid", refuses_slopes)
+    monkeypatch.setattr("hiproof.compose.compose", refuses_slopes)
     building = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
     assert building.status is Status.SIMPLIFIED
     assert "planted" in building.detail

@@ -200,27 +200,18 @@ def solid_or_simpler(
     roof: Roof, points: np.ndarray, z_ground: float, fitted: Fitted, settings: Settings
 ) -> tuple[Roof, Solid | None, Fitted]:
     """The roof as a checked solid in the local frame; a flat block where the fitted roof cannot become a valid one."""
+    from .compose import compose
+
     try:
-        return roof, checked_solid(roof, z_ground, settings), fitted
+        return roof, compose(roof, z_ground, settings), fitted
     except CompositionError as error:
         why = f"{Status.SIMPLIFIED.value} ({error})"
     fitted = flat(points, roof.outline, Status.SIMPLIFIED, why)
     roof = dataclasses.replace(roof, parts=fitted.parts)
     try:
-        return roof, checked_solid(roof, z_ground, settings), fitted
+        return roof, compose(roof, z_ground, settings), fitted
     except CompositionError as error:
         return roof, None, dataclasses.replace(fitted, status=Status.BAD_FOOTPRINT, detail=str(error))
-
-
-def checked_solid(roof: Roof, z_ground: float, settings: Settings) -> Solid:
-    """Compose and check; the ground is lowered where the roof would touch it."""
-    from .compose import check_solid, compose
-
-    solid = compose(roof, z_ground, settings)
-    findings = check_solid(solid)
-    if findings:
-        raise CompositionError(f"expected a valid solid, got {findings[0]}")
-    return solid
 
 
 def judge(

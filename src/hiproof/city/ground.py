@@ -7,6 +7,7 @@ answer is the same whatever tile the cells were gathered for, and costs a few ta
 from __future__ import annotations
 
 import numpy as np
+from numba import njit
 
 from ..read.terrain import LowestPointsTerrain, TinTerrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
@@ -29,21 +30,6 @@ class Cells:
         tables[:, cell[:, 1], cell[:, 0]] = xyz.T
         self.x, self.y, self.z = tables
 
-    def around(self, xy: np.ndarray, reach: int, box: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Offsets dx, dy and heights z (n, k) of the cells at most `reach` cells from `xy` (n, 2) and inside `box`."""
-        steps = np.arange(-reach, reach + 1)
-        cell = np.floor(xy).astype(np.int64)
-        column = (cell[:, 0, None, None] + steps[None, None, :] + 0 * steps[None, :, None]).reshape(len(xy), -1)
-        row = (cell[:, 1, None, None] + steps[None, :, None] + 0 * steps[None, None, :]).reshape(len(xy), -1)
-        low = np.maximum(self.low, box[:2]).astype(np.int64)
-        high = np.minimum(self.low + self.z.shape[::-1], box[2:]).astype(np.int64)
-        inside = (column >= low[0]) & (column < high[0]) & (row >= low[1]) & (row < high[1])
-        place = np.where(inside, row - self.low[1], 0), np.where(inside, column - self.low[0], 0)
-        z = np.where(inside, self.z[place], np.nan) if self.z.size else np.full(inside.shape, np.nan)
-        if not self.z.size:
-            return z, z, z
-        return self.x[place] - xy[:, :1], self.y[place] - xy[:, 1:], z
-
 
 class GroundAround:
     """Terrain for one building: a plane through the known cells around each position, the near ones weighing most.
@@ -58,30 +44,8 @@ class GroundAround:
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Height (n,) at `xy_world` (n, 2); NaN where no cell within the last ring is known."""
-        xy = np.asarray(xy_world, float)[:, :2]
-        heights, unknown = np.full(len(xy), np.nan), np.arange(len(xy))
-        for reach in RINGS:
-            dx, dy, z = self.cells.around(xy[unknown], reach, self.box)
-            enough = np.isfinite(z).sum(axis=1) >= (3 if reach < RINGS[-1] else 1)
-            heights[unknown[enough]] = plane_heights(dx[enough], dy[enough], z[enough])
-            unknown = unknown[~enough]
-            if not len(unknown):
-                break
-        return heights
-
-
-def plane_heights(dx: np.ndarray, dy: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Heights (n,) at the origin of the weighted planes through (dx, dy, z) (n, k), NaN standing for no point."""
-    known = np.isfinite(z)
-    dx, dy, z = (np.where(known, values, 0.0) for values in (dx, dy, z))
-    weight = np.where(known, 1.0 / (dx * dx + dy * dy + SOFT_M2), 0.0)
-    weight /= weight.sum(axis=1, keepdims=True)
-    mean_x, mean_y, mean_z = ((weight * values).sum(axis=1) for values in (dx, dy, z))
-    x, y, rise = dx - mean_x[:, None], dy - mean_y[:, None], z - mean_z[:, None]
-    xx, yy = (weight * x * x).sum(axis=1) + LEVELLING, (weight * y * y).sum(axis=1) + LEVELLING
-    xy, xz, yz = ((weight * a * b).sum(axis=1) for a, b in ((x, y), (x, rise), (y, rise)))
-    det = xx * yy - xy * xy
-    return mean_z - ((yy * xz - xy * yz) * mean_x + (xx * yz - xy * xz) * mean_y) / det
+        xy, cells = np.ascontiguousarray(xy_world, float), self.cells
+        return plane_heights(xy, cells.x, cells.y, cells.z, cells.low, self.box.astype(np.int64))
 
 
 class LowestAround:
@@ -97,9 +61,83 @@ class LowestAround:
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
-        _, _, z = self.cells.around(np.asarray(xy_world, float)[:, :2], RINGS[-1], self.box)
-        ascending = np.sort(z, axis=1)  # NaN last
-        return np.where(np.isfinite(z).sum(axis=1) >= 10, ascending[:, 1], ascending[:, 0])
+        xy = np.ascontiguousarray(xy_world, float)
+        return lowest_heights(xy, self.cells.z, self.cells.low, self.box.astype(np.int64))
+
+
+@njit(cache=True)
+def window(x, y, reach, low, shape, box):
+    """First and last row and column (both excluded) of a table whose corner is cell `low`: cells at most `reach` from (x, y)
+    and inside `box`."""
+    column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
+    rows = max(row - reach, box[1], low[1]) - low[1], min(row + reach + 1, box[3], low[1] + shape[0]) - low[1]
+    columns = max(column - reach, box[0], low[0]) - low[0], min(column + reach + 1, box[2], low[0] + shape[1]) - low[0]
+    return rows[0], rows[1], columns[0], columns[1]
+
+
+@njit(cache=True)
+def plane_heights(xy, x, y, z, low, box):
+    """Heights (n,) at `xy` (n, 2) of the weighted planes through the known cells of the tables x, y, z inside `box`."""
+    heights = np.full(len(xy), np.nan)
+    for i in range(len(xy)):
+        for reach in RINGS:
+            bounds = window(xy[i, 0], xy[i, 1], reach, low, z.shape, box)
+            known, total, mean_x, mean_y, mean_z = weighted_mean(xy[i], x, y, z, bounds)
+            if known >= (3 if reach < RINGS[-1] else 1):
+                slope_x, slope_y = weighted_slope(xy[i], x, y, z, bounds, total, mean_x, mean_y, mean_z)
+                heights[i] = mean_z - slope_x * mean_x - slope_y * mean_y
+                break
+    return heights
+
+
+@njit(cache=True)
+def weighted_mean(at, x, y, z, bounds):
+    """Known cells within `bounds`, the sum of their weights, and their mean offset from `at` (2,) and height."""
+    known, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
+    for row in range(bounds[0], bounds[1]):
+        for column in range(bounds[2], bounds[3]):
+            if not np.isnan(z[row, column]):
+                dx, dy = x[row, column] - at[0], y[row, column] - at[1]
+                weight = 1.0 / (dx * dx + dy * dy + SOFT_M2)
+                known, total = known + 1, total + weight
+                sum_x, sum_y, sum_z = sum_x + weight * dx, sum_y + weight * dy, sum_z + weight * z[row, column]
+    if known == 0:
+        return 0, 0.0, 0.0, 0.0, 0.0
+    return known, total, sum_x / total, sum_y / total, sum_z / total
+
+
+@njit(cache=True)
+def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
+    """Rise of the plane through the known cells within `bounds` along x and along y, held back by LEVELLING."""
+    xx, yy, xy, xz, yz = LEVELLING, LEVELLING, 0.0, 0.0, 0.0
+    for row in range(bounds[0], bounds[1]):
+        for column in range(bounds[2], bounds[3]):
+            if not np.isnan(z[row, column]):
+                dx, dy = x[row, column] - at[0], y[row, column] - at[1]
+                weight = 1.0 / (dx * dx + dy * dy + SOFT_M2) / total
+                dx, dy, rise = dx - mean_x, dy - mean_y, z[row, column] - mean_z
+                xx, yy, xy = xx + weight * dx * dx, yy + weight * dy * dy, xy + weight * dx * dy
+                xz, yz = xz + weight * dx * rise, yz + weight * dy * rise
+    determinant = xx * yy - xy * xy
+    return (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
+
+
+@njit(cache=True)
+def lowest_heights(xy, z, low, box):
+    """Lowest known height (n,) of the table z around `xy` (n, 2) and inside `box`, the second lowest of ten or more."""
+    heights = np.full(len(xy), np.nan)
+    for i in range(len(xy)):
+        bounds = window(xy[i, 0], xy[i, 1], RINGS[-1], low, z.shape, box)
+        known, lowest, second = 0, np.inf, np.inf
+        for row in range(bounds[0], bounds[1]):
+            for column in range(bounds[2], bounds[3]):
+                here = z[row, column]
+                if not np.isnan(here):
+                    known += 1
+                    lowest, second = min(lowest, here), min(second, max(lowest, here))
+        if known:
+            heights[i] = second if known >= 10 else lowest
+    return heights
 
 
 def ground_cells(xyz: np.ndarray) -> Cells:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -50,41 +51,44 @@ class PlanCells:
     side: np.ndarray
 
 
-def polygon_soup(polygon: shapely.Polygon) -> np.ndarray:
-    """Edges (m, 4) of all rings of a polygon (or of several), rounded to the grid, without edges of no length."""
-    xy, ring = shapely.get_coordinates(shapely.get_rings(shapely.get_parts(polygon)), return_index=True)
+def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
+    """Edges (m, 4) of all rings of each polygon (or of several in one), rounded to the grid, without those of no length."""
+    parts, polygon_of_part = shapely.get_parts(np.array(polygons, object), return_index=True)
+    rings, part_of_ring = shapely.get_rings(parts, return_index=True)
+    xy, ring = shapely.get_coordinates(rings, return_index=True)
     if not np.isfinite(xy).all() or np.abs(xy).max(initial=0) > MAX_EXTENT_M:
         raise CompositionError(
             "expected plan coordinates within 50 km of the roof's local origin, got larger or non-finite ones;"
             " give the outline in the roof's local frame"
         )
     xy = np.rint(xy / GRID_M)
-    soup = np.concatenate((xy[:-1], xy[1:]), axis=1)[ring[:-1] == ring[1:]]
-    return soup[(soup[:, :2] != soup[:, 2:]).any(axis=1)]
+    soup = np.concatenate((xy[:-1], xy[1:]), axis=1)
+    kept = (ring[:-1] == ring[1:]) & ((soup[:, 0] != soup[:, 2]) | (soup[:, 1] != soup[:, 3]))
+    owner = polygon_of_part[part_of_ring[ring[:-1][kept]]]
+    return np.split(soup[kept], np.searchsorted(owner, np.arange(1, len(polygons))))
 
 
 def plan_problem(roof: Roof) -> PlanProblem:
     """The roof on the grid. Raises CompositionError when it has no outline, no pieces or planes that are not finite."""
-    soups, planes, part = [polygon_soup(roof.outline)], [], []
-    plane_start = [0]
-    for index, roof_part in enumerate(roof.parts):
-        for piece in roof_part.pieces:
-            soup = polygon_soup(piece.outline)
-            if len(soup) == 0 or len(piece.planes) == 0:
-                continue
-            soups.append(soup)
-            planes.append(np.asarray(piece.planes, float).reshape(-1, 3))
-            part.extend([index] * len(planes[-1]))
-            plane_start.append(plane_start[-1] + len(planes[-1]))
-    if len(soups[0]) == 0 or not planes:
+    outline, *borders = polygon_soups([roof.outline, *(piece.outline for piece in roof.pieces)])
+    part_of_piece = [index for index, part in enumerate(roof.parts) for _ in part.pieces]
+    pieces = [
+        (border, np.asarray(piece.planes, float).reshape(-1, 3), index)
+        for border, piece, index in zip(borders, roof.pieces, part_of_piece, strict=True)
+        if len(border) and len(piece.planes)
+    ]
+    if len(outline) == 0 or not pieces:
         raise CompositionError(
             "expected a roof with an outline and at least one piece with planes, got none; fall back to a flat block"
         )
+    borders, planes, part = zip(*pieces, strict=True)
+    counts = [len(own) for own in planes]
     stacked = np.concatenate(planes)
     if not np.isfinite(stacked).all():
         raise CompositionError("expected finite roof planes, got NaN or infinity; fall back to a flat block")
-    group = equal_planes(stacked)
-    return PlanProblem(soups, stacked / [1, 1, GRID_M], np.array(plane_start), group, np.array(part))
+    plane_start = np.array([0, *itertools.accumulate(counts)])
+    in_grid_units = stacked / [1, 1, GRID_M]
+    return PlanProblem([outline, *borders], in_grid_units, plane_start, equal_planes(stacked), np.repeat(part, counts))
 
 
 def equal_planes(planes: np.ndarray) -> np.ndarray:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -62,15 +63,16 @@ def raise_shell(
     if saddle >= 0:
         radius = max(SETBACK_M, 4 * reach_m) / GRID_M * (1 + 0.25 * len(problem.patches))  # grows: a cure may need room
         raise Saddle(cure(sectors_at(saddle, xy, edges, side, levels), radius))
-    label, vertices = side.ravel().tolist(), levels.vertices
+    # from here on numbers of a few dozen edges: plain lists are faster than arrays
+    label, xyz = side.ravel().tolist(), levels.vertices.tolist()
     follow, face, level = levels.follow.tolist(), levels.face.tolist(), levels.level.tolist()
-    faces = roof_faces(follow, face, level, label, vertices, problem.part)
+    faces = roof_faces(follow, face, level, label, xyz, problem.part)
     rises = wall_rises(follow, level)
-    runs = wall_runs(rises, follow, label, vertices) if merge_walls else [[h] for h in rises]
+    runs = wall_runs(rises, follow, label, xyz) if merge_walls else [[h] for h in rises]
     skip = {rises[h][0] for run in runs for h in run[1:]}
-    faces += [Face((tuple(v for v in wall_ring(run, rises) if v not in skip),), WALL) for run in runs]
-    faces.append(ground_face(follow, level, label, skip, vertices))
-    return compacted(vertices, faces)
+    faces += [Face((tuple([v for v in wall_ring(run, rises) if v not in skip]),), WALL) for run in runs]
+    faces.append(ground_face(follow, level, label, skip, xyz))
+    return compacted(levels.vertices, faces)
 
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
@@ -114,14 +116,15 @@ def simple_loops(ring: list[int]) -> list[list[int]]:
     return loops
 
 
-def signed_area(ring: list[int], vertices: np.ndarray) -> float:
+def signed_area(ring: list[int], xyz: list[list[float]]) -> float:
     """Plan area of a ring of vertex indices, positive counter-clockwise."""
-    x, y = vertices[ring, 0] - vertices[ring[0], 0], vertices[ring, 1] - vertices[ring[0], 1]
-    return 0.5 * float(x @ np.roll(y, -1) - y @ np.roll(x, -1))
+    x0, y0, _ = xyz[ring[0]]
+    plan = [(xyz[vertex][0] - x0, xyz[vertex][1] - y0) for vertex in ring]
+    return 0.5 * sum(ax * by - ay * bx for (ax, ay), (bx, by) in pairwise(plan))
 
 
 def roof_faces(
-    follow: list[int], face: list[int], level: list[int], label: list[int], vertices: np.ndarray, part: np.ndarray
+    follow: list[int], face: list[int], level: list[int], label: list[int], xyz: list[list[float]], part: np.ndarray
 ) -> list[Face]:
     """A RoofSurface a cell: its outer walk counter-clockwise from above, then its holes."""
     rings_of: dict[int, list[list[int]]] = {}
@@ -132,12 +135,12 @@ def roof_faces(
     faces = []
     for cell, rings in rings_of.items():
         if len(rings) > 1:
-            rings.sort(key=lambda ring: -signed_area(ring, vertices))
+            rings.sort(key=lambda ring: -signed_area(ring, xyz))
         faces.append(Face(tuple(map(tuple, rings)), ROOF, int(part[label_of[cell]])))
     return faces
 
 
-def ground_face(follow: list[int], level: list[int], label: list[int], skip: set[int], vertices: np.ndarray) -> Face:
+def ground_face(follow: list[int], level: list[int], label: list[int], skip: set[int], xyz: list[list[float]]) -> Face:
     """The GroundSurface: the walks around the outside, which run counter-clockwise seen from below.
 
     `skip` are ground vertices in the middle of a straight wall, which nothing else needs.
@@ -145,7 +148,8 @@ def ground_face(follow: list[int], level: list[int], label: list[int], skip: set
     rings = []
     for walk in walks(follow, [here == OUTSIDE for here in label]):
         rings += simple_loops([level[h] for h in walk if level[h] not in skip])
-    rings.sort(key=lambda ring: signed_area(ring, vertices))
+    if len(rings) > 1:
+        rings.sort(key=lambda ring: signed_area(ring, xyz))
     return Face(tuple(map(tuple, rings)), GROUND)
 
 
@@ -160,18 +164,18 @@ def wall_rises(follow: list[int], level: list[int]) -> dict[int, tuple[int, int,
 
 
 def wall_runs(
-    rises: dict[int, tuple[int, int, int, int]], follow: list[int], label: list[int], vertices: np.ndarray
+    rises: dict[int, tuple[int, int, int, int]], follow: list[int], label: list[int], xyz: list[list[float]]
 ) -> list[list[int]]:
     """Half-edges with walls, grouped: consecutive ones on a straight stretch of the outline make one wall."""
     outer = {follow[h ^ 1] ^ 1: h for h in rises if label[h ^ 1] == OUTSIDE}
-    after = {before: h for before, h in outer.items() if is_straight([before, h], rises, vertices)}
+    after = {before: h for before, h in outer.items() if is_straight([before, h], rises, xyz)}
     runs = [[h] for h in rises if label[h ^ 1] != OUTSIDE]
     starts = set(outer.values()) - set(after.values())
     for first in sorted(starts):
         run = [first]
         while run[-1] in after:
             following = after[run[-1]]
-            if is_straight([*run, following], rises, vertices):
+            if is_straight([*run, following], rises, xyz):
                 run.append(following)
             else:
                 runs.append(run)
@@ -180,13 +184,13 @@ def wall_runs(
     return runs
 
 
-def is_straight(run: list[int], rises: dict[int, tuple[int, int, int, int]], vertices: np.ndarray) -> bool:
+def is_straight(run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz: list[list[float]]) -> bool:
     """Whether all ground vertices inside a run lie on the line between its ends."""
-    ax, ay = vertices[rises[run[0]][0], :2].tolist()
-    bx, by = vertices[rises[run[-1]][2], :2].tolist()
+    ax, ay, _ = xyz[rises[run[0]][0]]
+    bx, by, _ = xyz[rises[run[-1]][2]]
     length = max(math.hypot(bx - ax, by - ay), 1.0)
     for h in run[1:]:
-        x, y = vertices[rises[h][0], :2].tolist()
+        x, y, _ = xyz[rises[h][0]]
         along = ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / length
         across = abs((x - ax) * (by - ay) - (y - ay) * (bx - ax)) / length
         if across > COLLINEAR_UNITS or not 0 < along < length:
@@ -210,11 +214,11 @@ def wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> li
 
 def compacted(vertices: np.ndarray, faces: list[Face]) -> Solid:
     """Solid with the vertices that faces use, in metres."""
-    used = np.unique([v for face in faces for ring in face.rings for v in ring])
-    number = np.empty(len(vertices), np.int64)
-    number[used] = np.arange(len(used))
-    renumber = number.tolist()
-    faces = [replace(face, rings=tuple(tuple(renumber[v] for v in ring) for ring in face.rings)) for face in faces]
+    used = sorted({v for face in faces for ring in face.rings for v in ring})
+    number = {vertex: index for index, vertex in enumerate(used)}
+    faces = [
+        Face(tuple([tuple([number[v] for v in ring]) for ring in face.rings]), face.kind, face.part) for face in faces
+    ]
     return Solid(np.round(vertices[used] * GRID_M, 4), tuple(faces))
 
 
