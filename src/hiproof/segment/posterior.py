@@ -20,7 +20,7 @@ SMALLEST_PRIOR = 1e-4
 GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 7.5, 0.02
 # The network may name a roof against the evidence, but a shape that lies farther from the points than the evidence's
 # by more than this is not built: a gable over a house and its porch is named so and fits neither.
-FARTHER_AT_MOST_M = 0.02
+FARTHER_AT_MOST_M = 0.01
 OUTLIER_DISTANCE_M = 1.0
 
 
