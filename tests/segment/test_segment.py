@@ -116,12 +116,12 @@ def test_labels_are_carried_back_from_the_nearest_samples():
 
 
 def test_points_weigh_nothing_only_where_they_are_surely_no_roof():
-    probability = np.array([[0.1, 0.9], [0.3, 0.7], [0.9, 0.1]])
+    logits = np.log([[0.1, 0.9], [0.3, 0.7], [0.9, 0.1]])
     sampled = np.repeat(np.array([[0.0, 0, 0], [10, 0, 0], [20, 0, 0]]), 12, axis=0)
-    found = Segmentation({"gable": 1.0}, np.repeat(probability, 12, axis=0), sampled, sampled)
+    found = Segmentation({"gable": 1.0}, np.repeat(logits, 12, axis=0), sampled, sampled)
     assert found.weights.tolist() == [0.0] * 12 + [1.0] * 24
     assert found.is_roof.tolist() == [False] * 24 + [True] * 12
-    alone = Segmentation({"gable": 1.0}, probability[[0] * 12], sampled[:12], sampled[:12])
+    alone = Segmentation({"gable": 1.0}, logits[[0] * 12], sampled[:12], sampled[:12])
     assert alone.weights.tolist() == [1.0] * 12
 
 

@@ -35,19 +35,19 @@ CARRIED_CHUNK = 200_000
 class Segmentation:
     """What the network says of one building's n points.
 
-    `types` probability of the building's roof type by name, in the catalogue's order, summing to 1. `probability`
+    `types` probability of the building's roof type by name, in the catalogue's order, summing to 1. `logits`
     (m, types + 1), not-roof last, of the m points `sampled` (m, 3) that the network took of all points `xyz` (n, 3);
     what is said of each of the n points is carried over from them when it is first asked for.
     """
 
     types: dict[str, float]
-    probability: np.ndarray
+    logits: np.ndarray
     sampled: np.ndarray
     xyz: np.ndarray
 
     @cached_property
     def _of_every_point(self) -> tuple[np.ndarray, np.ndarray]:
-        return carried_back(self.probability, self.sampled, self.xyz)
+        return carried_back(softmax(self.logits), self.sampled, self.xyz)
 
     @property
     def labels(self) -> np.ndarray:
@@ -107,10 +107,10 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
     arranged = arrange(xyz, model.layout)
     point_logits, type_logits = run(model, [arranged])
     barred = barred_types(model, settings.fit.types)
-    point_probability = softmax(point_logits[: arranged.sampled] + np.append(barred, 0.0))
     type_probability = softmax(type_logits[0] + barred)
     types = dict(zip(model.types, map(float, type_probability), strict=True))
-    return Segmentation(types, point_probability, xyz[arranged.chosen[: arranged.sampled]], xyz)
+    logits = point_logits[: arranged.sampled] + np.append(barred, 0.0)
+    return Segmentation(types, logits, xyz[arranged.chosen[: arranged.sampled]], xyz)
 
 
 def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
