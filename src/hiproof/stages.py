@@ -71,7 +71,8 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
         if footprint.is_empty or not footprint.area >= 0.1:
             return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
     points = np.asarray(points, float).reshape(-1, 3)
-    points = points[np.isfinite(points).all(axis=1)]
+    if not np.isfinite(points).all():
+        points = points[np.isfinite(points).all(axis=1)]
     if footprint is not None:
         points = points[shapely.intersects_xy(footprint, points[:, 0], points[:, 1])]
     points = distinct(points)
@@ -92,7 +93,8 @@ def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
 def distinct(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) sorted by x, y, z without repeats: the same set gives the same array."""
     points = points[np.lexsort(points.T[::-1])]
-    return points[np.r_[True, np.any(np.diff(points, axis=0) != 0, axis=1)]] if len(points) else points
+    differs = points[1:] != points[:-1]
+    return points[np.r_[True, differs[:, 0] | differs[:, 1] | differs[:, 2]]] if len(points) else points
 
 
 def on_a_line(xy: np.ndarray, width_m: float = 0.05) -> bool:

@@ -64,7 +64,8 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
     or under it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
-    points = points[np.isfinite(points).all(axis=1)]
+    if not np.isfinite(points).all():
+        points = points[np.isfinite(points).all(axis=1)]
     polygons = roof_polygons(model)
     outline = _observed_outline(points) if outline is None else outline
     has_outline = outline is not None and outline.area > 0

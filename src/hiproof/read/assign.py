@@ -48,8 +48,9 @@ class PointGrid:
         left, right = max(first[0], 0), min(first[1], self.columns - 1)
         if left > right or not len(rows):
             return np.empty(0, np.int64)
-        starts = np.searchsorted(self.keys, rows * self.columns + left)
-        stops = np.searchsorted(self.keys, rows * self.columns + right, side="right")
+        # looked up as the keys' own type: NumPy would convert all keys otherwise
+        starts = np.searchsorted(self.keys, (rows * self.columns + left).astype(self.keys.dtype))
+        stops = np.searchsorted(self.keys, (rows * self.columns + right).astype(self.keys.dtype), side="right")
         return np.concatenate([self.order[start:stop] for start, stop in zip(starts, stops, strict=True)])
 
     def cell_range(self, low: float, high: float, axis: int) -> tuple[int, int]:
