@@ -20,7 +20,7 @@ from .plan import Plan
 PARAMETER_SHARE = 0.45  # of a unit of complexity: what one parameter costs
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.12, 0.25
 MOST_REGULARITIES = 24
-ITERATIONS = 3
+ITERATIONS = 2
 
 
 @dataclass(frozen=True)
@@ -65,19 +65,20 @@ def fit_together(layout: Layout, plan: Plan, tau: float, evidence: float) -> Joi
     position = {int(row): 3 * k for k, row in enumerate(rows)}
     constraints = structure(layout, rows, position)
     value = objective(layout, plan.cloud, plan.ghosts, tau, evidence)
-    value, _ = solved(layout, rows, constraints, plan.cloud, plan.ghosts, tau, evidence, value)
+    basis = null_space(constraints, 3 * len(rows))
+    value, _ = solved(layout, rows, basis, plan.cloud, plan.ghosts, tau, evidence, value)
     allowed = PARAMETER_SHARE * evidence
     for constraint in regularities(layout, rows, position, plan):
-        before = np.linalg.matrix_rank(constraints) if len(constraints) else 0
-        more = np.vstack([constraints, constraint])
-        if np.linalg.matrix_rank(more) == before:
+        if np.abs(constraint @ basis).max(initial=0.0) < 1e-9:  # it holds already
             continue
-        value, kept = solved(layout, rows, more, plan.cloud, plan.ghosts, tau, evidence, value + allowed)
+        more = np.vstack([constraints, constraint])
+        narrower = null_space(more, 3 * len(rows))
+        value, kept = solved(layout, rows, narrower, plan.cloud, plan.ghosts, tau, evidence, value + allowed)
         if kept:
-            constraints = more
+            constraints, basis = more, narrower
         else:
             value -= allowed
-    return JointFit(rows, covariance(layout, rows, constraints, plan.cloud, tau))
+    return JointFit(rows, covariance(layout, rows, basis, plan.cloud, tau))
 
 
 def rows_in_use(layout: Layout) -> np.ndarray:
@@ -162,16 +163,15 @@ def normal_equations(layout: Layout, rows: np.ndarray, cloud: Cloud, tau: float)
 def solved(
     layout: Layout,
     rows: np.ndarray,
-    constraints: np.ndarray,
+    basis: np.ndarray,
     cloud: Cloud,
     ghosts: Ghosts,
     tau: float,
     evidence: float,
     limit: float,
 ) -> tuple[float, bool]:
-    """Re-weighted least squares under `constraints`; (objective, True), or the old planes and (`limit`, False) above it."""
+    """Re-weighted least squares within `basis`; (objective, True), or the old planes and (`limit`, False) above it."""
     before = layout.table[rows].copy()
-    basis = null_space(constraints, before.size)
     for _ in range(ITERATIONS):
         matrix, right, _ = normal_equations(layout, rows, cloud, tau)
         old = basis.T @ layout.table[rows].ravel()
@@ -189,10 +189,9 @@ def solved(
     return limit, False
 
 
-def covariance(layout: Layout, rows: np.ndarray, constraints: np.ndarray, cloud: Cloud, tau: float) -> np.ndarray:
+def covariance(layout: Layout, rows: np.ndarray, basis: np.ndarray, cloud: Cloud, tau: float) -> np.ndarray:
     """Covariance (3 k, 3 k) of the coefficients: the inverse Hessian of the likelihood at the residuals' own variance."""
     matrix, _, variance = normal_equations(layout, rows, cloud, tau)
-    basis = null_space(constraints, matrix.shape[0])
     reduced = basis.T @ matrix @ basis
     ridge = 1e-9 * max(np.trace(reduced) / len(reduced), 1.0)
     return variance * basis @ np.linalg.inv(reduced + ridge * np.eye(len(reduced))) @ basis.T

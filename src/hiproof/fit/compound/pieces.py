@@ -130,7 +130,7 @@ def within_heights(whole: RowPiece, low: float, high: float) -> list[RowPiece]:
     """The piece with every height held between `low` and `high`: a flat cap above, flat pieces where it would be below."""
     planes, rows, polygon = whole.piece.planes, whole.rows, whole.piece.outline
     z = shapely.get_coordinates(polygon) @ planes[:, :2].T + planes[:, 2]
-    if z.max() > high and where_above(planes, high, polygon).area > 0.0:
+    if (z.max(axis=0) > high).all() and rises_above(planes, high, polygon):
         planes, rows = np.vstack([planes, [0.0, 0.0, high]]), np.append(rows, -1)
         kept = active_planes(planes, polygon)
         planes, rows = planes[kept], rows[kept]
@@ -143,6 +143,29 @@ def within_heights(whole: RowPiece, low: float, high: float) -> list[RowPiece]:
         found.append(RowPiece(Piece(part, planes[kept]), rows[kept]))
     flat = np.array([[0.0, 0.0, low]])
     return found + [RowPiece(Piece(p, flat), np.array([-1])) for p in polygons_of(shapely.difference(polygon, above))]
+
+
+def rises_above(planes: np.ndarray, height: float, polygon: shapely.Polygon) -> bool:
+    """Whether the min of `planes` is above `height` somewhere over `polygon`, holes not asked: its ring cut by each plane."""
+    ring = shapely.get_coordinates(polygon.exterior)[:-1].tolist()
+    for a, b, c in planes.tolist():
+        ring = ring_above(ring, a, b, c - height)
+    doubled = sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in zip(ring, ring[1:] + ring[:1], strict=True))
+    return abs(doubled) > 1e-9
+
+
+def ring_above(ring: list[list[float]], a: float, b: float, c: float) -> list[list[float]]:
+    """The part of a ring of vertices where a x + b y + c > 0 (Sutherland and Hodgman 1974)."""
+    signed = [a * x + b * y + c for x, y in ring]
+    kept = []
+    for k, (vertex, z) in enumerate(zip(ring, signed, strict=True)):
+        z_before = signed[k - 1]
+        if (z > 0.0) != (z_before > 0.0):
+            (x0, y0), share = ring[k - 1], z_before / (z_before - z)
+            kept.append([x0 + share * (vertex[0] - x0), y0 + share * (vertex[1] - y0)])
+        if z > 0.0:
+            kept.append(vertex)
+    return kept
 
 
 def where_above(planes: np.ndarray, height: float, polygon: shapely.Polygon) -> shapely.Geometry:

@@ -17,7 +17,7 @@ from ..outline import estimate_outline, is_rectangular
 from ..single import fit_roof
 from .fit import CompoundFit
 from .layout import OVERLAYS, Layout, is_alive
-from .pieces import CLAMP_M, polygons_of, where_above
+from .pieces import CLAMP_M, polygons_of, rises_above
 from .plan import Plan
 
 PART_COST, PARAMETER_COST = (
@@ -116,7 +116,7 @@ def stays_within(part: Part, outline: shapely.Polygon, plan: Plan) -> bool:
     for piece in part.pieces:
         for polygon in polygons_of(shapely.intersection(piece.outline, outline)):
             too_low = piece.height_at(shapely.get_coordinates(polygon)).min() < low
-            if too_low or where_above(piece.planes, high, polygon).area > 0.0:
+            if too_low or rises_above(piece.planes, high, polygon):
                 return False
     return True
 
