@@ -24,6 +24,7 @@ MAX_PLANES = 5  # of one part
 SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
 MIN_SIDE_M = 0.6
 NEIGHBOUR_RADIUS_M = 2.5
+RIDGE_STEP_M = 0.4
 TEMPLATE_POINTS = 150
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
@@ -478,9 +479,9 @@ def plane_pool(cloud, grid, candidates, tau, evidence, most):
 
 @njit(cache=True)
 def mirrored_gables(pool, grid):
-    """Every axis-sloped plane of the pool mirrored about ridges 0.25 m apart: candidates (m, MAX_PLANES, 3)."""
-    steps_u = int((grid.u[-1] - grid.u[0]) / 0.25) + 2
-    steps_v = int((grid.v[-1] - grid.v[0]) / 0.25) + 2
+    """Every axis-sloped plane of the pool mirrored about ridges RIDGE_STEP_M apart: candidates (m, MAX_PLANES, 3)."""
+    steps_u = int((grid.u[-1] - grid.u[0]) / RIDGE_STEP_M) + 2
+    steps_v = int((grid.v[-1] - grid.v[0]) / RIDGE_STEP_M) + 2
     out = np.zeros((len(pool) * (steps_u + steps_v), MAX_PLANES, 3))
     m = 0
     for plane in pool:
@@ -496,7 +497,7 @@ def mirrored_gables(pool, grid):
             out[m, 0] = plane
             out[m, 1, kind - 1] = -slope
             out[m, 1, 2] = plane[2] + 2.0 * slope * ridge
-            ridge += 0.25
+            ridge += RIDGE_STEP_M
             m += 1
     return out[:m]
 
