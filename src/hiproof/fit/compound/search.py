@@ -14,7 +14,7 @@ from .refine import add_overlay, refine, settle
 
 POOL_PLANES, POOL_GABLES = 20, 6
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
-SEARCH_POINTS = 4000
+SEARCH_POINTS = 2000
 POOL_POINTS = 600  # the planes are looked for on at most so many points, evenly spread
 SEEDS, PAIRS_PER_SEED = 80, 2
 
@@ -73,7 +73,6 @@ def search(layout, cloud, ghosts, grid, tau, evidence, with_overlays):
     pool = without_twins(pool, cloud)
     partition(layout, cloud, ghosts, grid, pool, gables, gable_counts, tau, evidence)
     refine(layout, cloud, grid, pool, tau, evidence)
-    refine(layout, cloud, grid, pool[:0], tau, evidence)
     if with_overlays:
         cover_outliers(layout, cloud, few, grid, tau, evidence)
     polish(layout, cloud, ghosts, tau, evidence)
