@@ -3,7 +3,17 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.compound.kernels import Cloud, Ghosts, Grid, best_rectangle, gain_by_point, reach_of_rows, truncated
+from hiproof.fit.compound.kernels import (
+    NEIGHBOUR_RADIUS_M,
+    Cloud,
+    Ghosts,
+    Grid,
+    best_rectangle,
+    gain_by_point,
+    neighbours_of,
+    reach_of_rows,
+    truncated,
+)
 from hiproof.fit.compound.layout import add_holder, complexity, empty_layout, evaluate, single_plane_layout
 from hiproof.fit.compound.partition import grow_tree, may_pay, partition_costs
 from hiproof.fit.compound.plan import grid_lines, signed_depth
@@ -54,6 +64,18 @@ def test_no_rectangle_reaches_beyond_its_rows(seed):
         assert brute_rectangle(gain[first:]) <= reach[first] + 1e-12
 
 
+@pytest.mark.parametrize("n", [1, 6, 200])
+def test_neighbours_are_those_of_sorting_all_distances(n):
+    u, v = np.random.default_rng(n).uniform(0.0, 8.0, (2, n))
+    cell = np.zeros(n, np.int64)
+    near, nearest = np.empty(n, np.int64), np.empty(17, np.int64)
+    count, kept = neighbours_of(Cloud(u, v, u, cell, cell), n // 2, near, np.empty(17), nearest)
+    distance = np.hypot(u - u[n // 2], v - v[n // 2])
+    assert near[:count].tolist() == np.nonzero(distance < NEIGHBOUR_RADIUS_M)[0].tolist()
+    assert kept == min(count, 17)
+    assert nearest[:kept].tolist() == np.argsort(distance)[:kept].tolist()
+
+
 @pytest.mark.parametrize("count", [1, 2, 4])
 def test_the_gain_of_a_min_of_planes_is_the_drop_of_truncated_cost(count):
     rng = np.random.default_rng(count)
@@ -101,11 +123,11 @@ def test_dynamic_programming_finds_the_cheapest_partition(seed):
             whole[a, b, c, d] = (cells[:, a:b, c:d].sum(axis=(1, 2)) + penalty).min()
     cost = partition_costs(sums, penalty, grid, cut_u, cut_v)
     for a, b, c, d in np.argwhere(np.isfinite(whole)):
-        assert cost[a, b, c, d] == pytest.approx(brute_partition((a, b, c, d), whole, cut_u, cut_v))
+        assert cost[a, b, c, d] == pytest.approx(brute_partition((a, b, c, d), whole, cut_u, cut_v), rel=1e-5)
     layout = empty_layout()
     planes, counts = rng.normal(0.0, 1.0, (5, 5, 3)), np.ones(5, np.int64)
     grow_tree(layout, cost, sums, penalty, planes, counts, grid, cut_u, cut_v)
-    assert cost_of_tree(layout, whole, cut_u, cut_v) == pytest.approx(cost[0, 3, 0, 3])
+    assert cost_of_tree(layout, whole, cut_u, cut_v) == pytest.approx(cost[0, 3, 0, 3], rel=1e-5)
 
 
 def cost_of_tree(layout, whole, cut_u, cut_v, node=0, box=(0, 3, 0, 3)):

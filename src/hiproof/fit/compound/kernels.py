@@ -24,6 +24,7 @@ MAX_PLANES = 5  # of one part
 SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
 MIN_SIDE_M = 0.6
 NEIGHBOUR_RADIUS_M = 2.5
+LOCAL_POINTS = (9, 17)  # neighbours of a local plane, the point itself among them
 RIDGE_STEP_M = 0.4
 TEMPLATE_POINTS = 150
 
@@ -280,6 +281,30 @@ def flat_hypotheses(z, out):
 
 
 @njit(cache=True)
+def neighbours_of(cloud, i, near, distance2, nearest):
+    """Points within NEIGHBOUR_RADIUS_M of point `i` into `near`, the closest of them into `nearest`, closest first.
+
+    `distance2` is room for their squares. Returns how many of each.
+    """
+    count = kept = 0
+    for q in range(len(cloud.u)):
+        d2 = (cloud.u[q] - cloud.u[i]) ** 2 + (cloud.v[q] - cloud.v[i]) ** 2
+        if d2 >= NEIGHBOUR_RADIUS_M**2:
+            continue
+        near[count] = q
+        count += 1
+        if kept == len(nearest) and d2 >= distance2[kept - 1]:
+            continue
+        kept = min(kept + 1, len(nearest))
+        place = kept - 1
+        while place > 0 and distance2[place - 1] > d2:
+            distance2[place], nearest[place] = distance2[place - 1], nearest[place - 1]
+            place -= 1
+        distance2[place], nearest[place] = d2, q
+    return count, kept
+
+
+@njit(cache=True)
 def hypotheses(cloud, seeds_wanted, pairs_per_seed):
     """Candidate planes (m, 3): flats, local least-squares planes, and slopes along the axes through pairs of points.
 
@@ -290,24 +315,21 @@ def hypotheses(cloud, seeds_wanted, pairs_per_seed):
     seeds = min(n, seeds_wanted)
     out = np.zeros((flats + seeds * (2 + 2 * pairs_per_seed), 3))
     m = flat_hypotheses(cloud.z, out[:flats])
-    distance2 = np.empty(n)
+    near, nearest = np.empty(n, np.int64), np.empty(max(LOCAL_POINTS), np.int64)
+    distance2 = np.empty(len(nearest))
     draw = 0.5
     for s in range(seeds):
         i = s * n // seeds
-        for q in range(n):
-            distance2[q] = (cloud.u[q] - cloud.u[i]) ** 2 + (cloud.v[q] - cloud.v[i]) ** 2
-        near = np.nonzero(distance2 < NEIGHBOUR_RADIUS_M**2)[0]
-        near = near[np.argsort(distance2[near], kind="mergesort")]
-        for count in (9, 17):
-            if min(len(near), count) >= 5:
-                plane, ok = local_plane(cloud, near, min(len(near), count))
+        count, kept = neighbours_of(cloud, i, near, distance2, nearest)
+        for wanted in LOCAL_POINTS:
+            if min(kept, wanted) >= 5:
+                plane, ok = local_plane(cloud, nearest, min(kept, wanted))
                 if ok:
                     out[m] = plane
                     m += 1
         for _ in range(pairs_per_seed):
             draw = (draw + 0.6180339887498949) % 1.0
-            j = near[int(draw * len(near))]
-            m = pair_slopes(cloud, i, j, out, m)
+            m = pair_slopes(cloud, i, near[int(draw * count)], out, m)
     return out[:m]
 
 

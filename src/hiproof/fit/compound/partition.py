@@ -20,6 +20,7 @@ from .kernels import (
 from .layout import HOLDERS, MAX_HOLDERS, MAX_NODES, NODES, add_holder, ghost_cost
 
 TOO_NARROW = 1e3  # points: what a rectangle narrower than MIN_SIDE_M costs besides
+NO_RECTANGLE = np.float32(1e30)  # dearer than anything, and finite for the loops that assume it
 
 
 @njit(cache=True)
@@ -120,13 +121,14 @@ def cost_prefix(cloud, ghosts, grid, planes, counts, tau):
 def partition_costs(sums, penalty, grid, cut_u, cut_v):
     """Cost (nu + 1, nu + 1, nv + 1, nv + 1) of the best guillotine partition of every rectangle of cells [a, b) x [c, d).
 
-    Exact, by dynamic programming from narrow to wide; the innermost loops run along rows of d, for the processor's sake.
+    Exact, by dynamic programming from narrow to wide. Single precision and innermost loops along rows of d are for the
+    processor's sake.
     """
     nu, nv = len(cut_u) - 1, len(cut_v) - 1
-    cost = np.empty((nu + 1, nu + 1, nv + 1, nv + 1))
-    cost[:] = np.inf
-    strip = np.zeros((nv + 8) // 8 * 8)
-    room = np.empty((nv, len(strip)))
+    cost = np.empty((nu + 1, nu + 1, nv + 1, nv + 1), np.float32)
+    cost[:] = NO_RECTANGLE
+    strip = np.zeros((nv + 8) // 8 * 8, np.float32)
+    room = np.empty((nv, len(strip)), np.float32)
     for width in range(1, nu + 1):
         for a in range(nu - width + 1):
             b = a + width
@@ -134,12 +136,12 @@ def partition_costs(sums, penalty, grid, cut_u, cut_v):
             flat = slab.reshape(-1)
             whole_costs(sums, penalty, grid, a, b, strip, room, slab)
             for k in range(a + 1, b):
-                left, right, price = cost[a, k].reshape(-1), cost[k, b].reshape(-1), cut_u[k]
+                left, right, price = cost[a, k].reshape(-1), cost[k, b].reshape(-1), np.float32(cut_u[k])
                 for cd in range(len(flat)):
                     flat[cd] = min(flat[cd], left[cd] + right[cd] + price)
             for c in range(nv - 2, -1, -1):
                 for k in range(c + 1, nv):
-                    price = slab[c, k] + cut_v[k]
+                    price = slab[c, k] + np.float32(cut_v[k])
                     for d in range(k + 1, nv + 1):
                         slab[c, d] = min(slab[c, d], price + slab[k, d])
     return cost
@@ -153,18 +155,18 @@ def whole_costs(sums, penalty, grid, a, b, strip, room, slab):
     the places they fill in vain.
     """
     nv = len(room)
-    room[:] = np.inf
+    room[:] = NO_RECTANGLE
     for m in range(len(penalty)):
         for d in range(nv + 1):
             strip[d] = sums[m, b, d] - sums[m, a, d]
         for c in range(nv):
-            price, row = penalty[m] - strip[c], room[c]
+            price, row = np.float32(penalty[m]) - strip[c], room[c]
             for d in range(len(strip)):
                 row[d] = min(row[d], price + strip[d])
     for c in range(nv):
         for d in range(c + 1, nv + 1):
             too_narrow = grid.u[b] - grid.u[a] < MIN_SIDE_M or grid.v[d] - grid.v[c] < MIN_SIDE_M
-            slab[c, d] = room[c, d] + (TOO_NARROW if too_narrow else 0.0)
+            slab[c, d] = room[c, d] + np.float32(TOO_NARROW if too_narrow else 0.0)
 
 
 @njit(cache=True)
