@@ -16,7 +16,7 @@ POOL_PLANES, POOL_GABLES = 20, 6
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 SEARCH_POINTS = 2000
 POOL_POINTS = 600  # the planes are looked for on at most so many points, evenly spread
-SEEDS, PAIRS_PER_SEED = 80, 2
+SEEDS, PAIRS_PER_SEED = 100, 2
 
 
 def evidence_per_unit(density: float, settings) -> float:
