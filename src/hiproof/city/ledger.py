@@ -53,7 +53,8 @@ class Ledger:
         self.database.execute("commit")
 
     def open_tasks(self, kind: str) -> list[str]:
-        sql = "select name from task where kind = ? and state = 'open' order by position"
+        """Names of the tasks still to do, the largest first, so that at the end no worker waits long for another."""
+        sql = "select name from task where kind = ? and state = 'open' order by buildings desc, position"
         return [name for (name,) in self.database.execute(sql, (kind,))]
 
     def start(self, name: str) -> None:

@@ -22,8 +22,7 @@ from .merge import merge
 from .plan import Plan, fingerprint
 from .prepare import make_plan
 from .quarantine import run_alone, solve_in_quarantine
-from .solve import solve_tile
-from .sort import sort_cloud
+from .tasks import solve_tile, sort_cloud
 
 MOST_LOSSES = 3
 Progress = Callable[[str, int, int], None]

@@ -34,9 +34,9 @@ def describe(ledger: Ledger) -> list[str]:
     total, done = sum(row[2] for row in solve), [row for row in solve if row[3] in CLOSED]
     finished = sum(row[2] for row in done)
     lines.append(f"buildings done: {finished} of {total}")
-    times = sorted(row[6] for row in done)
-    if len(times) > 1 and times[-1] > times[0]:
-        rate = (finished - done[0][2]) / (times[-1] - times[0])
+    by_time = sorted(done, key=lambda row: row[6])
+    if len(done) > 1 and by_time[-1][6] > by_time[0][6]:
+        rate = (finished - by_time[0][2]) / (by_time[-1][6] - by_time[0][6])
         left = f", about {(total - finished) / rate:.0f} s left" if finished < total and rate else ""
         lines.append(f"throughput: {rate:.1f} buildings a second{left}")
     lines += [f"{number} {status}" for status, number in ledger.counts("status").items()]

@@ -1,0 +1,18 @@
+"""The tasks of a run by name. What they need is imported where they run: a main process that only hands them out does
+without compiled code, the network and the readers of points."""
+
+from __future__ import annotations
+
+
+def sort_cloud(folder: str, number: int) -> dict:
+    """See sort.py."""
+    from . import sort
+
+    return sort.sort_cloud(folder, number)
+
+
+def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tuple]:
+    """See solve.py."""
+    from . import solve
+
+    return solve.solve_tile(folder, tile, avoid)
