@@ -120,12 +120,14 @@ class Search:
 
     def best_of_type(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
         """The `count` best of each type that are within `slack` nats of its best, types in the tables' order."""
-        family = self.family[candidates.kinds]
-        order = np.lexsort((candidates.values, family))
-        family, values = family[order], candidates.values[order]
-        first = np.searchsorted(family, family)
-        keep = (np.arange(len(order)) - first < count) & (values <= values[first] + slack)
-        return candidates.chosen(order[keep])
+        families, values = self.family[candidates.kinds].tolist(), candidates.values.tolist()
+        ranked = sorted(zip(families, values, range(len(values)), strict=True))
+        kept, rank, best = [], {}, {}
+        for family, value, row in ranked:
+            rank[family] = rank.get(family, 0) + 1
+            if rank[family] <= count and value <= best.setdefault(family, value) + slack:
+                kept.append(row)
+        return candidates.chosen(kept)
 
 
 def fit_likelihood(
@@ -313,8 +315,11 @@ def covariance_of(search: Search, kind: int, theta: np.ndarray, noise: Noise, va
     first = KAPPA if search.whole.plan_is_free else Q0
     heights = [k for k in range(first, search.tables.size[kind]) if k not in PLAN]
     by_heights = np.linalg.inv(hessian[np.ix_(heights, heights)] + 1e-6 * np.eye(len(heights)))
-    response = -by_heights @ hessian[np.ix_(heights, PLAN)]
     covariance = np.zeros((9, 9))
+    if not search.whole.plan_is_free:
+        covariance[np.ix_(heights, heights)] = by_heights
+        return covariance
+    response = -by_heights @ hessian[np.ix_(heights, PLAN)]
     of_plan = turn @ np.diag(variances) @ turn.T
     covariance[np.ix_(PLAN, PLAN)] = of_plan
     covariance[np.ix_(heights, PLAN)] = response @ of_plan

@@ -109,22 +109,23 @@ def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
 
 def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
     """Lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`; and which pass a vertex."""
-    kept = [low, high]
-    for x in np.sort(vertices):
+    kept = [float(low), float(high)]
+    for x in sorted(vertices.tolist()):
         if min(abs(x - y) for y in kept) > MERGE_LINES_M:
-            kept.append(float(x))
-    kept = np.sort(kept)
+            kept.append(x)
+    kept.sort()
     while len(kept) > MAX_CELLS:  # an outline of hundreds of vertices: give up the line closest to its neighbours
-        crowded = 1 + int(np.argmin(kept[2:] - kept[:-2]))
-        kept = np.delete(kept, crowded)
-    step = max(cell, (high - low) / MAX_CELLS)
-    fill = np.maximum(1, np.round(np.diff(kept) / step)).astype(int)
-    while fill.sum() > MAX_CELLS and fill.max() > 1:
+        crowded = min(range(1, len(kept) - 1), key=lambda k: kept[k + 1] - kept[k - 1])
+        del kept[crowded]
+    gaps = [b - a for a, b in pairwise(kept)]
+    step = max(cell, (kept[-1] - kept[0]) / MAX_CELLS)
+    fill = [max(1, round(gap / step)) for gap in gaps]
+    while sum(fill) > MAX_CELLS and max(fill) > 1:
         step *= 1.1
-        fill = np.maximum(1, np.round(np.diff(kept) / step)).astype(int)
-    lines = [a + (b - a) * q / count for (a, b), count in zip(pairwise(kept), fill, strict=True) for q in range(count)]
+        fill = [max(1, round(gap / step)) for gap in gaps]
+    lines = [a + gap * q / count for a, gap, count in zip(kept, gaps, fill, strict=False) for q in range(count)]
     at_vertex = [q == 0 for count in fill for q in range(count)]
-    return np.array([*lines, high]), np.array([*at_vertex, True])
+    return np.array([*lines, kept[-1]]), np.array([*at_vertex, True])
 
 
 def cells_of(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
