@@ -10,20 +10,10 @@ import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
-from tiny_town import write_town
+from run_records import records
 
-RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 dask = pytest.importorskip("dask", reason="needs dask[distributed], the extra `city`")
 distributed = pytest.importorskip("distributed", reason="needs dask[distributed], the extra `city`")
-
-
-def records(out):
-    return {name: (out / name).read_bytes() for name in RECORDS}
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    return [str(path) for path in write_town(tmp_path_factory.mktemp("town"))]
 
 
 @pytest.fixture(scope="module")
@@ -41,39 +31,30 @@ def small_tiles(monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
 
 
-@pytest.fixture(scope="module")
-def undisturbed(files, tmp_path_factory):
-    out = tmp_path_factory.mktemp("undisturbed")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(city_run, "solve_tile", planted.solve_quickly)
-        reconstruct_area(Request((files[0],), out, files[1]))
-    return records(out)
-
-
-def test_a_cluster_whose_worker_is_killed_changes_no_byte(files, undisturbed, cluster, tmp_path, monkeypatch):
+def test_a_cluster_whose_worker_is_killed_changes_no_byte(town_files, undisturbed, cluster, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
-    reconstruct_area(Request((files[0],), tmp_path, files[1], scheduler=cluster.scheduler_address))
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address))
     assert (tmp_path / ".hiproof" / "killed").exists()
-    assert records(tmp_path) == undisturbed
+    assert records(tmp_path) == records(undisturbed)
 
 
-def test_a_building_that_kills_dask_workers_is_left_out_alone(files, cluster, tmp_path, monkeypatch):
+def test_a_building_that_kills_dask_workers_is_left_out_alone(town_files, cluster, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_deadly)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
     monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
-    summary = reconstruct_area(Request((files[0],), tmp_path, files[1], scheduler=cluster.scheduler_address))
+    summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address))
     assert summary.buildings == 4
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
 
 
-def test_an_address_without_a_scheduler_gets_one_sentence(files, tmp_path, monkeypatch):
+def test_an_address_without_a_scheduler_gets_one_sentence(town_files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.executors.CONNECT_S", 1)
     with pytest.raises(InputError, match=r"Dask scheduler at tcp://127.0.0.1:9"):
-        reconstruct_area(Request((files[0],), tmp_path, files[1], scheduler="tcp://127.0.0.1:9"))
+        reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler="tcp://127.0.0.1:9"))
 
 
-def test_the_example_runs(files, tmp_path):
-    example = [sys.executable, "examples/dask_two_workers.py", str(tmp_path / "out"), *files]
+def test_the_example_runs(town_files, tmp_path):
+    example = [sys.executable, "examples/dask_two_workers.py", str(tmp_path / "out"), *town_files]
     got = subprocess.run(
         example, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": "src"}, check=False, timeout=300
     )

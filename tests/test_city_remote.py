@@ -12,10 +12,10 @@ from hiproof.errors import InputError
 from hiproof.read.pointcloud import read_points
 from range_server import serving
 from read.test_pointcloud import write_copc
+from run_records import RECORDS
 from tiny_town import make_town, write_town
 
 pytest.importorskip("aiohttp", reason="needs fsspec[http], part of the extra `city`")
-RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 
 
 @pytest.fixture

@@ -1,7 +1,6 @@
 """What a city run does when workers die, memory or disk ends, or a building is too much: the others come out the same."""
 
 import errno
-import json
 import sqlite3
 
 import numpy as np
@@ -16,22 +15,8 @@ from hiproof.read.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
 from hiproof.write import files as output_files
 from read.test_pointcloud import write_copc
+from run_records import by_id, records
 from tiny_town import make_town, write_cloud, write_footprints, write_town
-
-RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
-
-
-def records(out):
-    return {name: (out / name).read_bytes() for name in RECORDS}
-
-
-def by_id(out):
-    return {row["id"]: row for row in map(json.loads, (out / "parameters.jsonl").read_text().splitlines())}
-
-
-@pytest.fixture(scope="module")
-def files(tmp_path_factory):
-    return [str(path) for path in write_town(tmp_path_factory.mktemp("town"))]
 
 
 @pytest.fixture(autouse=True)
@@ -39,38 +24,29 @@ def small_tiles(monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 2)
 
 
-@pytest.fixture(scope="module")
-def undisturbed(files, tmp_path_factory):
-    out = tmp_path_factory.mktemp("undisturbed")
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(city_run, "solve_tile", planted.solve_quickly)
-        reconstruct_area(Request((files[0],), out, files[1]))
-    return records(out), by_id(out)
-
-
-def test_a_worker_killed_from_outside_changes_no_byte(files, undisturbed, tmp_path, monkeypatch):
+def test_a_worker_killed_from_outside_changes_no_byte(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
-    reconstruct_area(Request((files[0],), tmp_path, files[1], jobs=2))
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], jobs=2))
     assert (tmp_path / ".hiproof" / "killed").exists()
-    assert records(tmp_path) == undisturbed[0]
+    assert records(tmp_path) == records(undisturbed)
 
 
 @pytest.mark.parametrize("solve", [planted.solve_deadly, planted.solve_hungry], ids=["kills", "eats memory"])
-def test_a_building_that_ends_its_process_is_left_out_alone(solve, files, undisturbed, tmp_path, monkeypatch):
+def test_a_building_that_ends_its_process_is_left_out_alone(solve, town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", solve)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
     monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
-    summary = reconstruct_area(Request((files[0],), tmp_path, files[1], jobs=2))
+    summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], jobs=2))
     assert summary.exit_code == 1
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
     rows = by_id(tmp_path)
     assert "process died" in rows.pop(planted.DEADLY)["detail"]
-    assert rows == {id: row for id, row in undisturbed[1].items() if id != planted.DEADLY}
+    assert rows == {id: row for id, row in by_id(undisturbed).items() if id != planted.DEADLY}
 
 
-def test_losses_with_the_main_process_lead_to_quarantine(files, undisturbed, tmp_path, monkeypatch):
+def test_losses_with_the_main_process_lead_to_quarantine(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    request = Request((files[0],), tmp_path, files[1])
+    request = Request((town_files[0],), tmp_path, town_files[1])
 
     def killed(step, done, total):
         if step == "solve" and done == 1:
@@ -86,12 +62,12 @@ def test_losses_with_the_main_process_lead_to_quarantine(files, undisturbed, tmp
     monkeypatch.setattr(city_run, "solve_in_quarantine", lambda *a: alone.append(a[-1]) or original(*a))
     reconstruct_area(request)
     assert len(alone) == 1
-    assert records(tmp_path) == undisturbed[0]
+    assert records(tmp_path) == records(undisturbed)
 
 
-def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(files, undisturbed, tmp_path, monkeypatch):
+def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    request = Request((files[0],), tmp_path, files[1])
+    request = Request((town_files[0],), tmp_path, town_files[1])
     original, written = output_files.OutputFile.write, []
 
     def full(self, data):
@@ -105,10 +81,10 @@ def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(files, undis
         reconstruct_area(request)
     monkeypatch.setattr(output_files.OutputFile, "write", original)
     reconstruct_area(request)
-    assert records(tmp_path) == undisturbed[0]
+    assert records(tmp_path) == records(undisturbed)
 
 
-def test_unfinished_files_of_a_killed_worker_are_not_read(files, undisturbed, tmp_path, monkeypatch):
+def test_unfinished_files_of_a_killed_worker_are_not_read(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
     def litter(step, done, total):
@@ -117,18 +93,18 @@ def test_unfinished_files_of_a_killed_worker_are_not_read(files, undisturbed, tm
                 (folder / ".0-0.npz-1-abcd.npz").write_bytes(b"cut off")
             (tmp_path / ".buildings.gml-1-abcd.gml").write_bytes(b"cut off")
 
-    reconstruct_area(Request((files[0],), tmp_path, files[1]), litter)
-    assert records(tmp_path) == undisturbed[0]
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]), litter)
+    assert records(tmp_path) == records(undisturbed)
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".buildings")]
 
 
-def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(files, tmp_path, monkeypatch):
+def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(town_files, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     (tmp_path / ".hiproof").mkdir()
     (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(b"not a database, but long enough to look like one" * 9)
     with pytest.raises(OutputError, match="--restart"):
-        reconstruct_area(Request((files[0],), tmp_path, files[1]))
-    assert reconstruct_area(Request((files[0],), tmp_path, files[1], restart=True)).buildings == 4
+        reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
+    assert reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True)).buildings == 4
 
 
 def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_path, monkeypatch):
@@ -143,10 +119,10 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_pat
         clouds.append(str(write_cloud(tmp_path / f"{name}.laz", town.xyz[members], town.classification[members])))
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
-    assert records(tmp_path / "out") == undisturbed[0]
+    assert records(tmp_path / "out") == records(undisturbed)
 
 
-def test_a_building_with_too_many_points_is_thinned_and_says_so(files, tmp_path):
+def test_a_building_with_too_many_points_is_thinned_and_says_so(town_files, tmp_path):
     settings = Settings.from_dict({"city": {"max_points_a_building": 1000}, "fit": {"parts": "one", "types": ["flat"]}})
     town = make_town(houses=1, density=20.0)
     cloud, footprints = write_town(tmp_path, town)
@@ -189,4 +165,4 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tm
     cloud = write_copc(tmp_path / "cloud.copc.laz", town.xyz, town.classification)
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
-    assert by_id(tmp_path / "out") == undisturbed[1]
+    assert by_id(tmp_path / "out") == by_id(undisturbed)

@@ -8,7 +8,7 @@ import shapely
 
 from hiproof.errors import InputError, OutputError
 from hiproof.read.database import hide_password
-from hiproof.read.footprints import read_footprints
+from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.write.postgis import lie_of, load_postgis
 from postgis_server import running, why_not
 from sample_models import write_sample_run
@@ -50,6 +50,13 @@ def test_a_table_gives_the_footprints_a_file_would(table):
     assert footprints[0].polygon.equals(shapely.box(0, 0, 10, 10))
     assert footprints[-1].polygon.is_empty
     assert [f.id for f in read_footprints(table + "&where=storeys=2")] == ["a"]
+
+
+def test_the_reference_system_is_asked_for_without_reading_rows(table, monkeypatch):
+    monkeypatch.setattr("hiproof.read.database.Table.rows", None)
+    assert footprint_crs(table).to_epsg() == 28992
+    assert footprint_crs(table + "&where=storeys=2").to_epsg() == 28992
+    assert footprint_crs(table + "&where=storeys=99") is None
 
 
 @pytest.mark.parametrize(

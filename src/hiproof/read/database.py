@@ -6,6 +6,8 @@ GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 from urllib.parse import parse_qs, urlencode, urlsplit, urlunsplit
 
@@ -27,29 +29,77 @@ def read_table(source: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray, lis
 
     Raises InputError in a full sentence when the database, the table or the geometry column cannot be used.
     """
+    with opened(source) as table:
+        rows = list(table.rows())
+    if not rows:
+        raise InputError(
+            f"expected footprints in {table.name}, got a table without rows; name another, or relax &where="
+        )
+    srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None}
+    names = sorted({name for _, attributes in rows for name in attributes})
+    columns = [np.array([attributes.get(name) for _, attributes in rows], object) for name in names]
+    geometries = np.empty(len(rows), object)
+    geometries[:] = [shape for shape, _ in rows]
+    return {"fields": names, "crs": crs_of(srids, table.name)}, np.arange(len(rows)), geometries, columns
+
+
+def table_crs(source: str) -> str | None:
+    """The reference system of the table a source names, without reading its rows; raises InputError as `read_table`."""
+    with opened(source) as table:
+        return crs_of(table.srids(), table.name)
+
+
+def crs_of(srids: set[int], table: str) -> str | None:
+    known = srids - {0}
+    if len(known) > 1:
+        raise InputError(
+            f"expected one reference system in {table}, got SRIDs {sorted(known)}; choose rows with &where="
+        )
+    return f"EPSG:{known.pop()}" if known else None
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table with geometries in an open database, and the rows of it that are asked for."""
+
+    cursor: Any
+    name: str
+    geometry: str
+    where: str | None
+
+    def query(self, text: str) -> None:
+        """Run `text` with {g}, {n} and {t} for the geometry column, its name as a value and the table."""
+        from psycopg import sql
+
+        names = {"g": sql.Identifier(self.geometry), "n": sql.Literal(self.geometry)}
+        condition = sql.SQL(f" where {self.where}" if self.where else "")
+        table = sql.SQL("{} t").format(sql.Identifier(*self.name.split("."))) + condition
+        self.cursor.execute(sql.SQL(text).format(t=table, **names))
+
+    def rows(self) -> Iterator[tuple]:
+        """(geometry or None, attributes) ordered by their own content, so that storage does not matter."""
+        self.query("select ST_AsEWKB({g}) as ewkb, to_jsonb(t) - {n} as attributes from {t} order by 2, 1")
+        for ewkb, attributes in self.cursor:
+            yield (shapely.from_wkb(bytes(ewkb)) if ewkb is not None else None), attributes
+
+    def srids(self) -> set[int]:
+        self.query("select distinct ST_SRID({g}) from {t}")
+        return {srid for (srid,) in self.cursor if srid is not None}
+
+
+@contextmanager
+def opened(source: str) -> Iterator[Table]:
+    """The table of a source in a database that stays open for the block, whose errors become InputErrors."""
     dsn, table, geometry, where = parse_source(source)
     psycopg = import_psycopg()
     try:
         with psycopg.connect(dsn, connect_timeout=10) as connection, connection.cursor() as cursor:
-            geometry = geometry or geometry_column(cursor, table, source)
-            rows = list(fetch(psycopg, cursor, table, geometry, where))
+            yield Table(cursor, table, geometry or geometry_column(cursor, table, source), where)
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
         raise InputError(
             f"expected a PostGIS table at {hide_password(source)}, got: {reason}; check address and table"
         ) from error
-    if not rows:
-        raise InputError(f"expected footprints in {table}, got a table without rows; name another, or relax &where=")
-    srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None} - {0}
-    if len(srids) > 1:
-        raise InputError(
-            f"expected one reference system in {table}, got SRIDs {sorted(srids)}; choose rows with &where="
-        )
-    names = sorted({name for _, attributes in rows for name in attributes})
-    columns = [np.array([attributes.get(name) for _, attributes in rows], object) for name in names]
-    geometries = np.empty(len(rows), object)
-    geometries[:] = [shape for shape, _ in rows]
-    return {"fields": names, "crs": f"EPSG:{srids.pop()}" if srids else None}, np.arange(len(rows)), geometries, columns
 
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
@@ -74,18 +124,6 @@ def geometry_column(cursor: Any, table: str, source: str) -> str:
         got = ", ".join(found) or "none"
         raise InputError(f"expected one geometry column in {table}, got {got}; name it with &geometry=")
     return found[0]
-
-
-def fetch(psycopg: Any, cursor: Any, table: str, geometry: str, where: str | None) -> Iterator[tuple]:
-    """Rows ordered by their own content, so that the same table gives the same order whatever its storage."""
-    sql = psycopg.sql
-    name = sql.Identifier(*table.split("."))
-    query = sql.SQL(
-        "select ST_AsEWKB({g}) as ewkb, to_jsonb(t) - {n} as attributes from {t} t {w} order by 2, 1"
-    ).format(g=sql.Identifier(geometry), n=sql.Literal(geometry), t=name, w=sql.SQL(f"where {where}" if where else ""))
-    cursor.execute(query)
-    for ewkb, attributes in cursor:
-        yield (shapely.from_wkb(bytes(ewkb)) if ewkb is not None else None), attributes
 
 
 def import_psycopg() -> Any:

@@ -17,7 +17,7 @@ from ..errors import InputError, InputWarning
 from ..model import Footprint
 from ..settings import Settings
 from .crs import parse_crs, require_metres, same_horizontal
-from .database import is_database, read_table
+from .database import is_database, read_table, table_crs
 from .polygons import simple_polygons
 from .remote import is_url
 
@@ -52,7 +52,7 @@ def read_footprints(
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
     """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
     if is_database(path):
-        return parse_crs(read_table(path)[0]["crs"])
+        return parse_crs(table_crs(path))
     return parse_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
 
 

@@ -1,0 +1,24 @@
+"""Fixtures that several test files share."""
+
+import pytest
+
+import planted
+from hiproof.city import run as city_run
+from hiproof.city.run import Request, reconstruct_area
+from tiny_town import write_town
+
+
+@pytest.fixture(scope="session")
+def town_files(tmp_path_factory):
+    """Paths of the tiny town's cloud and footprints."""
+    return [str(path) for path in write_town(tmp_path_factory.mktemp("town"))]
+
+
+@pytest.fixture(scope="session")
+def undisturbed(town_files, tmp_path_factory):
+    """The output folder of a run over the tiny town that nothing disturbs: what every other run has to give."""
+    out = tmp_path_factory.mktemp("undisturbed")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(city_run, "solve_tile", planted.solve_quickly)
+        reconstruct_area(Request((town_files[0],), out, town_files[1]))
+    return out
