@@ -305,7 +305,7 @@ def neighbours_of(cloud, i, near, distance2, nearest):
 
 
 @njit(cache=True)
-def hypotheses(cloud, seeds_wanted, pairs_per_seed):
+def hypotheses(cloud, seeds_wanted, pairs_wanted):
     """Candidate planes (m, 3): flats, local least-squares planes, and slopes along the axes through pairs of points.
 
     Seeds and partners are spread evenly (golden-ratio sequence) over the sorted points, so nothing is drawn at random.
@@ -313,6 +313,7 @@ def hypotheses(cloud, seeds_wanted, pairs_per_seed):
     n = len(cloud.u)
     flats = min(n, 200)
     seeds = min(n, seeds_wanted)
+    pairs_per_seed = max(2, pairs_wanted // seeds)
     out = np.zeros((flats + seeds * (2 + 2 * pairs_per_seed), 3))
     m = flat_hypotheses(cloud.z, out[:flats])
     near, nearest = np.empty(n, np.int64), np.empty(max(LOCAL_POINTS), np.int64)

@@ -16,7 +16,7 @@ POOL_PLANES, POOL_GABLES = 20, 6
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 SEARCH_POINTS = 2000
 POOL_POINTS = 600  # the planes are looked for on at most so many points, evenly spread
-SEEDS, PAIRS_PER_SEED = 100, 2
+SEEDS, PAIRS = 120, 250  # of few points more pairs are tried
 
 
 def evidence_per_unit(density: float, settings) -> float:
@@ -66,7 +66,7 @@ def search(layout, cloud, ghosts, grid, tau, evidence, with_overlays):
     """Pools of planes and gables, partition and refinement; then overlays and the polish."""
     few = thinned(cloud, POOL_POINTS)
     pool_evidence = evidence * len(few.u) / len(cloud.u)
-    candidates = hypotheses(few, SEEDS, PAIRS_PER_SEED)
+    candidates = hypotheses(few, SEEDS, PAIRS)
     pool = plane_pool(few, grid, candidates, tau, pool_evidence, POOL_PLANES)
     pool = np.concatenate((pool, np.zeros((1, 3))))
     gables, gable_counts = gable_pool(few, grid, pool, tau, pool_evidence, POOL_GABLES)
@@ -97,6 +97,6 @@ def cover_outliers(layout, cloud, few, grid, tau, evidence):
         if len(far) < MIN_STRUCTURE_POINTS:
             return
         unexplained = Cloud(cloud.u[far], cloud.v[far], cloud.z[far], cloud.i[far], cloud.j[far])
-        candidates = hypotheses(thinned(unexplained, POOL_POINTS), SEEDS, PAIRS_PER_SEED)
+        candidates = hypotheses(thinned(unexplained, POOL_POINTS), SEEDS, PAIRS)
         if not add_overlay(layout, cloud, few, grid, candidates, tau, evidence):
             return
