@@ -166,3 +166,29 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tm
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert by_id(tmp_path / "out") == by_id(undisturbed)
+
+
+def test_models_by_work_tile_are_the_merged_ones_cut(town_files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
+    by_tile, out = Settings.from_dict({"city": {"models": "tiles"}}), tmp_path / "out"
+    reconstruct_area(Request((town_files[0],), out, town_files[1], jobs=2, settings=by_tile))
+    files = sorted(path.name for path in (out / "models").iterdir())
+    assert len(files) == 4 and not any(name.startswith(".") for name in files)
+    assert not (out / "buildings.gml").exists() and not (out / "buildings.city.jsonl").exists()
+    assert by_id(out) == by_id(undisturbed)
+    for ending, merged in ((".gml", "buildings.gml"), (".city.jsonl", "buildings.city.jsonl")):
+        cut = [
+            line for name in files if name.endswith(ending) for line in (out / "models" / name).read_text().splitlines()
+        ]
+        buildings = [line for line in (undisturbed / merged).read_text().splitlines() if "house-" in line]
+        assert sorted(line for line in cut if "house-" in line) == sorted(buildings)
+
+
+def test_a_new_run_removes_the_models_of_old_work_tiles_and_nothing_else(town_files, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    both = Settings.from_dict({"city": {"models": "both"}})
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], settings=both))
+    assert (tmp_path / "buildings.gml").exists() and len(list((tmp_path / "models").iterdir())) == 4
+    (tmp_path / "models" / "mine.gml").touch()
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True))
+    assert [path.name for path in (tmp_path / "models").iterdir()] == ["mine.gml"]

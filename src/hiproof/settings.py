@@ -89,6 +89,11 @@ class CitySettings:
         20000, "a building with more points is thinned to so many, evenly and by a fixed rule", "", 1000, 10**7
     )
     parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `city`)")
+    models: str = setting(
+        "merged",
+        "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or both",
+        choices=("merged", "tiles", "both"),
+    )
 
 
 @dataclass(frozen=True)

@@ -3,24 +3,47 @@
 from __future__ import annotations
 
 import pickle
+import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 from ..write.run_files import Fragments, join_fragments
 from .plan import Plan
 
-FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg", "buildings.parquet")
+MODELS = {"gml": "buildings.gml", "cityjson": "buildings.city.jsonl"}
+TABLES = {"parameters": "parameters.jsonl", "gpkg": "buildings.gpkg"}
+PARQUET = {"parquet": "buildings.parquet"}
+TILE_FOLDER, TILE_ENDINGS = "models", {"gml": ".gml", "cityjson": ".city.jsonl"}
+TILE_FILE = re.compile(r"\.?-?\d+_-?\d+_\d+\.(gml|city\.jsonl).*")  # a dot before it: unfinished
 
 
 def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
     """Write the files of the run, each whole or not at all, and remove what a killed merge left unfinished."""
-    for name in FILES:
+    for name in (*MODELS.values(), *TABLES.values(), *PARQUET.values()):
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
-    join_fragments(out, parts_of(plan, state, progress), plan.translate, plan.crs(), plan.settings.city.parquet)
+    remove_tiles(out, ".*")
+    city = plan.settings.city
+    names = (MODELS if city.models != "tiles" else {}) | TABLES | (PARQUET if city.parquet else {})
+    files = {kind: out / name for kind, name in names.items()}
+    join_fragments(files, parts_of(plan, state, progress), plan.translate, plan.crs())
 
 
 def parts_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
     for number, tile in enumerate(plan.tiles):
         progress("merge", number, len(plan.tiles))
         yield from pickle.loads((state / "tiles" / f"{tile}.pickle").read_bytes())
+
+
+def write_tile(plan: Plan, out: Path, tile: str, parts: list[Fragments]) -> None:
+    """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
+    if plan.settings.city.models != "merged":
+        files = {kind: out / TILE_FOLDER / f"{tile}{ending}" for kind, ending in TILE_ENDINGS.items()}
+        join_fragments(files, parts, plan.translate, plan.crs())
+
+
+def remove_tiles(out: Path, pattern: str = "*") -> None:
+    """Remove the models of work tiles whose names match `pattern`; nobody else's files."""
+    for file in (out / TILE_FOLDER).glob(pattern):
+        if TILE_FILE.fullmatch(file.name):
+            file.unlink(missing_ok=True)

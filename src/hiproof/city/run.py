@@ -18,7 +18,7 @@ from ..settings import Settings
 from ..write.files import atomic
 from .executors import WorkerLost, make_executor
 from .ledger import Ledger
-from .merge import merge
+from .merge import merge, remove_tiles
 from .plan import Plan, fingerprint
 from .prepare import make_plan
 from .quarantine import run_alone, solve_in_quarantine
@@ -169,6 +169,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
 
 def forget(state: Path, ledger: Ledger) -> None:
     """Drop all that an earlier run in this folder has left of its state (its output files stay until replaced)."""
+    remove_tiles(state.parent)
     for table in ("run", "task", "building"):
         ledger.database.execute(f"delete from {table}")
     for name in ("tiles", "points"):

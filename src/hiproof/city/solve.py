@@ -21,6 +21,7 @@ from ..status import Status
 from ..write.files import atomic_file
 from ..write.run_files import Fragments, fragments
 from .ground import GROUND_REACH_M, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from .merge import write_tile
 from .plan import Job, Plan, load_plan, neighbourhood
 from .sort import load_points
 
@@ -66,6 +67,7 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
             building, part = solve_one(plan, job, surroundings)
         parts.append(part)
         rows.append(ledger_row(index, building, time.perf_counter() - start))
+    write_tile(plan, root.parent, tile, parts)
     with atomic_file(root / "tiles" / f"{tile}.pickle") as file:
         pickle.dump(parts, file, protocol=5)
     return rows

@@ -56,6 +56,7 @@ def reconstruct(
     network: Annotated[bool | None, typer.Option(help="recognise roof types with the network first")] = None,
     config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
     parquet: Annotated[bool | None, typer.Option(help="write the attributes as GeoParquet too (extra `city`)")] = None,
+    models: Annotated[str | None, typer.Option(help="models merged, by work tiles, or both [default: merged]")] = None,
     jobs: Annotated[int, typer.Option(min=1, help="processes on this machine")] = 1,
     scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
     restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
@@ -71,7 +72,7 @@ def reconstruct(
         "fit": {"types": types.split(",") if types else None, "objective": objective, "parts": parts},
         "compound": {"detail": detail},
         "segment": {"enabled": network},
-        "city": {"parquet": parquet},
+        "city": {"parquet": parquet, "models": models},
     }
     raise typer.Exit(run(clouds, out, footprints, terrain, id_attribute, options, config, jobs, scheduler, restart))
 

@@ -79,28 +79,27 @@ def fragments(asked: Building, names: tuple[str, str], translate: np.ndarray) ->
     return building, Fragments(member, feature, parameters_line(building), table_row(building, attributes))
 
 
-def join_fragments(
-    folder: str | os.PathLike, parts: Iterable[Fragments], translate: np.ndarray, crs: Any = None, parquet: bool = False
-) -> None:
-    """Write the files of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
+def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], translate: np.ndarray, crs: Any = None) -> None:
+    """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
 
-    `parquet` adds buildings.parquet, the table once more as GeoParquet. Raises OutputError when the folder cannot be
-    written.
+    `files` are paths by what they hold: gml, cityjson, parameters, gpkg (the attribute table) or parquet (the same as
+    GeoParquet). Raises OutputError when one cannot be written.
     """
-    folder = Path(folder)
+    writers = {
+        "gml": lambda path: (CityGMLWriter(path, crs), "gml"),
+        "cityjson": lambda path: (CityJSONWriter(path, crs, translate=translate), "cityjson"),
+        "parameters": lambda path: (ParametersWriter(path), "parameters"),
+        "gpkg": lambda path: (AttributesWriter(path, crs), "row"),
+        "parquet": lambda path: (GeoParquetWriter(path, crs), "row"),
+    }
     with ExitStack() as stack:
-        gml = stack.enter_context(CityGMLWriter(folder / "buildings.gml", crs))
-        cityjson = stack.enter_context(CityJSONWriter(folder / "buildings.city.jsonl", crs, translate=translate))
-        parameters = stack.enter_context(ParametersWriter(folder / "parameters.jsonl"))
-        tables = [stack.enter_context(AttributesWriter(folder / "buildings.gpkg", crs))]
-        if parquet:
-            tables.append(stack.enter_context(GeoParquetWriter(folder / "buildings.parquet", crs)))
+        opened = []
+        for kind, path in files.items():
+            writer, content = writers[kind](path)
+            opened.append((stack.enter_context(writer), content))
         for part in parts:
-            gml.put(part.gml)
-            cityjson.put(part.cityjson)
-            parameters.put(part.parameters)
-            for table in tables:
-                table.put(part.row)
+            for writer, content in opened:
+                writer.put(getattr(part, content))
 
 
 def measured(building: Building) -> tuple[Building, RoofFigures | None]:
