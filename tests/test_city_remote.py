@@ -11,7 +11,7 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError
 from hiproof.read.pointcloud import read_points
 from range_server import serving
-from read.test_pointcloud import write_copc
+from read.test_pointcloud import write_copc, write_ply, write_text
 from run_records import RECORDS
 from tiny_town import make_town, write_town
 
@@ -66,10 +66,32 @@ def test_copc_by_address_is_read_in_ranges(served, tmp_path):
     assert "/a.copc.laz" in log.read_text()
 
 
-def test_an_address_that_answers_with_nothing_gets_one_sentence(served):
+@pytest.mark.parametrize("name", ["a.ply", "b.ply", "c.xyz", "d.CSV"])
+def test_text_and_ply_by_address_are_what_the_files_hold(served, name):
+    folder, address, _ = served
+    xyz = np.random.default_rng(1).uniform(0, 1000, (40000, 3)).round(3)
+    classes = np.arange(40000, dtype=np.uint8) % 7
+    if name.endswith("ply"):
+        write_ply(folder / name, xyz, classes, "ascii" if name == "a.ply" else "binary_little_endian")
+    else:
+        write_text(folder / name, xyz, classes)
+    here, there = read_points(folder / name), read_points(f"{address}/{name}?token=1")
+    assert np.array_equal(here.xyz, there.xyz) and np.array_equal(here.classification, there.classification)
+
+
+@pytest.mark.parametrize("name", ["page.ply", "page.xyz"])
+def test_a_page_instead_of_points_gets_one_sentence(served, name):
+    folder, address, _ = served
+    (folder / name).write_text("<html>not a cloud</html>\n" * 50)
+    with pytest.raises(InputError, match=name):
+        read_points(f"{address}/{name}")
+
+
+@pytest.mark.parametrize("name", ["missing.laz", "missing.ply", "missing.xyz"])
+def test_an_address_that_answers_with_nothing_gets_one_sentence(served, name):
     _, address, _ = served
-    with pytest.raises(InputError, match=r"missing\.laz"):
-        read_points(f"{address}/missing.laz")
+    with pytest.raises(InputError, match=name):
+        read_points(f"{address}/{name}")
 
 
 def test_an_address_of_something_else_gets_one_sentence(served):

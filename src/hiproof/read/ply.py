@@ -12,6 +12,7 @@ import numpy as np
 from ..errors import InputError
 from .columns import find_columns
 from .las import Chunk
+from .remote import opened
 from .text import TextLayout, classes_of, parse_rows
 
 TYPES = {
@@ -32,9 +33,9 @@ class PlyLayout:
     columns: tuple[int, ...]
 
 
-def ply_chunks(path: Path, chunk_points: int) -> Iterator[Chunk]:
+def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
     """Yield the vertices of a PLY file. Raises InputError for a header or a body that is not one."""
-    with open(path, "rb") as file:
+    with opened(path) as file:
         layout = read_ply_header(file, path)
         remaining = layout.count
         while remaining:
@@ -43,7 +44,7 @@ def ply_chunks(path: Path, chunk_points: int) -> Iterator[Chunk]:
             remaining -= len(table)
 
 
-def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: Path, read: int) -> np.ndarray:
+def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int) -> np.ndarray:
     """The next `count` vertices as a float64 table of x, y, z and, where there is one, class."""
     if layout.byte_order == "":
         table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
@@ -62,7 +63,7 @@ def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: Path, rea
     return table
 
 
-def read_ply_header(file: BinaryIO, path: Path) -> PlyLayout:
+def read_ply_header(file: BinaryIO, path: str | Path) -> PlyLayout:
     """Read up to `end_header`, leaving `file` at the first vertex."""
     byte_order, count, properties, element = None, None, [], None
     for words in header_lines(file, path):
@@ -84,7 +85,7 @@ def read_ply_header(file: BinaryIO, path: Path) -> PlyLayout:
     return PlyLayout(byte_order, count, tuple(properties), columns)
 
 
-def header_lines(file: BinaryIO, path: Path) -> Iterator[list[str]]:
+def header_lines(file: BinaryIO, path: str | Path) -> Iterator[list[str]]:
     for _ in range(1000):
         line = file.readline(4096)
         words = line.decode("latin-1").split()
@@ -97,7 +98,7 @@ def header_lines(file: BinaryIO, path: Path) -> Iterator[list[str]]:
     raise unreadable(path, "a header that does not end")
 
 
-def unreadable(path: Path, got: str) -> InputError:
+def unreadable(path: str | Path, got: str) -> InputError:
     return InputError(
         f"expected a PLY file whose first element is the vertices with scalar x, y, z in {path}, got {got}; "
         "export the points alone, or write them as LAZ"

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def iter_points(path: str | Path, chunk_points: int = CHUNK_POINTS, box: Box | N
     if kind == "las":
         chunks = las.las_chunks(path, chunk_points, box)
     else:
-        chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(Path(path), chunk_points)
+        chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, chunk_points)
     dropped = 0
     for xyz, classes in chunks:
         keep = np.isfinite(xyz)
@@ -127,9 +128,13 @@ def expand_path(path: str | Path) -> list[str | Path]:
 
 
 def file_kind(path: str | Path) -> str:
-    """ "las", "ply" or "text", from the first bytes and the ending. Raises InputError for anything else."""
+    """ "las", "ply" or "text", from the first bytes and the ending. Raises InputError for anything else.
+
+    An address is not opened for it: it goes by its ending, and is LAS without one of the others'.
+    """
     if is_url(path):
-        return "las"
+        suffix = Path(urlsplit(str(path)).path).suffix.lower()
+        return "ply" if suffix == ".ply" else "text" if suffix in TEXT_SUFFIXES else "las"
     try:
         with open(path, "rb") as file:
             head = file.read(4)

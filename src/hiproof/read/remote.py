@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -31,7 +32,8 @@ def opened(path: str | Path) -> Iterator[BinaryIO]:
 def open_address(url: str) -> BinaryIO:
     fsspec = import_fsspec()
     try:
-        return fsspec.open(url, "rb", block_size=BLOCK_BYTES).open()
+        # buffered once more: fsspec's own files read lines of any length only
+        return io.BufferedReader(fsspec.open(url, "rb", block_size=BLOCK_BYTES).open())
     except ImportError as error:
         raise InputError(f"expected what fsspec needs to open {url}, got: {error}; install it") from error
     except Exception as error:  # each of fsspec's file systems raises errors of its own

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ import numpy as np
 from ..errors import InputError
 from .columns import find_columns
 from .las import Chunk
+from .remote import opened
 
 COMMENTS = ("#", "//")
 
@@ -26,11 +28,11 @@ class TextLayout:
     columns: tuple[int, ...]
 
 
-def text_chunks(path: Path, chunk_points: int) -> Iterator[Chunk]:
+def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
     """Yield the points of a text file. Raises InputError naming the first line that holds no point."""
     layout = sniff(path)
     read = 0
-    with open(path, encoding="utf-8-sig", errors="replace") as file:
+    with opened(path) as binary, io.TextIOWrapper(binary, encoding="utf-8-sig", errors="replace") as file:
         list(islice(file, layout.skip))
         while True:
             table = parse_rows(file, layout, chunk_points, path, read)
@@ -41,7 +43,7 @@ def text_chunks(path: Path, chunk_points: int) -> Iterator[Chunk]:
                 return
 
 
-def parse_rows(file, layout: TextLayout, count: int, path: Path, read: int) -> np.ndarray:
+def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int) -> np.ndarray:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # NumPy warns of an empty rest, which is the normal end
@@ -61,9 +63,9 @@ def classes_of(table: np.ndarray) -> np.ndarray | None:
     return np.clip(np.nan_to_num(table[:, 3]), 0, 255).astype(np.uint8)
 
 
-def sniff(path: Path) -> TextLayout:
+def sniff(path: str | Path) -> TextLayout:
     """Find the layout from the first lines. Raises InputError when they are no text or hold no three numbers."""
-    with open(path, "rb") as file:
+    with opened(path) as file:
         head = file.read(65536)
     if b"\0" in head:
         raise InputError(f"expected text with x y z on each line in {path}, got binary data; rename it")
