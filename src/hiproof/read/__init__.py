@@ -1,8 +1,7 @@
 """From files to values: point clouds, footprints, terrain, RoofN3D, and the split of a cloud into buildings.
 
 `read_points` and `read_footprints` give what a run starts from; `points_of_footprints` brings the two together,
-`split_buildings` and `estimate_outline` stand in for footprints where there are none, a terrain answers how high the
-ground is. Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by
+`split_buildings` stands in for footprints where there are none, a terrain answers how high the ground is. Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by
 `errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a third of a second.
 """
 
@@ -14,8 +13,7 @@ _HOME = {
     **dict.fromkeys(("read_footprints", "footprint_crs", "check_overlap"), "footprints"),
     **dict.fromkeys(("points_of_footprints", "points_near_footprints", "PointGrid"), "assign"),
     **dict.fromkeys(("read_terrain", "terrain_from_points", "lowest_points", "Terrain", "TerrainChain"), "terrain"),
-    **dict.fromkeys(("split_buildings", "FoundBuilding", "adapted_gap"), "split"),
-    **dict.fromkeys(("estimate_outline", "plan_density"), "outline"),
+    **dict.fromkeys(("split_buildings", "FoundBuilding", "adapted_gap", "plan_density"), "split"),
     **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
     **dict.fromkeys(("same_horizontal", "combine", "parse_crs"), "crs"),
 }

@@ -1,4 +1,4 @@
-"""A cloud without footprints becomes buildings: roof points connected in plan, each group with a rough outline."""
+"""A cloud without footprints becomes buildings: roof points connected in plan."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ import shapely
 from ..errors import InputError, InputWarning
 from ..model import PointCloud
 from ..settings import Settings
-from .outline import estimate_outline, plan_density
 
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
 SPACINGS_PER_GAP = 2.5
@@ -20,20 +19,20 @@ SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 20_000, 0.9
 NEVER_CLASSIFIED = (0, 1)
 NOISE = (7, 18)
 MIN_AREA_M2 = 4.0
+SPACINGS_BEYOND = 0.35  # a roof ends about so far beyond its outermost points
 
 
 @dataclass(frozen=True)
 class FoundBuilding:
-    """A group of points taken for one building: ascending `index` (n,) into the cloud, plan geometry in world metres.
+    """A group of points taken for one building: ascending `index` (n,) into the cloud.
 
-    `area` is the union of the cells that hold the group's points: all of them lie in it, and none of another group.
-    `outline` is a rough outline of the roof, straightened, from which a fit may start.
+    `area` is the union of the cells that hold the group's points, in world metres: all of them lie in it, and none of
+    another group. The roof's outline is the fit's business.
     """
 
     id: str
     index: np.ndarray
     area: shapely.Geometry
-    outline: shapely.Polygon
 
 
 def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
@@ -53,8 +52,12 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
     xy = cloud.xyz[roof, :2]
     gap_m = read.split_gap_m or adapted_gap(xy)
     groups = [roof[group] for group in connected_groups(xy, gap_m)]
-    large = [group for group in groups if len(group) >= read.split_min_points]
-    found = [building for building in named(large, cloud.xyz, gap_m) if building.outline.area >= MIN_AREA_M2]
+    large = [
+        group
+        for group in groups
+        if len(group) >= read.split_min_points and hull_area(cloud.xyz[group, :2]) >= MIN_AREA_M2
+    ]
+    found = named(large, cloud.xyz, gap_m)
     left_out = len(groups) - len(found)
     if left_out:
         warnings.warn(
@@ -104,6 +107,18 @@ def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
     )
 
 
+def plan_density(xy: np.ndarray) -> float:
+    """Points a square metre where there are points: the median over occupied cells, large enough for four points."""
+    xy = np.asarray(xy, float)[:, :2]
+    for cell_m in (1.0, 2.0, 4.0, 8.0):
+        cells = np.floor(xy / cell_m).astype(np.int64)
+        cells -= cells.min(axis=0)
+        counts = np.unique(cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0], return_counts=True)[1]
+        if np.median(counts) >= 4:
+            break
+    return float(np.median(counts)) / cell_m**2
+
+
 def adapted_gap(xy: np.ndarray) -> float:
     """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points are sparse."""
     needed = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
@@ -148,8 +163,13 @@ def named(groups: list[np.ndarray], xyz: np.ndarray, gap_m: float) -> list[Found
         id = f"B_{x}_{y}"
         used[id] += 1
         id = id if used[id] == 1 else f"{id}_{used[id]}"
-        found.append(FoundBuilding(id, index, cell_area(xy, gap_m / 2), estimate_outline(xy)))
+        found.append(FoundBuilding(id, index, cell_area(xy, gap_m / 2)))
     return found
+
+
+def hull_area(xy: np.ndarray) -> float:
+    """Plan area of the points' convex hull, wider by what a roof is expected to reach beyond its outermost points."""
+    return shapely.MultiPoint(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
 
 
 def cell_area(xy: np.ndarray, cell_m: float) -> shapely.Geometry:
