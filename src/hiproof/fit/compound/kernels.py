@@ -26,6 +26,7 @@ MIN_SIDE_M = 0.6
 NEIGHBOUR_RADIUS_M = 2.5
 LOCAL_POINTS = (9, 17)  # neighbours of a local plane, the point itself among them
 RIDGE_STEP_M = 0.4
+SAME_PLANE = 0.05
 TEMPLATE_POINTS = 150
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
@@ -331,7 +332,24 @@ def hypotheses(cloud, seeds_wanted, pairs_wanted):
         for _ in range(pairs_per_seed):
             draw = (draw + 0.6180339887498949) % 1.0
             m = pair_slopes(cloud, i, near[int(draw * count)], out, m)
-    return out[:m]
+    return distinct(out[:m], np.mean(cloud.u), np.mean(cloud.v))
+
+
+@njit(cache=True)
+def distinct(planes, centre_u, centre_v):
+    """One of all `planes` (m, 3) whose slopes and height at the centre fall into the same bins of SAME_PLANE."""
+    keys = np.empty(len(planes), np.int64)
+    for q in range(len(planes)):
+        a, b, c = planes[q]
+        height = a * centre_u + b * centre_v + c
+        keys[q] = 0
+        for value in (a, b, height):
+            keys[q] = keys[q] * 100003 + np.int64(np.floor(value / SAME_PLANE + 0.5))
+    order = np.argsort(keys, kind="mergesort")
+    first = np.ones(len(planes), np.bool_)
+    for q in range(1, len(planes)):
+        first[order[q]] = keys[order[q]] != keys[order[q - 1]]
+    return planes[first]
 
 
 @njit(cache=True)

@@ -90,9 +90,11 @@ def in_rectangle(rect, u, v):
 
 @njit(cache=True)
 def holder_at(layout, u, v):
+    rect = layout.rect
     for q in range(layout.count[OVERLAYS] - 1, -1, -1):
-        if in_rectangle(layout.rect[layout.overlays[q]], u, v):
-            return layout.overlays[q]
+        h = layout.overlays[q]
+        if rect[h, 0] <= u < rect[h, 1] and rect[h, 2] <= v < rect[h, 3]:
+            return h
     return descend(layout, layout.count[ROOT], u, v)
 
 
@@ -100,9 +102,10 @@ def holder_at(layout, u, v):
 def height_of(layout, h, u, v):
     """Height of holder `h` and the index k of its active plane."""
     best, active = np.inf, 0
+    table = layout.table
     for k in range(layout.planes_of[h]):
-        p = layout.table[layout.plane_of[h, k]]
-        z = p[0] * u + p[1] * v + p[2]
+        row = layout.plane_of[h, k]
+        z = table[row, 0] * u + table[row, 1] * v + table[row, 2]
         if z < best:
             best, active = z, k
     return best, active
@@ -171,6 +174,19 @@ def objective(layout, cloud, ghosts, tau, evidence):
         total += truncated(cloud.z[i] - z, tau)
     for q in range(len(ghosts.u)):
         z, _ = height_of(layout, holder_at(layout, ghosts.u[q], ghosts.v[q]), ghosts.u[q], ghosts.v[q])
+        total += ghost_cost(ghosts, q, z)
+    return total
+
+
+@njit(cache=True)
+def known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence):
+    """`objective` where the holders (n,) of the points and (g,) of the ghosts are known already."""
+    total = evidence * complexity(layout)
+    for i in range(len(holder)):
+        z, _ = height_of(layout, holder[i], cloud.u[i], cloud.v[i])
+        total += truncated(cloud.z[i] - z, tau)
+    for q in range(len(ghost_holder)):
+        z, _ = height_of(layout, ghost_holder[q], ghosts.u[q], ghosts.v[q])
         total += ghost_cost(ghosts, q, z)
     return total
 

@@ -35,7 +35,7 @@ from .layout import (
     holder_at,
     in_rectangle,
     is_alive,
-    objective,
+    known_objective,
 )
 
 
@@ -275,16 +275,17 @@ def settle(layout, cloud, ghosts, grid, tau, evidence):
     move_cuts(layout, cloud, grid, tau, evidence)
     for index in range(layout.count[OVERLAYS]):
         move_overlay(layout, index, cloud, grid, tau)
-    value = objective(layout, cloud, ghosts, tau, evidence)
     _, holder, active = evaluate(layout, cloud.u, cloud.v)
+    _, ghost_holder, _ = evaluate(layout, ghosts.u, ghosts.v)
+    value = known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence)
     alive = is_alive(layout)
     for h in range(layout.count[HOLDERS]):
         if alive[h]:
-            value = refit_holder(layout, h, holder, active, cloud, ghosts, tau, evidence, value)
+            value = refit_holder(layout, h, holder, active, ghost_holder, cloud, ghosts, tau, evidence, value)
 
 
 @njit(cache=True)
-def refit_holder(layout, h, holder, active, cloud, ghosts, tau, evidence, value):
+def refit_holder(layout, h, holder, active, ghost_holder, cloud, ghosts, tau, evidence, value):
     """Refit the planes of holder `h`, as a pair where they are a symmetric gable; returns the objective, never higher."""
     rows = layout.plane_of[h, : layout.planes_of[h]].copy()
     old = layout.table[rows]
@@ -301,7 +302,7 @@ def refit_holder(layout, h, holder, active, cloud, ghosts, tau, evidence, value)
             members = np.nonzero(answering == rows[k])[0]
             if len(members) >= 3:
                 layout.table[rows[k]], _ = fit_plane(cloud, members, old[k], tau, evidence)
-    changed = objective(layout, cloud, ghosts, tau, evidence)
+    changed = known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence)
     if changed < value:
         return changed
     for k in range(len(rows)):
