@@ -9,12 +9,21 @@ from hiproof.fit.compound.kernels import (
     Ghosts,
     Grid,
     best_rectangle,
+    distinct,
     gain_by_point,
     neighbours_of,
     reach_of_rows,
     truncated,
 )
-from hiproof.fit.compound.layout import add_holder, complexity, empty_layout, evaluate, single_plane_layout
+from hiproof.fit.compound.layout import (
+    add_holder,
+    complexity,
+    empty_layout,
+    evaluate,
+    known_objective,
+    objective,
+    single_plane_layout,
+)
 from hiproof.fit.compound.partition import grow_tree, may_pay, partition_costs
 from hiproof.fit.compound.plan import grid_lines, signed_depth
 from hiproof.fit.compound.polish import polish
@@ -178,6 +187,22 @@ def two_leaves_and_an_overlay():
     layout.rect[h] = (0.0, 1.5, 0.0, 1.0)
     layout.overlays[0], layout.count[3] = h, 1
     return layout, gable, level, dormer
+
+
+def test_the_objective_is_the_same_where_the_holders_are_known():
+    layout, *_ = two_leaves_and_an_overlay()
+    rng = np.random.default_rng(1)
+    u, v, z = rng.uniform(-1.0, 3.0, (3, 80))
+    cell = np.zeros(80, np.int64)
+    cloud, ghosts = Cloud(u, v, z, cell, cell), Ghosts(v, u, rng.random(80), cell, cell, 0.5, 2.5)
+    holders = evaluate(layout, u, v)[1], evaluate(layout, v, u)[1]
+    known = known_objective(layout, *holders, cloud, ghosts, 0.2, 1.3)
+    assert known == pytest.approx(objective(layout, cloud, ghosts, 0.2, 1.3))
+
+
+def test_hypotheses_of_one_bin_become_one():
+    planes = np.array([[0.5, 0.0, 1.0], [0.501, 0.0, 1.001], [0.0, 0.0, 1.0], [0.5, 0.0, 2.0]])
+    assert distinct(planes, 0.0, 0.0).tolist() == planes[[0, 2, 3]].tolist()
 
 
 def test_the_height_of_a_layout_is_ten_lines_of_numpy():
