@@ -16,8 +16,8 @@ if TYPE_CHECKING:
 EVIDENCE_EXPONENT = 0.1
 SMALLEST_PRIOR = 1e-4
 # A type missing from the BICs was given up by the fit as far behind. How far is not known, and an annex or a dormer
-# alone can set a type back so much: it counts as this many nats behind the best.
-GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 7.5, 0.02
+# alone can set a type back so much that it says little: it counts as this many nats behind the best.
+GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 2.0, 0.006
 # The network may name a roof against the evidence, but a shape that lies farther from the points than the evidence's
 # by more than this is not built: a gable over a house and its porch is named so and fits neither.
 FARTHER_AT_MOST_M = 0.01
