@@ -1,6 +1,7 @@
 """What a city run does when workers die, memory or disk ends, or a building is too much: the others come out the same."""
 
 import errno
+import json
 import sqlite3
 
 import numpy as np
@@ -14,6 +15,7 @@ from hiproof.errors import OutputError
 from hiproof.read.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
 from hiproof.write import files as output_files
+from read.test_lax import write_lax
 from read.test_pointcloud import write_copc
 from run_records import by_id, records
 from tiny_town import make_town, write_cloud, write_footprints, write_town
@@ -166,6 +168,25 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tm
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert by_id(tmp_path / "out") == by_id(undisturbed)
+
+
+def test_an_index_beside_the_file_saves_points_and_changes_no_byte(undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    monkeypatch.setattr("hiproof.read.lax.JOINED_POINTS", 50)
+    town = make_town()
+    along = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
+    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz[along], town.classification[along])
+    write_lax(tmp_path / "cloud.lax", town.xyz[along])
+    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
+    assert records(tmp_path / "out") == records(undisturbed)
+    alone = write_footprints(tmp_path / "alone.geojson", dict(list(town.footprints.items())[:1]))
+    reconstruct_area(Request((str(cloud),), tmp_path / "alone", str(alone)))
+    assert by_id(tmp_path / "alone")["house-0"] == by_id(undisturbed)["house-0"]
+    ((_, _, _, _, _, told, _),) = [
+        r for r in Ledger(tmp_path / "alone" / ".hiproof" / "ledger.sqlite").tasks() if r[1] == "sort"
+    ]
+    assert json.loads(told)["points"] < 0.6 * len(town.xyz)
 
 
 def test_models_by_work_tile_are_the_merged_ones_cut(town_files, undisturbed, tmp_path, monkeypatch):

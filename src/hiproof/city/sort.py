@@ -21,6 +21,7 @@ from ..model import PointCloud
 from ..read.assign import PointGrid
 from ..read.cell_kernel import mask_at
 from ..read.las import is_copc
+from ..read.lax import read_lax
 from ..read.pointcloud import file_kind, iter_points, read_header
 from ..settings import ReadSettings
 from ..write.files import atomic_file
@@ -171,13 +172,14 @@ def sort_cloud(folder: str, number: int) -> dict:
 
 
 def wanted_points(path: str, reaches: Reaches) -> Iterator[PointCloud]:
-    """All chunks of a file; of one with a spatial index (COPC) only the boxes that hold buildings' surroundings.
+    """All chunks of a file; of one with a spatial index only what holds buildings' surroundings.
 
-    The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
+    An index beside the file (.lax) names runs of points, read once in their order; a COPC file is asked for boxes, which are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
     are decoded twice. A point on a border may come twice, as in files that overlap.
     """
     if file_kind(path) != "las" or not is_copc(path):
-        yield from iter_points(path)
+        index = read_lax(path, read_header(path).count) if file_kind(path) == "las" else None
+        yield from iter_points(path, runs=None if index is None else index.runs_meeting(reaches.bounds))
         return
     xmin, ymin, _, xmax, ymax, _ = read_header(path).bounds
     for x in np.arange(np.floor(xmin / QUERY_M), np.floor(xmax / QUERY_M) + 1) * QUERY_M:

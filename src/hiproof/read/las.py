@@ -66,8 +66,16 @@ def las_crs(header: laspy.LasHeader, path: str | Path):
         return None
 
 
-def las_chunks(path: str | Path, chunk_points: int, box: tuple[float, float, float, float] | None) -> Iterator[Chunk]:
-    """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the box are decoded."""
+def las_chunks(
+    path: str | Path,
+    chunk_points: int,
+    box: tuple[float, float, float, float] | None,
+    runs: np.ndarray | None = None,
+) -> Iterator[Chunk]:
+    """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the box are decoded.
+
+    `runs` (k, 2) of points, [first, end), limit what is read of another file.
+    """
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
         return
@@ -79,10 +87,15 @@ def las_chunks(path: str | Path, chunk_points: int, box: tuple[float, float, flo
         opened(path) as file,
         laspy.open(file, decompression_selection=wanted, read_evlrs=False) as reader,
     ):
-        expected = reader.header.point_count
-        for record in reader.chunk_iterator(chunk_points):
-            found += len(record)
-            yield decode(record, path)
+        runs = np.array([[0, reader.header.point_count]]) if runs is None else runs
+        expected = int((runs[:, 1] - runs[:, 0]).sum())
+        for first, end in runs.tolist():
+            if first:
+                reader.seek(first)
+            for start in range(first, end, chunk_points):
+                record = reader.read_points(min(chunk_points, end - start))
+                found += len(record)
+                yield decode(record, path)
     if found != expected:
         raise InputError(
             f"expected {expected} points in {path} as its header says, got {found}; "

@@ -59,15 +59,18 @@ def read_points(*paths: str | Path, settings: Settings | None = None, box: Box |
     return PointCloud(xyz, joined_classes(clouds), crs, tuple(str(file) for file in files))
 
 
-def iter_points(path: str | Path, chunk_points: int = CHUNK_POINTS, box: Box | None = None) -> Iterator[PointCloud]:
+def iter_points(
+    path: str | Path, chunk_points: int = CHUNK_POINTS, box: Box | None = None, runs: np.ndarray | None = None
+) -> Iterator[PointCloud]:
     """Yield the points of one file, at most `chunk_points` at a time, without their CRS: memory stays bounded.
 
-    Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Raises InputError as
+    Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Of LAS and LAZ only the
+    `runs` (k, 2) of points, [first, end), are read where they are given (see lax.py). Raises InputError as
     `read_points` does, an empty file excepted, which yields nothing.
     """
     kind = file_kind(path)
     if kind == "las":
-        chunks = las.las_chunks(path, chunk_points, box)
+        chunks = las.las_chunks(path, chunk_points, box, runs)
     else:
         chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, chunk_points)
     dropped = 0

@@ -1,0 +1,102 @@
+"""The spatial index that LAStools writes beside a LAS or LAZ file (`.lax`): a quadtree whose cells name runs of points.
+
+All of the file are little-endian words of four bytes: "LASX" and a version; "LASS" and a type (0: quadtree); "LASQ", a
+version, levels, level_index, implicit_levels (0 here), min_x, max_x, min_y, max_y as float32; "LASV", a version, the number
+of cells, and for each its index, its number of runs, how many points are in it, and the first and last point of each run.
+Cells of a level are numbered after those of all coarser ones, two bits a level (1: upper half in x, 2: in y). A run may hold
+points of other cells, too. The layout is that of LASlib's lasindex, lasquadtree and lasinterval (rapidlasso, open source).
+"""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import InputWarning
+from .remote import is_url
+
+JOINED_POINTS = 50_000  # LAZ is decoded by chunks of so many: skipping less costs as much as reading on
+
+
+@dataclass(frozen=True)
+class LaxIndex:
+    """Boxes (c, 4) of the cells (xmin, ymin, xmax, ymax), and runs (r, 2) of points, [first, end), of the cells `cell_of` (r,)."""
+
+    boxes: np.ndarray
+    cell_of: np.ndarray
+    runs: np.ndarray
+
+    def runs_meeting(self, boxes: np.ndarray) -> np.ndarray:
+        """Runs (k, 2) in ascending order that hold every point inside any of `boxes` (m, 4), and others."""
+        low, high = boxes[:, None, :2] <= self.boxes[:, 2:], boxes[:, None, 2:] >= self.boxes[:, :2]
+        met = (low & high).all(axis=2).any(axis=0)
+        return joined(self.runs[met[self.cell_of]])
+
+
+def read_lax(path: str | Path, points: int) -> LaxIndex | None:
+    """The index beside the file at `path`, which holds so many `points`; None where there is none.
+
+    One that cannot be understood, or that tells of another number of points, is left aside with an InputWarning.
+    """
+    if is_url(path):
+        return None
+    beside = next((p for p in (Path(path).with_suffix(end) for end in (".lax", ".LAX")) if p.is_file()), None)
+    if beside is None:
+        return None
+    try:
+        index, told = parsed(np.fromfile(beside, "<u4"))
+        if told != points or index.runs.max(initial=0) > points:
+            raise ValueError(f"it tells of {told} points, the file has {points}")
+    except (ValueError, IndexError, OSError) as error:
+        warnings.warn(f"{beside}: is left aside as an index of {path} ({error}); make it again", InputWarning)
+        return None
+    return index
+
+
+def parsed(words: np.ndarray) -> tuple[LaxIndex, int]:
+    """The index in the file's words, and how many points its cells hold. Raises ValueError or IndexError for another file."""
+    for place, mark in ((0, b"LASX"), (2, b"LASS"), (4, b"LASQ"), (13, b"LASV")):
+        if words[place : place + 1].tobytes() != mark:
+            raise ValueError(f"expected {mark.decode()} in its word {place}")
+    if words[3] or words[7] or words[8] or words[14]:
+        raise ValueError("expected a whole quadtree with counts of 32 bits")
+    min_x, max_x, min_y, max_y = words[9:13].view("<f4")
+    boxes, cell_of, runs, told, at = [], [], [], 0, 16
+    for cell in range(int(words[15])):
+        index, count, held = (int(word) for word in words[at : at + 3])
+        own = words[at + 3 : at + 3 + 2 * count].reshape(count, 2)
+        boxes.append(cell_box(index, (min_x, min_y, max_x, max_y)))
+        cell_of.append(np.full(count, cell))
+        runs.append(own.astype(np.int64) + [0, 1])
+        told, at = told + held, at + 3 + 2 * count
+    if not boxes:
+        raise ValueError("it has no cells")
+    return LaxIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), told
+
+
+def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
+    """Box of a cell, halved in float32 as the writer does, and wider by what float32 cannot tell apart."""
+    level = 0
+    while index >= 4**level:
+        index -= 4**level
+        level += 1
+    low, high = list(root[:2]), list(root[2:])
+    for step in range(level - 1, -1, -1):
+        for axis in (0, 1):
+            middle = (low[axis] + high[axis]) / np.float32(2)
+            (low if index >> 2 * step & 1 + axis else high)[axis] = middle
+    blur = 2 * float(np.spacing(np.abs(np.array(root)).max()))
+    return (*(float(v) - blur for v in low), *(float(v) + blur for v in high))
+
+
+def joined(runs: np.ndarray) -> np.ndarray:
+    """Runs (k, 2) in ascending order, those that overlap or are less than JOINED_POINTS apart made one."""
+    if not len(runs):
+        return runs
+    runs = runs[np.argsort(runs[:, 0], kind="stable")]
+    reached = np.maximum.accumulate(runs[:, 1])
+    first = np.flatnonzero(np.r_[True, runs[1:, 0] - reached[:-1] >= JOINED_POINTS])
+    return np.column_stack([runs[first, 0], np.maximum.reduceat(runs[:, 1], first)])
