@@ -172,15 +172,21 @@ def sort_cloud(folder: str, number: int) -> dict:
 
 
 def wanted_points(path: str, reaches: Reaches) -> Iterator[PointCloud]:
-    """All chunks of a file; of one with a spatial index only what holds buildings' surroundings.
+    """All chunks of a file; of one with a spatial index only what holds buildings' surroundings."""
+    if file_kind(path) != "las":
+        return iter_points(path)
+    if is_copc(path):
+        return points_by_squares(path, reaches)
+    index = read_lax(path, read_header(path).count)
+    return iter_points(path, runs=None if index is None else index.runs_meeting(reaches.bounds))
 
-    An index beside the file (.lax) names runs of points, read once in their order; a COPC file is asked for boxes, which are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
+
+def points_by_squares(path: str, reaches: Reaches) -> Iterator[PointCloud]:
+    """Points of a COPC file in the boxes that hold buildings' surroundings.
+
+    The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
     are decoded twice. A point on a border may come twice, as in files that overlap.
     """
-    if file_kind(path) != "las" or not is_copc(path):
-        index = read_lax(path, read_header(path).count) if file_kind(path) == "las" else None
-        yield from iter_points(path, runs=None if index is None else index.runs_meeting(reaches.bounds))
-        return
     xmin, ymin, _, xmax, ymax, _ = read_header(path).bounds
     for x in np.arange(np.floor(xmin / QUERY_M), np.floor(xmax / QUERY_M) + 1) * QUERY_M:
         for y in np.arange(np.floor(ymin / QUERY_M), np.floor(ymax / QUERY_M) + 1) * QUERY_M:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from ..errors import InputWarning
 from .remote import is_url
@@ -31,8 +32,9 @@ class LaxIndex:
 
     def runs_meeting(self, boxes: np.ndarray) -> np.ndarray:
         """Runs (k, 2) in ascending order that hold every point inside any of `boxes` (m, 4), and others."""
-        low, high = boxes[:, None, :2] <= self.boxes[:, 2:], boxes[:, None, 2:] >= self.boxes[:, :2]
-        met = (low & high).all(axis=2).any(axis=0)
+        cells = shapely.STRtree(shapely.box(*self.boxes.T))
+        met = np.zeros(len(self.boxes), bool)
+        met[cells.query(shapely.box(*boxes.T))[1]] = True
         return joined(self.runs[met[self.cell_of]])
 
 
