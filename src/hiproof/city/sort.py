@@ -177,7 +177,7 @@ def wanted_points(path: str, reaches: Reaches) -> Iterator[PointCloud]:
         return iter_points(path)
     if is_copc(path):
         return points_by_squares(path, reaches)
-    index = read_lax(path, read_header(path).count)
+    index = read_lax(path)
     return iter_points(path, runs=None if index is None else index.runs_meeting(reaches.bounds))
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputWarning
+from .las import read_las_header
 from .remote import is_url
 
 JOINED_POINTS = 50_000  # LAZ is decoded by chunks of so many: skipping less costs as much as reading on
@@ -38,16 +39,18 @@ class LaxIndex:
         return joined(self.runs[met[self.cell_of]])
 
 
-def read_lax(path: str | Path, points: int) -> LaxIndex | None:
-    """The index beside the file at `path`, which holds so many `points`; None where there is none.
+def read_lax(path: str | Path) -> LaxIndex | None:
+    """The index beside the LAS or LAZ file at `path`; None where there is none.
 
-    One that cannot be understood, or that tells of another number of points, is left aside with an InputWarning.
+    One that cannot be understood, or that tells of another number of points than the file, is left aside with an
+    InputWarning. Raises InputError where the file's own header cannot be read.
     """
     if is_url(path):
         return None
     beside = next((p for p in (Path(path).with_suffix(end) for end in (".lax", ".LAX")) if p.is_file()), None)
     if beside is None:
         return None
+    points = read_las_header(path).point_count
     try:
         index, told = parsed(np.fromfile(beside, "<u4"))
         if told != points or index.runs.max(initial=0) > points:
