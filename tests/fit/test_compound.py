@@ -167,6 +167,26 @@ def test_equal_monopitches_in_a_row_are_one_saw_tooth():
     assert fit.roof_parts[0].parameters["teeth"] == 3
 
 
+def tooth_edges(fit):
+    """Where the teeth of the one saw-tooth end along y."""
+    (shed,) = fit.roof_parts
+    return np.unique(np.round([piece.outline.bounds[k] for piece in shed.pieces for k in (1, 3)], 6))
+
+
+def test_teeth_are_equally_wide_however_the_points_beside_a_step_lie():
+    hall = shapely.box(0, 0, 12, 15)
+    points = sampled(lambda x, y: 4.0 + 0.5 * (y % 5.0), hall)
+    points[:, :2] += np.random.default_rng(1).normal(0.0, 0.05, (len(points), 2))
+    assert tooth_edges(fit_building(points, hall)) == pytest.approx([0.0, 5.0, 10.0, 15.0], abs=1e-3)
+
+
+def test_uneven_teeth_stay_uneven():
+    edges = np.array([0.0, 5.0, 10.4, 15.0])
+    hall = shapely.box(0, 0, 12, 15)
+    points = sampled(lambda x, y: 4.0 + 0.5 * (y - edges[np.searchsorted(edges, y, side="right") - 1]), hall)
+    assert tooth_edges(fit_building(points, hall)) == pytest.approx(edges, abs=0.1)
+
+
 def test_detail_main_leaves_a_dormer_out():
     def with_dormer(x, y):
         return np.where((abs(x - 6) < 0.9) & (y > 1.0) & (y < 3.0), 8.0, 8.0 - 0.9 * np.abs(y - 3.5))

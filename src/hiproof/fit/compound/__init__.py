@@ -76,7 +76,8 @@ def fit_building(
         if wings is not None:
             return wings
     joint = fit_together(layout, plan, settings.compound.tolerance_m, evidence)
-    parts = assembled_parts(disjoint_pieces(layout, plan, outline), joint, plan)
+    pieces = disjoint_pieces(layout, plan, outline)
+    parts = assembled_parts(pieces, joint, plan, settings.compound.tolerance_m, evidence)
     z, _, _ = evaluate(layout, plan.cloud.u, plan.cloud.v)
     unexplained = float(np.mean(np.abs(plan.cloud.z - z) > settings.compound.tolerance_m))
     return CompoundFit(parts, outline, objective, len(z), unexplained)
