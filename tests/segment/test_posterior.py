@@ -70,9 +70,9 @@ class FakeFit:
 
     points_used = 100
 
-    def __init__(self, names, noise_m=0.05, outlier_share=0.0):
+    def __init__(self, names, noise_m=0.05, outlier_share=0.0, objective="likelihood"):
         self.type, self.bics = (names[0], {names[0]: 50.0}) if names else ("gable", {"gable": 0.0, "hip": 8.0})
-        self.noise_m, self.outlier_share = noise_m, outlier_share
+        self.noise_m, self.outlier_share, self.objective = noise_m, outlier_share, objective
 
 
 def test_most_probable_fits_again_only_where_the_network_disagrees_with_the_evidence():
@@ -95,6 +95,14 @@ def test_a_named_type_far_from_the_points_is_not_built(worse):
 
     found, posterior = most_probable(fit, {"gable": 0.01, "hip": 0.99})
     assert next(iter(posterior)) == "hip" and found.type == "gable"
+
+
+def test_with_the_papers_objective_the_named_type_is_built():
+    def fit(names):
+        return FakeFit(names, noise_m=0.9 if names else 0.5, objective="paper")
+
+    found, _ = most_probable(fit, {"gable": 0.01, "hip": 0.99})
+    assert found.type == "hip"
 
 
 def test_expected_distance_is_the_mean_over_noise_and_outliers():

@@ -77,7 +77,7 @@ def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]
     """The fit to build, and the posterior by type, best first.
 
     It is the fit of the type with the highest posterior, unless its roof lies clearly farther from the points than the
-    most evident one: then that. `fit` fits a roof of the types named (empty: all of them), such as `fit_roof` with its
+    most evident one: then that. (By the paper's objective, which knows no outliers, the type decides.) `fit` fits a roof of the types named (empty: all of them), such as `fit_roof` with its
     points bound; it is called a second time only where the network disagrees with the evidence.
     """
     found = fit(())
@@ -87,7 +87,8 @@ def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]
         return found, posterior
     named = fit((best,))
     farther = expected_distance(named) - expected_distance(found)
-    return (named if farther <= FARTHER_AT_MOST_M else found), posterior
+    keeps_name = named.objective == "paper" or farther <= FARTHER_AT_MOST_M
+    return (named if keeps_name else found), posterior
 
 
 def expected_distance(fit: Fit) -> float:
