@@ -35,6 +35,24 @@ def test_most_winged_buildings_are_told_as_the_two_primitives_they_are(kind):
     assert near >= 5
 
 
+def test_three_hips_around_a_court_are_three_hips():
+    """The middle wing's own points show a gable: its hipped ends lie under the other wings."""
+    boxes = [(-12.0, -8.0, -5.0, 6.0), (-12.0, -3.5, 12.0, 6.0), (5.0, -8.0, 12.0, 6.0)]
+
+    def hip(box, x, y):
+        inside = [x - box[0], box[2] - x, y - box[1], box[3] - y]
+        return np.where(np.min(inside, axis=0) >= 0.0, 5.0 + 0.5 * np.min(inside, axis=0), -np.inf)
+
+    outline = shapely.union_all([shapely.box(*box) for box in boxes])
+    rng = np.random.default_rng(0)
+    xy = rng.uniform((-12.0, -8.0), (12.0, 6.0), (2400, 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    z = np.max([hip(box, *xy.T) for box in boxes], axis=0) + rng.normal(0.0, 0.03, len(xy))
+    fit = fit_building(np.column_stack([xy, z]), outline)
+    assert [part.type for part in fit.roof_parts] == ["hip", "hip", "hip"]
+    assert fit.unexplained == 0.0
+
+
 def test_the_answer_turns_with_the_building():
     building, points = scanned("cross", 1)
     c, s = np.cos(0.7), np.sin(0.7)

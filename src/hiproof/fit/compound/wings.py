@@ -26,6 +26,7 @@ from .single import PARAMETER_COST, PART_COST, moved, stays_within
 
 TYPES = tuple(name for name in CATALOGUE if name != "shed")
 ENDS_ANYWHERE = ("flat", "monopitch", "gable", "asymmetric_gable", "gambrel")  # straight on, as far as they go
+MAY_BECOME = {"gable": ("gable", "hip", "half_hip")}
 MOST_WINGS, MOST_CORNERS, FEWEST_POINTS = 4, 16, 8
 SAME_LINE_M, ON_AXIS, FILLED = 0.3, 0.06, 0.97
 JOINT_COST = 1.0  # units of complexity for each wing after the first, as for a cut
@@ -52,24 +53,18 @@ def fit_wings(
     points = np.column_stack([plan.frame.xy_local(uv), plan.cloud.z + plan.frame.origin[2]])
     inside = np.stack([within(uv, box) for box in boxes])
     tau = settings.compound.tolerance_m
-    wings = own_wings(boxes, points, inside, plan, evidence, to_beat, settings)
-    if wings is None:
+    own = own_wings(boxes, points, inside, plan, evidence, to_beat, settings)
+    if own is None:
         return None
-    wings, value = trimmed(wings, points, plan, tau)
-    for k, again in enumerate(refitted(wings, points, inside, plan, settings)):
-        if again is not None:
-            changed = [*wings[:k], again, *wings[k + 1 :]]
-            cost = misfit(changed, points, plan, tau)
-            wings, value = (changed, cost) if cost < value else (wings, value)
-    if not all(stays_within(wing.part, outline, plan) for wing in wings):
-        return None
-    objective = value + evidence * sum(complexity(wing.part) for wing in wings) - evidence * JOINT_COST
-    if objective > to_beat:
+    for start in (trimmed(own, points, plan, tau), own):  # what looks like a gable cut short may be a whole hip
+        wings = bettered(start, points, inside, plan, evidence, settings)
+        objective = cost_of(wings, points, plan, tau, evidence)
+        if objective <= to_beat:
+            break
+    if objective > to_beat or not all(stays_within(wing.part, outline, plan) for wing in wings):
         return None
     gap = np.abs(points[:, 2] - height_of_wings(wings, points, plan))
-    return CompoundFit(
-        tuple(wing.part for wing in wings), outline, float(objective), len(points), float(np.mean(gap > tau))
-    )
+    return CompoundFit(tuple(wing.part for wing in wings), outline, objective, len(points), float(np.mean(gap > tau)))
 
 
 def wing_boxes(outline: shapely.Polygon, plan: Plan) -> list[Box]:
@@ -160,7 +155,7 @@ def polygon_of(box: Box, plan: Plan) -> shapely.Polygon:
     return shapely.transform(shapely.box(*box), plan.frame.xy_local)
 
 
-def trimmed(wings: list[Wing], points: np.ndarray, plan: Plan, tau: float) -> tuple[list[Wing], float]:
+def trimmed(wings: list[Wing], points: np.ndarray, plan: Plan, tau: float) -> list[Wing]:
     """Wings ended under the middle of those they meet wherever that brings the roof nearer to its points."""
     value = misfit(wings, points, plan, tau)
     for k in range(len(wings)):
@@ -169,7 +164,7 @@ def trimmed(wings: list[Wing], points: np.ndarray, plan: Plan, tau: float) -> tu
             cost = misfit(changed, points, plan, tau)
             if cost < value:
                 wings, value = changed, cost
-    return wings, value
+    return wings
 
 
 def shorter_boxes(wings: list[Wing], k: int) -> list[Box]:
@@ -190,15 +185,32 @@ def shorter_boxes(wings: list[Wing], k: int) -> list[Box]:
     return [b for b in found if b != box and b[2] - b[0] > SAME_LINE_M and b[3] - b[1] > SAME_LINE_M]
 
 
+def bettered(
+    wings: list[Wing], points: np.ndarray, inside: np.ndarray, plan: Plan, evidence: float, settings: Settings
+) -> list[Wing]:
+    """The wings, each replaced by its refit where that lowers the objective."""
+    tau = settings.compound.tolerance_m
+    objective = cost_of(wings, points, plan, tau, evidence)
+    for k, again in enumerate(refitted(wings, points, inside, plan, settings)):
+        if again is not None:
+            changed = [*wings[:k], again, *wings[k + 1 :]]
+            cost = cost_of(changed, points, plan, tau, evidence)
+            wings, objective = (changed, cost) if cost < objective else (wings, objective)
+    return wings
+
+
 def refitted(
     wings: list[Wing], points: np.ndarray, inside: np.ndarray, plan: Plan, settings: Settings
 ) -> list[Wing | None]:
-    """Each wing fitted again, type kept, to all points over which it is the highest."""
+    """Each wing fitted again to all points over which it is the highest.
+
+    Its type is kept, but for a gable, which may have hipped ends where it meets others: its own points show none.
+    """
     highest = heights(wings, points, plan).argmax(axis=0)
     again = []
     for k, wing in enumerate(wings):
         members = points[inside[k] & (highest == k)]
-        again.append(fitted_wing(members, wing.box, plan, settings, (wing.part.type,)))
+        again.append(fitted_wing(members, wing.box, plan, settings, MAY_BECOME.get(wing.part.type, (wing.part.type,))))
     return again
 
 
@@ -219,6 +231,12 @@ def misfit(wings: list[Wing], points: np.ndarray, plan: Plan, tau: float) -> flo
     """Sum of min((dz / tau)^2, 1) over the points; one that no wing covers costs one."""
     gap = (points[:, 2] - height_of_wings(wings, points, plan)) / tau
     return float(np.minimum(gap**2, 1.0).sum())
+
+
+def cost_of(wings: list[Wing], points: np.ndarray, plan: Plan, tau: float, evidence: float) -> float:
+    """The wings' objective on the layouts' scale."""
+    structure = sum(complexity(wing.part) for wing in wings) - JOINT_COST
+    return misfit(wings, points, plan, tau) + evidence * structure
 
 
 def complexity(part: Part) -> float:
