@@ -67,8 +67,7 @@ class LowestAround:
 
 @njit(cache=True)
 def window(x, y, reach, low, shape, box):
-    """First and last row and column (both excluded) of a table whose corner is cell `low`: cells at most `reach` from (x, y)
-    and inside `box`."""
+    """Rows and columns, [first, end), of a table whose corner is cell `low`: at most `reach` from (x, y), inside `box`."""
     column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
     rows = max(row - reach, box[1], low[1]) - low[1], min(row + reach + 1, box[3], low[1] + shape[0]) - low[1]
     columns = max(column - reach, box[0], low[0]) - low[0], min(column + reach + 1, box[2], low[0] + shape[1]) - low[0]

@@ -1,8 +1,9 @@
 """From files to values: point clouds, footprints, terrain, RoofN3D, and the split of a cloud into buildings.
 
 `read_points` and `read_footprints` give what a run starts from; `points_of_footprints` brings the two together,
-`split_buildings` stands in for footprints where there are none, a terrain answers how high the ground is. Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by
-`errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a third of a second.
+`split_buildings` stands in for footprints where there are none, a terrain answers how high the ground is. Everything
+unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by `errors.InputWarning`.
+The names below are imported when first used: GDAL and laspy cost a third of a second.
 """
 
 from importlib import import_module

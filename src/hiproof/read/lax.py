@@ -1,10 +1,11 @@
 """The spatial index that LAStools writes beside a LAS or LAZ file (`.lax`): a quadtree whose cells name runs of points.
 
 All of the file are little-endian words of four bytes: "LASX" and a version; "LASS" and a type (0: quadtree); "LASQ", a
-version, levels, level_index, implicit_levels (0 here), min_x, max_x, min_y, max_y as float32; "LASV", a version, the number
-of cells, and for each its index, its number of runs, how many points are in it, and the first and last point of each run.
-Cells of a level are numbered after those of all coarser ones, two bits a level (1: upper half in x, 2: in y). A run may hold
-points of other cells, too. The layout is that of LASlib's lasindex, lasquadtree and lasinterval (rapidlasso, open source).
+version, levels, level_index, implicit_levels (0 here), min_x, max_x, min_y, max_y as float32; "LASV", a version, the
+number of cells, and for each its index, its number of runs, how many points are in it, and the first and last point of
+each run. Cells of a level are numbered after those of all coarser ones, two bits a level (1: upper half in x, 2: in y).
+A run may hold points of other cells, too. The layout is that of LASlib's lasindex, lasquadtree and lasinterval
+(rapidlasso, open source).
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ JOINED_POINTS = 50_000  # LAZ is decoded by chunks of so many: skipping less cos
 
 @dataclass(frozen=True)
 class LaxIndex:
-    """Boxes (c, 4) of the cells (xmin, ymin, xmax, ymax), and runs (r, 2) of points, [first, end), of the cells `cell_of` (r,)."""
+    """`boxes` (c, 4) of the cells (xmin, ymin, xmax, ymax); `runs` (r, 2) of points, [first, end), of cells `cell_of` (r,)."""
 
     boxes: np.ndarray
     cell_of: np.ndarray
@@ -62,7 +63,7 @@ def read_lax(path: str | Path) -> LaxIndex | None:
 
 
 def parsed(words: np.ndarray) -> tuple[LaxIndex, int]:
-    """The index in the file's words, and how many points its cells hold. Raises ValueError or IndexError for another file."""
+    """The index in a file's words, and how many points its cells hold; ValueError or IndexError for another file."""
     for place, mark in ((0, b"LASX"), (2, b"LASS"), (4, b"LASQ"), (13, b"LASV")):
         if words[place : place + 1].tobytes() != mark:
             raise ValueError(f"expected {mark.decode()} in its word {place}")
