@@ -8,7 +8,7 @@ early. Everything compiled is in kernel.py and direction.py; here is the schedul
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -65,7 +65,7 @@ class Candidates:
     evaluations: int = 0
 
     def chosen(self, rows: np.ndarray) -> Candidates:
-        return replace(self, kinds=self.kinds[rows], thetas=self.thetas[rows], values=self.values[rows])
+        return Candidates(self.kinds[rows], self.thetas[rows], self.values[rows], self.evaluations)
 
     def within(self, slack: float) -> Candidates:
         """Those at most `slack` nats behind the best."""

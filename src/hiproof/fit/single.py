@@ -92,12 +92,20 @@ def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shape
             f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {len(cloud)} of {len(points)} given; "
             "a flat roof at their median height is all that can be said"
         )
-    cloud = cloud[np.lexsort(cloud.T[::-1])]
+    cloud = in_order(cloud)
     narrow, wide = plan_extents(cloud[:, :2])
     if narrow <= max(THINNEST * wide, 1e-6):
         shape = "in one place" if wide < 1e-6 else "on one line in plan"
         raise FitError(f"expected points spread over a roof, got {len(cloud)} points {shape}; add points beside it")
     return cloud
+
+
+def in_order(cloud: np.ndarray) -> np.ndarray:
+    """Rows (n, k) in lexicographic order; those of a building come so already, and looking is cheaper than sorting."""
+    step = np.zeros(len(cloud) - 1)
+    for column in cloud.T:
+        step = np.where(step == 0.0, np.diff(column), step)
+    return cloud if (step >= 0.0).all() else cloud[np.lexsort(cloud.T[::-1])]
 
 
 def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
