@@ -36,7 +36,10 @@ def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
 
 def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
     """The roof's outline in plan: the union of its roof surfaces seen from above (empty without any)."""
-    polygons = [shapely.Polygon(rings[0][:, :2], [hole[:, :2] for hole in rings[1:]]) for rings in roof_polygons(model)]
+    polygons = [
+        shapely.polygons(outer[:, :2], holes=[shapely.linearrings(hole[:, :2]) for hole in holes] or None)
+        for outer, *holes in roof_polygons(model)
+    ]
     return shapely.union_all([p if p.is_valid else p.buffer(0) for p in polygons])
 
 

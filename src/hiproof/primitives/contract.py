@@ -189,7 +189,7 @@ class Primitive:
         for low, high, group in zip(breaks[:-1], breaks[1:], groups, strict=True):
             uv = np.array([(-half_length, low), (half_length, low), (half_length, high), (-half_length, high)])
             xy = translation[:2] + uv @ np.array([[c, s], [-s, c]])
-            pieces.append(Piece(shapely.Polygon(xy), group))
+            pieces.append(Piece(shapely.polygons(xy), group))
         return Part(self.name, tuple(pieces), theta_p, kappa, translation, dict(sigma or {}))
 
 

@@ -143,7 +143,9 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
         if len(away) >= max(8, 0.5 * len(inside)):
             inside = away
     centroid = shapely.get_coordinates(outline.centroid)[0]
-    frame = PlanFrame(np.array([*centroid, np.median(inside[:, 2]) if len(inside) else 0.0]), rotation)
+    middle = len(inside) // 2
+    height = np.partition(inside[:, 2], middle)[middle] if len(inside) else 0.0
+    frame = PlanFrame(np.array([*centroid, height]), rotation)
     uvz = frame.to_plan(inside)
     uvz = uvz[np.lexsort(np.round(uvz.T, 6))]  # one order, whatever order the points came in
     density = len(uvz) / max(COVERED_SHARE * outline.area, 1.0)
