@@ -117,7 +117,7 @@ def killed_run(clouds: list[str], footprints: str, out: Path, whole: Path, kills
         while not ended:
             main = subprocess.Popen([*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
             while done < kills and main.poll() is None:
-                time.sleep(draw.uniform(0.3, 12.0))
+                time.sleep(draw.uniform(0.3, 5.0))
                 victim = draw.choice([main.pid, *children(main.pid)])
                 if main.poll() is None:
                     os.kill(victim, signal.SIGKILL)
