@@ -22,9 +22,6 @@ FEWEST_POINTS = 4
 ASSUMED_WALL_M = 3.0
 """Height of the lowest wall where nothing is known of the terrain."""
 
-LOWEST_WALL_M = 0.1
-"""A wall is at least this high: terrain above the eaves (a cellar roof, a wrong terrain model) is lowered to it."""
-
 
 @dataclass(frozen=True)
 class Recognised:

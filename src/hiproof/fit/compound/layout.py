@@ -168,14 +168,9 @@ def complexity(layout):
 @njit(cache=True)
 def objective(layout, cloud, ghosts, tau, evidence):
     """Cost of all points and ghosts plus that of the structure: what every step lowers."""
-    total = evidence * complexity(layout)
-    for i in range(len(cloud.u)):
-        z, _ = height_of(layout, holder_at(layout, cloud.u[i], cloud.v[i]), cloud.u[i], cloud.v[i])
-        total += truncated(cloud.z[i] - z, tau)
-    for q in range(len(ghosts.u)):
-        z, _ = height_of(layout, holder_at(layout, ghosts.u[q], ghosts.v[q]), ghosts.u[q], ghosts.v[q])
-        total += ghost_cost(ghosts, q, z)
-    return total
+    _, holder, _ = evaluate(layout, cloud.u, cloud.v)
+    _, ghost_holder, _ = evaluate(layout, ghosts.u, ghosts.v)
+    return known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence)
 
 
 @njit(cache=True)

@@ -19,8 +19,6 @@ SAME_M = 0.08
 LEVEL_SLOPE = 0.03
 PROBES = np.array([(u, v) for u in (-1.0, -0.5, 0.0, 0.5, 1.0) for v in (-1.0, -0.5, 0.0, 0.5, 1.0)])
 
-Proposal = tuple[str, list[float]]
-
 
 def recognised(piece: Piece, covariance: np.ndarray | None = None) -> Part:
     """`piece` as a Part of the catalogue's type that it is, else "free".
