@@ -1,0 +1,166 @@
+"""Is the roof drawn as a person would? Real towns' LoD2 solids, scanned by simulation, modelled again and compared.
+
+usage: python -m benchmarks.towns [--town essen nrw_5657 denhaag] [--density 5] [--without-footprints]
+           [--every K] [--parity even|odd] [--most N] [--worst N] [--save DIR]
+
+A building is the solids of one CityJSON building (its parts with it) whose grounds touch; those of 30 m2 or more are
+scanned one by one (generator seeded by the id, no gaps in the cloud) and reconstructed under their true ground outline,
+or without it. `wireframe.py` compares corners, edges and faces of the written models with the true ones. `--every` takes
+each k-th building, `--parity` those at even or odd places, `--most` draws so many by chance, always the same ones.
+Milliseconds are the CPU time of `reconstruct`, recognition and quality included.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+import zlib
+from collections import defaultdict
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from hiproof import reconstruct
+from hiproof.model import GROUND, Building, Solid
+from hiproof.read.solids import read_solids
+from hiproof.settings import Settings
+from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
+from hiproof.status import Status
+from hiproof.write import write_cityjson
+
+from .judging import SHARED, area_by_type, named_share, wireframe_figures
+
+TOWNS = {
+    "essen": SHARED / "data/towns/essen.city.json",
+    "nrw_5657": SHARED / "data/towns/nrw_5657.city.json",
+    "denhaag": SHARED / "data/denhaag/DenHaag_01.city.json",
+}
+SMALLEST_M2 = 30.0
+TOUCH_M = 0.01
+
+
+@dataclass(frozen=True)
+class TrueBuilding:
+    """Solids that touch each other, by the ids of their city objects, and the union of their grounds (world)."""
+
+    id: str
+    solids: dict[str, Solid]
+    footprint: shapely.Polygon
+
+    def scanned(self, density: float) -> np.ndarray:
+        """Points (n, 3) of the building by itself, ground left out, always the same for one id."""
+        rng = np.random.default_rng(zlib.crc32(self.id.encode()))
+        cloud = scan_solids(list(self.solids.values()), rng, ScanSettings(density=density, defects=Defects.none()))
+        return cloud.points[cloud.source != SOURCES.index("ground")]
+
+
+def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding]:
+    """The buildings of a CityJSON file with a ground of `smallest_m2` or more, in the order of their ids."""
+    objects = json.loads(path.read_text())["CityObjects"]
+    solids = defaultdict(dict)
+    for name, solid in read_solids(path):
+        solids[objects[name].get("parents", [name])[0]][name] = solid
+    found = [building for id in sorted(solids) for building in touching(id, solids[id])]
+    return [building for building in found if building.footprint.area >= smallest_m2]
+
+
+def touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
+    """The solids of one building as one or, where their grounds lie apart, as several."""
+    grounds = {name: ground_of(solid) for name, solid in solids.items()}
+    joined = shapely.union_all([ground.buffer(TOUCH_M, join_style="mitre") for ground in grounds.values()])
+    outlines = shapely.get_parts(joined.buffer(-TOUCH_M, join_style="mitre"))
+    outlines = sorted((o for o in outlines if o.area > 0), key=lambda outline: -outline.area)
+    found = []
+    for k, outline in enumerate(outlines):
+        own = {name: solids[name] for name, ground in grounds.items() if nearest(ground, outlines) == k}
+        found.append(TrueBuilding(id if k == 0 else f"{id}~{k + 1}", own, outline.simplify(TOUCH_M)))
+    return found
+
+
+def nearest(ground: shapely.Geometry, outlines: list[shapely.Polygon]) -> int:
+    """Index of the outline that covers most of `ground`."""
+    return int(np.argmax(shapely.area(shapely.intersection(ground, outlines))))
+
+
+def ground_of(solid: Solid) -> shapely.Geometry:
+    rings = [[solid.vertices[list(ring), :2] for ring in face.rings] for face in solid.of_kind(GROUND)]
+    return shapely.union_all([shapely.make_valid(shapely.Polygon(outer, holes)) for outer, *holes in rings])
+
+
+def chosen(buildings: list, every: int = 1, parity: str | None = None, most: int | None = None) -> list:
+    """Every k-th of `buildings`, those at even or odd places, at most so many drawn by a fixed chance; in order."""
+    buildings = buildings[::every]
+    buildings = buildings if parity is None else buildings[("even", "odd").index(parity) :: 2]
+    if most is None or most >= len(buildings):
+        return buildings
+    return [buildings[k] for k in sorted(np.random.default_rng(0).choice(len(buildings), most, replace=False))]
+
+
+def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:
+    """The city objects of `buildings` out of the CityJSON file `source`, each under its TrueBuilding as parent."""
+    city = json.loads(source.read_text())
+    parents = {name: building.id for building in buildings for name in building.solids}
+    city["CityObjects"] = {name: city["CityObjects"][name] | {"parents": [id]} for name, id in parents.items()}
+    path.write_text(json.dumps(city))
+
+
+def modelled(
+    building: TrueBuilding, density: float, with_footprint: bool, settings: Settings
+) -> tuple[Building, float]:
+    """One building reconstructed from its scan, and the seconds it took."""
+    points = building.scanned(density)
+    started = time.process_time()
+    model = reconstruct(points, building.footprint if with_footprint else None, settings=settings, id=building.id)
+    return model, time.process_time() - started
+
+
+def measured(town: str, buildings: list[TrueBuilding], models: list[Building], folder: Path, worst: int) -> str:
+    """What the judge says of the models of `buildings`, after writing models and truth to `folder`."""
+    folder.mkdir(parents=True, exist_ok=True)
+    paths = folder / f"{town}.city.jsonl", folder / f"{town}_truth.city.json"
+    write_cityjson(paths[0], [model for model in models if model.solid is not None])
+    write_truth(paths[1], TOWNS[town], buildings)
+    figures, lines = wireframe_figures(*paths, worst)
+    areas = area_by_type(models)
+    types = ", ".join(f"{name} {area / areas.total():.0%}" for name, area in areas.items())
+    modelled = sum(model.status is Status.MODELLED for model in models)
+    rows = [
+        "edges    precision {edge_precision}, recall {edge_recall}, F1 {edge_f1} %; {edges_of_truth} times the truth's",
+        "corners  F1 {corner_f1} %; {corners_of_truth} times the truth's; {corner_offset_m} m off",
+        "faces    {faces_of_truth} times the truth's; a share of {same_number_of_faces} of the buildings has as many",
+        "heights  RMSE {height_rmse_m} m in the mean, {height_rmse_median_m} in the median",
+        f"parts    {np.mean([len(model.parts) for model in models]):.2f} a building; named share"
+        f" {named_share(models):.3f}: {types}",
+        f"status   {modelled} of {len(models)} modelled without reserve",
+    ]
+    return "\n".join("  " + row.format(**figures) for row in rows + [f"worst    {line}" for line in lines])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--town", nargs="+", choices=list(TOWNS), default=list(TOWNS))
+    parser.add_argument("--density", type=float, default=5.0, help="points a square metre")
+    parser.add_argument("--without-footprints", action="store_true", help="estimate outlines from the points")
+    parser.add_argument("--every", type=int, default=1, help="take each k-th building")
+    parser.add_argument("--parity", choices=("even", "odd"), help="take those at even or odd places")
+    parser.add_argument("--most", type=int, help="at most so many buildings a town, drawn by chance")
+    parser.add_argument("--worst", type=int, default=0, help="name the buildings with the worst edges")
+    parser.add_argument("--save", type=Path, help="keep models and truth in this folder")
+    a = parser.parse_args()
+    for town in a.town:
+        buildings = chosen(read_town(TOWNS[town]), a.every, a.parity, a.most)
+        modelled(buildings[0], a.density, not a.without_footprints, Settings())  # loads what is compiled
+        outcomes = [modelled(building, a.density, not a.without_footprints, Settings()) for building in buildings]
+        models, ms = [model for model, _ in outcomes], 1e3 * np.array([seconds for _, seconds in outcomes])
+        times = f"{np.median(ms):.1f} ms a building in the median, {ms.mean():.1f} in the mean, {ms.max():.0f} at most"
+        print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {times}")
+        with tempfile.TemporaryDirectory() as folder:
+            print(measured(town, buildings, models, a.save or Path(folder), a.worst), flush=True)
+
+
+if __name__ == "__main__":
+    main()
