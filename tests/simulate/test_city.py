@@ -92,7 +92,7 @@ def test_streets_offer_every_type():
     names = drawn_names(np.random.default_rng(0), HOUSES)
     assert {next(names) for _ in range(1500)} == set(HOUSES)
     terrain = SMALL.terrain
-    kinds = {b.kind for i in range(12) for b in block_buildings(1, i, 0, terrain)}
+    kinds = {b.kind for i in range(20) for b in block_buildings(1, i, 0, terrain)}
     assert {"single", "terraced", "extension"} <= kinds
 
 

@@ -14,6 +14,7 @@ from hiproof.simulate.shapes import box
 
 SEEDS = range(12)
 PARTS = {"L": {2}, "T": {2}, "U": {3}, "cross": {2}, "extension": {2}, "two_level": {2}, "saw_tooth_hall": {2}}
+PARTS |= {"dormered": {2, 3, 4, 5}, "winged_hip": {3}, "L_of_hips": {2}, "row": {3, 4, 5, 6}}
 
 
 def profile(building, u, v):
@@ -67,7 +68,7 @@ def test_plan_and_slopes_are_those_of_houses(seed):
 def test_compounds_have_their_parts_in_one_outline(kind):
     for seed in SEEDS:
         building = random_compound(np.random.default_rng(seed), kind)
-        assert len(building.roof.parts) in PARTS.get(kind, {3, 4, 5, 6})
+        assert len(building.roof.parts) in PARTS[kind]
         assert building.kind == kind and building.outline.geom_type == "Polygon" and building.outline.is_valid
         covered = shapely.union_all([piece.outline for piece in building.roof.pieces])
         assert covered.symmetric_difference(building.outline).area < 1e-3
@@ -83,6 +84,43 @@ def test_wings_change_the_outline_and_show_above_it(kind):
         for part in building.roof.parts:
             inside = shapely.get_coordinates(part.pieces[0].outline)[:-1].mean(axis=0)
             assert np.isfinite(building.roof.height_at(inside[None])).all()
+
+
+def test_dormers_come_out_of_one_slope_and_end_under_it():
+    for seed in SEEDS:
+        building = random_compound(np.random.default_rng(seed), "dormered", kappa=0.0)
+        house, *dormers = building.roof.parts
+        for dormer in dormers:
+            (x_low, y_low, x_high, y_high) = dormer.pieces[0].outline.bounds
+            side = np.sign(y_low + y_high)
+            front, back = sorted((y_low, y_high), key=lambda y: -side * y)
+            x = np.linspace(x_low, x_high, 7)
+            above = dormer.pieces[0].height_at(np.column_stack([x, np.full(7, front)]))
+            above -= house.pieces[0].height_at(np.column_stack([x, np.full(7, front)]))
+            below = dormer.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
+            below -= house.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
+            assert above.min() > 0.6 and below.max() < -0.05 and back * side > 0
+        outlines = [dormer.pieces[0].outline for dormer in dormers]
+        assert shapely.union_all(outlines).area == pytest.approx(sum(outline.area for outline in outlines))
+
+
+def test_two_hips_of_an_l_have_one_ridge_height():
+    for seed in SEEDS:
+        first, second = random_compound(np.random.default_rng(seed), "L_of_hips").roof.parts
+        ridge = [part.translation[2] + part.parameters["height"] for part in (first, second)]
+        assert ridge[0] == pytest.approx(ridge[1])
+        assert first.translation[2] == pytest.approx(second.translation[2])
+
+
+def test_the_inner_ends_of_a_hips_wings_are_hidden():
+    for seed in SEEDS:
+        building = random_compound(np.random.default_rng(seed), "winged_hip", kappa=0.0)
+        hip, *wings = building.roof.parts
+        for wing in wings:
+            x_low, y_low, x_high, y_high = wing.pieces[0].outline.bounds
+            y = y_low if wing.translation[1] > 0 else y_high
+            end = np.column_stack([np.linspace(x_low, x_high, 9), np.full(9, y)])
+            assert (wing.pieces[0].height_at(end) <= hip.pieces[0].height_at(end) + 1e-9).all()
 
 
 def test_kappa_turns_the_building_and_nothing_else():

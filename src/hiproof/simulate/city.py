@@ -49,6 +49,9 @@ HOUSES = {
     "two_level": 0.02,
     "cross": 0.005,
     "U": 0.005,
+    "dormered": 0.04,
+    "winged_hip": 0.01,
+    "L_of_hips": 0.02,
 }
 WORKS = {"shed": 0.35, "saw_tooth_hall": 0.15, "flat": 0.2, "two_level": 0.15, "monopitch": 0.1, "U": 0.05}
 

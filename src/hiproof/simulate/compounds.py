@@ -1,7 +1,7 @@
-"""Compound buildings: wings, annexes, steps and rows, as the maximum of their parts' roofs.
+"""Compound buildings: wings, annexes, steps, rows and dormers, as the maximum of their parts' roofs.
 
 Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under the main roof as
-far as its ridge, so that the maximum of both makes the valley.
+far as its ridge, so that the maximum of both makes the valley, and a dormer until its top is under the slope.
 """
 
 from __future__ import annotations
@@ -15,7 +15,20 @@ from ..model import Part
 from .roofs import SimBuilding, assemble, random_eave, random_parameters
 from .shapes import make_part
 
-COMPOUND_KINDS = ("L", "T", "U", "cross", "extension", "two_level", "saw_tooth_hall", "row")
+COMPOUND_KINDS = (
+    "L",
+    "T",
+    "U",
+    "cross",
+    "extension",
+    "two_level",
+    "saw_tooth_hall",
+    "row",
+    "dormered",
+    "winged_hip",
+    "L_of_hips",
+)
+DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 
 class _Layout:
@@ -38,8 +51,8 @@ def random_compound(
 ) -> SimBuilding:
     """A compound of `kind` (one of COMPOUND_KINDS; drawn when None) on the ground at `origin` (world).
 
-    L, T, cross, extension, two_level and saw_tooth_hall have two parts, U three, a row three to six. Raises
-    InputError for an unknown kind.
+    L, L_of_hips, T, cross, extension, two_level and saw_tooth_hall have two parts, U and winged_hip three, a dormered
+    house two to five, a row three to six. Raises InputError for an unknown kind.
 
     >>> len(random_compound(np.random.default_rng(0), "U").roof.parts)
     3
@@ -51,9 +64,7 @@ def random_compound(
     if kind in ("L", "T", "U", "cross"):
         parts = _winged(rng, layout, kind)
     else:
-        parts = {"extension": _extended, "two_level": _two_level, "saw_tooth_hall": _hall, "row": _row}[kind](
-            rng, layout
-        )
+        parts = _OTHERS[kind](rng, layout)
     return assemble(tuple(parts), kind, origin)
 
 
@@ -142,3 +153,81 @@ def _row(rng: np.random.Generator, layout: _Layout) -> list[Part]:
         parts.append(layout.part(type, _regular(type, span, depth, slope), u + span / 2, 0.0, z))
         u += span
     return parts
+
+
+def _dormered(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """A house with one to four dormers of one shape, on one slope or on both."""
+    type = "gable" if rng.random() < 0.75 else "hip"
+    width, slope = rng.uniform(8.0, 11.0), math.tan(math.radians(rng.uniform(38, 52)))
+    ridge = width * rng.uniform(0.9, 1.4)
+    length, eave = ridge + (width if type == "hip" else 0.0), random_eave(rng) + 1.0
+    parts = [layout.part(type, _regular(type, length, width, slope), 0.0, 0.0, eave)]
+    span, both_sides = rng.uniform(2.2, 3.0), rng.random() < 0.4
+    room = int((ridge + DORMER_GAP_M) / (span + 2 * DORMER_GAP_M))
+    count = int(rng.integers(1, min(2 if both_sides else 3, room) + 1))
+    shape, depth, front, top = _dormer(rng, span, slope, width)
+    centres = (np.arange(count) - (count - 1) / 2) * ridge / max(count, 2)
+    for side in (-1, 1) if both_sides else (-1,):
+        v = side * (width / 2 - front - depth / 2)
+        quarters = {"gable": 1, "flat": 0, "monopitch": 0 if side < 0 else 2}[shape]
+        length, across = (depth, span) if shape == "gable" else (span, depth)
+        parameters = {"length": float(length), "width": float(across)} | ({"height": top[1]} if top[1] else {})
+        parts += [layout.part(shape, parameters, float(u), v, eave + top[0], quarters) for u in centres]
+    return parts
+
+
+def _dormer(
+    rng: np.random.Generator, span: float, slope: float, width: float
+) -> tuple[str, float, float, tuple[float, float]]:
+    """Type, depth, distance of its front from the eave, and (eave over the house's eave, rise) of a dormer of `span` on
+    a roof of `width` and `slope`; its back ends under the slope."""
+    type = str(rng.choice(("gable", "flat", "monopitch"), p=(0.5, 0.25, 0.25)))
+    front, own_slope = rng.uniform(0.6, 1.1), math.tan(math.radians(rng.uniform(6, 14)))
+    rise = span / 2 * math.tan(math.radians(rng.uniform(25, 36))) if type == "gable" else 0.0
+    # The top stays half a metre under the house's ridge; the house's least width and slope leave a wall of 0.7 m.
+    wall = min(rng.uniform(1.1, 1.7), (width / 2 - front) * slope - rise - 0.5)
+    meets = (wall + rise) / (slope - (own_slope if type == "monopitch" else 0.0))
+    depth = min(meets + DORMER_BACK_M, width / 2 - front)
+    rise = float(depth * own_slope) if type == "monopitch" else float(rise)
+    return type, float(depth), float(front), (float(front * slope + wall), rise)
+
+
+def _winged_hip(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """A hip with two lower wings alike, gables or hips, on one side of it or on both."""
+    type = str(rng.choice(("gable", "hip")))
+    width, eave = rng.uniform(8.0, 12.0), random_eave(rng)
+    slope = math.tan(math.radians(rng.uniform(22, 45)))
+    wing_width = width * rng.uniform(0.45, 0.65)
+    length = width * rng.uniform(1.0, 1.3) + 2 * wing_width
+    step = rng.uniform(0.8, 2.0) if rng.random() < 0.3 else 0.0
+    inner = -width / 2 if type == "hip" else 0.0
+    outer = width / 2 + wing_width * rng.uniform(0.6, 1.2)
+    wing = _regular(type, outer - inner, wing_width, slope)
+    place = (length - wing_width) / 2 - rng.uniform(0.8, 0.25 * wing_width + 0.8)
+    sides = (1, 1) if rng.random() < 0.6 else (1, -1)
+    return [layout.part("hip", _regular("hip", length, width, slope), 0.0, 0.0, eave)] + [
+        layout.part(type, wing, u, side * (inner + outer) / 2, max(2.2, eave - step), quarters=1)
+        for u, side in zip((-place, place), sides, strict=True)
+    ]
+
+
+def _L_of_hips(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+    """Two hips of one width, slope and eave that share a corner: their ridges meet there at one height."""
+    width, eave = rng.uniform(6.5, 10.5), random_eave(rng)
+    slope = math.tan(math.radians(rng.uniform(20, 48)))
+    length, reach = width * rng.uniform(1.7, 2.6), width * rng.uniform(0.7, 1.4)
+    return [
+        layout.part("hip", _regular("hip", length, width, slope), 0.0, 0.0, eave),
+        layout.part("hip", _regular("hip", width + reach, width, slope), (length - width) / 2, reach / 2, eave, 1),
+    ]
+
+
+_OTHERS = {
+    "extension": _extended,
+    "two_level": _two_level,
+    "saw_tooth_hall": _hall,
+    "row": _row,
+    "dormered": _dormered,
+    "winged_hip": _winged_hip,
+    "L_of_hips": _L_of_hips,
+}
