@@ -1,0 +1,107 @@
+"""Which fitted part stands for which true one, whether its type is right, and how large its errors are in sigmas.
+
+Parts are compared by what shows of them: the part on top at points of the plan, in the truth and in the fit. A true part
+is found where a fitted one, each of them taken once, has at least half of the points that either of the two has.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from scipy.optimize import linear_sum_assignment
+
+from hiproof.model import Part, Piece
+
+FOUND_IOU, HIDDEN_SLACK_M, SAME = 0.5, 0.02, 1e-6
+ONE_END_LESS = {"hip": "side_hip", "half_hip": "side_half_hip", "mansard": "side_mansard"}
+ALONG = ("length", "ridge_length", "t_x", "t_y")
+"""What cannot be known of a part whose end runs on under another."""
+
+
+def told_apart(parts: Sequence[Part]) -> list[Part]:
+    """`parts` where neighbours that nothing tells apart, such as a row's houses under one ridge, are one.
+
+    A united part keeps the parameters its members share; its place along the row is NaN.
+    """
+    parts = list(parts)
+    for k in range(len(parts) - 1, 0, -1):
+        united = one_of(parts[k - 1], parts[k])
+        if united is not None:
+            parts[k - 1 : k + 1] = [united]
+    return parts
+
+
+def one_of(a: Part, b: Part) -> Part | None:
+    """Two parts of the same planes side by side as one; None where they differ or lie otherwise."""
+    if a.type != b.type or len(a.pieces) > 1 or a.pieces[0].planes.shape != b.pieces[0].planes.shape:
+        return None
+    outline = a.pieces[0].outline.union(b.pieces[0].outline.buffer(SAME, join_style="mitre"))
+    rectangle = outline.minimum_rotated_rectangle
+    if rectangle.area - a.area - b.area > 1e-3 or not np.allclose(a.pieces[0].planes, b.pieces[0].planes, atol=SAME):
+        return None
+    shared = {
+        name: value for name, value in a.parameters.items() if abs(value - b.parameters.get(name, math.inf)) < SAME
+    }
+    place = np.array([np.nan, np.nan, a.translation[2]])
+    return dataclasses.replace(a, pieces=(Piece(rectangle, a.pieces[0].planes),), parameters=shared, translation=place)
+
+
+def heights(parts: Sequence[Part], xy: np.ndarray) -> np.ndarray:
+    """Height (p, n) of each of `parts` at plan points (n, 2), minus infinity beside it."""
+    z = np.full((len(parts), len(xy)), -np.inf)
+    for row, part in zip(z, parts, strict=True):
+        for piece in part.pieces:
+            inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
+            row[inside] = np.maximum(row[inside], piece.height_at(xy[inside]))
+    return z
+
+
+def matched(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
+    """For each true part the index of the fitted one that stands for it at plan points (n, 2), -1 where none does."""
+    tops = [heights(parts, xy).argmax(axis=0) for parts in (truth, fit)]
+    common = np.zeros((len(truth), len(fit)))
+    np.add.at(common, tuple(tops), 1.0)
+    iou = common / np.maximum(common.sum(axis=1, keepdims=True) + common.sum(axis=0) - common, 1.0)
+    found = [-1] * len(truth)
+    for i, j in zip(*linear_sum_assignment(-iou), strict=True):
+        if iou[i, j] >= FOUND_IOU:
+            found[i] = int(j)
+    return found
+
+
+def hidden_end(part: Part, others: Sequence[Part]) -> bool:
+    """Whether one of the two ends of `part`'s length lies under or in the roofs of `others`."""
+    if "length" not in part.parameters or len(part.pieces) > 1 or not others:
+        return False
+    along = np.array([math.cos(part.kappa), math.sin(part.kappa)])
+    ring = shapely.get_coordinates(part.pieces[0].outline)[:-1]
+    for sign in (-1, 1):
+        corners = ring[np.argsort(-sign * (ring @ along))[:2]] - sign * 0.01 * along
+        xy = corners[0] + np.linspace(0.02, 0.98, 9)[:, None] * (corners[1] - corners[0])
+        if (part.pieces[0].height_at(xy) <= heights(others, xy).max(axis=0) + HIDDEN_SLACK_M).all():
+            return True
+    return False
+
+
+def right_types(part: Part, hidden: bool) -> set[str]:
+    """The types a true part may be called by: of a hidden end nothing can be known, and an asymmetric gable of equal
+    slopes is a gable whose eaves differ."""
+    types = {part.type} | ({ONE_END_LESS[part.type]} if hidden and part.type in ONE_END_LESS else set())
+    slopes = np.hypot(*part.pieces[0].planes[:, :2].T)
+    return types | ({"gable"} if part.type == "asymmetric_gable" and np.ptp(slopes) < 0.01 else set())
+
+
+def errors_in_sigmas(truth: Part, fit: Part, hidden: bool) -> dict[str, float]:
+    """Error over standard deviation of every parameter that both parts of one type have; none where they are turned
+    against each other, none along a part whose end is hidden."""
+    turn = math.remainder(fit.kappa - truth.kappa, math.pi)
+    if fit.type != truth.type or abs(turn) > 0.3:
+        return {}
+    gaps = {name: fit.parameters[name] - truth.parameters[name] for name in truth.parameters if name in fit.parameters}
+    gaps |= dict(zip(("t_x", "t_y", "t_z"), fit.translation - truth.translation, strict=True)) | {"kappa": turn}
+    ratios = {name: gap / fit.sigma[name] for name, gap in gaps.items() if fit.sigma.get(name, 0.0) > 0}
+    return {n: float(r) for n, r in ratios.items() if math.isfinite(r) and not (hidden and n in ALONG)}
