@@ -29,10 +29,10 @@ from hiproof.model import Part, Roof
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, SimBuilding, random_compound, scan
 from hiproof.simulate.scene import Defects
 
-from .judging import fitted
+from .judging import RASTER_M, fitted, raster
 from .matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
 
-RASTER_M, STEP_M, NEAR_STEP_CELLS, NEAR_M = 0.2, 0.4, 3, 0.1
+STEP_M, NEAR_STEP_CELLS, NEAR_M = 0.4, 3, 0.1
 MEDIAN_OF_ABSOLUTE_NORMAL = 0.6745
 
 
@@ -48,15 +48,11 @@ class Outcome:
     ratios: tuple[tuple[str, float], ...]
 
 
-def raster(outline: shapely.Polygon) -> tuple[np.ndarray, tuple[int, int]]:
-    x0, y0, x1, y1 = outline.bounds
-    x, y = np.meshgrid(np.arange(x0, x1, RASTER_M), np.arange(y0, y1, RASTER_M), indexing="ij")
-    return np.column_stack([x.ravel(), y.ravel()]), x.shape
-
-
 def errors(truth: Roof, fit: CompoundFit) -> tuple[float, float]:
     """RMSE (m) over the roof's raster, and over it without the surroundings of the true roof's steps."""
-    xy, shape = raster(truth.outline)
+    x0, y0, x1, y1 = truth.outline.bounds
+    x, y = np.meshgrid(np.arange(x0, x1, RASTER_M), np.arange(y0, y1, RASTER_M), indexing="ij")
+    xy, shape = np.column_stack([x.ravel(), y.ravel()]), x.shape
     inside = shapely.contains_xy(truth.outline, xy[:, 0], xy[:, 1])
     z_true = np.where(inside, truth.height_at(xy), np.nan).reshape(shape)
     z_fit = Roof(fit.roof_parts, fit.outline, truth.frame).height_at(xy).reshape(shape)
@@ -81,10 +77,8 @@ def drawn(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray
 def compared(truth: Roof, parts: tuple[Part, ...]) -> tuple[int, bool, list[tuple[str, float]]]:
     """The true number of parts, whether `parts` are as many, each found with its type, and their errors in sigmas."""
     true_parts = told_apart(truth.parts)
-    xy, _ = raster(truth.outline)
-    xy = xy[shapely.contains_xy(truth.outline, xy[:, 0], xy[:, 1])]
     right, ratios = len(parts) == len(true_parts), []
-    for k, index in enumerate(matched(true_parts, parts, xy)):
+    for k, index in enumerate(matched(true_parts, parts, raster(truth.outline))):
         hidden = hidden_end(true_parts[k], true_parts[:k] + true_parts[k + 1 :])
         right &= index >= 0 and parts[index].type in right_types(true_parts[k], hidden)
         if index >= 0:

@@ -7,7 +7,7 @@ import importlib.util
 import io
 import json
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from types import ModuleType
 
@@ -15,10 +15,11 @@ import numpy as np
 import shapely
 
 from hiproof.fit.compound import CompoundFit, fit_building
-from hiproof.model import ROOF, Building
+from hiproof.model import Building, Part, Roof
 from hiproof.settings import Settings
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
+RASTER_M = 0.2
 
 
 def fitted(points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None) -> CompoundFit:
@@ -42,21 +43,36 @@ def wireframe_figures(models: Path, truth: Path, worst: int = 0) -> tuple[dict[s
     return json.loads(figures), lines
 
 
-def visible_areas(building: Building) -> np.ndarray:
-    """Plan area (m2) of each part's faces in the building's solid: what is hidden under another part does not count."""
-    areas = np.zeros(len(building.parts))
-    if building.solid is not None:
-        for face in building.solid.of_kind(ROOF):
-            outer, *holes = (building.solid.vertices[list(ring), :2] for ring in face.rings)
-            areas[face.part] += shapely.Polygon(outer).area - sum(shapely.Polygon(hole).area for hole in holes)
-    return areas
+def heights(parts: Sequence[Part], xy: np.ndarray) -> np.ndarray:
+    """Height (p, n) of each of `parts` at plan points (n, 2), minus infinity beside it."""
+    z = np.full((len(parts), len(xy)), -np.inf)
+    for row, part in zip(z, parts, strict=True):
+        for piece in part.pieces:
+            inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
+            row[inside] = np.maximum(row[inside], piece.height_at(xy[inside]))
+    return z
+
+
+def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
+    """Plan points (n, 2) inside `outline` on a square grid; one point within it where the grid has none."""
+    x0, y0, x1, y1 = outline.bounds
+    axes = (np.arange(low + 0.5 * step_m, high, step_m) for low, high in ((x0, x1), (y0, y1)))
+    xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
+    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    return xy if len(xy) else shapely.get_coordinates(outline.representative_point())
+
+
+def visible_areas(roof: Roof) -> np.ndarray:
+    """Plan area (m2) where each part is the highest: what is hidden under another does not count."""
+    top = heights(roof.parts, raster(roof.outline)).argmax(axis=0)
+    return roof.outline.area * np.bincount(top, minlength=len(roof.parts)) / len(top)
 
 
 def area_by_type(buildings: Iterable[Building]) -> Counter[str]:
     """Roof area in plan (m2) that each type of part has in all `buildings`, the largest first."""
     areas: Counter[str] = Counter()
-    for building in buildings:
-        for part, area in zip(building.parts, visible_areas(building), strict=True):
+    for roof in (building.roof for building in buildings if building.roof is not None):
+        for part, area in zip(roof.parts, visible_areas(roof), strict=True):
             areas[part.type] += float(area)
     return Counter(dict(areas.most_common()))
 

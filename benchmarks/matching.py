@@ -16,6 +16,8 @@ from scipy.optimize import linear_sum_assignment
 
 from hiproof.model import Part, Piece
 
+from .judging import heights
+
 FOUND_IOU, HIDDEN_SLACK_M, SAME = 0.5, 0.02, 1e-6
 ONE_END_LESS = {"hip": "side_hip", "half_hip": "side_half_hip", "mansard": "side_mansard"}
 ALONG = ("length", "ridge_length", "t_x", "t_y")
@@ -48,16 +50,6 @@ def one_of(a: Part, b: Part) -> Part | None:
     }
     place = np.array([np.nan, np.nan, a.translation[2]])
     return dataclasses.replace(a, pieces=(Piece(rectangle, a.pieces[0].planes),), parameters=shared, translation=place)
-
-
-def heights(parts: Sequence[Part], xy: np.ndarray) -> np.ndarray:
-    """Height (p, n) of each of `parts` at plan points (n, 2), minus infinity beside it."""
-    z = np.full((len(parts), len(xy)), -np.inf)
-    for row, part in zip(z, parts, strict=True):
-        for piece in part.pieces:
-            inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
-            row[inside] = np.maximum(row[inside], piece.height_at(xy[inside]))
-    return z
 
 
 def matched(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
