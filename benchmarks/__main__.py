@@ -1,10 +1,12 @@
-"""Run every benchmark one after the other: `python -m benchmarks [--quick]`."""
+"""Run every benchmark one after the other: `python -m benchmarks [--quick]`; --quick goes to those that know it."""
 
 import subprocess
 import sys
 from pathlib import Path
 
 for path in sorted(Path(__file__).parent.glob("*.py")):
-    if not path.name.startswith("_") and "def main(" in path.read_text():
-        print(f"\n== python -m benchmarks.{path.stem} {' '.join(sys.argv[1:])}", flush=True)
-        subprocess.run([sys.executable, "-m", f"benchmarks.{path.stem}", *sys.argv[1:]], check=False)
+    text = path.read_text()
+    if not path.name.startswith("_") and "def main(" in text:
+        words = [word for word in sys.argv[1:] if f'"{word}"' in text]
+        print(f"\n== python -m benchmarks.{path.stem} {' '.join(words)}", flush=True)
+        subprocess.run([sys.executable, "-m", f"benchmarks.{path.stem}", *words], check=False)

@@ -45,6 +45,7 @@ LINES = {
     "eave": {"color": "#333333", "linewidth": 0.9},
     "seam": {"color": "#444444", "linewidth": 0.9, "linestyle": ":"},
 }
+LABELLED_CELLS = 18  # of 3,600: a part that covers less gets no label
 HALO = [patheffects.withStroke(linewidth=2.5, foreground="white")]
 VIEW_PIXELS, VIEW_TILT, VIEW_TURN = 260, math.radians(42), math.radians(-28)
 
@@ -228,7 +229,7 @@ def draw_parts(axes: plt.Axes, building: Drawn, origin: np.ndarray) -> None:
                 ring = shapely.get_coordinates(polygon.exterior) - origin
                 axes.plot(*ring.T, color=part.colour, linewidth=2.6, alpha=0.8, zorder=2)
         seen = grid[top == k]
-        if len(seen):
+        if len(seen) > LABELLED_CELLS:
             place = seen[np.argmin(((seen - np.median(seen, axis=0)) ** 2).sum(axis=1))] - origin
             label = part.type.replace("asymmetric_", "asym. ").replace("_", " ")
             axes.text(*place, label, fontsize=8, ha="center", va="center", zorder=5, path_effects=HALO)

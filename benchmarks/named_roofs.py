@@ -1,0 +1,100 @@
+"""Are roofs called what they are? The demo's 26 buildings and 12 labelled real roofs through `reconstruct`.
+
+usage: python -m benchmarks.named_roofs [--data ../shared/data/roofn3d/labelled]
+
+The demo's buildings are reconstructed under their footprints: `main` counts those whose largest part has the true type,
+`all` those with the true number of parts, each found with its type (matching.py says how). The labelled roofs come
+without footprints and are right where the largest part has the label, an asymmetric gable counting as a gable; how many
+parts they have is printed beside. Every building that is not right is named.
+"""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+
+from hiproof import read_footprints, read_points, reconstruct
+from hiproof.model import Building, Footprint, Part, Roof
+from hiproof.read.assign import points_of_footprints
+from hiproof.simulate import SimBuilding, building_of, demo_files
+from hiproof.stages import moved
+
+from .compounds import compared
+from .judging import SHARED
+from .matching import right_types
+
+BUILDING_CLASS = 6
+
+
+def demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
+    """True building, points (n, 3) and footprint of each of the demo's buildings, in world metres."""
+    files = demo_files()
+    cloud = read_points(files["cloud"])
+    points = cloud.xyz[cloud.classification == BUILDING_CLASS]
+    footprints = list(read_footprints(files["footprints"]))
+    truth = {record["id"]: building_of(record) for record in json.loads(files["truth"].read_text())["buildings"]}
+    own = points_of_footprints(points, footprints)
+    return [(truth[f.id], points[index], f) for index, f in zip(own, footprints, strict=True)]
+
+
+def parts_in(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
+    """The parts of `roof` in the frame whose origin (world) is `origin` (3,)."""
+    shift = roof.frame.origin - origin
+    return tuple(
+        dataclasses.replace(
+            part, translation=part.translation + shift, pieces=tuple(moved(piece, shift) for piece in part.pieces)
+        )
+        for part in roof.parts
+    )
+
+
+def named(parts: tuple[Part, ...]) -> str:
+    return ", ".join(part.type for part in parts)
+
+
+def judged(truth: SimBuilding, model: Building) -> tuple[bool, bool]:
+    """Whether the largest part has its true type, and whether all parts are there with theirs."""
+    largest = max(truth.roof.parts, key=lambda part: part.area)
+    main = model.type in right_types(largest, hidden=False)
+    _, every, _ = compared(truth.roof, parts_in(model.roof, truth.roof.frame.origin))
+    return main, every
+
+
+def demo_report() -> str:
+    lines, right = [], []
+    for truth, points, footprint in demo():
+        model = reconstruct(points, footprint)
+        right.append(judged(truth, model))
+        if not all(right[-1]):
+            lines.append(f"  {footprint.id} ({truth.kind}): {named(truth.roof.parts)} taken for {named(model.parts)}")
+    main, every = np.sum(right, axis=0)
+    return "\n".join([f"demo: main type {main}, all parts {every} of {len(right)}", *lines])
+
+
+def labelled_report(folder: Path) -> str:
+    lines, right, parts = [], 0, []
+    files = sorted(folder.glob("*/*.pts"))
+    for path in files:
+        model = reconstruct(np.loadtxt(path)[:, :3])
+        name = "gable" if model.type == "asymmetric_gable" else model.type
+        right += name == path.parent.name
+        parts.append(len(model.parts))
+        if name != path.parent.name:
+            lines.append(f"  {path.parent.name} {path.stem} taken for {named(model.parts)}")
+    return "\n".join([f"labelled roofs: {right} of {len(files)} right, {np.mean(parts):.2f} parts a roof", *lines])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--data", type=Path, default=SHARED / "data/roofn3d/labelled")
+    arguments = parser.parse_args()
+    print(demo_report(), flush=True)
+    print(labelled_report(arguments.data))
+
+
+if __name__ == "__main__":
+    main()

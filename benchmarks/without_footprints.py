@@ -1,0 +1,72 @@
+"""Roofs of clouds that come without footprints: how near their points they lie, of how many parts and which types.
+
+usage: python -m benchmarks.without_footprints [--set stbarth ctview] [--each]
+
+The cloud of a set (class 6 of all its files) is split into buildings, each is reconstructed from its points alone. Printed: mean
+over buildings of the share of points within 0.2 m (all points of the building, those beside the roof counted as misses),
+median distance of points to the roof, parts and roof faces in the mean, the share of the area in plan that has a type
+other than "free", the area by type, milliseconds of `reconstruct`. `--each` adds a line a building, the largest first.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections import Counter
+
+import numpy as np
+
+from hiproof import read_points, reconstruct
+from hiproof.model import ROOF, Building
+from hiproof.read.split import split_buildings
+
+from .judging import SHARED, area_by_type, named_share
+
+SETS = ("stbarth", "ctview")
+
+
+def models_of(name: str) -> list[tuple[Building, float]]:
+    """Every building found in the set's cloud, reconstructed, and the seconds it took."""
+    cloud = read_points(*sorted((SHARED / "data" / name).glob("*.laz")))
+    outcomes = []
+    for found in split_buildings(cloud):
+        started = time.process_time()
+        outcomes.append((reconstruct(cloud.xyz[found.index], id=found.id), time.process_time() - started))
+    return outcomes
+
+
+def row(building: Building) -> str:
+    types = ", ".join(f"{count} {name}" for name, count in Counter(p.type for p in building.parts).most_common())
+    quality = building.quality
+    return f"  {building.id}: share {quality.share_within_20cm:.3f} of {quality.points} points; {types}"
+
+
+def report(name: str, outcomes: list[tuple[Building, float]]) -> str:
+    buildings = [building for building, _ in outcomes if building.solid is not None]
+    ms, areas = 1e3 * np.array([seconds for _, seconds in outcomes]), area_by_type(buildings)
+    return (
+        f"{name}: {len(buildings)} of {len(outcomes)} buildings modelled"
+        f"  share {np.mean([b.quality.share_within_20cm for b in buildings]):.4f}"
+        f"  distance median {np.median([b.quality.psd_mean for b in buildings]):.3f} m"
+        f"  parts {np.mean([len(b.parts) for b in buildings]):.2f} ({sum(len(b.parts) for b in buildings)})"
+        f"  faces {np.mean([len(b.solid.of_kind(ROOF)) for b in buildings]):.2f}"
+        f"  named {named_share(buildings):.3f}  ms median {np.median(ms):.1f} mean {ms.mean():.1f} max {ms.max():.0f}\n"
+        "  " + ", ".join(f"{type} {area / areas.total():.1%}" for type, area in areas.items())
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--set", nargs="+", choices=SETS, default=SETS)
+    parser.add_argument("--each", action="store_true", help="a line a building")
+    arguments = parser.parse_args()
+    for name in arguments.set:
+        outcomes = models_of(name)
+        print(report(name, outcomes), flush=True)
+        if arguments.each:
+            largest_first = sorted((b for b, _ in outcomes), key=lambda building: -building.quality.points)
+            print("\n".join(row(building) for building in largest_first))
+
+
+if __name__ == "__main__":
+    main()
