@@ -50,9 +50,11 @@ def make_town(houses: int = 4, density: float = 6.0, seed: int = 0) -> Town:
     return Town(np.round(xyz, 3), np.concatenate(classes), footprints)
 
 
-def write_cloud(path: Path, xyz: np.ndarray, classification: np.ndarray, crs: str | None = CRS) -> Path:
+def write_cloud(
+    path: Path, xyz: np.ndarray, classification: np.ndarray, crs: str | None = CRS, origin: np.ndarray = ORIGIN
+) -> Path:
     header = laspy.LasHeader(point_format=6, version="1.4")
-    header.scales, header.offsets = [0.001] * 3, np.floor(ORIGIN)
+    header.scales, header.offsets = [0.001] * 3, np.floor(origin)
     if crs:
         header.add_crs(pyproj.CRS(crs))
     las = laspy.LasData(header)
@@ -65,7 +67,7 @@ def write_cloud(path: Path, xyz: np.ndarray, classification: np.ndarray, crs: st
 def write_footprints(path: Path, footprints: dict[str, shapely.Polygon], crs: str | None = "EPSG:28992") -> Path:
     ids = np.array(list(footprints), object)
     geometry = shapely.to_wkb(np.array(list(footprints.values()), object))
-    pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Unknown", crs=crs, driver="GeoJSON")
+    pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Unknown", crs=crs)
     return path
 
 

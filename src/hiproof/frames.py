@@ -1,8 +1,54 @@
-"""The only place that shifts coordinates: a local origin per building, so that all geometry runs on small float64."""
+"""The only place that shifts and scales coordinates.
+
+Files count in the unit of their reference system; `Units` makes them metres where they are read and the files' own
+again where they are written. In between, the world is in metres, and each building has a local origin, so that all
+geometry runs on small float64.
+"""
 
 from dataclasses import dataclass
 
 import numpy as np
+
+
+@dataclass(frozen=True)
+class Units:
+    """Metres in one unit of a file's coordinates, in plan and in height, and the names of these units.
+
+    >>> feet = Units(0.3048, 0.3048, "foot", "foot")
+    >>> feet.to_metres([[10, 20, 30]]).round(4).tolist()
+    [[3.048, 6.096, 9.144]]
+    >>> str(Units(0.3048, 1.0, "foot", "metre"))
+    'foot, heights in metre'
+    """
+
+    plan: float = 1.0
+    height: float = 1.0
+    plan_name: str = "metre"
+    height_name: str = "metre"
+
+    @property
+    def are_metres(self) -> bool:
+        return self.plan == self.height == 1.0
+
+    def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
+        """World metres of a file's coordinates (n, 2) or (n, 3)."""
+        coordinates = np.asarray(coordinates, float)
+        return coordinates * self.factors[: coordinates.shape[-1]]
+
+    def from_metres(self, world: np.ndarray) -> np.ndarray:
+        """A file's coordinates of world metres (n, 2) or (n, 3)."""
+        world = np.asarray(world, float)
+        return world / self.factors[: world.shape[-1]]
+
+    @property
+    def factors(self) -> np.ndarray:
+        return np.array([self.plan, self.plan, self.height])
+
+    def __str__(self) -> str:
+        return self.plan_name if self.plan == self.height else f"{self.plan_name}, heights in {self.height_name}"
+
+
+METRES = Units()
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .frames import LocalFrame
+from .frames import METRES, LocalFrame, Units
 from .status import Status
 
 ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
@@ -21,12 +21,16 @@ ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
 
 @dataclass(frozen=True)
 class PointCloud:
-    """Points of some files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a pyproj CRS or None."""
+    """Points of some files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a pyproj CRS or None.
+
+    World metres are the files' coordinates times their units, `units`: of a CRS in feet they are not its coordinates.
+    """
 
     xyz: np.ndarray
     classification: np.ndarray | None = None
     crs: Any = None
     sources: tuple[str, ...] = ()
+    units: Units = METRES
 
     def __len__(self) -> int:
         return len(self.xyz)

@@ -26,6 +26,11 @@ class ReadSettings:
     building_classes: tuple[int, ...] = setting((6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)")
     ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points")
     crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say')
+    unit: str = setting(
+        "auto",
+        "unit of the clouds' coordinates; auto is that of their CRS, and metre where they name none",
+        choices=("auto", "metre", "foot", "us-survey-foot"),
+    )
     split_gap_m: float = setting(
         0.0, "without footprints: clear space that separates buildings; 0 adapts it to the density", "m", 0.0, 20.0
     )

@@ -8,7 +8,7 @@ from pyproj import CRS
 import hiproof.read.columns
 import hiproof.read.crs
 from hiproof.errors import InputError
-from hiproof.read.crs import combine, parse_crs, require_metres, same_horizontal, vertical_crs
+from hiproof.read.crs import combine, parse_crs, same_horizontal, units_of, vertical_crs
 from hiproof.write.naming import srs_name
 
 
@@ -43,10 +43,32 @@ def test_nothing_is_called_nothing():
     assert srs_name(CRS.from_proj4("+proj=tmerc +lon_0=9.3 +x_0=1234 +datum=WGS84")) is None
 
 
-@pytest.mark.parametrize("code", [4326, 2263, 6360])
-def test_degrees_and_feet_are_refused(code):
-    with pytest.raises(InputError, match="axes are metres"):
-        require_metres(CRS.from_epsg(code), "the cloud")
+@pytest.mark.parametrize("code", [4326, 4979, 4978, 6360])
+def test_what_counts_in_no_length_in_plan_is_refused(code):
+    with pytest.raises(InputError, match="expected the cloud in a"):
+        units_of(CRS.from_epsg(code), "the cloud")
+
+
+@pytest.mark.parametrize(
+    ("crs", "plan", "height"),
+    [
+        ("EPSG:7415", 1.0, 1.0),
+        ("EPSG:2263", 1200 / 3937, 1200 / 3937),
+        ("EPSG:2263+5703", 1200 / 3937, 1.0),
+        ("EPSG:2222+5703", 0.3048, 1.0),
+        (CRS("EPSG:2222").to_3d(), 0.3048, 1.0),
+        ("EPSG:26918+6360", 1.0, 1200 / 3937),
+    ],
+)
+def test_units_are_those_of_the_axes(crs, plan, height):
+    units = units_of(CRS(crs))
+    assert (units.plan, units.height) == pytest.approx((plan, height), rel=1e-12)
+
+
+def test_a_unit_that_contradicts_the_crs_is_refused():
+    assert units_of(None, named="foot").plan == units_of(CRS("EPSG:2222"), named="foot").plan == 0.3048
+    with pytest.raises(InputError, match="--unit"):
+        units_of(CRS("EPSG:7415"), named="foot")
 
 
 def test_a_name_nobody_knows_is_refused():

@@ -16,11 +16,12 @@ import shapely
 
 from .. import __version__
 from ..errors import InputError
+from ..frames import Units
 from ..model import Footprint
 from ..settings import Settings
 from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
-from ..write.naming import UniqueNames, gml_name
+from ..write.naming import FileUnits, UniqueNames, gml_name
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,18 @@ class Plan:
 
     def names_of(self, job: Job) -> tuple[str, str]:
         return self.names.get(job.index) or (job.id, gml_name(job.id))
+
+    @functools.cached_property
+    def units(self) -> Units:
+        """Units of the clouds' and the footprints' coordinates; everything in between counts in metres."""
+        from ..read.crs import units_of
+
+        return units_of(self.crs(), named=self.settings.read.unit)
+
+    @functools.cached_property
+    def file_units(self) -> FileUnits:
+        """Units of the coordinates in the files written."""
+        return FileUnits.of(self.crs(), self.units)
 
     def crs(self) -> Any:
         """The output's reference system, None where no input names one."""
@@ -89,9 +102,10 @@ def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
     return unusual
 
 
-def offset_of_jobs(jobs: tuple[Job, ...]) -> np.ndarray:
-    """The CityJSON file's offset (3,), from the first area that is one."""
-    return next((offset_of(job.area.bounds[:2]) for job in jobs if not job.area.is_empty), np.zeros(3))
+def offset_of_jobs(jobs: tuple[Job, ...], units: Units) -> np.ndarray:
+    """The CityJSON file's offset (3,) in its `units`, from the first area that is one."""
+    corners = (units.from_metres(job.area.bounds[:2]) for job in jobs if not job.area.is_empty)
+    return next(map(offset_of, corners), np.zeros(3))
 
 
 def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str, tuple[int, ...]]:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
 import numpy as np
 import shapely
 
-from ..errors import InputError
+from ..errors import InputError, InputWarning
+from ..frames import Units
+from ..settings import Settings
+from ..write.naming import FileUnits
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 
 TILE_M = 250.0
@@ -16,15 +20,22 @@ MOST_BUILDINGS_A_TILE = 100
 
 def make_plan(request, mark: str) -> Plan:
     """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
-    from ..read.crs import parse_crs
+    from ..read.crs import units_of
     from ..read.footprints import footprint_crs
 
-    headers, crs = read_headers(request.clouds)
-    crs = parse_crs(request.settings.read.crs) or crs
+    headers = read_headers(request.clouds)
+    cloud = crs_of_clouds(headers, request.settings)
+    footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
+    if cloud is None and footprints is not None:
+        refuse_degrees_alone(request.footprints, footprints)
+    crs = cloud or footprints
+    units = units_of(crs, "the point clouds", request.settings.read.unit)
+    if crs is None:
+        refuse_degrees_of(headers)
+    if cloud is None:
+        say_what_is_assumed(headers[0].path, footprints, units)
     if request.footprints:
-        jobs = jobs_from_footprints(request, headers, crs)
-        # a cloud that names no CRS is taken to be in the footprints'
-        crs = crs or footprint_crs(request.footprints)
+        jobs = jobs_from_footprints(request, headers, cloud, footprints, units)
     else:
         jobs = jobs_from_cloud(request)
     return Plan(
@@ -36,7 +47,7 @@ def make_plan(request, mark: str) -> Plan:
         settings=request.settings,
         fingerprint=mark,
         names=unusual_names(jobs),
-        translate=offset_of_jobs(jobs),
+        translate=offset_of_jobs(jobs, FileUnits.of(crs, units).cityjson),
     )
 
 
@@ -45,8 +56,8 @@ def absolute(name: str) -> str:
     return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
 
 
-def read_headers(clouds: tuple[str, ...]) -> tuple[list, object]:
-    """Headers of the readable point files, and the first CRS among them; one unreadable file does not end the run."""
+def read_headers(clouds: tuple[str, ...]) -> list:
+    """Headers of the readable point files; one unreadable file does not end the run."""
     from ..read.pointcloud import read_header
 
     headers, errors = [], []
@@ -57,16 +68,59 @@ def read_headers(clouds: tuple[str, ...]) -> tuple[list, object]:
             errors.append(error)
     if not headers:
         raise errors[0]
-    return headers, next((h.crs for h in headers if h.crs is not None), None)
+    return headers
 
 
-def jobs_from_footprints(request, headers: list, crs) -> tuple[Job, ...]:
-    from ..read.footprints import check_overlap, read_footprints
+def crs_of_clouds(headers: list, settings: Settings) -> object:
+    """The CRS that the settings give the clouds, else the one their headers agree on, None where none names one."""
+    from ..read.crs import parse_crs
+    from ..read.pointcloud import common_crs
 
-    footprints = read_footprints(request.footprints, id_attribute=request.id_attribute, target_crs=crs)
-    bounds = np.array([header.bounds for header in headers])
-    box = (*bounds[:, :2].min(axis=0), *bounds[:, 3:5].max(axis=0))
-    check_overlap(footprints, box, cloud_crs=crs)
+    return common_crs({header.path: header.crs for header in headers}, parse_crs(settings.read.crs))
+
+
+def plan_bounds(headers: list) -> np.ndarray:
+    """Boxes (n, 4) of the point files in plan, in their own unit; those without points left out."""
+    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
+    return bounds[np.isfinite(bounds).all(axis=1)]
+
+
+def refuse_degrees_of(headers: list) -> None:
+    from ..read.overlap import refuse_degrees
+
+    bounds = plan_bounds(headers)
+    refuse_degrees(bounds[:, :2], bounds[:, 2:], "the point clouds")
+
+
+def refuse_degrees_alone(path: str, crs) -> None:
+    """Footprints in degrees cannot stand in for the CRS of clouds that name none."""
+    from ..read.crs import described
+
+    if crs.is_geographic:
+        raise InputError(
+            f"expected footprints that tell the CRS of clouds that name none, got {path} in {described(crs)}, which is in "
+            "degrees; name the clouds' CRS with --crs, or reproject the footprints"
+        )
+
+
+def say_what_is_assumed(path: str, footprints: object, units: Units) -> None:
+    """One line where no cloud names a CRS: whatever is then taken for granted would else be taken in silence."""
+    from ..read.crs import described
+
+    taken = f"taken to be in the footprints' {described(footprints)}" if footprints else f"its unit is taken as {units}"
+    warnings.warn(f"{path}: names no CRS; {taken}; say otherwise with --crs or --unit", InputWarning)
+
+
+def jobs_from_footprints(request, headers: list, cloud_crs, footprints_crs, units: Units) -> tuple[Job, ...]:
+    from ..read.footprints import read_footprints
+    from ..read.overlap import check_overlap
+
+    footprints = read_footprints(
+        request.footprints, request.layer, request.id_attribute, cloud_crs, settings=request.settings
+    )
+    bounds = units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
+    if len(bounds):
+        check_overlap(footprints, bounds, footprints_crs, cloud_crs, units)
     return jobs_of_footprints(footprints)
 
 

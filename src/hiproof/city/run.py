@@ -14,6 +14,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError, OutputError
+from ..frames import METRES, Units
 from ..settings import Settings
 from ..write.files import atomic
 from .executors import WorkerLost, make_executor
@@ -37,6 +38,7 @@ class Request:
     footprints: str | None = None
     terrain: str | None = None
     id_attribute: str | None = None
+    layer: str | None = None
     settings: Settings = field(default_factory=Settings)
     jobs: int = 1
     scheduler: str | None = None
@@ -56,6 +58,7 @@ class Summary:
     broken_inputs: tuple[tuple[str, str], ...]
     failures: tuple[tuple[str, str], ...]
     seconds: dict[str, float]
+    units: Units = METRES
 
     @property
     def exit_code(self) -> int:
@@ -85,7 +88,7 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
         clock.lap("solve")
         if ledger.get("merged") != "yes":
             merge(plan, state, Path(request.out), progress)
-        summary = summarise(request, ledger, clock)
+        summary = summarise(request, plan, ledger, clock)
         write_run_record(request, plan, summary)
         ledger.set(merged="yes")
         clean(state)
@@ -257,7 +260,7 @@ def refuse_without_points(plan: Plan, ledger: Ledger) -> None:
         )
 
 
-def summarise(request: Request, ledger: Ledger, clock: Clock) -> Summary:
+def summarise(request: Request, plan: Plan, ledger: Ledger, clock: Clock) -> Summary:
     clock.lap("merge")
     broken = tuple((request_name(row[0], request), row[5]) for row in ledger.tasks() if row[3] == "failed")
     return Summary(
@@ -270,6 +273,7 @@ def summarise(request: Request, ledger: Ledger, clock: Clock) -> Summary:
         broken_inputs=broken,
         failures=tuple(ledger.failures()),
         seconds=clock.seconds,
+        units=plan.units,
     )
 
 
@@ -288,8 +292,14 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
     record = {
         "hiproof": __version__,
         "settings": plan.settings.to_dict(),
-        "inputs": {"clouds": list(request.clouds), "footprints": request.footprints, "terrain": request.terrain},
+        "inputs": {
+            "clouds": list(request.clouds),
+            "footprints": request.footprints,
+            "layer": request.layer,
+            "terrain": request.terrain,
+        },
         "crs": plan.crs_wkt,
+        "units": {"coordinates": str(plan.units), "attributes": "metre", **metres_in(plan.units)},
         "jobs": request.jobs,
         "buildings": summary.buildings,
         "by_status": summary.by_status,
@@ -301,6 +311,10 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
     }
     with atomic(Path(request.out) / "run.json") as beside:
         Path(beside).write_text(json.dumps(record, indent=1) + "\n")
+
+
+def metres_in(units: Units) -> dict[str, float]:
+    return {"metres_in_plan_unit": units.plan, "metres_in_height_unit": units.height}
 
 
 def clean(state: Path) -> None:

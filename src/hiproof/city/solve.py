@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
+from ..frames import Units
 from ..model import Building
 from ..read.assign import PointGrid
 from ..read.terrain import Terrain, TerrainChain, read_terrain
@@ -56,7 +57,7 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
     root = Path(folder)
     plan = load_plan(root)
     surroundings = Surroundings(
-        load_points(root, tile), terrain_model(plan.terrain, plan.crs_wkt, threading.get_ident())
+        load_points(root, tile), terrain_model(plan.terrain, plan.crs_wkt, plan.units, threading.get_ident())
     )
     parts, rows = [], []
     for index in plan.tiles[tile]:
@@ -74,11 +75,11 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
 
 
 @functools.lru_cache(maxsize=32)
-def terrain_model(path: str | None, crs_wkt: str | None, thread: int) -> Terrain | None:
+def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: int) -> Terrain | None:
     """The terrain model, opened once a thread: GDAL's data sets are not to be shared."""
     from pyproj import CRS
 
-    return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None) if path else None
+    return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
 
 
 def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Building, Fragments]:
@@ -93,7 +94,7 @@ def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Buildin
         if len(used) < len(points) and building.status is Status.MODELLED:
             detail = f"{building.status.value}; fitted to {len(used)} of its {len(points)} points"
             building = dataclasses.replace(building, detail=detail)
-        return fragments(building, plan.names_of(job), plan.translate)
+        return fragments(building, plan.names_of(job), plan.translate, plan.file_units)
     except MemoryError:
         raise
     except Exception as error:
@@ -105,7 +106,7 @@ def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:
     """A building that hiproof failed on, with what the input said of it."""
     attributes = job.footprint.attributes if job.footprint else {}
     building = Building(job.id, Status.INTERNAL_ERROR, detail, footprint=job.area, attributes=attributes)
-    return fragments(building, plan.names_of(job), plan.translate)
+    return fragments(building, plan.names_of(job), plan.translate, plan.file_units)
 
 
 def ledger_row(position: int, building: Building, seconds: float) -> tuple:

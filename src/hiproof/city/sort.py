@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from ..frames import Units
 from ..model import PointCloud
 from ..read.assign import PointGrid
 from ..read.cell_kernel import mask_at
@@ -159,7 +160,7 @@ def sort_cloud(folder: str, number: int) -> dict:
     plan, reaches = load_plan(root), reaches_of(root, (root / "plan.pickle").stat().st_mtime_ns)
     gatherer, broken = Gatherer(reaches, plan.settings.read, root / "points", number), None
     try:
-        for cloud in wanted_points(plan.clouds[number], reaches):
+        for cloud in wanted_points(plan.clouds[number], reaches, plan.units):
             gatherer.add(cloud)
     except MemoryError:
         raise
@@ -171,30 +172,32 @@ def sort_cloud(folder: str, number: int) -> dict:
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
-def wanted_points(path: str, reaches: Reaches) -> Iterator[PointCloud]:
-    """All chunks of a file; of one with a spatial index only what holds buildings' surroundings."""
+def wanted_points(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
+    """All chunks of a file in `units`; of one with a spatial index only what holds buildings' surroundings."""
     if file_kind(path) != "las":
-        return iter_points(path)
+        return iter_points(path, units=units)
     if is_copc(path):
-        return points_by_squares(path, reaches)
+        return points_by_squares(path, reaches, units)
     index = read_lax(path)
-    return iter_points(path, runs=None if index is None else index.runs_meeting(reaches.bounds))
+    boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
+    return iter_points(path, runs=None if index is None else index.runs_meeting(boxes), units=units)
 
 
-def points_by_squares(path: str, reaches: Reaches) -> Iterator[PointCloud]:
+def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
     """Points of a COPC file in the boxes that hold buildings' surroundings.
 
     The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
     are decoded twice. A point on a border may come twice, as in files that overlap.
     """
-    xmin, ymin, _, xmax, ymax, _ = read_header(path).bounds
+    (xmin, ymin), (xmax, ymax) = units.to_metres(np.reshape(read_header(path).bounds, (2, 3))[:, :2])
     for x in np.arange(np.floor(xmin / QUERY_M), np.floor(xmax / QUERY_M) + 1) * QUERY_M:
         for y in np.arange(np.floor(ymin / QUERY_M), np.floor(ymax / QUERY_M) + 1) * QUERY_M:
             square = (x, y, x + QUERY_M, y + QUERY_M)
             near = np.array([reaches.of(tile).bounds for tile in reaches.near(square)])
             if len(near):
                 low, high = near[:, :2].min(axis=0), near[:, 2:].max(axis=0)
-                yield from iter_points(path, box=(*np.maximum(square[:2], low), *np.minimum(square[2:], high)))
+                box = (*np.maximum(square[:2], low), *np.minimum(square[2:], high))
+                yield from iter_points(path, box=box, units=units)
 
 
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:

@@ -45,7 +45,10 @@ def reconstruct(
     clouds: Clouds,
     out: Annotated[Path, typer.Option(help="folder for the results")],
     footprints: Annotated[str | None, typer.Option(help="building polygons; without them the cloud is split")] = None,
+    layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
     terrain: Annotated[str | None, typer.Option(help="terrain model (GeoTIFF); else the cloud's ground class")] = None,
+    crs: Annotated[str | None, typer.Option(help="CRS of the clouds, such as EPSG:7415 [default: as they say]")] = None,
+    unit: Annotated[str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")] = None,
     id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
     building_class: Annotated[list[int] | None, typer.Option(help="LAS class of roof points [default: 6]")] = None,
     ground_class: Annotated[list[int] | None, typer.Option(help="LAS class of terrain points [default: 2]")] = None,
@@ -68,13 +71,14 @@ def reconstruct(
     from .reconstruct import run
 
     options = {
-        "read": {"building_classes": building_class, "ground_classes": ground_class},
+        "read": {"building_classes": building_class, "ground_classes": ground_class, "crs": crs, "unit": unit},
         "fit": {"types": types.split(",") if types else None, "objective": objective, "parts": parts},
         "compound": {"detail": detail},
         "segment": {"enabled": network},
         "city": {"parquet": parquet, "models": models},
     }
-    raise typer.Exit(run(clouds, out, footprints, terrain, id_attribute, options, config, jobs, scheduler, restart))
+    inputs = {"footprints": footprints, "layer": layer, "terrain": terrain, "id_attribute": id_attribute}
+    raise typer.Exit(run(clouds, out, inputs, options, config, jobs, scheduler, restart))
 
 
 @app.command()

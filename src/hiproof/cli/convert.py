@@ -23,13 +23,15 @@ def convert(
 ) -> None:
     """Convert the models of a run to glTF binary or OBJ, with building ids and roof types as properties."""
     from ..evaluate.models import read_models, run_models
+    from ..evaluate.run import run_record, run_units
     from ..write.gltf import write_glb
     from ..write.obj import write_obj
 
     models = run_models(folder)
     path = out or Path(folder) / f"buildings.{format.value}"
     write = {Format.glb: write_glb, Format.obj: write_obj}[format]
-    buildings = ((m.id, m.roof_type, m.solid, m.attributes) for m in read_models(models) if m.solid is not None)
+    found = read_models(models, run_units(run_record(folder)))
+    buildings = ((m.id, m.roof_type, m.solid, m.attributes) for m in found if m.solid is not None)
     count = write(path, buildings, crs=reference_system(models))
     typer.echo(f"{path}: {count} buildings")
 

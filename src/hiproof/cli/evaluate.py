@@ -23,6 +23,7 @@ def evaluate(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     clouds: Annotated[list[str], typer.Argument(help="point files to measure against")],
     footprints: Annotated[str | None, typer.Option(help="building polygons; else the models' own outlines")] = None,
+    layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
     reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
     out: Annotated[Path | None, typer.Option(help="folder for evaluation.csv and .json [default: the run's]")] = None,
 ) -> None:
@@ -31,7 +32,7 @@ def evaluate(
     from ..evaluate.run import evaluate_run
     from ..write.files import atomic_file
 
-    run = evaluate_run(folder, clouds, footprints, reference)
+    run = evaluate_run(folder, clouds, footprints, reference, layer)
     place = Path(out or folder)
     for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
         with atomic_file(place / name) as file:

@@ -15,24 +15,20 @@ from ..status import Status
 def run(
     clouds: list[str],
     out: Path,
-    footprints: str | None,
-    terrain: str | None,
-    id_attribute: str | None,
+    inputs: dict[str, str | None],
     options: dict[str, dict[str, Any]],
     config: Path | None,
     jobs: int,
     scheduler: str | None,
     restart: bool,
 ) -> int:
-    """Run the main job and print its summary; returns the exit code."""
+    """Run the main job and print its summary; returns the exit code. `inputs` are further fields of the request."""
     given = {s: {k: v for k, v in changes.items() if v is not None} for s, changes in options.items()}
     settings = (Settings.from_toml(config) if config else Settings()).replace({s: c for s, c in given.items() if c})
     request = Request(
         clouds=tuple(map(str, expand_paths(tuple(clouds)))),
         out=out,
-        footprints=footprints,
-        terrain=terrain,
-        id_attribute=id_attribute,
+        **inputs,
         settings=settings,
         jobs=jobs,
         scheduler=scheduler,
@@ -90,6 +86,8 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
             f", {100 * summary.median_share:.0f} % of points within 0.2 m" if summary.median_share is not None else ""
         )
         show(f"median over buildings: {summary.median_psd:.3f} m from points to roof{share}")
+    if not summary.units.are_metres:
+        show(f"coordinates are in {summary.units}, as in the input; attributes and parameters in metres")
     show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
     for name, why in summary.broken_inputs:
         show(f"[red]could not be read:[/red] {name}: {why}")

@@ -14,6 +14,7 @@ def report(
         list[str] | None, typer.Argument(help="point files [default: those of the run, if still there]")
     ] = None,
     footprints: Annotated[str | None, typer.Option(help="building polygons [default: those of the run]")] = None,
+    layer: Annotated[str | None, typer.Option(help="layer of the footprints")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write [default: report.html in the folder]")] = None,
 ) -> None:
     """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings, settings."""
@@ -21,7 +22,9 @@ def report(
     from ..evaluate.run import evaluate_run, run_inputs
 
     path = out or Path(folder) / "report.html"
-    known_clouds, known_footprints = run_inputs(folder)
-    run = evaluate_run(folder, clouds or known_clouds, footprints or known_footprints)
+    known_clouds, known_footprints, known_layer = run_inputs(folder)
+    if footprints is None:
+        footprints, layer = known_footprints, layer or known_layer
+    run = evaluate_run(folder, clouds or known_clouds, footprints, layer=layer)
     write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
     typer.echo(f"{path}: {len(run.models)} buildings, {path.stat().st_size / 1e6:.1f} MB")

@@ -11,7 +11,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..frames import METRES, Units
 from ..model import ROOF, WALL, Face, Solid
+from ..write.naming import units_named
 
 RUN_MODELS = "buildings.city.jsonl"
 
@@ -43,18 +45,20 @@ def run_models(folder: Path) -> Path:
     return path
 
 
-def read_models(path: str | Path) -> Iterator[BuildingModel]:
-    """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts joined.
+def read_models(path: str | Path, otherwise: Units = METRES) -> Iterator[BuildingModel]:
+    """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts joined, in metres.
 
-    Of several solids of one object that with the highest level of detail counts. Raises InputError for files that
-    cannot be read as CityJSON.
+    Of several solids of one object that with the highest level of detail counts. `otherwise` are the units of a file
+    that names no CRS. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
     """
     path = Path(path)
     try:
-        transform = None
+        transform, units = {"scale": [1, 1, 1], "translate": [0, 0, 0]}, otherwise
         for document in _documents(path):
             transform = document.get("transform", transform)
-            yield from _buildings(document, transform or {"scale": [1, 1, 1], "translate": [0, 0, 0]})
+            if name := document.get("metadata", {}).get("referenceSystem"):
+                units = units_named(name, otherwise)
+            yield from _buildings(document, transform, units)
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise InputError(f"expected a CityJSON file at {path}, got: {error}; check the path") from error
     except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
@@ -69,8 +73,9 @@ def _documents(path: Path) -> Iterator[dict[str, Any]]:
         yield from (json.loads(line) for line in file if line.strip())
 
 
-def _buildings(document: dict[str, Any], transform: dict[str, Any]) -> Iterator[BuildingModel]:
+def _buildings(document: dict[str, Any], transform: dict[str, Any], units: Units) -> Iterator[BuildingModel]:
     vertices = np.asarray(document["vertices"], float).reshape(-1, 3) * transform["scale"] + transform["translate"]
+    vertices = units.to_metres(vertices)
     objects = document["CityObjects"]
     for id, city_object in objects.items():
         if city_object["type"] != "Building":

@@ -12,6 +12,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..frames import Units
 from ..settings import Settings
 from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
 from .metrics import plan_outline
@@ -39,15 +40,20 @@ class EvaluatedRun:
 
 
 def evaluate_run(
-    folder: Path, clouds: Sequence[str] = (), footprints: str | None = None, reference: str | None = None
+    folder: Path,
+    clouds: Sequence[str] = (),
+    footprints: str | None = None,
+    reference: str | None = None,
+    layer: str | None = None,
 ) -> EvaluatedRun:
     """Read the models of `folder` and measure them against `clouds`; without clouds no residual figures come out.
 
-    The building classes are those the run was made with. Raises InputError for what cannot be read.
+    The building classes, the CRS and the units are those the run was made with; `layer` is that of the footprints.
+    Raises InputError for what cannot be read.
     """
-    models = tuple(read_models(run_models(folder)))
     record = run_record(folder)
-    outlines = footprint_of_each(models, footprints, record)
+    models = tuple(read_models(run_models(folder), run_units(record)))
+    outlines = footprint_of_each(models, footprints, layer, record)
     areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
     if clouds:
         points = points_by_outline(building_points(clouds, record, areas), areas)
@@ -69,18 +75,19 @@ def run_record(folder: Path) -> dict[str, Any]:
         ) from error
 
 
-def run_inputs(folder: Path) -> tuple[list[str], str | None]:
-    """Clouds and footprints a run was made from, as far as they are still where they were."""
+def run_inputs(folder: Path) -> tuple[list[str], str | None, str | None]:
+    """Clouds, footprints and their layer that a run was made from, as far as they are still where they were."""
     inputs = run_record(folder).get("inputs", {})
     clouds = [path for path in inputs.get("clouds") or [] if Path(path).exists()]
     footprints = inputs.get("footprints")
-    return clouds, footprints if footprints and Path(footprints).exists() else None
+    return clouds, footprints if footprints and Path(footprints).exists() else None, inputs.get("layer")
 
 
 def run_settings(record: dict[str, Any]) -> Settings:
     """The settings a run was made with, as far as this version knows them."""
-    classes = record.get("settings", {}).get("read", {}).get("building_classes")
-    return Settings.from_dict({"read": {"building_classes": classes}}) if classes else Settings()
+    read = record.get("settings", {}).get("read", {})
+    known = {name: read[name] for name in ("building_classes", "unit") if read.get(name)}
+    return Settings.from_dict({"read": {**known, "crs": record.get("crs") or ""}})
 
 
 def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]) -> np.ndarray:
@@ -95,22 +102,26 @@ def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequen
     return cloud.xyz[np.isin(cloud.classification, settings.read.building_classes)]
 
 
-def footprint_of_each(models: Sequence[BuildingModel], path: str | None, record: dict[str, Any]) -> list[Any]:
+def footprint_of_each(
+    models: Sequence[BuildingModel], path: str | None, layer: str | None, record: dict[str, Any]
+) -> list[Any]:
     """The footprint polygon of each model, None without one."""
     if path is None:
         return [None] * len(models)
     from ..read.footprints import read_footprints
 
-    footprints = read_footprints(path, target_crs=run_crs(record))
+    footprints = read_footprints(path, layer, settings=run_settings(record))
     areas = [(f.id, shapely.make_valid(f.polygon)) for f in footprints]
     matches = match_by_id_or_overlap(models, areas)
     return [None if match is None else areas[match][1] for match in matches]
 
 
-def run_crs(record: dict[str, Any]) -> Any:
-    from pyproj import CRS
+def run_units(record: dict[str, Any]) -> Units:
+    """Units of the coordinates a run was made from; metres where nothing is known of it."""
+    from ..read.crs import parse_crs, units_of
 
-    return CRS.from_user_input(record["crs"]) if record.get("crs") else None
+    read = run_settings(record).read
+    return units_of(parse_crs(read.crs), "the run", read.unit)
 
 
 def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:

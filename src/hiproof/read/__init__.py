@@ -11,7 +11,8 @@ from typing import Any
 
 _HOME = {
     **dict.fromkeys(("read_points", "iter_points", "read_header", "PointFileHeader"), "pointcloud"),
-    **dict.fromkeys(("read_footprints", "footprint_crs", "check_overlap"), "footprints"),
+    **dict.fromkeys(("read_footprints", "footprint_crs"), "footprints"),
+    "check_overlap": "overlap",
     **dict.fromkeys(("points_of_footprints", "points_near_footprints", "PointGrid"), "assign"),
     **dict.fromkeys(("read_terrain", "terrain_from_points", "lowest_points", "Terrain", "TerrainChain"), "terrain"),
     **dict.fromkeys(("split_buildings", "FoundBuilding", "adapted_gap", "plan_density"), "split"),

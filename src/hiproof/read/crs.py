@@ -1,4 +1,4 @@
-"""Coordinate reference systems: are two the same in plan, what is one called in a CityGML file, how do two combine."""
+"""Coordinate reference systems: are two the same in plan, in which units do they count, how do two combine."""
 
 from __future__ import annotations
 
@@ -8,6 +8,15 @@ from pyproj import CRS
 from pyproj.exceptions import CRSError
 
 from ..errors import InputError
+from ..frames import METRES, Units
+
+NAMED_UNITS = {
+    "auto": METRES,
+    "metre": METRES,
+    "foot": Units(0.3048, 0.3048, "foot", "foot"),
+    "us-survey-foot": Units(1200 / 3937, 1200 / 3937, "US survey foot", "US survey foot"),
+}
+"""Units by the setting's name, for coordinates without a CRS."""
 
 
 def parse_crs(value: Any) -> CRS | None:
@@ -75,13 +84,56 @@ def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
     return CRS.from_epsg(code) if code is not None else compound
 
 
-def require_metres(crs: CRS | None, source: str) -> None:
-    """Raise InputError where `crs` counts in degrees or feet: every length in hiproof is a metre. Unknown CRSs pass."""
+def units_of(crs: CRS | None, source: str = "the coordinates", named: str = "auto") -> Units:
+    """Units that coordinates in `crs` count in; heights of a CRS without any are taken to be in the plan's unit.
+
+    `named` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS in degrees, and for a name
+    that contradicts the CRS; `source` is what the message calls the coordinates.
+
+    >>> str(units_of(CRS("EPSG:2263"))), str(units_of(CRS("EPSG:2263+5703"))), str(units_of(None, named="foot"))
+    ('US survey foot', 'US survey foot, heights in metre', 'foot')
+    """
     if crs is None:
-        return
-    units = {axis.unit_name for axis in crs.axis_info if axis.unit_name} - {"metre"}
-    if units:
+        return NAMED_UNITS[named]
+    plan, height = horizontal_crs(crs), vertical_crs(crs)
+    if plan.is_geographic or plan.is_geocentric:
         raise InputError(
-            f"expected {source} in a CRS whose axes are metres, got {crs.name} in {', '.join(sorted(units))}; "
+            f"expected {source} in a projected CRS, got {crs.name} in "
+            f"{'degrees' if plan.is_geographic else 'geocentric coordinates'}; "
             "reproject it first, to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
         )
+    if plan.is_vertical:
+        raise InputError(f"expected {source} in a CRS of the plan, got {crs.name}, which is one of heights alone")
+    across = plan.axis_info[0]
+    up = height.axis_info[0] if height is not None else crs.axis_info[2] if len(crs.axis_info) == 3 else across
+    units = Units(across.unit_conversion_factor, up.unit_conversion_factor, across.unit_name, up.unit_name)
+    if named != "auto" and abs(NAMED_UNITS[named].plan / units.plan - 1) > 1e-9:
+        raise InputError(
+            f"expected {source} in {named}, as --unit says, got {crs.name} in {units}; leave --unit out, "
+            "or say with --crs which CRS is right"
+        )
+    return units
+
+
+def same_heights(first: CRS, second: CRS) -> bool:
+    """Whether heights mean the same in both; a CRS that names none goes with any whose heights are in its unit.
+
+    >>> same_heights(CRS("EPSG:7415"), CRS("EPSG:28992")), same_heights(CRS("EPSG:2263+6360"), CRS("EPSG:2263+5703"))
+    (True, False)
+    """
+    if abs(units_of(first).height / units_of(second).height - 1) > 1e-9:
+        return False
+    codes = [None if height is None else epsg_code(height) for height in (vertical_crs(first), vertical_crs(second))]
+    return None in codes or codes[0] == codes[1]
+
+
+def described(crs: CRS | None) -> str:
+    """What a message calls a CRS: its EPSG code and name.
+
+    >>> described(CRS("EPSG:28992")), described(None)
+    ('EPSG:28992 (Amersfoort / RD New)', 'no CRS')
+    """
+    if crs is None:
+        return "no CRS"
+    code = epsg_code(crs)
+    return crs.name if code is None else f"EPSG:{code} ({crs.name})"

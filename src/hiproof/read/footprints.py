@@ -16,7 +16,7 @@ from pyproj import CRS, Transformer
 from ..errors import InputError, InputWarning
 from ..model import Footprint
 from ..settings import Settings
-from .crs import parse_crs, require_metres, same_horizontal
+from .crs import described, parse_crs, same_horizontal, units_of
 from .database import is_database, read_table, table_crs
 from .polygons import simple_polygons
 from .remote import is_url
@@ -34,18 +34,23 @@ def read_footprints(
     target_crs: Any = None,
     settings: Settings | None = None,
 ) -> tuple[Footprint, ...]:
-    """Footprints of a file, URL or data source name, in `target_crs` (the cloud's) where one is given.
+    """Footprints of a file, URL or data source name in world metres, in `target_crs` (the cloud's) where one is given.
 
-    Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the feature's id; polygons
+    `layer` names one of a file's layers, which may be left out where only one holds geometries. Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the feature's id; polygons
     without area stay, with an empty polygon. Ids come from `id_attribute`, else from the first usual column without
-    gaps or repeats, else they are the feature's number. `settings.read.crs` stands in for a `target_crs` that is None.
-    Raises InputError for what cannot be read, holds no features, or names a CRS that cannot be transformed.
+    gaps or repeats, else they are the feature's number. `settings.read.crs` stands in for a `target_crs` that is None,
+    `settings.read.unit` for the unit where there is no CRS. Raises InputError for what cannot be read, holds no features
+    or several layers, or names a CRS that cannot be transformed.
     """
-    target = parse_crs(target_crs) or parse_crs((settings or Settings()).read.crs)
+    read = (settings or Settings()).read
+    target = parse_crs(target_crs) or parse_crs(read.crs)
     meta, numbers, geometries, columns = read_features(path, layer)
     attributes = attribute_rows(list(meta["fields"]), columns, len(geometries))
     ids = feature_ids(attributes, numbers, id_attribute, path)
-    geometries = transformed(geometries, parse_crs(meta["crs"]), target, path)
+    source = parse_crs(meta["crs"])
+    geometries = transformed(geometries, source, target, path)
+    units = units_of(target or source, f"the footprints of {path}", read.unit)
+    geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
     return tuple(unique_ids(split_features(ids, geometries, attributes, path), path))
 
 
@@ -53,7 +58,22 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
     if is_database(path):
         return parse_crs(table_crs(path))
+    layer = one_layer(path, layer)
     return parse_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
+
+
+def one_layer(path: str | Path, layer: str | int | None) -> str | int | None:
+    """`layer`, or the only layer of a file that holds geometries. Raises InputError, listing them, where several do."""
+    if layer is not None:
+        return layer
+    named = reading(lambda: pyogrio.list_layers(str(path)), path)
+    layers = [name for name, geometry in named if geometry is not None]
+    if len(layers) > 1:
+        raise InputError(
+            f"expected one layer of footprints in {path}, got {len(layers)}: {', '.join(map(str, layers))}; "
+            "name one with --layer"
+        )
+    return layers[0] if layers else None
 
 
 def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
@@ -65,6 +85,7 @@ def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.n
             raise InputError(f"expected footprints at {path}, got no such file; check the path")
         if Path(path).is_file() and Path(path).stat().st_size == 0:
             raise InputError(f"expected footprints in {path}, got an empty file; copy or download it again")
+    layer = one_layer(path, layer)
     meta, numbers, wkb, columns = reading(
         lambda: pyogrio.raw.read(str(path), layer=layer, return_fids=True, datetime_as_string=True), path
     )
@@ -147,13 +168,9 @@ def id_text(value: Any) -> str:
 def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path) -> np.ndarray:
     """Geometries in plan in the target CRS. Raises InputError where that is impossible or leads to no numbers."""
     geometries = shapely.force_2d(geometries)
-    if target is None:
-        require_metres(source, f"the footprints of {path}")
-        return geometries
-    if source is None:
-        warnings.warn(f"{path}: names no coordinate reference system; the cloud's is assumed", InputWarning)
-        return geometries
-    if same_horizontal(source, target):
+    if source is None and target is not None:
+        warnings.warn(f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning)
+    if source is None or target is None or same_horizontal(source, target):
         return geometries
     transformer = Transformer.from_crs(source, target, always_xy=True)
     moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1])))
@@ -168,7 +185,7 @@ def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, 
 def split_features(
     ids: list[str], geometries: np.ndarray, attributes: list[dict[str, Any]], path: str | Path
 ) -> list[Footprint]:
-    footprints, mended, empty = [], 0, 0
+    footprints, mended, empty, split = [], 0, 0, []
     invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries))
     for id, geometry, row, was_invalid in zip(ids, geometries, attributes, invalid, strict=True):
         polygons = simple_polygons(geometry)
@@ -177,8 +194,12 @@ def split_features(
         if len(polygons) == 1:
             footprints.append(Footprint(id, polygons[0], row))
         else:
+            split.append(len(polygons))
             parts = enumerate(polygons, start=1)
             footprints += [Footprint(f"{id}-{number}", polygon, {**row, "part_of": id}) for number, polygon in parts]
+    if split:
+        many = "1 feature of several polygons" if len(split) == 1 else f"{len(split)} features of several polygons"
+        warnings.warn(f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...", InputWarning)
     if mended:
         warnings.warn(f"{path}: {mended} invalid footprints were repaired", InputWarning)
     if empty:
@@ -209,34 +230,3 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
             f"{path}: {copies} footprints repeat another's polygon; see their attribute copy_of", InputWarning
         )
     return result
-
-
-def check_overlap(
-    footprints: Sequence[Footprint],
-    bounds: Sequence[float] | Sequence[Sequence[float]],
-    footprints_crs: CRS | None = None,
-    cloud_crs: CRS | None = None,
-) -> None:
-    """Raise InputError when no footprint meets the cloud's `bounds`, of one file or of several.
-
-    Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax, ymax, zmax). The CRSs
-    only name in the message what the two sides were read as.
-    """
-    boxes = shapely.bounds([footprint.polygon for footprint in footprints if not footprint.polygon.is_empty])
-    files = np.atleast_2d(np.asarray(bounds, float))
-    files = files[:, [0, 1, 3, 4]] if files.shape[1] == 6 else files
-    if not len(boxes) or len(shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*files.T))[0]):
-        return
-    raise InputError(
-        f"expected footprints that overlap the cloud in {extent(files)} ({name_of(cloud_crs)}), got footprints in "
-        f"{extent(boxes)} ({name_of(footprints_crs)}); check the CRS each file names, or set [read] crs"
-    )
-
-
-def extent(boxes: np.ndarray) -> str:
-    (xmin, ymin), (xmax, ymax) = boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)
-    return f"x {xmin:.1f} to {xmax:.1f}, y {ymin:.1f} to {ymax:.1f}"
-
-
-def name_of(crs: CRS | None) -> str:
-    return "no CRS named" if crs is None else crs.name

@@ -12,6 +12,8 @@ import laspy
 import numpy as np
 
 from ..errors import InputError, InputWarning
+from .crs import combine
+from .geokeys import heights_of_keys
 from .remote import opened
 
 Chunk = tuple[np.ndarray, np.ndarray | None]  # xyz (n, 3) float64, classification (n,) uint8 or None
@@ -58,7 +60,7 @@ def refuse_missing_records(path: str | Path) -> None:
 def las_crs(header: laspy.LasHeader, path: str | Path):
     """The header's pyproj CRS, None where it names none or none that pyproj understands (then with a warning)."""
     try:
-        return header.parse_crs()
+        return combine(header.parse_crs(), heights_of_keys(header))
     except Exception as error:  # laspy lets through whatever pyproj makes of the records
         warnings.warn(
             f"{path}: its coordinate reference system cannot be understood ({error}); taken as unknown", InputWarning

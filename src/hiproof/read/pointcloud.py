@@ -13,10 +13,11 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from ..errors import InputError, InputWarning
+from ..frames import METRES, Units
 from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
-from .crs import parse_crs, require_metres, same_horizontal
+from .crs import described, parse_crs, same_heights, same_horizontal, units_of, vertical_crs
 from .remote import is_url
 
 LAS_SUFFIXES = (".las", ".laz")
@@ -30,7 +31,7 @@ Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metre
 
 @dataclass(frozen=True)
 class PointFileHeader:
-    """What a point file says of itself; `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax)."""
+    """What a point file says of itself; `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit."""
 
     path: str
     bounds: tuple[float, float, float, float, float, float]
@@ -40,15 +41,16 @@ class PointFileHeader:
 
 
 def read_points(*paths: str | Path, settings: Settings | None = None, box: Box | None = None) -> PointCloud:
-    """All points of the files, folders or wildcards `paths`, those outside `box` in plan left out.
+    """All points of the files, folders or wildcards `paths` in world metres, those outside `box` in plan left out.
 
     Classes are kept, NaN and infinite coordinates dropped with an InputWarning. The CRS is `settings.read.crs` where
-    that is given, else the files' own. Raises InputError for what is missing, unreadable, empty, in degrees or feet, or
-    in different CRSs.
+    that is given, else the files' own; coordinates in feet are made metres, and `units` of the cloud tells what they
+    were. Raises InputError for what is missing, unreadable, empty, in degrees, or in different CRSs.
     """
-    files = expand_paths(paths)
-    crs = common_crs(files, settings)
-    clouds = [chunk for file in files for chunk in iter_points(file, box=box)]
+    files, read = expand_paths(paths), (settings or Settings()).read
+    crs = common_crs({str(file): file_crs(file) for file in files}, parse_crs(read.crs))
+    units = units_of(crs, "the point cloud", read.unit)
+    clouds = [chunk for file in files for chunk in iter_points(file, box=box, units=units)]
     xyz = np.concatenate([cloud.xyz for cloud in clouds]) if clouds else np.empty((0, 3))
     if not len(xyz):
         where = "" if box is None else f" inside the box {tuple(float(side) for side in box)}"
@@ -56,13 +58,19 @@ def read_points(*paths: str | Path, settings: Settings | None = None, box: Box |
             f"expected points{where} in {', '.join(map(str, files))}, got none; "
             + ("check the file" if box is None else "check the box against the files' bounds and CRS")
         )
-    return PointCloud(xyz, joined_classes(clouds), crs, tuple(str(file) for file in files))
+    return PointCloud(xyz, joined_classes(clouds), crs, tuple(str(file) for file in files), units)
 
 
 def iter_points(
-    path: str | Path, chunk_points: int = CHUNK_POINTS, box: Box | None = None, runs: np.ndarray | None = None
+    path: str | Path,
+    chunk_points: int = CHUNK_POINTS,
+    box: Box | None = None,
+    runs: np.ndarray | None = None,
+    units: Units = METRES,
 ) -> Iterator[PointCloud]:
     """Yield the points of one file, at most `chunk_points` at a time, without their CRS: memory stays bounded.
+
+    `units` are those of the file's coordinates; the points, and `box`, are in world metres.
 
     Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Of LAS and LAZ only the
     `runs` (k, 2) of points, [first, end), are read where they are given (see lax.py). Raises InputError as
@@ -70,7 +78,7 @@ def iter_points(
     """
     kind = file_kind(path)
     if kind == "las":
-        chunks = las.las_chunks(path, chunk_points, box, runs)
+        chunks = las.las_chunks(path, chunk_points, None if box is None else box_in_file(box, units), runs)
     else:
         chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, chunk_points)
     dropped = 0
@@ -80,10 +88,11 @@ def iter_points(
             keep = keep.all(axis=1)
             dropped += len(xyz) - int(keep.sum())
             xyz, classes = chosen(xyz, classes, keep)
+        xyz = xyz if units.are_metres else units.to_metres(xyz)
         if box is not None:
             xyz, classes = chosen(xyz, classes, in_box(xyz, box))
         if len(xyz):
-            yield PointCloud(xyz, classes, None, (str(path),))
+            yield PointCloud(xyz, classes, None, (str(path),), units)
     if dropped:
         warnings.warn(f"{path}: {dropped} points with NaN or infinite coordinates were left out", InputWarning)
 
@@ -159,22 +168,45 @@ def file_kind(path: str | Path) -> str:
     )
 
 
-def common_crs(files: list[str | Path], settings: Settings | None) -> Any:
-    """The CRS the files share: the setting's, else the headers'. Files that name none go with those that do."""
-    given = parse_crs((settings or Settings()).read.crs)
-    crs, first = given, None
-    if given is None:
-        for file in files:
-            other = las.las_crs(las.read_las_header(file), file) if file_kind(file) == "las" else None
-            if crs is not None and other is not None and not same_horizontal(crs, other):
-                raise InputError(
-                    f"expected all clouds in one CRS, got {crs.name} in {first} and {other.name} in {file}; "
-                    "reproject one of them, or set [read] crs where a header is wrong"
-                )
-            if crs is None and other is not None:
-                crs, first = other, file
-    require_metres(crs, "the point cloud")
-    return crs
+def file_crs(path: str | Path) -> Any:
+    """The CRS that a point file names, None where it names none: text and PLY never do."""
+    return las.las_crs(las.read_las_header(path), path) if file_kind(path) == "las" else None
+
+
+def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
+    """The one CRS of point files, from what each names: `given` where that is a CRS, else the files' own.
+
+    Files that name none go with those that do, and files overruled by `given` go with it, with an InputWarning each.
+    Raises InputError, naming both files, where two disagree.
+    """
+    named = {path: crs for path, crs in crs_of.items() if crs is not None}
+    if given is not None:
+        overruled = [path for path, crs in named.items() if not same_horizontal(crs, given)]
+        if overruled:
+            warnings.warn(
+                f"{overruled[0]}{and_others(overruled)}: taken in {described(given)}, as --crs says, "
+                f"although its header names {described(named[overruled[0]])}",
+                InputWarning,
+            )
+        return given
+    first = next(iter(named), None)
+    for path, crs in named.items():
+        if not (same_horizontal(named[first], crs) and same_heights(named[first], crs)):
+            raise InputError(
+                f"expected all clouds in one CRS, got {described(named[first])} in {first} and {described(crs)} in "
+                f"{path}; reproject one of them, or say with --crs which is right where a header is wrong"
+            )
+    unnamed = [path for path in crs_of if path not in named]
+    if first is not None and unnamed:
+        warnings.warn(
+            f"{unnamed[0]}{and_others(unnamed)}: names no CRS; taken in {described(named[first])} as {first} is",
+            InputWarning,
+        )
+    return max(named.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
+
+
+def and_others(paths: list[str]) -> str:
+    return f" and {len(paths) - 1} more" if len(paths) > 1 else ""
 
 
 def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
@@ -188,6 +220,14 @@ def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
 
 def chosen(xyz: np.ndarray, classes: np.ndarray | None, keep: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
     return xyz[keep], None if classes is None else classes[keep]
+
+
+def box_in_file(box: Box, units: Units) -> Box:
+    """A box in the file's unit that holds all of `box`: a trifle wider where rounding could cut its border off."""
+    if units.are_metres:
+        return box
+    low, high = units.from_metres(box[:2]) - 0.01, units.from_metres(box[2:]) + 0.01
+    return (*low.tolist(), *high.tolist())
 
 
 def in_box(xyz: np.ndarray, box: Box) -> np.ndarray:

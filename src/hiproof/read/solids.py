@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError
+from ..frames import METRES, Units
 from ..model import WALL, Face, Solid
+from ..write.naming import units_named
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
@@ -23,7 +26,9 @@ SURFACES = {"RoofSurface", "WallSurface", "GroundSurface", "OuterCeilingSurface"
 
 
 def read_solids(path: str | Path) -> Iterator[tuple[str, Solid]]:
-    """Yield (id, Solid) for each shell in a `.json`, `.jsonl` or `.gml` file, in the file's coordinates.
+    """Yield (id, Solid) for each shell in a `.json`, `.jsonl` or `.gml` file, in metres.
+
+    They are the file's coordinates, times the unit of the CRS that the file names.
 
     The id is the city object's, with `#2`, `#3` ... for its further shells. CityJSONSeq is read line by line and CityGML
     city object by city object, so memory does not grow with the file. Raises InputError when the file cannot be read as what
@@ -82,12 +87,12 @@ def cityjson_solids(path: Path) -> Iterator[tuple[str, Solid]]:
         raise InputError(
             f'expected "type": "CityJSON" in {path}, got {city.get("type")!r}; is this another kind of JSON?'
         )
-    yield from feature_solids(city, city.get("transform"), str(path))
+    yield from feature_solids(city, city.get("transform"), units_of_city(city), str(path))
 
 
 def cityjsonseq_solids(path: Path) -> Iterator[tuple[str, Solid]]:
     """Shells of a CityJSONSeq file: a CityJSON line with the transform, then one CityJSONFeature a line."""
-    transform, seen_header = None, False
+    transform, units, seen_header = None, METRES, False
     try:
         with path.open(encoding="utf-8") as lines:
             for number, line in enumerate(lines, 1):
@@ -95,24 +100,34 @@ def cityjsonseq_solids(path: Path) -> Iterator[tuple[str, Solid]]:
                     continue
                 value, place = parsed(line, f"line {number} of {path}"), f"line {number} of {path}"
                 if value.get("type") == "CityJSON":
-                    transform, seen_header = value.get("transform"), True
+                    transform, units, seen_header = value.get("transform"), units_of_city(value), True
                 elif not seen_header or value.get("type") != "CityJSONFeature":
                     raise InputError(
                         f"expected a CityJSON line followed by CityJSONFeatures, got {value.get('type')!r} in {place}"
                     )
-                yield from feature_solids(value, transform, place)
+                yield from feature_solids(value, transform, units, place)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"expected a readable text file at {path}, got: {error}") from error
     if not seen_header:
         raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file")
 
 
-def feature_solids(value: dict[str, Any], transform: dict[str, Any] | None, place: str) -> Iterator[tuple[str, Solid]]:
+def units_of_city(city: dict[str, Any]) -> Units:
+    """Units of the CRS that a CityJSON object names, metres where it names none."""
+    metadata = city.get("metadata")
+    name = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
+    return units_named(name if isinstance(name, str) else None)
+
+
+def feature_solids(
+    value: dict[str, Any], transform: dict[str, Any] | None, units: Units, place: str
+) -> Iterator[tuple[str, Solid]]:
     """Shells of all city objects of one CityJSON object or feature."""
     try:
         vertices = np.array(value.get("vertices", []), float).reshape(-1, 3)
         if transform:
             vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
+        vertices = units.to_metres(vertices)
         objects = value.get("CityObjects", {}).items()
         found = [
             (
@@ -185,13 +200,16 @@ def citygml_solids(path: Path) -> Iterator[tuple[str, Solid]]:
     """
     from lxml import etree
 
-    members = 0
+    members, units = 0, METRES
     try:
         for _, element in etree.iterparse(str(path), events=("end",), huge_tree=True, resolve_entities=False):
+            if local_name(element) == "Envelope" and not members:
+                units = units_named(element.get("srsName"))
             if local_name(element) not in ("cityObjectMember", "featureMember"):
                 continue
             members += 1
-            yield from member_solids(element, path)
+            for name, solid in member_solids(element, path):
+                yield name, replace(solid, vertices=units.to_metres(solid.vertices))
             element.clear()
             while element.getprevious() is not None:
                 del element.getparent()[0]

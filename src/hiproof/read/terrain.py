@@ -5,6 +5,7 @@ All three answer `height_at` and name their `source`; a `TerrainChain` asks the 
 
 from __future__ import annotations
 
+import warnings
 from collections import OrderedDict
 from collections.abc import Sequence
 from functools import cached_property
@@ -12,9 +13,11 @@ from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
+from pyproj import CRS
 
-from ..errors import InputError
-from .crs import parse_crs, same_horizontal
+from ..errors import InputError, InputWarning
+from ..frames import Units
+from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
 from .thin import rank_in_cells, thin_to_grid
 
 THIN_M = 1.0
@@ -22,6 +25,12 @@ REACH_M = 50.0
 LOWEST_RADIUS_M = 10.0
 TILE_PX = 512
 TILES_KEPT = 8
+HEIGHT_UNITS = {
+    **dict.fromkeys(("m", "metre", "meter", "metres", "meters"), 1.0),
+    **dict.fromkeys(("ft", "foot", "feet", "international foot"), 0.3048),
+    **dict.fromkeys(("us-ft", "ftus", "us survey foot", "us survey feet"), 1200 / 3937),
+}
+"""Metres in the units that a raster's band may name."""
 
 
 class Terrain(Protocol):
@@ -41,8 +50,11 @@ class RasterTerrain:
     data take no part: between them and cells with data the latter's weighted mean is given, amid them NaN.
     """
 
-    def __init__(self, path: str | Path, crs: Any = None):
-        """Open `path`; `crs` is that of the coordinates asked for, None for the raster's own. Raises InputError."""
+    def __init__(self, path: str | Path, crs: Any = None, units: Units | None = None):
+        """Open `path` to be asked in `crs`, None for the raster's own, counted in world metres. Raises InputError.
+
+        `units` are those of `crs`, which need telling where there is none.
+        """
         self.path, self.source = str(path), f"terrain model {Path(path).name}"
         self.crs = parse_crs(crs)
         self.tiles: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
@@ -50,7 +62,9 @@ class RasterTerrain:
             raise InputError(
                 f"expected a georeferenced raster of heights at {path}, got an image without position; name a GeoTIFF"
             )
+        self.units = units or units_of(self.crs or self.own_crs, f"the terrain model {path}")
         self.transformer = self.make_transformer()
+        self.metres_in_height = self.height_unit()
 
     @cached_property
     def dataset(self):
@@ -72,14 +86,36 @@ class RasterTerrain:
         vars(self).update(state)
         self.transformer = self.make_transformer()
 
+    @property
+    def own_crs(self) -> CRS | None:
+        return parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
+
     def make_transformer(self):
         """From the coordinates asked for to the raster's; None where they are the same in plan, or one is unknown."""
-        own = parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
+        own = self.own_crs
         if self.crs is None or own is None or same_horizontal(self.crs, own):
             return None
         from pyproj import Transformer
 
         return Transformer.from_crs(self.crs, own, always_xy=True)
+
+    def height_unit(self) -> float:
+        """Metres in one unit of the raster's heights: as its band says, else its CRS, else as the cloud counts.
+
+        Heights over a plan in degrees are metres; those over a plan in feet that say nothing are taken for feet.
+        """
+        name, own = self.dataset.units[0], self.own_crs
+        if name and name.lower() in HEIGHT_UNITS:
+            return HEIGHT_UNITS[name.lower()]
+        if own is None:
+            return self.units.height
+        plan = horizontal_crs(own)
+        if vertical_crs(own) is None and (plan.is_geographic or plan.is_geocentric):
+            return 1.0
+        units = units_of(own, f"the terrain model {self.path}")
+        if vertical_crs(own) is None and not units.are_metres:
+            warnings.warn(f"{self.path}: names no unit of its heights; taken as {units.height_name}", InputWarning)
+        return units.height
 
     @property
     def bounds(self) -> tuple[float, float, float, float]:
@@ -87,8 +123,8 @@ class RasterTerrain:
         return tuple(self.dataset.bounds)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN outside the raster and where it has no data."""
-        xy = np.asarray(xy_world, float)[:, :2]
+        """Height (n,) in metres at `xy_world` (n, 2), NaN outside the raster and where it has no data."""
+        xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
         if self.transformer is not None:
             xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
         heights = np.full(len(xy), np.nan)
@@ -99,7 +135,7 @@ class RasterTerrain:
         # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its centre's value.
         column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
         row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
-        heights[inside] = self.interpolate(row, column)
+        heights[inside] = self.interpolate(row, column) * self.metres_in_height
         return heights
 
     def interpolate(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
@@ -301,11 +337,14 @@ class TerrainChain:
         return heights, tuple(sources)
 
 
-def read_terrain(path: str | Path, crs: Any = None) -> RasterTerrain:
-    """The terrain model at `path`, to be asked in coordinates of `crs` (the cloud's). Raises InputError."""
+def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) -> RasterTerrain:
+    """The terrain model at `path`, to be asked in world metres of `crs`, the cloud's. Raises InputError.
+
+    `units` tell those of a cloud without a CRS.
+    """
     if "://" not in str(path) and not str(path).startswith("/vsi") and not Path(path).is_file():
         raise InputError(f"expected a terrain model at {path}, got no such file; check the path")
-    return RasterTerrain(path, crs)
+    return RasterTerrain(path, crs, units)
 
 
 def terrain_from_points(xyz_ground: np.ndarray, thin_m: float = THIN_M, reach_m: float = REACH_M) -> TinTerrain:

@@ -9,6 +9,7 @@ import laspy
 import numpy as np
 
 from ..errors import FitError, InputError, OutputError
+from ..frames import METRES, Units
 from ..read.pointcloud import read_points
 from ..settings import Settings
 from .inference import SHIPPED_WEIGHTS, Segmentation, load, segment
@@ -26,25 +27,27 @@ def classify_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Pa
     if out.suffix.lower() not in (".laz", ".las"):
         raise OutputError(f"expected --out to name a .laz or .las file, got {out}; the table is written beside it")
     model = load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
-    labelled, failures, crs = [], {}, None
+    labelled, failures, crs, units = [], {}, None, METRES
     for number, path in enumerate(clouds, start=1):
         try:
             cloud = read_points(path, settings=settings)
             labelled.append((number, path, cloud.xyz, segment(cloud.xyz, settings)))
-            crs = crs or cloud.crs
+            crs, units = crs or cloud.crs, units if crs else cloud.units
         except (FitError, InputError) as error:
             failures[path] = str(error)
     if not labelled:
         why = "; ".join(f"{path}: {reason}" for path, reason in failures.items())
         raise InputError(f"expected at least one building to label, got none ({why})")
-    write_points(out, labelled, model.types, crs)
+    write_points(out, labelled, model.types, crs, units)
     write_table(out.with_suffix(".csv"), labelled, model.types)
     return failures
 
 
-def write_points(out: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types, crs) -> None:
-    """All points with their extra dimensions, heights and positions to the millimetre."""
-    xyz = np.concatenate([points for _, _, points, _ in labelled])
+def write_points(
+    out: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types, crs, units: Units
+) -> None:
+    """All points in `units` with their extra dimensions, heights and positions to a thousandth."""
+    xyz = units.from_metres(np.concatenate([points for _, _, points, _ in labelled]))
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = np.full(3, 0.001), np.floor(xyz.min(axis=0))
     header.add_extra_dims([laspy.ExtraBytesParams(name, kind) for name, kind in EXTRA_DIMENSIONS])

@@ -17,10 +17,11 @@ import numpy as np
 import shapely
 
 from ..errors import OutputError
+from ..frames import METRES, Units
 from ..model import GROUND, Building
 from .building_attributes import OWN, PREFIX, building_attributes, figures_of, plain_text
 from .files import atomic, scratch
-from .naming import plan_wkt
+from .naming import FileUnits, plan_wkt
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
@@ -39,7 +40,7 @@ def write_attributes(
     """Write the outline of each of `buildings` (world coordinates) with its attributes to the GeoPackage `path`.
 
     A building whose outline is unknown gets a row without geometry. Values of one column are brought to one type: whole
-    numbers and decimals to decimals, anything beside text to text. Raises OutputError when the file cannot be written.
+    numbers and decimals to decimals, anything beside text to text. Outlines are in the unit of `crs`. Raises OutputError when the file cannot be written.
     """
     with AttributesWriter(path, crs, prefix) as writer:
         for building in buildings:
@@ -49,9 +50,11 @@ def write_attributes(
 class AttributesWriter(BuildingWriter):
     """Incremental form of `write_attributes`."""
 
-    def __init__(self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX) -> None:
+    def __init__(
+        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, units: Units | None = None
+    ) -> None:
         super().__init__(path)
-        self.plan_wkt, self.prefix = plan_wkt(crs), prefix
+        self.plan_wkt, self.prefix, self.units = plan_wkt(crs), prefix, FileUnits.of(crs, units).gml
         self.kinds: dict[str, set[type]] = {}
         self.count = 0
 
@@ -60,7 +63,8 @@ class AttributesWriter(BuildingWriter):
         self.waiting = stack.enter_context(scratch(self.path))
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        self.put(table_row(building, building_attributes(building, figures or figures_of(building), self.prefix)))
+        attributes = building_attributes(building, figures or figures_of(building), self.prefix, self.units)
+        self.put(table_row(building, attributes, self.units))
 
     def put(self, row: Row) -> None:
         """Write a building that `table_row` made, here or in another process."""
@@ -111,10 +115,12 @@ class AttributesWriter(BuildingWriter):
             ) from error
 
 
-def table_row(building: Building, attributes: dict[str, Any]) -> Row:
-    """The outline of `building` as WKB (None where it is unknown) and its attributes by column."""
+def table_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
+    """The outline of `building` in `units` as WKB (None where it is unknown) and its attributes by column."""
     named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in attributes.items()}
     outline = plan_outline(building)
+    if outline is not None and not units.are_metres:
+        outline = shapely.transform(outline, units.from_metres)
     return None if outline is None else shapely.to_wkb(outline), {"id": plain_text(building.id), **named}
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..frames import METRES, Units
 from ..model import Building
 from ..status import Status
 from .roof_figures import RoofFigures, roof_figures
@@ -22,16 +23,21 @@ def figures_of(building: Building) -> RoofFigures | None:
     return None if building.solid is None else roof_figures(building.solid)
 
 
-def building_attributes(building: Building, figures: RoofFigures | None = None, prefix: str = PREFIX) -> dict[str, Any]:
+def building_attributes(
+    building: Building, figures: RoofFigures | None = None, prefix: str = PREFIX, units: Units = METRES
+) -> dict[str, Any]:
     """Attributes by name, in a fixed order: the input's own, then roofer's (`prefix`), then ours (`hiproof_`).
 
     Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what we computed wins.
-    Lengths are metres, `volume` m3, `pt_density` points/m2, `val3dity_lod22` "[]" because only valid solids are
+    Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose coordinates are in other `units`, which
+    `hiproof_units` then says. `val3dity_lod22` "[]" because only valid solids are
     written.
     """
     own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
     computed |= {OWN + name: value for name, value in hiproof_attributes(building).items()}
+    if not units.are_metres:
+        computed[OWN + "units"] = f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
     return own | {name: plain(value) for name, value in computed.items()}
 
 

@@ -17,9 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from ..frames import METRES, Units
 from ..model import GROUND, ROOF, WALL, Building, Face
 from .building_attributes import PREFIX, building_attributes, figures_of, ground_height, rounded
-from .naming import UniqueNames, gml_name, srs_name
+from .naming import FileUnits, UniqueNames, gml_name, srs_name
 from .roof_codes import roof_type_code
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
@@ -49,7 +50,7 @@ def write_citygml(
 
     `crs` is anything pyproj understands or None; `prefix` goes before roofer's attribute names; `creation_date` is
     written on every building if given (never taken from a clock, so that the same input gives the same file). A
-    building without a solid is written without geometry. Raises OutputError when the file cannot be written.
+    building without a solid is written without geometry. Coordinates are written in the unit of `crs`. Raises OutputError when the file cannot be written.
     """
     with CityGMLWriter(path, crs, prefix, creation_date) as writer:
         for building in buildings:
@@ -65,9 +66,10 @@ class CityGMLWriter(BuildingWriter):
         crs: Any = None,
         prefix: str = PREFIX,
         creation_date: datetime.date | None = None,
+        units: Units | None = None,
     ) -> None:
         super().__init__(path)
-        self.srs_name = srs_name(crs)
+        self.srs_name, self.units = srs_name(crs), FileUnits.of(crs, units).gml
         self.prefix, self.creation_date = prefix, creation_date
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.names = UniqueNames()
@@ -81,9 +83,9 @@ class CityGMLWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        attributes = building_attributes(building, figures, self.prefix)
+        attributes = building_attributes(building, figures, self.prefix, self.units)
         name = self.names.take(gml_name(building.id))
-        self.put(gml_member(building, figures, attributes, name, self.creation_date))
+        self.put(gml_member(building, figures, attributes, name, self.units, self.creation_date))
 
     def put(self, member: Member) -> None:
         """Write a building that `gml_member` made, here or in another process."""
@@ -109,7 +111,7 @@ class CityGMLWriter(BuildingWriter):
 
 @dataclass(frozen=True)
 class Member:
-    """One building as XML text, and its extent (3,) in world metres; infinite and reversed where it has none."""
+    """One building as XML text, and its extent (3,) in the file's unit; infinite and reversed where it has none."""
 
     text: bytes
     low: np.ndarray
@@ -121,13 +123,14 @@ def gml_member(
     figures: RoofFigures | None,
     attributes: dict[str, Any],
     name: str,
+    units: Units = METRES,
     creation_date: datetime.date | None = None,
 ) -> Member:
     """The cityObjectMember of `building`, whose gml:ids end in `name`; the root's namespaces are taken as declared."""
-    text = city_object_member(building, figures, attributes, name, creation_date)
-    lines = terrain_lines(building)
+    text = city_object_member(building, figures, attributes, name, units, creation_date)
+    lines = terrain_lines(building, units)
     if figures is not None:
-        lines = [*lines, building.solid.vertices]
+        lines = [*lines, units.from_metres(building.solid.vertices)]
     low, high = np.full(3, np.inf), np.full(3, -np.inf)
     for line in lines:
         low, high = np.minimum(low, line.min(axis=0)), np.maximum(high, line.max(axis=0))
@@ -139,6 +142,7 @@ def city_object_member(
     figures: RoofFigures | None,
     attributes: dict[str, Any],
     name: str,
+    units: Units,
     creation_date: datetime.date | None = None,
 ) -> str:
     """One bldg:Building, its children in the schema's order; all its gml:ids end in `name`, unique in the file."""
@@ -154,9 +158,9 @@ def city_object_member(
         height = figures.h_max - min(ground_height(building, figures), figures.h_base)
         text.append(f'<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>')
         text.append(solid_text(polygon_ids, name))
-    text.append(terrain_intersection(terrain_lines(building)))
+    text.append(terrain_intersection(terrain_lines(building, units)))
     if figures is not None:
-        text += boundary_surfaces(building, figures, polygon_ids)
+        text += boundary_surfaces(building, figures, polygon_ids, units)
     text.append("</bldg:Building></core:cityObjectMember>")
     return "".join(text)
 
@@ -189,9 +193,10 @@ def solid_text(polygon_ids: list[str], name: str) -> str:
     )
 
 
-def terrain_lines(building: Building) -> list[np.ndarray]:
-    """The terrain intersection's lines (m, 3) that are lines: two points at least, all known."""
-    return [line for line in building.terrain_intersection if len(line) > 1 and np.isfinite(line).all()]
+def terrain_lines(building: Building, units: Units) -> list[np.ndarray]:
+    """The terrain intersection's lines (m, 3) in `units` that are lines: two points at least, all known."""
+    lines = (line for line in building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
+    return [units.from_metres(line) for line in lines]
 
 
 def terrain_intersection(lines: list[np.ndarray]) -> str:
@@ -205,9 +210,9 @@ def terrain_intersection(lines: list[np.ndarray]) -> str:
     return f"<bldg:lod2TerrainIntersection><gml:MultiCurve>{members}</gml:MultiCurve></bldg:lod2TerrainIntersection>"
 
 
-def boundary_surfaces(building: Building, figures: RoofFigures, polygon_ids: list[str]) -> list[str]:
+def boundary_surfaces(building: Building, figures: RoofFigures, polygon_ids: list[str], units: Units) -> list[str]:
     """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth in degrees."""
-    place = positions(building.solid.vertices)
+    place = positions(units.from_metres(building.solid.vertices))
     surfaces = []
     for index, (face, polygon_id) in enumerate(zip(building.solid.faces, polygon_ids, strict=True)):
         tag = f"bldg:{face.kind}"
@@ -241,5 +246,5 @@ def position_list(place: list[str]) -> str:
 
 
 def positions(xyz: np.ndarray) -> list[str]:
-    """Each of the coordinates (n, 3) as text, to a tenth of a millimetre."""
+    """Each of the coordinates (n, 3) as text, to a ten-thousandth of their unit."""
     return ["%.4f %.4f %.4f" % (x, y, z) for x, y, z in (np.round(xyz, 4) + 0.0).tolist()]  # noqa: UP031

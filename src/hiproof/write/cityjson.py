@@ -2,7 +2,7 @@
 
 A building is written as soon as it is added and forgotten, so a city needs no more memory than a street. The first
 line must name the offset of all coordinates and their extent, which only the last building settles: its place is
-reserved and filled in at the end. The offset is the first solid's corner rounded down to whole kilometres, so that
+reserved and filled in at the end. The offset is the first solid's corner rounded down to whole thousands, so that
 small changes of the input leave the integers of all other buildings as they were.
 """
 
@@ -16,17 +16,18 @@ from typing import Any
 
 import numpy as np
 
+from ..frames import Units
 from ..model import Building
 from .building_attributes import PREFIX, building_attributes, figures_of, metres, plain_text
 from .cityjson_geometry import Vertices, building_geometry, first_corner
 from .files import scratch
 from .json_text import dump
-from .naming import UniqueNames, reference_system
+from .naming import FileUnits, UniqueNames, reference_system
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
-SCALE_M = 0.0001
-GRID_M = 1000.0
+SCALE = 0.0001
+GRID = 1000.0
 WIDEST = -123456789.1234
 
 
@@ -35,14 +36,15 @@ def write_cityjson(
     buildings: Iterable[Building],
     crs: Any = None,
     prefix: str = PREFIX,
-    scale_m: float = SCALE_M,
+    scale: float = SCALE,
 ) -> None:
     """Write `buildings` (solids in world metres) to `path`: CityJSONSeq 2.0, or one document if it ends in `.json`.
 
-    `crs` is anything pyproj understands or None; `prefix` goes before roofer's attribute names; `scale_m` is the grid
-    that coordinates are rounded to. Raises OutputError when the file cannot be written; an older file then stays.
+    `crs` is anything pyproj understands or None; coordinates are written in its unit. `prefix` goes before roofer's
+    attribute names; `scale` is the grid that coordinates are rounded to, in the file's unit. Raises OutputError when the
+    file cannot be written; an older file then stays.
     """
-    with CityJSONWriter(path, crs, prefix, scale_m) as writer:
+    with CityJSONWriter(path, crs, prefix, scale) as writer:
         for building in buildings:
             writer.add(building)
 
@@ -55,13 +57,15 @@ class CityJSONWriter(BuildingWriter):
         path: str | os.PathLike,
         crs: Any = None,
         prefix: str = PREFIX,
-        scale_m: float = SCALE_M,
+        scale: float = SCALE,
         translate: np.ndarray | None = None,
+        units: Units | None = None,
     ) -> None:
         super().__init__(path)
+        self.units = FileUnits.of(crs, units).cityjson
         self.is_document = str(path).endswith(".json")
         self.reference_system = reference_system(crs)
-        self.prefix, self.scale_m = prefix, scale_m
+        self.prefix, self.scale = prefix, scale
         self.translate = translate
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.ids = UniqueNames()
@@ -76,8 +80,8 @@ class CityJSONWriter(BuildingWriter):
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
         name = self.ids.take(plain_text(building.id))
-        vertices = Vertices(self.origin_for(building), self.scale_m)
-        attributes = building_attributes(building, figures, self.prefix)
+        vertices = Vertices(self.origin_for(building), self.scale, self.units)
+        attributes = building_attributes(building, figures, self.prefix, self.units)
         if self.is_document:
             city_object, extent = city_object_of(building, figures, attributes, vertices, self.prefix)
             self.widen(extent)
@@ -100,7 +104,7 @@ class CityJSONWriter(BuildingWriter):
             corner = first_corner(building)
             if corner is None:
                 return np.zeros(3)
-            self.translate = offset_of(corner[:2])
+            self.translate = offset_of(self.units.from_metres(corner[:2]))
         return self.translate
 
     def add_to_document(self, name: str, city_object: dict[str, Any], vertices: Vertices) -> None:
@@ -134,7 +138,7 @@ class CityJSONWriter(BuildingWriter):
             metadata["geographicalExtent"] = extent
         if self.reference_system is not None:
             metadata["referenceSystem"] = self.reference_system
-        transform = {"scale": [self.scale_m] * 3, "translate": [float(v) for v in translate]}
+        transform = {"scale": [self.scale] * 3, "translate": [float(v) for v in translate]}
         head = {"type": "CityJSON", "version": "2.0", "transform": transform, "metadata": metadata}
         if self.is_document:
             return dump(head)[:-1] + b',"CityObjects":{'
@@ -150,8 +154,8 @@ class Feature:
 
 
 def offset_of(corner_xy: np.ndarray) -> np.ndarray:
-    """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole kilometres, so that it seldom moves."""
-    return np.append(np.floor(np.asarray(corner_xy) / GRID_M) * GRID_M, 0.0)
+    """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole thousands, so that it seldom moves."""
+    return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
 def feature_line(

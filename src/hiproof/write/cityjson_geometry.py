@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..frames import METRES, Units
 from ..model import GROUND, ROOF, Building, Face
 from .building_attributes import OWN, plain, rounded
 from .roof_figures import RoofFigures
@@ -16,16 +17,16 @@ LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 
 
 class Vertices:
-    """The vertices of one feature as integers: world = integer * scale + origin; equal ones are one."""
+    """The vertices of one feature as integers: integer * scale + origin, in `units`; equal ones are one."""
 
-    def __init__(self, origin: np.ndarray, scale: float) -> None:
-        self.origin, self.scale = origin, scale
+    def __init__(self, origin: np.ndarray, scale: float, units: Units = METRES) -> None:
+        self.origin, self.scale, self.units = origin, scale, units
         self.grid: list[tuple[int, int, int]] = []
         self.index_of: dict[tuple[int, int, int], int] = {}
 
     def add(self, xyz: np.ndarray) -> list[int]:
-        """Indices of the world coordinates `xyz` (n, 3)."""
-        integers = np.rint((xyz - self.origin) / self.scale).astype(np.int64).tolist()
+        """Indices of the world coordinates `xyz` (n, 3), metres."""
+        integers = np.rint((self.units.from_metres(xyz) - self.origin) / self.scale).astype(np.int64).tolist()
         return [self.index(tuple(integer)) for integer in integers]
 
     def index(self, integer: tuple[int, int, int]) -> int:

@@ -7,6 +7,7 @@ import os
 from typing import Any
 
 from ..errors import InputError
+from ..frames import Units
 from .attributes import AttributesWriter, Row, column_kind, column_names
 from .building_attributes import PREFIX
 
@@ -16,9 +17,11 @@ GEOMETRY = "geometry"
 class GeoParquetWriter(AttributesWriter):
     """Incremental writer of the same rows as the GeoPackage's; raises InputError where pyarrow is missing."""
 
-    def __init__(self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX) -> None:
+    def __init__(
+        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, units: Units | None = None
+    ) -> None:
         import_pyarrow()
-        super().__init__(path, crs, prefix)
+        super().__init__(path, crs, prefix, units)
 
     def finish(self) -> None:
         import pyarrow.parquet

@@ -24,7 +24,7 @@ ARRAY_BUFFER, FLOAT, VEC3 = 34962, 5126, "VEC3"
 def write_glb(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None) -> int:
     """Write `buildings` (id, roof type, solid in world metres, attributes) to `path`; returns how many.
 
-    `crs` is kept as text beside the origin. Raises OutputError when the file cannot be written.
+    `crs` is kept as text beside the origin, which is in metres too, whatever the unit of the CRS. Raises OutputError when the file cannot be written.
     """
     from .files import atomic_file
 
@@ -91,7 +91,7 @@ class GlbContent:
             "asset": {
                 "version": "2.0",
                 "generator": "hiproof",
-                "extras": {"origin": origin, "crs": crs, "axes": "x east, y up, z south"},
+                "extras": {"origin": origin, "unit": "metre", "crs": crs, "axes": "x east, y up, z south"},
             },
             "scene": 0,
             "scenes": [{"nodes": list(range(len(self.nodes)))} if self.nodes else {}],

@@ -1,9 +1,12 @@
-"""Names in files: gml:ids that are valid, unique and the same in every run, and how a CRS is named."""
+"""Names in files: gml:ids that are valid, unique and the same in every run, how a CRS is named, and its units."""
 
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass
 from typing import Any
+
+from ..frames import METRES, Units
 
 NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
 
@@ -77,3 +80,43 @@ def plan_wkt(crs: Any) -> str | None:
 
     crs = parse_crs(crs)
     return None if crs is None else horizontal_crs(crs).to_wkt()
+
+
+@dataclass(frozen=True)
+class FileUnits:
+    """Units in which the files of a run hold coordinates; attributes and parameters are in metres in all of them.
+
+    They are those of the CRS that a file names, so that a reader who knows only the file is right: where CityJSON can
+    name the plan's CRS alone, heights are in the plan's unit.
+    """
+
+    gml: Units = METRES
+    cityjson: Units = METRES
+
+    @classmethod
+    def of(cls, crs: Any, own: Units | None = None) -> FileUnits:
+        """Units of files in `crs`; `own` are those of coordinates without one, or without a name for it.
+
+        >>> files = FileUnits.of("EPSG:2263+5703")
+        >>> str(files.gml), str(files.cityjson)
+        ('US survey foot, heights in metre', 'US survey foot')
+        """
+        from ..read.crs import parse_crs, units_of
+
+        own = own or units_of(parse_crs(crs))
+        return cls(units_named(srs_name(crs), own), units_named(reference_system(crs), own))
+
+    def __str__(self) -> str:
+        return str(self.gml)
+
+
+def units_named(name: str | None, otherwise: Units = METRES) -> Units:
+    """Units of the CRS that a file names by URN or address, `otherwise` where it names none that is known."""
+    from ..errors import InputError
+    from ..read.crs import parse_crs, units_of
+
+    try:
+        crs = parse_crs(name)
+    except InputError:
+        return otherwise
+    return otherwise if crs is None else units_of(crs, "the models")

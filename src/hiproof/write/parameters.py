@@ -30,7 +30,7 @@ def write_parameters(path: str | os.PathLike, buildings: Iterable[Building]) -> 
     deviations by name), objective, points, residuals, recognised and types (probability by roof type from the network,
     and after the fits), z_ground, ground_source, parts. theta_p, kappa, T_L and sigma on top are those of the largest part. A part has type, theta_p, kappa, T_L,
     sigma and pieces, a piece `outline` (rings, outer first) and `planes` (a, b, c of z = a x + b y + c), both
-    relative to T_G. What cannot be told is null.
+    relative to T_G. All lengths are metres, T_G too, also where the files' CRS counts in feet. What cannot be told is null.
     """
     with ParametersWriter(path) as writer:
         for building in buildings:

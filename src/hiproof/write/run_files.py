@@ -21,9 +21,10 @@ from ..status import Status
 from .attributes import AttributesWriter, Row, table_row
 from .building_attributes import building_attributes, figures_of
 from .citygml import CityGMLWriter, Member, gml_member
-from .cityjson import SCALE_M, CityJSONWriter, Feature, feature_line
+from .cityjson import SCALE, CityJSONWriter, Feature, feature_line
 from .cityjson_geometry import Vertices
 from .geoparquet import GeoParquetWriter
+from .naming import FileUnits
 from .parameters import ParametersWriter, parameters_line
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
@@ -67,16 +68,19 @@ class Fragments:
     row: Row
 
 
-def fragments(asked: Building, names: tuple[str, str], translate: np.ndarray) -> tuple[Building, Fragments]:
+def fragments(
+    asked: Building, names: tuple[str, str], translate: np.ndarray, units: FileUnits
+) -> tuple[Building, Fragments]:
     """The texts of one building, `names` being its CityJSON id and its gml:id, and the building they tell of.
 
-    `translate` (3,) is the offset of the CityJSON file. A solid that cannot be measured is left out, as in `write_all`.
+    `translate` (3,) is the offset of the CityJSON file, `units` those of coordinates in each file. A solid that cannot
+    be measured is left out, as in `write_all`.
     """
     building, figures = measured(asked)
-    attributes = building_attributes(building, figures)
-    feature = feature_line(building, figures, attributes, names[0], Vertices(translate, SCALE_M))
-    member = gml_member(building, figures, attributes, names[1])
-    return building, Fragments(member, feature, parameters_line(building), table_row(building, attributes))
+    attributes = building_attributes(building, figures, units=units.gml)
+    feature = feature_line(building, figures, attributes, names[0], Vertices(translate, SCALE, units.cityjson))
+    member = gml_member(building, figures, attributes, names[1], units.gml)
+    return building, Fragments(member, feature, parameters_line(building), table_row(building, attributes, units.gml))
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], translate: np.ndarray, crs: Any = None) -> None:

@@ -1,0 +1,114 @@
+"""Do footprints lie where the cloud does? Where not, the usual slips are tried, to say what it looks like."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+import shapely
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError
+
+from ..errors import InputError
+from ..frames import METRES, Units
+from ..model import Footprint
+from .crs import described, epsg_code, horizontal_crs, parse_crs, same_horizontal
+
+DEGREES_WIDE = 0.2  # no building is narrower in metres, hardly a tile wider in degrees
+NEIGHBOURS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
+FOOT_M = 0.3048
+
+
+def check_overlap(
+    footprints: Sequence[Footprint],
+    bounds: Sequence[float] | Sequence[Sequence[float]],
+    footprints_crs: CRS | None = None,
+    cloud_crs: CRS | None = None,
+    units: Units = METRES,
+) -> None:
+    """Raise InputError when no footprint meets the cloud's `bounds`, of one file or of several; all in world metres.
+
+    Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax, ymax, zmax). The CRSs
+    are those that the two sides name, `units` those of the CRS they are in; the message says what they look like.
+    """
+    boxes = shapely.bounds([footprint.polygon for footprint in footprints if not footprint.polygon.is_empty])
+    files = np.atleast_2d(np.asarray(bounds, float))
+    files = files[:, [0, 1, 3, 4]] if files.shape[1] == 6 else files
+    if not len(boxes) or len(shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*files.T))[0]):
+        return
+    files = units.from_metres(files.reshape(-1, 2)).reshape(-1, 4)
+    moved = units.from_metres((boxes[:, :2] + boxes[:, 2:]) / 2)
+    middles = reprojected(moved, cloud_crs, footprints_crs)
+    guess = next((what for what, xy in slips(middles, footprints_crs, cloud_crs) if any_inside(xy, files)), None)
+    raise InputError(
+        f"expected footprints that overlap the cloud in {extent(files[:, :2], files[:, 2:])} ({described(cloud_crs)}), "
+        f"got footprints in {extent(middles, middles)} ({described(footprints_crs)}); "
+        + (guess or "check the CRS each file names, or say the cloud's with --crs")
+    )
+
+
+def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tuple[str, np.ndarray]]:
+    """What footprints at `xy` (n, 2), in their own CRS `named`, may be instead, and where the cloud's CRS has them then.
+
+    Where only one side names a CRS the other is taken to be in it.
+    """
+    swapped, own, target = xy[:, ::-1], named or cloud, cloud or named
+    yield "their x and y look swapped: swap them, in the footprints or in the cloud", reprojected(swapped, own, target)
+    if target is not None:
+        if not same_horizontal(own, target):
+            yield f"their coordinates look like the cloud's {described(target)}: name that CRS in the footprints", xy
+        degrees = parse_crs("EPSG:4326")
+        for what, pairs in (("longitude and latitude", xy), ("latitude and longitude", swapped)):
+            if (np.abs(pairs) <= (180, 90)).all():
+                text = f"they look like {what} in degrees: name EPSG:4326 in the footprints, with longitude first"
+                yield text, reprojected(pairs, degrees, target)
+        yield "the cloud looks like longitude and latitude in degrees: reproject it", reprojected(xy, own, degrees)
+        for neighbour in neighbours(own):
+            text = f"they look like {described(neighbour)}: name the right zone in the footprints"
+            yield text, reprojected(xy, neighbour, target)
+        for neighbour in neighbours(target):
+            text = f"the cloud looks like {described(neighbour)}: name the right zone with --crs"
+            yield text, reprojected(xy, own, neighbour)
+    yield "they look like metres and the cloud like feet: name CRSs, or the cloud's --unit", xy / FOOT_M
+    yield "they look like feet and the cloud like metres: name CRSs, or the cloud's --unit", xy * FOOT_M
+
+
+def neighbours(crs: CRS | None) -> Iterator[CRS]:
+    """Projected CRSs of the codes next to that of `crs`."""
+    code = None if crs is None else epsg_code(horizontal_crs(crs))
+    for step in NEIGHBOURS if code else ():
+        try:
+            neighbour = CRS.from_epsg(code + step)
+        except CRSError:
+            continue
+        if neighbour.is_projected:
+            yield neighbour
+
+
+def reprojected(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
+    """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either is unknown."""
+    if source is None or target is None or same_horizontal(source, target):
+        return xy
+    return np.column_stack(Transformer.from_crs(source, target, always_xy=True).transform(*xy.T))
+
+
+def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
+    finite = xy[np.isfinite(xy).all(axis=1)]
+    return len(shapely.STRtree(shapely.points(finite)).query(shapely.box(*boxes.T))[0]) > 0
+
+
+def refuse_degrees(low: np.ndarray, high: np.ndarray, what: str) -> None:
+    """Raise InputError where the boxes `low` to `high` (n, 2) of things without a CRS look like degrees."""
+    degrees = (np.abs(low) <= (180, 90)).all() and (np.abs(high) <= (180, 90)).all()
+    if len(low) and degrees and np.median((high - low).max(axis=1)) < DEGREES_WIDE:
+        raise InputError(
+            f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like degrees; "
+            "reproject to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
+        )
+
+
+def extent(low: np.ndarray, high: np.ndarray) -> str:
+    """Where boxes from `low` to `high` (n, 2) lie, as text."""
+    (xmin, ymin), (xmax, ymax) = np.nanmin(low, axis=0), np.nanmax(high, axis=0)
+    digits = 5 if max(map(abs, (xmin, ymin, xmax, ymax))) <= 180 else 1
+    return f"x {xmin:.{digits}f} to {xmax:.{digits}f}, y {ymin:.{digits}f} to {ymax:.{digits}f}"

@@ -1,0 +1,241 @@
+"""Laws of units: what is measured in feet gives the same buildings as in metres, and is written in feet again."""
+
+import doctest
+import json
+import warnings
+
+import laspy
+import numpy as np
+import pyogrio
+import pyproj
+import pytest
+import rasterio
+import shapely
+from lxml import etree
+from rasterio.transform import from_origin
+
+import hiproof.frames
+import hiproof.write.naming
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.errors import InputError, InputWarning
+from hiproof.evaluate.models import read_models
+from hiproof.evaluate.run import evaluate_run
+from hiproof.frames import METRES, Units
+from hiproof.read import read_footprints, read_points, read_terrain
+from hiproof.read.crs import units_of
+from hiproof.read.las import las_crs
+from hiproof.read.solids import read_solids
+from hiproof.settings import Settings
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+
+US_FOOT = 1200 / 3937
+TOWN = make_town(houses=2)
+FEET = units_of(pyproj.CRS("EPSG:2263"))
+MIXED = units_of(pyproj.CRS("EPSG:2263+5703"))
+
+
+def write_town_in(folder, units, cloud_crs, plan_crs):
+    """The tiny town counted in other units, as a LAZ and a GeoPackage."""
+    folder.mkdir()
+    xyz, origin = units.from_metres(TOWN.xyz), units.from_metres(ORIGIN)
+    cloud = write_cloud(folder / "cloud.laz", xyz, TOWN.classification, cloud_crs, origin)
+    outlines = {id: shapely.transform(outline, units.from_metres) for id, outline in TOWN.footprints.items()}
+    return str(cloud), str(write_footprints(folder / "footprints.gpkg", outlines, plan_crs))
+
+
+def run(folder, units, cloud_crs, plan_crs, **options):
+    cloud, footprints = write_town_in(folder, units, cloud_crs, plan_crs)
+    summary = reconstruct_area(Request((cloud,), folder / "out", footprints, **options))
+    assert summary.exit_code == 0
+    return folder / "out"
+
+
+def parameters(out):
+    return [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+
+
+def attributes(out):
+    return {model.id: model.attributes for model in read_models(out / "buildings.city.jsonl")}
+
+
+def lengths(building):
+    """Every length of the parts and heights of a building, in metres."""
+    parts = [value for part in building["parts"] for value in part["theta_p"].values()]
+    return np.array([*parts, *building["T_L"], building["z_ground"], *building["residuals"].values()], float)
+
+
+@pytest.fixture(scope="module")
+def in_metres(tmp_path_factory):
+    return run(tmp_path_factory.mktemp("units") / "metres", METRES, "EPSG:7415", "EPSG:28992")
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(hiproof.frames).failed == doctest.testmod(hiproof.write.naming).failed == 0
+
+
+@pytest.mark.parametrize("units", [METRES, FEET, MIXED])
+def test_there_and_back_is_the_identity(units):
+    xyz = np.random.default_rng(0).uniform(-1e6, 1e6, (50, 3))
+    assert np.allclose(units.to_metres(units.from_metres(xyz)), xyz, rtol=1e-15)
+    assert np.array_equal(units.to_metres(xyz)[:, :2], units.to_metres(xyz[:, :2]))
+    assert np.array_equal(METRES.to_metres(xyz), xyz)
+
+
+@pytest.mark.parametrize(
+    ("units", "cloud_crs", "plan_crs", "options"),
+    [
+        (FEET, "EPSG:2263+6360", "EPSG:2263", {}),
+        (FEET, "EPSG:2263", None, {}),
+        (MIXED, "EPSG:2263+5703", "EPSG:2263", {}),
+        (FEET, None, None, {"settings": Settings.from_dict({"read": {"unit": "us-survey-foot"}})}),
+        (FEET, None, None, {"settings": Settings.from_dict({"read": {"crs": "EPSG:2263+6360"}})}),
+        (FEET, None, "EPSG:2263", {}),
+    ],
+    ids=["compound", "plan only", "heights in metres", "--unit", "--crs", "CRS of the footprints"],
+)
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning", "ignore:'crs' was not provided")
+def test_feet_give_the_same_buildings_as_metres(in_metres, tmp_path, units, cloud_crs, plan_crs, options):
+    out = run(tmp_path / "feet", units, cloud_crs, plan_crs, **options)
+    for here, there in zip(parameters(out), parameters(in_metres), strict=True):
+        assert (here["id"], here["type"], len(here["parts"])) == (there["id"], there["type"], len(there["parts"]))
+        assert np.abs(lengths(here) - lengths(there)).max() < 0.005
+    ours, theirs = attributes(out), attributes(in_metres)
+    for id, told in ours.items():
+        for name in ("rf_volume_lod22", "rf_h_ground", "rf_h_roof_max", "rf_pt_density"):
+            assert told[name] == pytest.approx(theirs[id][name], rel=2e-3)
+        assert "US survey foot" in told["hiproof_units"] and "hiproof_units" not in theirs[id]
+    record = json.loads((out / "run.json").read_text())["units"]
+    assert (record["metres_in_plan_unit"], record["metres_in_height_unit"]) == pytest.approx((units.plan, units.height))
+
+
+def extents(out):
+    """Low and high corner (2, 3) of the coordinates as they stand in the CityJSON and in the CityGML, and plan in the table."""
+    header = json.loads((out / "buildings.city.jsonl").read_text().splitlines()[0])
+    corners = [
+        node.text.split() for node in etree.parse(out / "buildings.gml").iter("{*}lowerCorner", "{*}upperCorner")
+    ]
+    _, _, outlines, _ = pyogrio.raw.read(out / "buildings.gpkg")
+    plan = shapely.total_bounds(shapely.from_wkb(outlines))
+    return (
+        np.reshape(header["metadata"]["geographicalExtent"], (2, 3)),
+        np.array(corners, float),
+        np.reshape(plan, (2, 2)),
+    )
+
+
+def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_metres, tmp_path):
+    """A compound without a code of its own is named by its plan alone in CityJSON: heights are then in the plan's unit."""
+    json_m, gml_m, table_m = extents(in_metres)
+    json_ft, gml_ft, table_ft = extents(run(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263"))
+    assert np.allclose(FEET.to_metres(json_ft), json_m, atol=0.02)
+    assert np.allclose(MIXED.to_metres(gml_ft), gml_m, atol=0.02)
+    assert np.allclose(FEET.to_metres(table_ft), table_m, atol=0.001)
+
+
+def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
+    out = run(tmp_path / "feet", FEET, "EPSG:2263+6360", "EPSG:2263")
+    for name in ("buildings.gml", "buildings.city.jsonl"):
+        for (_, ours), (_, theirs) in zip(read_solids(out / name), read_solids(in_metres / name), strict=True):
+            assert np.allclose(np.ptp(ours.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02)
+    cloud, footprints = tmp_path / "feet/cloud.laz", tmp_path / "feet/footprints.gpkg"
+    for figures in evaluate_run(out, [str(cloud)], str(footprints)).figures:
+        assert figures.quality.share_within_20cm > 0.95 and figures.quality.outline_iou > 0.99
+
+
+def test_a_unit_without_a_crs_is_known_again_by_evaluate(tmp_path):
+    settings = Settings.from_dict({"read": {"unit": "us-survey-foot"}})
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        out = run(tmp_path / "feet", FEET, None, None, settings=settings)
+        run_again = evaluate_run(out, [str(tmp_path / "feet/cloud.laz")], str(tmp_path / "feet/footprints.gpkg"))
+    assert all(figures.quality.share_within_20cm > 0.95 for figures in run_again.figures)
+
+
+def test_points_and_footprints_are_read_in_metres_and_say_what_they_were(tmp_path):
+    cloud, footprints = write_town_in(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263")
+    points = read_points(cloud)
+    assert np.abs(points.xyz - TOWN.xyz).max() < 1e-3 and points.units == MIXED
+    inside = read_points(cloud, box=(85000, 446000, 85020.0005, 446020.0005))
+    assert len(inside) == (TOWN.xyz[:, :2] <= (85020.0005, 446020.0005)).all(axis=1).sum()
+    for got, true in zip(read_footprints(footprints), TOWN.footprints.values(), strict=True):
+        assert got.polygon.equals_exact(true, 1e-6)
+
+
+def write_plane(path, crs, size, height, unit=None):
+    with rasterio.open(
+        path, "w", driver="GTiff", width=9, height=9, count=1, dtype="float64", crs=crs,
+        transform=from_origin(-4.5 * size, 4.5 * size, size, size),
+    ) as file:  # fmt: skip
+        file.write(np.full((1, 9, 9), height))
+        if unit:
+            file.units = (unit,)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("crs", "size", "height", "unit", "expected"),
+    [
+        ("EPSG:2263", 10.0, 10.0, None, 10 * US_FOOT),
+        ("EPSG:2263", 10.0, 10.0, "metre", 10.0),
+        ("EPSG:2263", 10.0, 10.0, "ft", 3.048),
+        (None, 10.0, 10.0, None, 10 * US_FOOT),
+    ],
+)
+def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, size, height, unit, expected):
+    path = write_plane(tmp_path / "dtm.tif", crs, size, height, unit)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        terrain = read_terrain(path, "EPSG:2263", FEET)
+    here, beyond = [0.0, 0.0], [44 * 0.3048 + 5.0, 0.0]  # the raster ends 45 feet, not metres, from its middle
+    heights = terrain.height_at(np.array([here, beyond]))
+    assert heights[0] == pytest.approx(expected) and np.isnan(heights[1])
+
+
+def test_the_unit_of_heights_that_geotiff_keys_name_counts(tmp_path):
+    """NAVD88 by its code (metres), while the heights are in feet, as their unit says: seen in many American files."""
+    header = laspy.LasHeader(point_format=1, version="1.2")
+    header.add_crs(pyproj.CRS("EPSG:2263"))
+    keys = header.vlrs.get("GeoKeyDirectoryVlr")[0]
+    for id, value in ((4096, 5703), (4099, 9003)):
+        entry = type(keys.geo_keys[0])(id=id, tiff_tag_location=0, count=1, value_offset=value)
+        keys.geo_keys.append(entry)
+    keys.geo_keys_header.number_of_keys = len(keys.geo_keys)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = np.ones((3, 4))
+    las.write(tmp_path / "a.las")
+    with laspy.open(tmp_path / "a.las") as file:
+        assert units_of(las_crs(file.header, "a.las")).height == pytest.approx(US_FOOT)
+    keys.geo_keys.pop()
+    assert units_of(las_crs(header, "a.las")).height == 1.0
+
+
+@pytest.mark.parametrize(("first", "second"), [("EPSG:7415", "EPSG:25832"), ("EPSG:2263+6360", "EPSG:2263+5703")])
+def test_clouds_of_two_reference_systems_are_refused(tmp_path, first, second):
+    clouds = [
+        str(write_cloud(tmp_path / name, TOWN.xyz, TOWN.classification, crs))
+        for name, crs in (("a.laz", first), ("b.laz", second))
+    ]
+    with pytest.raises(InputError, match=r"in one CRS, got .* in .*a\.laz and .* in .*b\.laz"):
+        reconstruct_area(Request(tuple(clouds), tmp_path / "out"))
+    with pytest.raises(InputError, match="in one CRS"):
+        read_points(*clouds)
+
+
+def test_a_cloud_that_names_no_crs_goes_with_one_that_does_and_says_so(tmp_path):
+    clouds = [
+        write_cloud(tmp_path / name, TOWN.xyz, TOWN.classification, crs)
+        for name, crs in (("a.laz", None), ("b.laz", "EPSG:7415"))
+    ]
+    with pytest.warns(InputWarning, match=r"a\.laz: names no CRS; taken in EPSG:7415"):
+        assert read_points(*clouds).crs == pyproj.CRS("EPSG:7415")
+
+
+def test_a_unit_that_is_not_the_crs_is_refused(tmp_path):
+    cloud = write_cloud(tmp_path / "a.laz", TOWN.xyz, TOWN.classification)
+    settings = Settings.from_dict({"read": {"unit": "foot"}})
+    with pytest.raises(InputError, match="--unit"):
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", settings=settings))
+
+
+def test_units_have_names():
+    assert str(METRES) == "metre" and str(Units(0.3048, 1.0, "foot", "metre")) == "foot, heights in metre"
