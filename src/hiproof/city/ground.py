@@ -7,8 +7,8 @@ answer is the same whatever tile the cells were gathered for, and costs a few ta
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..read.terrain import LowestPointsTerrain, TinTerrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
 
@@ -65,7 +65,7 @@ class LowestAround:
         return lowest_heights(xy, self.cells.z, self.cells.low, self.box.astype(np.int64))
 
 
-@njit(cache=True)
+@compiled
 def window(x, y, reach, low, shape, box):
     """Rows and columns, [first, end), of a table whose corner is cell `low`: at most `reach` from (x, y), inside `box`."""
     column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
@@ -74,7 +74,7 @@ def window(x, y, reach, low, shape, box):
     return rows[0], rows[1], columns[0], columns[1]
 
 
-@njit(cache=True)
+@compiled
 def plane_heights(xy, x, y, z, low, box):
     """Heights (n,) at `xy` (n, 2) of the weighted planes through the known cells of the tables x, y, z inside `box`."""
     heights = np.full(len(xy), np.nan)
@@ -89,7 +89,7 @@ def plane_heights(xy, x, y, z, low, box):
     return heights
 
 
-@njit(cache=True)
+@compiled
 def weighted_mean(at, x, y, z, bounds):
     """Known cells within `bounds`, the sum of their weights, and their mean offset from `at` (2,) and height."""
     known, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
@@ -105,7 +105,7 @@ def weighted_mean(at, x, y, z, bounds):
     return known, total, sum_x / total, sum_y / total, sum_z / total
 
 
-@njit(cache=True)
+@compiled
 def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
     """Rise of the plane through the known cells within `bounds` along x and along y, held back by LEVELLING."""
     xx, yy, xy, xz, yz = LEVELLING, LEVELLING, 0.0, 0.0, 0.0
@@ -121,7 +121,7 @@ def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
     return (yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant
 
 
-@njit(cache=True)
+@compiled
 def lowest_heights(xy, z, low, box):
     """Lowest known height (n,) of the table z around `xy` (n, 2) and inside `box`, the second lowest of ten or more."""
     heights = np.full(len(xy), np.nan)

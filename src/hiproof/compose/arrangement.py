@@ -12,14 +12,15 @@ Polygons are soups of edges (x0, y0, x1, y1) in any order; inside is by parity.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 GRID_M = 1e-4
 OUTSIDE, UNCOVERED = -1, -2
 COLLINEAR_UNITS = 2.0
 
 
-@njit(cache=True)
+@compiled
 def grown(array):
     """A copy of `array` with twice the rows."""
     larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
@@ -27,7 +28,7 @@ def grown(array):
     return larger
 
 
-@njit(cache=True)
+@compiled
 def vertex_at(xy, count, x, y, reach):
     """Index of the vertex nearest to (x, y) within `reach`, -1 if there is none."""
     best, best_d2 = -1, reach * reach
@@ -38,7 +39,7 @@ def vertex_at(xy, count, x, y, reach):
     return best
 
 
-@njit(cache=True)
+@compiled
 def is_beside(p, a, b, reach):
     """Whether `p` lies beside the inner part of segment ab, closer than `reach`."""
     abx, aby, apx, apy = b[0] - a[0], b[1] - a[1], p[0] - a[0], p[1] - a[1]
@@ -49,7 +50,7 @@ def is_beside(p, a, b, reach):
     return across * across < reach * reach * float(length2)
 
 
-@njit(cache=True)
+@compiled
 def first_vertex_beside(xy, count, a, b, reach):
     """The vertex beside segment ab (other than its ends) nearest to a, -1 if there is none."""
     r = np.int64(reach) + 1
@@ -67,13 +68,13 @@ def first_vertex_beside(xy, count, a, b, reach):
     return best
 
 
-@njit(cache=True)
+@compiled
 def turn(a, b, c):
     """Twice the signed area of triangle abc: positive when c lies left of ab. Exact for integers."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-@njit(cache=True)
+@compiled
 def first_crossing(xy, edges, count, a, b):
     """The first live edge that properly crosses segment ab, -1 if there is none."""
     x_low, x_high = min(xy[a, 0], xy[b, 0]), max(xy[a, 0], xy[b, 0])
@@ -95,7 +96,7 @@ def first_crossing(xy, edges, count, a, b):
     return -1
 
 
-@njit(cache=True)
+@compiled
 def crossing_point(a, b, c, d):
     """Grid point nearest to the crossing of ab and cd."""
     left, right = float(turn(c, d, a)), float(turn(c, d, b))
@@ -103,7 +104,7 @@ def crossing_point(a, b, c, d):
     return np.int64(np.rint(a[0] + t * (b[0] - a[0]))), np.int64(np.rint(a[1] + t * (b[1] - a[1])))
 
 
-@njit(cache=True)
+@compiled
 def numbered_ends(segments, reach):
     """End points of the segments as numbered vertices: (xy with room to grow, how many, ends (m, 2))."""
     xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
@@ -119,7 +120,7 @@ def numbered_ends(segments, reach):
     return xy, count, ends
 
 
-@njit(cache=True)
+@compiled
 def has_edge(edges, count, a, b):
     """Whether edge ab is there, in either direction."""
     for e in range(count):
@@ -129,7 +130,7 @@ def has_edge(edges, count, a, b):
     return False
 
 
-@njit(cache=True)
+@compiled
 def node(segments, reach):
     """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by `reach` grid units.
 
@@ -185,7 +186,7 @@ def node(segments, reach):
     return xy[:count].copy(), edges[:edge_count][live]
 
 
-@njit(cache=True)
+@compiled
 def half_edge_order(xy, edges):
     """Half-edges sorted by origin, then counter-clockwise: (order (2e,), start (n + 1,) of each vertex's run in it)."""
     size = 2 * len(edges)
@@ -205,7 +206,7 @@ def half_edge_order(xy, edges):
     return order, start
 
 
-@njit(cache=True)
+@compiled
 def next_half_edges(edges, order, start):
     """The half-edge that follows each around the face on its left."""
     follow = np.empty(len(order), np.int64)
@@ -216,7 +217,7 @@ def next_half_edges(edges, order, start):
     return follow
 
 
-@njit(cache=True)
+@compiled
 def face_left_of(xy, edges, x, y):
     """Half-edge first hit by the ray from (x, y) towards -x, with that point on its left; -1 if none. y is no integer."""
     best, best_x = -1, -np.inf
@@ -232,7 +233,7 @@ def face_left_of(xy, edges, x, y):
     return best
 
 
-@njit(cache=True)
+@compiled
 def trace_faces(xy, edges, follow):
     """Face on the left of each half-edge (2e,), and each face's area (f,) in square grid units; face 0 is unbounded.
 
@@ -273,7 +274,7 @@ def trace_faces(xy, edges, follow):
     return face_of_walk[walk], area[:faces].copy()
 
 
-@njit(cache=True)
+@compiled
 def chord(xy, edges, h):
     """Length of the ray from the middle of half-edge `h` to its left until the first edge, and its unit direction."""
     a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
@@ -297,7 +298,7 @@ def chord(xy, edges, h):
     return nearest, nx, ny
 
 
-@njit(cache=True)
+@compiled
 def face_points(xy, edges, face, faces):
     """A point (f, 2) well inside each face: the middle of its longest chord at right angles to an edge's middle."""
     longest, best = np.zeros(faces), np.zeros(faces)
@@ -318,7 +319,7 @@ def face_points(xy, edges, face, faces):
     return points
 
 
-@njit(cache=True)
+@compiled
 def covers(soup, low, high, x, y):
     """Whether the polygon of soup[low:high] holds (x, y), by parity."""
     inside = False
@@ -330,7 +331,7 @@ def covers(soup, low, high, x, y):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def active_plane(x, y, soup, soup_start, planes, plane_start):
     """Plane active at (x, y): the lowest of each covering piece, the highest of those; UNCOVERED, OUTSIDE the outline.
 
@@ -352,7 +353,7 @@ def active_plane(x, y, soup, soup_start, planes, plane_start):
     return best
 
 
-@njit(cache=True)
+@compiled
 def label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label):
     """Label of each face (f,): the group of the plane active at its point, or what the last patch over it says."""
     label = np.full(len(points), OUTSIDE, np.int64)
@@ -365,7 +366,7 @@ def label_faces(points, soup, soup_start, planes, plane_start, group, patches, p
     return label
 
 
-@njit(cache=True)
+@compiled
 def find(parent, i):
     while parent[i] != i:
         parent[i] = parent[parent[i]]
@@ -373,7 +374,7 @@ def find(parent, i):
     return i
 
 
-@njit(cache=True)
+@compiled
 def regions_of(edges, face, label):
     """Region (f,) of each face: faces joined over edges that have the same label on both sides."""
     parent = np.arange(len(label))
@@ -386,7 +387,7 @@ def regions_of(edges, face, label):
     return parent
 
 
-@njit(cache=True)
+@compiled
 def edge_lengths(xy, edges):
     length = np.empty(len(edges))
     for e in range(len(edges)):
@@ -395,7 +396,7 @@ def edge_lengths(xy, edges):
     return length
 
 
-@njit(cache=True)
+@compiled
 def merge_slivers(xy, edges, face, area, label, min_area, min_width):
     """Give every region too small or too thin to the neighbour it shares the longest border with, smallest first."""
     length = edge_lengths(xy, edges)
@@ -432,7 +433,7 @@ def merge_slivers(xy, edges, face, area, label, min_area, min_width):
                 label[f] = into
 
 
-@njit(cache=True)
+@compiled
 def keep_largest_component(edges, face, area, label):
     """Turn everything but the largest connected inside to OUTSIDE (a neck thinner than the reach was cut)."""
     parent = np.arange(len(label))
@@ -451,7 +452,7 @@ def keep_largest_component(edges, face, area, label):
             label[f] = OUTSIDE
 
 
-@njit(cache=True)
+@compiled
 def renumbered(xy, edges, side):
     """The edges that are left (first vertex not negative), their sides, and the vertices they use, numbered anew."""
     number = np.full(len(xy), -1, np.int64)
@@ -471,7 +472,7 @@ def renumbered(xy, edges, side):
     return out_xy[:count].copy(), out_edges[:kept].copy(), out_side[:kept].copy()
 
 
-@njit(cache=True)
+@compiled
 def dissolve(xy, edges, side):
     """Drop edges with one label on both sides, then vertices on straight stretches; (xy, edges, side) compacted.
 
@@ -516,7 +517,7 @@ def dissolve(xy, edges, side):
     return renumbered(xy, edges, side)
 
 
-@njit(cache=True)
+@compiled
 def plan_cells(
     segments,
     reach,
@@ -547,7 +548,7 @@ def plan_cells(
     return dissolve(xy, edges, side)
 
 
-@njit(cache=True)
+@compiled
 def inside_intervals(soup, low, high, px, py, dx, dy):
     """Sorted parameters (even in number) at which the line (px, py) + t (dx, dy) enters and leaves a polygon."""
     cuts = np.empty(high - low)
@@ -563,7 +564,7 @@ def inside_intervals(soup, low, high, px, py, dx, dy):
     return np.sort(cuts[:count])
 
 
-@njit(cache=True)
+@compiled
 def clip_to_lowest(planes, low, high, j, px, py, dx, dy, t_low, t_high):
     """Narrow [t_low, t_high] to where plane j is the lowest of planes[low:high] along the line."""
     for k in range(low, high):
@@ -581,7 +582,7 @@ def clip_to_lowest(planes, low, high, j, px, py, dx, dy, t_low, t_high):
     return t_low, t_high
 
 
-@njit(cache=True)
+@compiled
 def meeting_lines(soup, soup_start, planes, plane_start):
     """Segments (m, 4) in the plan along which the active plane changes, within a piece and between overlapping ones."""
     out, count = np.empty((64, 4), np.int64), 0

@@ -8,21 +8,22 @@ component of their normal, which only drops a coordinate and so moves nothing.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 SAME_POINT_M = 1e-3
 TOUCH_M = 1e-9
 NORMAL_COSINE = np.cos(np.deg2rad(20.0))
 
 
-@njit(cache=True)
+@compiled
 def find_root(parent, i):
     while parent[i] != i:
         i = parent[i]
     return i
 
 
-@njit(cache=True)
+@compiled
 def weld(vertices, tolerance):
     """For each vertex (n,) the lowest index of a vertex closer than `tolerance`."""
     same = np.arange(len(vertices))
@@ -42,7 +43,7 @@ def weld(vertices, tolerance):
     return same
 
 
-@njit(cache=True)
+@compiled
 def newell(vertices, index, low, high):
     """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the normal."""
     total = np.zeros(3)
@@ -56,12 +57,12 @@ def newell(vertices, index, low, high):
     return 0.5 * total
 
 
-@njit(cache=True)
+@compiled
 def cross2(a, b, c):
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
-@njit(cache=True)
+@compiled
 def distance_to_segment(p, a, b):
     dx, dy = b[0] - a[0], b[1] - a[1]
     length2 = dx * dx + dy * dy
@@ -69,7 +70,7 @@ def distance_to_segment(p, a, b):
     return np.hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy)
 
 
-@njit(cache=True)
+@compiled
 def crosses(a, b, c, d):
     """Whether the open segments ab and cd cross in one point."""
     left, right = cross2(a, b, c), cross2(a, b, d)
@@ -79,7 +80,7 @@ def crosses(a, b, c, d):
     return (left > 0 and right < 0) or (left < 0 and right > 0)
 
 
-@njit(cache=True)
+@compiled
 def inside_ring(p, flat, index, low, high):
     """Whether the plan point p lies in the ring, by parity."""
     inside = False
@@ -90,7 +91,7 @@ def inside_ring(p, flat, index, low, high):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def depth_in_face(p, flat, index, ring_start, first, last):
     """Distance of the plan point p from the border of a face, negative outside."""
     inside, nearest = False, np.inf
@@ -103,7 +104,7 @@ def depth_in_face(p, flat, index, ring_start, first, last):
     return nearest if inside else -nearest
 
 
-@njit(cache=True)
+@compiled
 def ring_is_simple(flat, index, low, high):
     """Whether a ring neither crosses nor touches nor folds back on itself (vertices already welded)."""
     size = high - low
@@ -133,7 +134,7 @@ def ring_is_simple(flat, index, low, high):
     return True
 
 
-@njit(cache=True)
+@compiled
 def same_ring(index, low, high, low2, high2):
     """Whether two rings hold the same vertices."""
     if high - low != high2 - low2:
@@ -147,7 +148,7 @@ def same_ring(index, low, high, low2, high2):
     return True
 
 
-@njit(cache=True)
+@compiled
 def rings_meet(flat, index, low, high, low2, high2):
     """(whether two rings cross or share a stretch, in how many points they touch)."""
     touches = 0
@@ -170,7 +171,7 @@ def rings_meet(flat, index, low, high, low2, high2):
     return False, touches
 
 
-@njit(cache=True)
+@compiled
 def ring_in_ring(flat, index, low, high, low2, high2):
     """Whether the first ring lies in the second, by its first vertex or edge middle that is not on the second's border."""
     for k in range(low, high):
@@ -186,7 +187,7 @@ def ring_in_ring(flat, index, low, high, low2, high2):
     return False
 
 
-@njit(cache=True)
+@compiled
 def check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f):
     """Codes 201, 202, 205, 206, 207, 208 of one face; `signed` are the rings' areas along the face's normal."""
     parent = np.arange(last - first)
@@ -224,7 +225,7 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, found, count
     return count
 
 
-@njit(cache=True)
+@compiled
 def bends(vertices, index, low, high, normal):
     """Whether some corner of a ring turns out of the face's plane by more than 20 degrees (those under 2 mm pass)."""
     for k in range(low, high):
@@ -241,7 +242,7 @@ def bends(vertices, index, low, high, normal):
     return False
 
 
-@njit(cache=True)
+@compiled
 def check_faces(vertices, index, ring_start, face_start, planarity, found):
     """Ring and face codes. Returns (rows found, unit normals (f, 3), offsets (f,), flatness (f,))."""
     faces = len(face_start) - 1
@@ -302,7 +303,7 @@ def check_faces(vertices, index, ring_start, face_start, planarity, found):
     return count, normals, offsets, flatness
 
 
-@njit(cache=True)
+@compiled
 def projected(vertices, normal):
     """Vertices (n, 2) without the coordinate along the normal's largest component."""
     axis = np.argmax(np.abs(normal))
@@ -312,7 +313,7 @@ def projected(vertices, normal):
     return flat
 
 
-@njit(cache=True)
+@compiled
 def directed_edges(index, ring_start, face_start):
     """All directed edges sorted by their vertices: (edge (e, 4): low vertex, high vertex, +1 or -1, face)."""
     edges = np.empty((len(index), 4), np.int64)
@@ -329,7 +330,7 @@ def directed_edges(index, ring_start, face_start):
     return edges[np.argsort(key, kind="mergesort")]
 
 
-@njit(cache=True)
+@compiled
 def check_edges(edges, faces, found, count):
     """Codes 302, 303, 307 (every edge twice, in opposite directions) and 305 (one component)."""
     parent = np.arange(faces)
@@ -356,7 +357,7 @@ def check_edges(edges, faces, found, count):
     return count, clean
 
 
-@njit(cache=True)
+@compiled
 def check_umbrellas(index, ring_start, face_start, found, count):
     """Code 303 where the faces around a vertex form more than one fan. Only for shells whose edges are all paired.
 
@@ -401,7 +402,7 @@ def check_umbrellas(index, ring_start, face_start, found, count):
     return count
 
 
-@njit(cache=True)
+@compiled
 def holds_vertex(index, low, high, v):
     for k in range(low, high):
         if index[k] == v:
@@ -409,7 +410,7 @@ def holds_vertex(index, low, high, v):
     return False
 
 
-@njit(cache=True)
+@compiled
 def edges_pierce(
     vertices,
     index,
@@ -447,7 +448,7 @@ def edges_pierce(
     return False
 
 
-@njit(cache=True)
+@compiled
 def lies_across(flat, index, ring_start, first, last, a, b, slack):
     """Whether edge ab, in the plane of a face, runs through its inside."""
     p, q = flat[a], flat[b]
@@ -462,7 +463,7 @@ def lies_across(flat, index, ring_start, first, last, a, b, slack):
     return depth_in_face(0.5 * (p + q), flat, index, ring_start, first, last) > slack
 
 
-@njit(cache=True)
+@compiled
 def check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count):
     """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; boxes are compared first."""
     faces = len(face_start) - 1
@@ -503,7 +504,7 @@ def check_intersections(vertices, index, ring_start, face_start, normals, offset
     return count
 
 
-@njit(cache=True)
+@compiled
 def apart(low, high, low2, high2, slack):
     """Whether two boxes are further apart than `slack` along some axis."""
     for axis in range(3):
@@ -512,7 +513,7 @@ def apart(low, high, low2, high2, slack):
     return False
 
 
-@njit(cache=True)
+@compiled
 def enclosed_volume(vertices, index, ring_start, face_start):
     total = 0.0
     for f in range(len(face_start) - 1):
@@ -522,7 +523,7 @@ def enclosed_volume(vertices, index, ring_start, face_start):
     return total / 3.0
 
 
-@njit(cache=True)
+@compiled
 def check_shell(vertices, index, ring_start, face_start, planarity):
     """All findings (k, 3) of one shell; shell codes only where every ring and face is sound, as val3dity does."""
     index = weld(vertices, SAME_POINT_M)[index]

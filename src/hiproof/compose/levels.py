@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from .arrangement import OUTSIDE, half_edge_order, next_half_edges, trace_faces
 
 LEVEL_GAP_M = 1.1e-3  # levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
 
 
-@njit(cache=True)
+@compiled
 def height(planes, label, x, y):
     return planes[label, 0] * x + planes[label, 1] * y + planes[label, 2]
 
 
-@njit(cache=True)
+@compiled
 def split_at_crossings(xy, edges, side, planes, reach):
     """Split every edge over which the two cells' heights swap order. Returns (xy, edges, side, ties (k, 3)).
 
@@ -57,7 +57,7 @@ def split_at_crossings(xy, edges, side, planes, reach):
     return out_xy[:vertices].copy(), out_edges[:count].copy(), out_side[:count].copy(), ties[:tied].copy()
 
 
-@njit(cache=True)
+@compiled
 def tied(ties, v, low, high):
     """Whether some tie at vertex v spans the gap from low to high."""
     for k in range(len(ties)):
@@ -66,7 +66,7 @@ def tied(ties, v, low, high):
     return False
 
 
-@njit(cache=True)
+@compiled
 def stack_levels(xy, edges, side, planes, z_ground, ties):
     """Levels over every plan vertex. All in grid units.
 
@@ -102,7 +102,7 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
     return order, start, follow, face, level, vertices[:count].copy()
 
 
-@njit(cache=True)
+@compiled
 def first_saddle(order, start, level, face, label):
     """First plan vertex around which the solid is no clean manifold, -1 if there is none.
 

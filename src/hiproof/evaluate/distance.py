@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 
+from ..compiled import compiled
 from ..errors import InputError
 
 Ring = np.ndarray
@@ -74,7 +74,7 @@ def _flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, n
     return np.ascontiguousarray(vertices), ring_start, np.array(polygon_start, np.int64)
 
 
-@njit(cache=True)
+@compiled
 def _nearest(points, vertices, ring_start, polygon_start):
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
@@ -98,7 +98,7 @@ def _nearest(points, vertices, ring_start, polygon_start):
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def _nearest_vertical(points, vertices, ring_start, polygon_start):
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
@@ -115,7 +115,7 @@ def _nearest_vertical(points, vertices, ring_start, polygon_start):
     return nearest
 
 
-@njit(cache=True)
+@compiled
 def _plane(vertices, rings):
     """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without area."""
     origin, normal = np.zeros(3), np.zeros(3)
@@ -135,14 +135,14 @@ def _plane(vertices, rings):
     return normal / length, origin, True
 
 
-@njit(cache=True)
+@compiled
 def _plan_axes(normal):
     """The two coordinate axes onto which a polygon of this normal projects with the largest area."""
     largest = np.argmax(np.abs(normal))
     return (largest + 1) % 3, (largest + 2) % 3
 
 
-@njit(cache=True)
+@compiled
 def _contains(vertices, rings, first, second, x, y):
     """Even-odd rule over all rings, so that holes are outside; a point on a shared edge belongs to one side only."""
     inside = False
@@ -158,7 +158,7 @@ def _contains(vertices, rings, first, second, x, y):
     return inside
 
 
-@njit(cache=True)
+@compiled
 def _edge_distance(vertices, rings, p):
     nearest_squared = np.inf
     for ring in range(rings.shape[0] - 1):

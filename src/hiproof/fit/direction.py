@@ -6,10 +6,11 @@ import math
 
 import numpy as np
 import shapely
-from numba import njit
+
+from ..compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def nearest(points, i, indices, distances):
     """Indices of the points nearest to point `i`, itself included; returns how many were found. `points` ascend in x.
 
@@ -37,7 +38,7 @@ def nearest(points, i, indices, distances):
     return found
 
 
-@njit(cache=True)
+@compiled
 def local_slope(points, indices):
     """(a, b, mean squared residual) of the least-squares plane through `points[indices]`; NaN where they are a line."""
     centre = np.zeros(3)
@@ -59,7 +60,7 @@ def local_slope(points, indices):
     return a, b, max(zz - a * xz - b * yz, 0.0) / len(indices)
 
 
-@njit(cache=True)
+@compiled
 def slope_direction(points, queries, neighbours):
     """(kappa, confidence 0..1) of the four-fold harmonic of the azimuths of local slopes at about `queries` points.
 
@@ -91,7 +92,7 @@ def slope_direction(points, queries, neighbours):
     return kappa, confidence
 
 
-@njit(cache=True)
+@compiled
 def rectangle_direction(points, trim, angles):
     """Direction in 0..pi/2, out of `angles`, of the smallest rectangle that holds all but `trim` of the points per side."""
     extents = np.empty(2 * angles)
@@ -106,7 +107,7 @@ def rectangle_direction(points, trim, angles):
     return np.argmin(areas) * math.pi / (2 * angles)
 
 
-@njit(cache=True)
+@compiled
 def trimmed_range(values, trim):
     """(low, high) between which all but a share `trim` at each end of `values` lie."""
     ordered = np.sort(values)
@@ -114,7 +115,7 @@ def trimmed_range(values, trim):
     return ordered[cut], ordered[len(values) - 1 - cut]
 
 
-@njit(cache=True)
+@compiled
 def rectangle_in_direction(points, kappa, trim):
     """Plan (5,) cx, cy, kappa, V, U of the trimmed rectangle of the points in the direction `kappa`."""
     c, s = math.cos(kappa), math.sin(kappa)

@@ -10,7 +10,6 @@ point is roof. The roof at (u, v) is the lowest plane (or the plane of the strip
 gradient and the Gauss-Newton Hessian through its active plane only, so sums of moments of (u, v, 1) by plane, and five by
 side, suffice; a small Jacobian of planes by parameters (from the term table) takes them to theta.
 
-All compiled functions live in this file, because the compiler's cache does not notice changes in another one.
 Units are metres and radians, points are (n, 4): x, y, z, w.
 """
 
@@ -20,7 +19,8 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 MAX_PLANES = 6
 CENTRE_X, CENTRE_Y, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0 = range(6)
@@ -71,7 +71,7 @@ class Space(NamedTuple):
     sides: np.ndarray  # (4, 5) at +u, -u, +v, -v: two of the gradient, three of the Hessian
 
 
-@njit(cache=True)
+@compiled
 def new_space():
     return Space(
         np.zeros((MAX_PLANES, 3)),
@@ -81,7 +81,7 @@ def new_space():
     )
 
 
-@njit(cache=True)
+@compiled
 def integer_power(base, exponent):
     """base ** exponent for the small, possibly negative exponents of the term table."""
     if exponent == 1:
@@ -92,7 +92,7 @@ def integer_power(base, exponent):
     return result if exponent >= 0 else 1.0 / result
 
 
-@njit(cache=True)
+@compiled
 def planes_from_terms(tables, kind, theta, planes):
     """Fill `planes` (k, 3), z = a u + b v + c, at `theta`; return the number of planes."""
     count = tables.planes[kind]
@@ -106,7 +106,7 @@ def planes_from_terms(tables, kind, theta, planes):
     return count
 
 
-@njit(cache=True)
+@compiled
 def jacobian_from_terms(tables, kind, theta, planes, jacobian):
     """Fill the exact `jacobian` (k, 3, 9) of `planes` (k, 3) by theta."""
     count = tables.planes[kind]
@@ -130,7 +130,7 @@ def jacobian_from_terms(tables, kind, theta, planes, jacobian):
         jacobian[j, 1, KAPPA] = a
 
 
-@njit(cache=True)
+@compiled
 def active_plane(planes, count, strips, half_width, u, v):
     """Index of the plane that is the roof at (u, v) and the height there."""
     if strips > 1:
@@ -145,7 +145,7 @@ def active_plane(planes, count, strips, half_width, u, v):
     return j, lowest
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def sum_moments(problem, tables, kind, theta, noise, space):
     """Minus the log likelihood at `theta`; fills planes, moments and sides of `space`.
 
@@ -210,7 +210,7 @@ def sum_moments(problem, tables, kind, theta, noise, space):
     return value - math.log(product), inliers, squares
 
 
-@njit(cache=True)
+@compiled
 def add_side(side, push, stiffness, along):
     """Add a point near a side, `along` metres from its middle."""
     side[0] += push
@@ -220,7 +220,7 @@ def add_side(side, push, stiffness, along):
     side[4] += push * stiffness * along * along
 
 
-@njit(cache=True)
+@compiled
 def add_height_terms(tables, kind, theta, space, gradient, hessian):
     """Add the part of the residuals to `gradient` (9,) and the lower triangle of `hessian` (9, 9)."""
     jacobian_from_terms(tables, kind, theta, space.planes, space.jacobian)
@@ -239,7 +239,7 @@ def add_height_terms(tables, kind, theta, space, gradient, hessian):
                 hessian[a, b] += t0 * d[0, b] + t1 * d[1, b] + t2 * d[2, b]
 
 
-@njit(cache=True)
+@compiled
 def add_side_terms(space, theta, inliers, gradient, hessian):
     """Add the part of the soft sides and of the area: margin = half extent - |u|, alpha + beta * (position along the side)."""
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
@@ -264,7 +264,7 @@ def add_side_terms(space, theta, inliers, gradient, hessian):
                 hessian[a, b] += side[2] * alpha[a] * alpha[b] + side[3] * mixed + side[4] * beta[a] * beta[b]
 
 
-@njit(cache=True)
+@compiled
 def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
     """Minus the log likelihood with its `gradient` (9,) and Gauss-Newton `hessian` (9, 9) at `theta` (9,).
 
@@ -282,7 +282,7 @@ def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
     return value, inliers, squares
 
 
-@njit(cache=True)
+@compiled
 def solve_damped(hessian, gradient, damping, size, step, factor):
     """Step of (H + damping diag H) step = -gradient by Cholesky; False where that is not positive definite."""
     for i in range(size):
@@ -311,7 +311,7 @@ def solve_damped(hessian, gradient, damping, size, step, factor):
     return True
 
 
-@njit(cache=True)
+@compiled
 def freeze_at_bounds(theta, low, high, size, gradient, hessian):
     """Take the parameters whose bound stops them out of the step: the active set."""
     for k in range(size):
@@ -322,7 +322,7 @@ def freeze_at_bounds(theta, low, high, size, gradient, hessian):
             hessian[k, k] = 1.0
 
 
-@njit(cache=True)
+@compiled
 def take_step(theta, step, low, high, size, moved):
     """`moved` = theta + step, shortened to the step caps and kept within the bounds."""
     share = 1.0
@@ -335,7 +335,7 @@ def take_step(theta, step, low, high, size, moved):
         moved[k] = min(max(theta[k] + move, low[k]), high[k])
 
 
-@njit(cache=True)
+@compiled
 def minimise(problem, tables, kind, theta, low, high, noise, iterations, tolerance):
     """Levenberg-Marquardt within the box [low, high]; `theta` (9,) is moved in place.
 
@@ -378,7 +378,7 @@ def minimise(problem, tables, kind, theta, low, high, noise, iterations, toleran
     return value, inliers, squares, evaluations
 
 
-@njit(cache=True)
+@compiled
 def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations, tolerance):
     """`minimise` from every row of `thetas` (m, 9), in place. Returns (values (m,), evaluations)."""
     values = np.empty(len(kinds))
@@ -391,7 +391,7 @@ def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations
     return values, total
 
 
-@njit(cache=True)
+@compiled
 def learn_noise(points_count, inliers, squares, noise, prior):
     """EM step: `noise` with sigma and eps that maximise the expected likelihood under the prior on sigma.
 
@@ -402,7 +402,7 @@ def learn_noise(points_count, inliers, squares, noise, prior):
     return Noise(min(max(sigma, prior[2]), prior[3]), noise.tau, min(max(eps, 0.005), 0.5))
 
 
-@njit(cache=True)
+@compiled
 def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, rounds):
     """Fit theta and noise in turns from every row of `thetas` (m, 9) and `noises` (m, 3), both in place.
 
@@ -432,7 +432,7 @@ def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, ro
     return values, total
 
 
-@njit(cache=True)
+@compiled
 def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
     """Re-fit with harder and harder sides, keeping the best; `theta` in place. Returns (value, noise, evaluations).
 
@@ -456,7 +456,7 @@ def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
     return best, best_noise, total
 
 
-@njit(cache=True)
+@compiled
 def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
     """Log likelihood ratio (4, k) of moving each side (+u, -u, +v, -v) outward by `shifts` (2, k), along u and along v."""
     points, planes = problem.points, space.planes
@@ -489,7 +489,7 @@ def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
     return table
 
 
-@njit(cache=True)
+@compiled
 def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
     """Posterior (mean shift of the centre, of the half extent, and their variances) of an axis on the grid of `shifts`.
 
@@ -517,7 +517,7 @@ def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
     return centre, growth, centre_squares / total - centre**2, growth_squares / total - growth**2
 
 
-@njit(cache=True)
+@compiled
 def height_hessian(problem, tables, kind, theta, noise):
     """Hessian (9, 9) of the heights alone (no sides) and the sum of inlier probabilities."""
     space = new_space()
@@ -530,7 +530,7 @@ def height_hessian(problem, tables, kind, theta, noise):
     return hessian, inliers
 
 
-@njit(cache=True)
+@compiled
 def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, grid):
     """Move `theta` to the posterior means of its four sides, heights held; in place.
 
@@ -558,7 +558,7 @@ def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, g
     return np.array([var_u, var_v, var_width, var_length])
 
 
-@njit(cache=True)
+@compiled
 def mode(values, bin_m, counts):
     """(count, position) of the fullest pair of neighbouring bins of `values`; `counts` is working space."""
     low, high = values.min(), values.max()
@@ -575,7 +575,7 @@ def mode(values, bin_m, counts):
     return counts[best] + counts[best + 1], low + (best + 1) * bin_m
 
 
-@njit(cache=True)
+@compiled
 def vote(problem, tables, kind, theta, space, heights, counts):
     """Best slope and height of `kind` in the plan of `theta` (in place): a small Hough transform. Returns the votes."""
     points = problem.points
@@ -605,7 +605,7 @@ def vote(problem, tables, kind, theta, space, heights, counts):
     return best
 
 
-@njit(cache=True)
+@compiled
 def vote_each(problem, tables, rectangles):
     """Starts of every voting variant in every plan of `rectangles` (d, 5): cx, cy, kappa, V, U, and in its quarter turns.
 

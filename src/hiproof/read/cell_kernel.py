@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def cell_keys(xy, cell_m, first_column, first_row, columns):
     """Number (n,) of each point's cell, row by row; `first_column`, `first_row` are the first cell's in the world's grid."""
     keys = np.empty(len(xy), np.int64)
@@ -17,7 +18,7 @@ def cell_keys(xy, cell_m, first_column, first_row, columns):
     return keys
 
 
-@njit(cache=True)
+@compiled
 def mask_at(mask, xy, index, x_low, y_low):
     """The mask's byte (k,) at the whole-metre cells of the points `xy[index]`, 0 outside; its corner is (x_low, y_low)."""
     found = np.zeros(len(index), np.uint8)
@@ -29,7 +30,7 @@ def mask_at(mask, xy, index, x_low, y_low):
     return found
 
 
-@njit(cache=True)
+@compiled
 def is_first(xyz, hashes):
     """Whether each of the points (n, 3) is the first with its coordinates, by open addressing on their hashes (n,)."""
     size = 16

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import math
 
-import numba
 import numpy as np
+
+from ..compiled import compiled
 
 FEATURES = (
     "x",
@@ -30,7 +31,7 @@ INTERPOLATED = 3
 HARMONIC_WIDTH = math.radians(12.0)
 
 
-@numba.njit(cache=True)
+@compiled
 def arranged(xyz, count, level1, level2, level3, group_size):
     """Everything the network takes of a cloud `xyz` (n, 3), metres about an origin near it, n >= 1.
 
@@ -64,7 +65,7 @@ def arranged(xyz, count, level1, level2, level3, group_size):
     return order, features, groups, radii, (up1, up2), weights
 
 
-@numba.njit(cache=True)
+@compiled
 def described(x, y, z, surface, spacing, count):
     """Features (count, 11) of points (s,) and their `surface` (s, 7) in the building's own axes, repeated to `count`."""
     cosine, sine = canonical_axes(x, y, surface)
@@ -85,7 +86,7 @@ def described(x, y, z, surface, spacing, count):
     return features
 
 
-@numba.njit(cache=True)
+@compiled
 def farthest_points(x, y, z, count):
     """Farthest-point sampling of n points: a prefix of the order is a coarser sample.
 
@@ -121,7 +122,7 @@ def farthest_points(x, y, z, count):
     return order, cover, nearest, reach
 
 
-@numba.njit(cache=True)
+@compiled
 def cover_from(x, y, z, current, away, uncovered, bits):
     """Squared distances of all points from the `current` one into `away`, and into `uncovered` those from the nearest
     chosen one, the largest of whose `bits` are returned: LLVM compares several integers at a time, but not floats."""
@@ -136,7 +137,7 @@ def cover_from(x, y, z, current, away, uncovered, bits):
     return farthest
 
 
-@numba.njit(cache=True)
+@compiled
 def insert(shortest, indices, place, distance, index):
     """Put `distance` and `index` into their ascending lists of place + 1, pushing out the last."""
     while place > 0 and shortest[place - 1] > distance:
@@ -145,7 +146,7 @@ def insert(shortest, indices, place, distance, index):
     shortest[place], indices[place] = distance, index
 
 
-@numba.njit(cache=True)
+@compiled
 def local_surfaces(x, y, z, order, nearest, reach):
     """What the `nearest` (s, k) points around each of `order` (s,) say, as rows of seven.
 
@@ -171,7 +172,7 @@ def local_surfaces(x, y, z, order, nearest, reach):
     return surface
 
 
-@numba.njit(cache=True)
+@compiled
 def plane_normal(xx, xy, xz, yy, yz, zz):
     """Upward unit eigenvector of the smallest eigenvalue of a covariance, and that eigenvalue (Smith 1961).
 
@@ -207,7 +208,7 @@ def plane_normal(xx, xy, xz, yy, yz, zz):
     return nx, ny, nz, across[0] * nx + across[1] * ny + across[2] * nz
 
 
-@numba.njit(cache=True)
+@compiled
 def canonical_axes(x, y, surface):
     """Cosine and sine of the building's own direction in plan, in the full circle.
 
@@ -239,7 +240,7 @@ def canonical_axes(x, y, surface):
     return cosine, sine
 
 
-@numba.njit(cache=True)
+@compiled
 def grouped(x, y, z, centres, sources, count, radius):
     """The nearest `count` of the first `sources` points within `radius` of each of the first `centres`, which repeat
     from the start where the points end: indices and distances (centres, count).
@@ -266,7 +267,7 @@ def grouped(x, y, z, centres, sources, count, radius):
     return indices, distances
 
 
-@numba.njit(cache=True)
+@compiled
 def inverse_shares(distances):
     """Inverse-distance weights (s, k) of a sum of 1."""
     weights = 1.0 / (distances + 1e-3)

@@ -9,10 +9,11 @@ that let part of the light through.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 
-@njit(cache=True)
+@compiled
 def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
     """Lower `z_hit` (n,) is raised to the entry height wherever a convex body lies above it; `face` (n,) gets its side.
 
@@ -45,7 +46,7 @@ def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
                 z_hit[i], face[i] = z_in, side
 
 
-@njit(cache=True)
+@compiled
 def cast_triangles(xy0, slope, triangles, z_hit, face):
     """The same for `triangles` (m, 3, 3); `face` gets the triangle's index.
 
@@ -69,7 +70,7 @@ def cast_triangles(xy0, slope, triangles, z_hit, face):
                     z_hit[i], face[i] = z, t
 
 
-@njit(cache=True)
+@compiled
 def cast_crowns(xy0, slope, crowns, free_path, z_crown):
     """Raise `z_crown` (n,) to where a beam is caught in a tree's crown, after `free_path` (n,) metres of leaves.
 
@@ -95,7 +96,7 @@ def cast_crowns(xy0, slope, crowns, free_path, z_crown):
                     z_crown[i] = max(z_crown[i], z_top - free_path[i] / stretch)
 
 
-@njit(cache=True)
+@compiled
 def cast_waves(xy0, slope, waves, base):
     """Heights (n,) where the beams meet the terrain z = base + sum of amplitude sin(kx x + ky y + phase).
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from ..compiled import compiled
 
 LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is level
 
 
-@njit(cache=True)
+@compiled
 def area_below(level, z, plan):
     """Plan area of the triangles with sorted heights `z` (t, 3) and signed plan areas `plan` (t,) at or below `level`."""
     area = 0.0
@@ -24,7 +25,7 @@ def area_below(level, z, plan):
     return area
 
 
-@njit(cache=True)
+@compiled
 def level_of_share(share, z, plan):
     """The level that `share` of the roof's plan area lies below; triangles as in `area_below`.
 

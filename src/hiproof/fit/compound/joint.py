@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import MAX_SLOPE, Cloud, Ghosts, is_symmetric_gable
 from .layout import MAX_TABLE, Layout, evaluate, is_alive, objective
 from .plan import Plan
@@ -36,7 +36,7 @@ class JointFit:
         return self.covariance[np.ix_(index, index)]
 
 
-@njit(cache=True)
+@compiled
 def plane_moments(layout, cloud, tau):
     """Per table row: biweighted moments (3, 3) of (u, v, 1), right side (3,), and of all points sum w r^2 and sum w."""
     matrix, right, squares, weights = np.zeros((MAX_TABLE, 3, 3)), np.zeros((MAX_TABLE, 3)), 0.0, 0.0

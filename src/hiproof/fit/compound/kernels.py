@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+
+from ...compiled import compiled
 
 # Units of complexity: what a piece of structure must pay for in evidence.
 FLAT, AXIS_SLOPE, FREE_SLOPE = 1.0, 1.4, 1.9
@@ -38,19 +39,19 @@ Ghosts = namedtuple(
 )  # cell centres inside the outline; heights a roof may take there
 
 
-@njit(cache=True)
+@compiled
 def kind_of(plane):
     """0 flat, 1 sloping along u, 2 along v, 3 free."""
     return (1 if abs(plane[0]) > 1e-9 else 0) + (2 if abs(plane[1]) > 1e-9 else 0)
 
 
-@njit(cache=True)
+@compiled
 def truncated(residual, tau):
     q = (residual / tau) ** 2
     return q if q < 1.0 else 1.0
 
 
-@njit(cache=True)
+@compiled
 def lower_envelope(planes, count, u, v):
     """Height of the min of the first `count` planes and which one is active."""
     best, active = np.inf, 0
@@ -61,7 +62,7 @@ def lower_envelope(planes, count, u, v):
     return best, active
 
 
-@njit(cache=True)
+@compiled
 def solve_masked(matrix, right, mask):
     """Solve the symmetric 3 x 3 system for the unknowns in `mask`, the others zero; False when it is singular."""
     a, b, x = matrix.copy(), right.copy(), np.zeros(3)
@@ -87,7 +88,7 @@ def solve_masked(matrix, right, mask):
     return x, True
 
 
-@njit(cache=True)
+@compiled
 def plane_cost(cloud, members, plane, tau):
     total = 0.0
     for i in members:
@@ -95,7 +96,7 @@ def plane_cost(cloud, members, plane, tau):
     return total
 
 
-@njit(cache=True)
+@compiled
 def biweight_step(cloud, members, plane, scale, mask, centre_u, centre_v):
     """One re-weighted least-squares step of `plane` on `members`; False when too little weight is left."""
     matrix, right = np.zeros((3, 3)), np.zeros(3)
@@ -126,7 +127,7 @@ def biweight_step(cloud, members, plane, scale, mask, centre_u, centre_v):
     return x, ok
 
 
-@njit(cache=True)
+@compiled
 def fit_plane(cloud, members, start, tau, evidence):
     """Best of flat, two axis slopes and a free plane near `start`, by truncated cost plus complexity."""
     n = len(members)
@@ -156,7 +157,7 @@ def fit_plane(cloud, members, start, tau, evidence):
     return best, best_cost
 
 
-@njit(cache=True)
+@compiled
 def is_symmetric_gable(planes, count):
     """Two planes whose opposite slopes along one axis are the same."""
     if count != 2:
@@ -166,7 +167,7 @@ def is_symmetric_gable(planes, count):
     return (kind == 1 or kind == 2) and kind_of(planes[1]) == kind and opposite
 
 
-@njit(cache=True)
+@compiled
 def is_symmetric_hip(planes, count):
     """Two pairs of planes, each with opposite slopes along one axis: pyramid or hip."""
     return (
@@ -177,7 +178,7 @@ def is_symmetric_hip(planes, count):
     )
 
 
-@njit(cache=True)
+@compiled
 def planes_complexity(planes, count):
     """Units of complexity of a min of planes: symmetric gables and hips count as one thing, others plane by plane."""
     if is_symmetric_gable(planes, count):
@@ -190,7 +191,7 @@ def planes_complexity(planes, count):
     return total
 
 
-@njit(cache=True)
+@compiled
 def fit_symmetric_gable(cloud, members, planes, tau):
     """Two planes with one shared slope along an axis near `planes` (2, 3); False when they are no gable."""
     fitted = planes[:2].copy()
@@ -231,7 +232,7 @@ def fit_symmetric_gable(cloud, members, planes, tau):
     return fitted, True
 
 
-@njit(cache=True)
+@compiled
 def local_plane(cloud, nearest, count):
     """Least-squares plane of the first `count` of `nearest`, once trimmed at twice the median residual."""
     plane, limit, ok = np.zeros(3), np.inf, True
@@ -271,7 +272,7 @@ def local_plane(cloud, nearest, count):
     return plane, ok and plane[0] ** 2 + plane[1] ** 2 < MAX_SLOPE**2
 
 
-@njit(cache=True)
+@compiled
 def flat_hypotheses(z, out):
     """A flat plane at every height (0.1 m apart) that some point has; returns how many."""
     steps = np.unique(np.round(z / 0.1))
@@ -281,7 +282,7 @@ def flat_hypotheses(z, out):
     return count
 
 
-@njit(cache=True)
+@compiled
 def neighbours_of(cloud, i, near, distance2, nearest):
     """Points within NEIGHBOUR_RADIUS_M of point `i` into `near`, the closest of them into `nearest`, closest first.
 
@@ -305,7 +306,7 @@ def neighbours_of(cloud, i, near, distance2, nearest):
     return count, kept
 
 
-@njit(cache=True)
+@compiled
 def hypotheses(cloud, seeds_wanted, pairs_wanted):
     """Candidate planes (m, 3): flats, local least-squares planes, and slopes along the axes through pairs of points.
 
@@ -335,7 +336,7 @@ def hypotheses(cloud, seeds_wanted, pairs_wanted):
     return distinct(out[:m], np.mean(cloud.u), np.mean(cloud.v))
 
 
-@njit(cache=True)
+@compiled
 def distinct(planes, centre_u, centre_v):
     """One of all `planes` (m, 3) whose slopes and height at the centre fall into the same bins of SAME_PLANE."""
     keys = np.empty(len(planes), np.int64)
@@ -352,7 +353,7 @@ def distinct(planes, centre_u, centre_v):
     return planes[first]
 
 
-@njit(cache=True)
+@compiled
 def pair_slopes(cloud, i, j, out, m):
     """Append the slopes along u and along v that pass points i and j, where they are far enough apart."""
     dz = cloud.z[j] - cloud.z[i]
@@ -366,7 +367,7 @@ def pair_slopes(cloud, i, j, out, m):
     return m
 
 
-@njit(cache=True)
+@compiled
 def reach_of_rows(gain, reach):
     """Fill `reach` (nu + 1,): no rectangle within the rows from i on has a larger sum of `gain` than reach[i]."""
     reach[-1] = 0.0
@@ -378,7 +379,7 @@ def reach_of_rows(gain, reach):
         reach[i] = reach[i + 1] + best_run
 
 
-@njit(cache=True)
+@compiled
 def best_rectangle(gain, least, reach, column):
     """Rectangle of cells with the largest sum of `gain` (nu, nv) above `least`: (sum, i0, i1, j0, j1), half open.
 
@@ -410,7 +411,7 @@ def best_rectangle(gain, least, reach, column):
     return best, i0_best, i1_best, j0_best, j1_best
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def gain_by_point(cloud, planes, count, current, tau, gain):
     """Fill `gain` (n,) with the drop of cost that the min of `planes` would bring; returns the sum over those that gain."""
     a, b, c = planes[0]
@@ -428,7 +429,7 @@ def gain_by_point(cloud, planes, count, current, tau, gain):
     return total
 
 
-@njit(cache=True)
+@compiled
 def gain_by_cell(cloud, gain_of_point, gain):
     """Fill `gain` (nu, nv) with the sums over each cell's points; returns the sum over the cells that gain."""
     gain[:] = 0.0
@@ -441,7 +442,7 @@ def gain_by_cell(cloud, gain_of_point, gain):
     return total
 
 
-@njit(cache=True)
+@compiled
 def most_promising(bounds, tried):
     """The candidate not yet `tried` with the highest of `bounds`, -1 where all were."""
     highest, chosen = -np.inf, -1
@@ -451,7 +452,7 @@ def most_promising(bounds, tried):
     return chosen
 
 
-@njit(cache=True)
+@compiled
 def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain):
     """The candidate with the best rectangle, lazily: `bounds` are upper bounds of its gain, and costs only ever fall.
 
@@ -483,13 +484,13 @@ def best_candidate(cloud, candidates, counts, bounds, current, tau, least, gain)
             best, chosen, rectangle = score, m, (i0, i1, j0, j1)
 
 
-@njit(cache=True)
+@compiled
 def members_of(cloud, rectangle):
     i0, i1, j0, j1 = rectangle
     return np.nonzero((cloud.i >= i0) & (cloud.i < i1) & (cloud.j >= j0) & (cloud.j < j1))[0]
 
 
-@njit(cache=True)
+@compiled
 def lower_costs(cloud, members, planes, count, tau, current):
     """Let `current` (n,) fall to the cost under the min of `planes` for `members`."""
     for i in members:
@@ -497,7 +498,7 @@ def lower_costs(cloud, members, planes, count, tau, current):
         current[i] = min(current[i], truncated(cloud.z[i] - z, tau))
 
 
-@njit(cache=True)
+@compiled
 def plane_pool(cloud, grid, candidates, tau, evidence, most):
     """Greedy pool (k, 3): the hypothesis that explains its best rectangle best, refitted there, until little is gained."""
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
@@ -518,7 +519,7 @@ def plane_pool(cloud, grid, candidates, tau, evidence, most):
     return pool
 
 
-@njit(cache=True)
+@compiled
 def mirrored_gables(pool, grid):
     """Every axis-sloped plane of the pool mirrored about ridges RIDGE_STEP_M apart: candidates (m, MAX_PLANES, 3)."""
     steps_u = int((grid.u[-1] - grid.u[0]) / RIDGE_STEP_M) + 2
@@ -543,7 +544,7 @@ def mirrored_gables(pool, grid):
     return out[:m]
 
 
-@njit(cache=True)
+@compiled
 def symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v, out):
     """Planes of z = height - max(slope_u (|u - centre_u| - top_u), slope_v (...)) into `out`; a slope of 0 leaves its pair out."""
     k = 0
@@ -558,7 +559,7 @@ def symmetric_planes(height, slope_u, top_u, centre_u, slope_v, top_v, centre_v,
     return k
 
 
-@njit(cache=True)
+@compiled
 def fit_template(z, drop, slope, tau):
     """Robust (height, slope) of z = height - slope * drop (n,), from a start slope; the slope is 0 where it fails."""
     height = np.median(z + slope * drop)
@@ -585,7 +586,7 @@ def fit_template(z, drop, slope, tau):
     return height, slope
 
 
-@njit(cache=True)
+@compiled
 def whole_roofs(cloud, grid, tau):
     """Gables, pyramid and hip over the whole plan from several start slopes: candidates (m, MAX_PLANES, 3) and counts.
 
@@ -625,7 +626,7 @@ def whole_roofs(cloud, grid, tau):
     return out[:m], counts[:m]
 
 
-@njit(cache=True)
+@compiled
 def gable_pool(cloud, grid, pool, tau, evidence, most):
     """Greedy pool of symmetric gables, pyramids and hips (k, MAX_PLANES, 3) and their counts; gables refitted."""
     gain = np.empty((len(grid.u) - 1, len(grid.v) - 1))
@@ -650,7 +651,7 @@ def gable_pool(cloud, grid, pool, tau, evidence, most):
     return gables, gable_counts
 
 
-@njit(cache=True)
+@compiled
 def without_twins(pool, cloud):
     """The planes of `pool` that differ by more than 4 cm on average from every one kept before."""
     kept = np.zeros((len(pool), 3))

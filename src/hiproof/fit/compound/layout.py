@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import (
     CUT,
     KIND_COST,
@@ -59,7 +59,7 @@ def single_plane_layout(plane) -> Layout:
     return layout
 
 
-@njit(cache=True)
+@compiled
 def add_holder(layout, planes, count):
     """Append a holder with its own copies of `planes`; returns its index, or -1 when there is no room."""
     h, row = layout.count[HOLDERS], layout.count[TABLE]
@@ -74,7 +74,7 @@ def add_holder(layout, planes, count):
     return h
 
 
-@njit(cache=True)
+@compiled
 def descend(layout, node, u, v):
     """Holder of the leaf under `node` that (u, v) falls into."""
     while layout.axis[node] >= 0:
@@ -83,12 +83,12 @@ def descend(layout, node, u, v):
     return layout.holder[node]
 
 
-@njit(cache=True)
+@compiled
 def in_rectangle(rect, u, v):
     return rect[0] <= u < rect[1] and rect[2] <= v < rect[3]
 
 
-@njit(cache=True)
+@compiled
 def holder_at(layout, u, v):
     rect = layout.rect
     for q in range(layout.count[OVERLAYS] - 1, -1, -1):
@@ -98,7 +98,7 @@ def holder_at(layout, u, v):
     return descend(layout, layout.count[ROOT], u, v)
 
 
-@njit(cache=True)
+@compiled
 def height_of(layout, h, u, v):
     """Height of holder `h` and the index k of its active plane."""
     best, active = np.inf, 0
@@ -111,7 +111,7 @@ def height_of(layout, h, u, v):
     return best, active
 
 
-@njit(cache=True)
+@compiled
 def evaluate(layout, u, v):
     """Height (n,), holder (n,) and active plane k (n,) of the layout at `u`, `v` (n,)."""
     z, holder, active = np.empty(len(u)), np.empty(len(u), np.int64), np.empty(len(u), np.int64)
@@ -122,12 +122,12 @@ def evaluate(layout, u, v):
     return z, holder, active
 
 
-@njit(cache=True)
+@compiled
 def ghost_cost(ghosts, q, z):
     return ghosts.weight[q] if z < ghosts.low or z > ghosts.high else 0.0
 
 
-@njit(cache=True)
+@compiled
 def holder_complexity(layout, h, seen):
     """Complexity of holder `h`; planes already `seen` (table rows, updated) count as reused."""
     count, fresh, total = layout.planes_of[h], 0, 0.0
@@ -145,7 +145,7 @@ def holder_complexity(layout, h, seen):
     return planes_complexity(own, count) if fresh == count else total
 
 
-@njit(cache=True)
+@compiled
 def complexity(layout):
     """Units of complexity of everything reachable from the root and of the overlays."""
     seen = np.zeros(MAX_TABLE, np.bool_)
@@ -165,7 +165,7 @@ def complexity(layout):
     return total
 
 
-@njit(cache=True)
+@compiled
 def objective(layout, cloud, ghosts, tau, evidence):
     """Cost of all points and ghosts plus that of the structure: what every step lowers."""
     _, holder, _ = evaluate(layout, cloud.u, cloud.v)
@@ -173,7 +173,7 @@ def objective(layout, cloud, ghosts, tau, evidence):
     return known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence)
 
 
-@njit(cache=True)
+@compiled
 def known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence):
     """`objective` where the holders (n,) of the points and (g,) of the ghosts are known already."""
     total = evidence * complexity(layout)
@@ -186,7 +186,7 @@ def known_objective(layout, holder, ghost_holder, cloud, ghosts, tau, evidence):
     return total
 
 
-@njit(cache=True)
+@compiled
 def mark_below(layout, node, below):
     """below[h] = True for the holders of all leaves under `node`."""
     stack = np.empty(MAX_NODES, np.int64)
@@ -201,7 +201,7 @@ def mark_below(layout, node, below):
             depth += 2
 
 
-@njit(cache=True)
+@compiled
 def is_alive(layout):
     """alive[h]: holder h is reachable, as a leaf or as an overlay."""
     alive = np.zeros(MAX_HOLDERS, np.bool_)

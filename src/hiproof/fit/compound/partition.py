@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import (
     CUT,
     CUT_AT_VERTEX,
@@ -23,7 +23,7 @@ TOO_NARROW = 1e3  # points: what a rectangle narrower than MIN_SIDE_M costs besi
 NO_RECTANGLE = np.float32(1e30)  # dearer than anything, and finite for the loops that assume it
 
 
-@njit(cache=True)
+@compiled
 def partition(layout, cloud, ghosts, grid, pool, gables, gable_counts, tau, evidence):
     """Fill the empty `layout` with the cheapest partition into planes of `pool`, mins of two of them, and `gables`."""
     planes, counts, penalty = primitives(pool, gables, gable_counts, cloud, ghosts, tau, evidence)
@@ -34,7 +34,7 @@ def partition(layout, cloud, ghosts, grid, pool, gables, gable_counts, tau, evid
     grow_tree(layout, cost, sums, penalty, planes, counts, grid, cut_u, cut_v)
 
 
-@njit(cache=True)
+@compiled
 def primitives(pool, gables, gable_counts, cloud, ghosts, tau, evidence):
     """Candidates for a rectangle: each plane, each pair of planes that may pay as a min, each gable; with their penalty."""
     n, g = len(pool), len(gables)
@@ -61,7 +61,7 @@ def primitives(pool, gables, gable_counts, cloud, ghosts, tau, evidence):
     return planes[:m], counts[:m], penalty[:m]
 
 
-@njit(cache=True)
+@compiled
 def heights_and_costs(pool, cloud, ghosts, tau):
     """Height and cost (k, n + g) of every plane of the pool at the points and, after them, at the ghosts."""
     n = len(cloud.u)
@@ -76,7 +76,7 @@ def heights_and_costs(pool, cloud, ghosts, tau):
     return heights, costs
 
 
-@njit(cache=True)
+@compiled
 def may_pay(heights, other_heights, costs, other_costs, points, price, other_price):
     """Whether the min of two planes can cost less on some rectangle than either of them alone, each at its price.
 
@@ -94,7 +94,7 @@ def may_pay(heights, other_heights, costs, other_costs, points, price, other_pri
     return saved > price and other_saved > other_price and 0.06 * points <= lower <= 0.94 * points
 
 
-@njit(cache=True)
+@compiled
 def cost_prefix(cloud, ghosts, grid, planes, counts, tau):
     """Prefix sums (m, nu + 1, nv + 1) over cells of the cost of each primitive, points and ghosts together."""
     m, nu, nv = len(counts), len(grid.u) - 1, len(grid.v) - 1
@@ -117,7 +117,7 @@ def cost_prefix(cloud, ghosts, grid, planes, counts, tau):
     return sums
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def partition_costs(sums, penalty, grid, cut_u, cut_v):
     """Cost (nu + 1, nu + 1, nv + 1, nv + 1) of the best guillotine partition of every rectangle of cells [a, b) x [c, d).
 
@@ -147,7 +147,7 @@ def partition_costs(sums, penalty, grid, cut_u, cut_v):
     return cost
 
 
-@njit(cache=True, fastmath=True)
+@compiled(fastmath=True)
 def whole_costs(sums, penalty, grid, a, b, strip, room, slab):
     """Fill `slab` (nv + 1, nv + 1) with the cost of the best primitive on every rectangle [a, b) x [c, d), left whole.
 
@@ -169,7 +169,7 @@ def whole_costs(sums, penalty, grid, a, b, strip, room, slab):
             slab[c, d] = room[c, d] + np.float32(TOO_NARROW if too_narrow else 0.0)
 
 
-@njit(cache=True)
+@compiled
 def grow_tree(layout, cost, sums, penalty, planes, counts, grid, cut_u, cut_v):
     """Fill the empty `layout` with the partition that `cost` belongs to; children come after their parent."""
     boxes = np.zeros((MAX_NODES, 4), np.int64)
@@ -200,7 +200,7 @@ def grow_tree(layout, cost, sums, penalty, planes, counts, grid, cut_u, cut_v):
         node += 1
 
 
-@njit(cache=True)
+@compiled
 def best_primitive(sums, penalty, a, b, c, d):
     """The primitive that explains the rectangle of cells [a, b) x [c, d) at the least cost, and that cost."""
     best, chosen = np.inf, 0
@@ -211,7 +211,7 @@ def best_primitive(sums, penalty, a, b, c, d):
     return chosen, best
 
 
-@njit(cache=True)
+@compiled
 def best_cut(cost, cut_u, cut_v, a, b, c, d):
     """(axis, grid line, cost) of the cheapest cut of the rectangle; the cost is infinite where it has no line inside."""
     best, axis, chosen = np.inf, 0, 0

@@ -8,8 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import Cloud, Ghosts, Grid
 
 MIN_STRUCTURE_POINTS = 4
@@ -83,7 +83,7 @@ def main_direction(outline: shapely.Polygon) -> float:
     return float(peak + (weight * off(peak)).sum() / max(weight.sum(), 1e-12))
 
 
-@njit(cache=True)
+@compiled
 def signed_depth(x, y, starts, ends):
     """Distance (n,) of points to the nearest of the edges `starts`, `ends` (m, 2), negative outside (even-odd rule)."""
     depth = np.empty(len(x))

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import fit_plane, truncated
 from .layout import (
     HOLDERS,
@@ -28,7 +28,7 @@ from .layout import (
 DROP_CUT, DROP_PLANE, DROP_OVERLAY, TIE_PLANES, TAKE_PLANES = range(5)
 
 
-@njit(cache=True)
+@compiled
 def polish(layout, cloud, ghosts, tau, evidence):
     """Greedily take the simplification that lowers the objective most; each is judged on the points it touches only."""
     share_equal_planes(layout)
@@ -46,7 +46,7 @@ def polish(layout, cloud, ghosts, tau, evidence):
         apply_move(layout, move, plane)
 
 
-@njit(cache=True)
+@compiled
 def share_equal_planes(layout):
     """Let holders whose planes are equal to the micrometre use one row of the table."""
     for h in range(layout.count[HOLDERS]):
@@ -62,7 +62,7 @@ def share_equal_planes(layout):
 State = namedtuple("State", "u v holder active cost")
 
 
-@njit(cache=True)
+@compiled
 def point_cost(layout, h, q, u, v, cloud, ghosts, tau):
     """Cost of point `q` (a ghost when beyond the cloud) under holder `h`."""
     z, _ = height_of(layout, h, u, v)
@@ -70,7 +70,7 @@ def point_cost(layout, h, q, u, v, cloud, ghosts, tau):
     return truncated(cloud.z[q] - z, tau) if q < n else ghost_cost(ghosts, q - n, z)
 
 
-@njit(cache=True)
+@compiled
 def current_state(layout, cloud, ghosts, tau):
     u, v = np.concatenate((cloud.u, ghosts.u)), np.concatenate((cloud.v, ghosts.v))
     _, holder, active = evaluate(layout, u, v)
@@ -80,7 +80,7 @@ def current_state(layout, cloud, ghosts, tau):
     return State(u, v, holder, active, cost)
 
 
-@njit(cache=True)
+@compiled
 def try_cuts(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     """Replace a cut by one of its sides."""
     alive = np.zeros(MAX_NODES, np.bool_)
@@ -110,7 +110,7 @@ def try_cuts(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     return best, move
 
 
-@njit(cache=True)
+@compiled
 def graft(layout, node, keep):
     """Let `node` become a copy of its child `keep`; returns what it was."""
     undo = (layout.axis[node], layout.at[node], layout.holder[node], layout.child[node, 0], layout.child[node, 1])
@@ -119,7 +119,7 @@ def graft(layout, node, keep):
     return undo
 
 
-@njit(cache=True)
+@compiled
 def remove_plane(layout, h, k):
     """Take plane `k` out of holder `h` by moving the others up; returns its table row."""
     row = layout.plane_of[h, k]
@@ -129,7 +129,7 @@ def remove_plane(layout, h, k):
     return row
 
 
-@njit(cache=True)
+@compiled
 def try_planes(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     """Take one plane out of a min."""
     alive = is_alive(layout)
@@ -150,14 +150,14 @@ def try_planes(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     return best, move
 
 
-@njit(cache=True)
+@compiled
 def remove_overlay(layout, index):
     for q in range(index, layout.count[OVERLAYS] - 1):
         layout.overlays[q] = layout.overlays[q + 1]
     layout.count[OVERLAYS] -= 1
 
 
-@njit(cache=True)
+@compiled
 def try_overlays(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     """Take one overlay off."""
     for index in range(layout.count[OVERLAYS]):
@@ -176,7 +176,7 @@ def try_overlays(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     return best, move
 
 
-@njit(cache=True)
+@compiled
 def try_takes(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     """Let one holder take over all planes of another."""
     alive = is_alive(layout)
@@ -198,7 +198,7 @@ def try_takes(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     return best, move
 
 
-@njit(cache=True)
+@compiled
 def try_ties(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     """Replace two planes by one fitted to the points of both, wherever they are used."""
     n = len(cloud.u)
@@ -220,7 +220,7 @@ def try_ties(layout, cloud, ghosts, state, base, tau, evidence, best, move):
     return best, move, plane
 
 
-@njit(cache=True)
+@compiled
 def nearly_one_plane(layout, cloud, rows, members, a, b):
     """Two active points each at least, and a mean gap under 0.6 m over the points of both."""
     of_a, gap = 0, 0.0
@@ -231,7 +231,7 @@ def nearly_one_plane(layout, cloud, rows, members, a, b):
     return of_a >= 2 and len(members) - of_a >= 2 and gap < 0.6 * len(members)
 
 
-@njit(cache=True)
+@compiled
 def users_of(layout, a, b):
     """uses[h]: holder h has table row `a` or `b`; False in the second place when some holder has both."""
     uses, apart = np.zeros(MAX_HOLDERS, np.bool_), True
@@ -245,7 +245,7 @@ def users_of(layout, a, b):
     return uses, apart
 
 
-@njit(cache=True)
+@compiled
 def tie_delta(layout, cloud, ghosts, state, base, tau, evidence, a, b, fitted):
     """Change of the objective when rows `a` and `b` become one plane `fitted`; infinite when one min has both."""
     uses, apart = users_of(layout, a, b)
@@ -262,7 +262,7 @@ def tie_delta(layout, cloud, ghosts, state, base, tau, evidence, a, b, fitted):
     return delta
 
 
-@njit(cache=True)
+@compiled
 def tie(layout, a, b, fitted):
     layout.table[a] = fitted
     for h in range(layout.count[HOLDERS]):
@@ -271,7 +271,7 @@ def tie(layout, a, b, fitted):
                 layout.plane_of[h, k] = a
 
 
-@njit(cache=True)
+@compiled
 def apply_move(layout, move, plane):
     kind, first, second = move
     if kind == DROP_CUT:

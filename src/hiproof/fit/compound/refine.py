@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import (
     FLAT,
     KIND_COST,
@@ -39,7 +39,7 @@ from .layout import (
 )
 
 
-@njit(cache=True)
+@compiled
 def refine(layout, cloud, grid, pool, tau, evidence):
     """Move every cut to where its two sides cost least, then refit every leaf on its own points."""
     leaf_of = move_cuts(layout, cloud, grid, tau, evidence)
@@ -50,7 +50,7 @@ def refine(layout, cloud, grid, pool, tau, evidence):
                 refine_leaf(layout, layout.holder[node], cloud, members, pool, tau, evidence)
 
 
-@njit(cache=True)
+@compiled
 def move_cuts(layout, cloud, grid, tau, evidence):
     """Move every cut from the root down; returns the leaf (n,) of every point, -1 under an overlay."""
     node_of = np.full(len(cloud.u), layout.count[ROOT])
@@ -75,7 +75,7 @@ def move_cuts(layout, cloud, grid, tau, evidence):
     return node_of
 
 
-@njit(cache=True)
+@compiled
 def move_cut(layout, node, cloud, members, grid, tau, evidence):
     """Best position of a cut within 0.9 m, midway between points; a footprint vertex within 0.8 m is worth 0.4 units."""
     if len(members) == 0:
@@ -109,7 +109,7 @@ def move_cut(layout, node, cloud, members, grid, tau, evidence):
     layout.at[node] = snapped
 
 
-@njit(cache=True)
+@compiled
 def envelope_cost(cloud, members, planes, count, tau):
     total = 0.0
     for i in members:
@@ -121,7 +121,7 @@ def envelope_cost(cloud, members, planes, count, tau):
     return total
 
 
-@njit(cache=True)
+@compiled
 def refit_envelope(cloud, members, planes, count, tau, evidence):
     """Alternate between giving each point to its active plane and refitting the planes; planes without points go."""
     planes = planes.copy()
@@ -146,7 +146,7 @@ def refit_envelope(cloud, members, planes, count, tau, evidence):
     return planes, count
 
 
-@njit(cache=True)
+@compiled
 def refine_leaf(layout, h, cloud, members, pool, tau, evidence):
     """Refit the planes of holder `h`, try a symmetric gable and one more plane of the pool; keep what lowers the cost."""
     count = layout.planes_of[h]
@@ -175,7 +175,7 @@ def refine_leaf(layout, h, cloud, members, pool, tau, evidence):
     layout.planes_of[h] = count
 
 
-@njit(cache=True)
+@compiled
 def add_plane(cloud, members, planes, count, pool, cost, tau, evidence):
     """Append to `planes` the pool plane that lowers the cost most as a further one of the min; returns the new count."""
     separate = 0.0
@@ -194,7 +194,7 @@ def add_plane(cloud, members, planes, count, pool, cost, tau, evidence):
     return count + 1
 
 
-@njit(cache=True)
+@compiled
 def current_costs(layout, cloud, tau):
     z, _, _ = evaluate(layout, cloud.u, cloud.v)
     costs = np.empty(len(z))
@@ -203,7 +203,7 @@ def current_costs(layout, cloud, tau):
     return costs
 
 
-@njit(cache=True)
+@compiled
 def add_overlay(layout, cloud, few, grid, candidates, tau, evidence):
     """Cover the roof with the one rectangle of one plane that explains unexplained points best; False when none pays.
 
@@ -240,7 +240,7 @@ def add_overlay(layout, cloud, few, grid, candidates, tau, evidence):
     return True
 
 
-@njit(cache=True)
+@compiled
 def move_edge(rect, edge, cloud, grid, benefit):
     """Move one edge of `rect` (in place) within 0.6 m to where the benefit inside is largest; returns that benefit."""
     lines, at_vertex = (grid.u, grid.at_vertex_u) if edge < 2 else (grid.v, grid.at_vertex_v)
@@ -269,7 +269,7 @@ def move_edge(rect, edge, cloud, grid, benefit):
     return best
 
 
-@njit(cache=True)
+@compiled
 def settle(layout, cloud, ghosts, grid, tau, evidence):
     """With overlays and shared planes in place: move cuts and overlay edges, refit every plane on all points it answers for."""
     move_cuts(layout, cloud, grid, tau, evidence)
@@ -284,7 +284,7 @@ def settle(layout, cloud, ghosts, grid, tau, evidence):
             value = refit_holder(layout, h, holder, active, ghost_holder, cloud, ghosts, tau, evidence, value)
 
 
-@njit(cache=True)
+@compiled
 def refit_holder(layout, h, holder, active, ghost_holder, cloud, ghosts, tau, evidence, value):
     """Refit the planes of holder `h`, as a pair where they are a symmetric gable; returns the objective, never higher."""
     rows = layout.plane_of[h, : layout.planes_of[h]].copy()
@@ -310,7 +310,7 @@ def refit_holder(layout, h, holder, active, ghost_holder, cloud, ghosts, tau, ev
     return value
 
 
-@njit(cache=True)
+@compiled
 def move_overlay(layout, index, cloud, grid, tau):
     """Move the edges of one overlay to where it gains most over what lies below it, points under later ones left out."""
     h = layout.overlays[index]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from ...compiled import compiled
 from .kernels import Cloud, Ghosts, gable_pool, hypotheses, plane_pool, without_twins
 from .layout import Layout, empty_layout, evaluate, objective, single_plane_layout
 from .partition import partition
@@ -47,7 +47,7 @@ def upper_median(z: np.ndarray) -> float:
     return float(np.sort(z)[len(z) // 2])
 
 
-@njit(cache=True)
+@compiled
 def fill(layout, cloud, ghosts, grid, tau, evidence, share, few_evidence, with_overlays):
     """Fill the empty `layout`: structure from a `share` of the points, settled on all; returns its objective.
 
@@ -61,7 +61,7 @@ def fill(layout, cloud, ghosts, grid, tau, evidence, share, few_evidence, with_o
     return objective(layout, cloud, ghosts, tau, evidence)
 
 
-@njit(cache=True)
+@compiled
 def search(layout, cloud, ghosts, grid, tau, evidence, with_overlays):
     """Pools of planes and gables, partition and refinement; then overlays and the polish."""
     few = thinned(cloud, POOL_POINTS)
@@ -78,7 +78,7 @@ def search(layout, cloud, ghosts, grid, tau, evidence, with_overlays):
     polish(layout, cloud, ghosts, tau, evidence)
 
 
-@njit(cache=True)
+@compiled
 def thinned(cloud, most):
     """At most `most` points of `cloud`, evenly spread over their order."""
     n = len(cloud.u)
@@ -88,7 +88,7 @@ def thinned(cloud, most):
     return Cloud(cloud.u[kept], cloud.v[kept], cloud.z[kept], cloud.i[kept], cloud.j[kept])
 
 
-@njit(cache=True)
+@compiled
 def cover_outliers(layout, cloud, few, grid, tau, evidence):
     """Add overlays (to `layout`) for the points it leaves unexplained, as long as they pay; `few` of the points choose."""
     for _ in range(len(layout.overlays)):

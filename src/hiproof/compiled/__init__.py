@@ -1,0 +1,38 @@
+"""Compiled functions that are kept on disk as long as nothing changes that they were compiled from.
+
+    @compiled
+    def distance(points, planes): ...
+
+numba's own cache looks at the file of the function alone, though functions and constants of other files are compiled
+into it, and takes old code for new after an upgrade. Here code belongs to a stamp of all its sources (stamp.py) and is
+kept under it (kept.py); who wants to show that something is being compiled is told by news.py.
+"""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+
+def compiled(function: Callable | None = None, **options: Any) -> Any:
+    """`numba.njit` with its options, as a decorator with or without them, for functions at the top of a module.
+
+    >>> @compiled(fastmath=True)
+    ... def half(x):
+    ...     return x / 2
+    >>> half(3.0)
+    1.5
+    """
+    if function is None:
+        return functools.partial(compiled, **options)
+    import numba  # not before it is needed: the command line shows its help without
+
+    from .kept import Kept
+
+    dispatcher = numba.njit(**options)(function)
+    file = Path(function.__code__.co_filename)
+    if file.is_file() and not numba.config.DISABLE_JIT:
+        dispatcher._cache = Kept(function, file)
+    return dispatcher

@@ -1,0 +1,132 @@
+"""Where compiled code is kept: a file for each function, stamp of its sources, argument types and processor.
+
+What has another stamp is never read, and is removed when its successor is written. Files lie in NUMBA_CACHE_DIR, beside
+the sources, or in the user's cache folder: read from any, written to the first that can be written. Where none can,
+functions are compiled in every process, and a warning says so once.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import pickle
+import sys
+import tempfile
+import uuid
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numba
+from numba.core import caching, compiler
+from numba.core.serialize import dumps
+
+from . import news
+from .stamp import stamp_of
+
+PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
+DAMAGED = (EOFError, pickle.UnpicklingError)
+
+
+class NotKeptWarning(UserWarning):
+    """Compiled functions cannot be kept: every process compiles them again."""
+
+
+class Kept:
+    """One function's code on disk, a file for each tuple of argument types; numba asks it as it asks its own cache."""
+
+    def __init__(self, function: Callable, file: Path):
+        self.name = f"{function.__module__}.{function.__qualname__}"
+        self.module, self.stamp = file.stem, stamp_of(file)
+        self.start = f"{file.stem}.{function.__qualname__}-{self.stamp}"
+        self.folders = folders(function, str(file))
+        news.known.add(self.name)
+
+    @property
+    def cache_path(self) -> str:
+        return str(self.folders[0])
+
+    def load_overload(self, signature: Any, context: Any) -> Any:
+        """The code for these argument types, or None where it has to be compiled."""
+        context.refresh()
+        for folder in self.folders:
+            try:
+                kept, code = pickle.loads((folder / self.file_name(signature, context.codegen())).read_bytes())
+            except (OSError, *DAMAGED):
+                continue
+            if kept == signature:
+                news.ready.add(self.name)
+                return compiler.CompileResult._rebuild(context, *code)
+        place_to_write(self.folders)
+        news.tell()
+        return None
+
+    def save_overload(self, signature: Any, result: Any) -> None:
+        """Keep what was just compiled, and remove what is out of date."""
+        news.ready.add(self.name)
+        news.tell()
+        folder = place_to_write(self.folders)
+        if folder is None or result.library.has_dynamic_globals:  # addresses of this process: not to be kept
+            return
+        file = folder / self.file_name(signature, result.codegen)
+        beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
+        try:
+            beside.write_bytes(dumps((signature, result._reduce())))
+            beside.replace(file)
+        except OSError:  # a full disk, a folder that went away
+            warn_not_kept()
+            return
+        remove_outdated(folder, self.module, self.stamp)
+
+    def file_name(self, signature: Any, codegen: Any) -> str:
+        key = hashlib.sha256(repr((signature, codegen.magic_tuple())).encode()).hexdigest()[:16]
+        return f"{self.start}-{key}.{PYTHON}.nbc"
+
+    def flush(self) -> None:
+        """Forget the code that is kept; numba asks for it when a function is to be compiled again."""
+        for folder in self.folders:
+            for file in folder.glob(f"{self.start}-*.{PYTHON}.nbc"):
+                file.unlink(missing_ok=True)
+
+
+def folders(function: Callable, file: str) -> tuple[Path, ...]:
+    """Where numba would keep functions of `file`, the first choice first."""
+    kinds = [caching.InTreeCacheLocator, caching.UserWideCacheLocator]
+    if numba.config.CACHE_DIR:
+        kinds.insert(0, caching.UserProvidedCacheLocator)
+    places = (Path(kind(function, file).get_cache_path()) for kind in kinds)
+    return tuple(place for place in places if place.is_absolute())  # a user without a home has "~/.cache"
+
+
+@functools.cache
+def place_to_write(places: tuple[Path, ...]) -> Path | None:
+    """The first folder that can be written, or None, with a warning."""
+    for place in places:
+        try:
+            place.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=place).close()
+            return place
+        except OSError:
+            continue
+    warn_not_kept()
+    return None
+
+
+@functools.cache
+def warn_not_kept() -> None:
+    """Say once what it costs, and what to do."""
+    warnings.warn(
+        "expected a folder where compiled functions can be kept, got none that can be written (beside the installed "
+        "package, the user's cache folder); every process compiles for minutes until NUMBA_CACHE_DIR names one",
+        NotKeptWarning,
+        stacklevel=2,
+    )
+
+
+@functools.cache
+def remove_outdated(folder: Path, module: str, stamp: str) -> None:
+    """Remove what this Python compiled from another state of the module's sources; other Pythons still use theirs."""
+    for file in folder.glob(f"{module}.*.{PYTHON}.*"):
+        if f"-{stamp}-" not in file.name:
+            file.unlink(missing_ok=True)

@@ -1,0 +1,111 @@
+"""The stamp of a source file: one digest of all that decides what its functions compile to.
+
+Compiling puts functions and constants of other files into a function, so the stamp is made of the file's text and of the
+texts of all files of its package that imports lead to from there, with the versions of the compiler and of NumPy. A
+change of any of them is a new stamp; one elsewhere is not.
+"""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from importlib.metadata import version
+from pathlib import Path
+
+IMPORT = re.compile(
+    r"^[ \t]*(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ \t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
+    re.MULTILINE,
+)
+VERSIONS = ("numba", "llvmlite", "numpy")
+HERE = Path(__file__).parent
+PACKAGE = HERE.parent
+
+
+@functools.cache
+def stamp_of(file: Path) -> str:
+    """Sixteen hexadecimal digits. Files that cannot be read raise OSError."""
+    return digest(closure(file))
+
+
+def digest(files: Iterable[Path]) -> str:
+    """One stamp of several files, whatever their order and wherever their package lies."""
+    said = hashlib.sha256(" ".join([sys.version, *map(version_of, VERSIONS)]).encode())
+    for file in sorted(files, key=place_in_package):
+        for text in (place_in_package(file).encode(), text_of(file)):
+            said.update(hashlib.sha256(text).digest())
+    return said.hexdigest()[:16]
+
+
+version_of = functools.cache(version)
+
+
+@functools.cache
+def text_of(file: Path) -> bytes:
+    return file.read_bytes()
+
+
+def closure(file: Path) -> set[Path]:
+    """The file and all files that its imports lead to, within its own package and hiproof.
+
+    How code is kept changes nothing of it, so of this folder only the decorator itself counts.
+    """
+    found, open_ends = set(), [file]
+    while open_ends:
+        at = open_ends.pop()
+        if at not in found:
+            found.add(at)
+            open_ends.extend(imported(at) if at.parent != HERE else ())
+    return found
+
+
+@functools.cache
+def imported(file: Path) -> frozenset[Path]:
+    """The files of the two packages that import statements of `file` name, at its top or inside functions."""
+    found = set()
+    for statement in IMPORT.finditer(text_of(file).decode()):
+        for path in named(file, statement):
+            found.update(
+                source for source in (path.with_name(path.name + ".py"), path / "__init__.py") if source.is_file()
+            )
+    return frozenset(found)
+
+
+def named(file: Path, statement: re.Match) -> Iterator[Path]:
+    """The modules and packages, as paths without ending, that one import statement may mean."""
+    if statement["modules"]:
+        for name in re.findall(r"[\w.]+", statement["modules"]):
+            parts = name.split(".")
+            yield from (
+                start.joinpath(*parts[:n]) for start in starts(file, parts[0]) for n in range(1, len(parts) + 1)
+            )
+        return
+    parts = [part for part in statement["module"].split(".") if part]
+    dots = len(statement["dots"])
+    for start in (file.parents[dots - 1],) if dots else starts(file, parts[0]):
+        base = start.joinpath(*parts)
+        yield base
+        yield from (base / name for name in re.findall(r"\w+", statement["names"]))
+
+
+def starts(file: Path, package: str) -> Iterator[Path]:
+    """Where absolute imports of `package` are looked up: beside the file's own package and beside hiproof."""
+    for top in {top_of(file), PACKAGE}:
+        if top.name == package:
+            yield top.parent
+
+
+@functools.cache
+def top_of(file: Path) -> Path:
+    """The outermost folder of the package that `file` belongs to; for a file outside packages, itself without ending."""
+    top = file.with_suffix("")
+    while (top.parent / "__init__.py").exists():
+        top = top.parent
+    return top
+
+
+def place_in_package(file: Path) -> str:
+    """The file's path from where its package lies, with forward slashes."""
+    return file.relative_to(top_of(file).parent).as_posix()

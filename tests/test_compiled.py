@@ -1,0 +1,217 @@
+"""Laws of compiled code: it is what all its sources say, it is kept, and where it cannot be kept that is said once."""
+
+import ast
+import errno
+import importlib
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import warnings
+import zipfile
+from pathlib import Path
+
+import numba
+import pytest
+
+import hiproof
+from hiproof.compiled import kept, stamp
+
+PACKAGE = Path(hiproof.__file__).parent
+SOURCES = sorted(PACKAGE.rglob("*.py"))
+OUTER = """
+from hiproof.compiled import compiled
+from .middle import doubled
+
+@compiled
+def answer(x):
+    return doubled(x) + 1
+"""
+MIDDLE = """
+from hiproof.compiled import compiled
+from . import inner
+
+@compiled(fastmath=True)
+def doubled(x):
+    return inner.number(x) * 2
+"""
+INNER = """
+from hiproof.compiled import compiled
+
+@compiled
+def number(x):
+    return x * {factor}
+"""
+
+
+def texts(factor):
+    """A package of three compiled functions, each calling the next; only the innermost knows `factor`."""
+    return {
+        "town/__init__.py": "",
+        "town/outer.py": OUTER,
+        "town/middle.py": MIDDLE,
+        "town/inner.py": INNER.format(factor=factor),
+    }
+
+
+@pytest.fixture
+def town(tmp_path, monkeypatch):
+    """A folder with the package, which is forgotten again afterwards."""
+    for name, text in texts(3).items():
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(text)
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "home"))
+    yield tmp_path
+    forget()
+
+
+def forget():
+    """Be as a new process to the package."""
+    for name in [name for name in sys.modules if name.split(".")[0] == "town"]:
+        del sys.modules[name]
+    for cached in (stamp.stamp_of, stamp.imported, stamp.text_of, kept.place_to_write, kept.warn_not_kept):
+        cached.cache_clear()
+    kept.remove_outdated.cache_clear()
+
+
+def ask():
+    """(the answer, whether its code was loaded rather than compiled, how often it was said that it cannot be kept)."""
+    forget()
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        answer = importlib.import_module("town.outer").answer
+        got = answer(10)
+    return got, bool(answer._cache_hits), len([w for w in said if w.category is kept.NotKeptWarning])
+
+
+def files_in(folder):
+    return sorted(path.name for path in folder.rglob("*.nbc"))
+
+
+def test_kept_code_is_loaded_by_the_next_process(town):
+    assert ask() == (61, False, 0)
+    assert [name.split("-")[0] for name in files_in(town)] == ["inner.number", "middle.doubled", "outer.answer"]
+    assert ask() == (61, True, 0)
+
+
+def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):
+    ask()
+    unchanged = files_in(town)[0]
+    (town / "town" / "middle.py").write_text(MIDDLE.replace("* 2", "* 4"))
+    assert ask() == (121, False, 0)
+    assert len(files_in(town)) == 3 and files_in(town)[0] == unchanged
+
+
+def run(packages, *command):
+    """The output of a process that finds this hiproof and what is in `packages`."""
+    environment = {**os.environ, "PYTHONPATH": f"{packages}:{PACKAGE.parent}"}
+    done = subprocess.run(
+        [sys.executable, *command], capture_output=True, text=True, check=False, timeout=300, env=environment
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path):
+    pytest.importorskip("pip", reason="needs pip, to install wheels")
+    packages = tmp_path / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
+    answers = []
+    for factor in (3, 4):
+        wheel = write_wheel(tmp_path, factor)
+        options = ["--no-index", "--no-deps", "--disable-pip-version-check", "--prefix", str(tmp_path)]
+        run(packages, "-m", "pip", "install", "--upgrade", *options, str(wheel))
+        answers.append(run(packages, "-c", "from town.outer import answer; print(answer(10))"))
+        assert len(files_in(packages)) == 3
+    assert answers == ["61\n", "81\n"]
+
+
+def write_wheel(folder, factor):
+    wheel, info = folder / f"town-{factor}-py3-none-any.whl", f"town-{factor}.dist-info"
+    files = {
+        **texts(factor),
+        f"{info}/METADATA": f"Metadata-Version: 2.1\nName: town\nVersion: {factor}\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+    }
+    with zipfile.ZipFile(wheel, "w") as archive:
+        for name, text in files.items():
+            archive.writestr(name, text)
+        archive.writestr(f"{info}/RECORD", "".join(f"{name},,\n" for name in [*files, f"{info}/RECORD"]))
+    return wheel
+
+
+def test_a_damaged_file_is_compiled_again(town):
+    ask()
+    for path in town.rglob("outer.*.nbc"):
+        path.write_bytes(path.read_bytes()[:100])
+    assert ask() == (61, False, 0)
+    assert ask() == (61, True, 0)
+
+
+def test_where_nothing_can_be_kept_every_process_compiles_and_says_so_once(town, monkeypatch):
+    (town / "town" / "__pycache__").write_text("a file where the folder would be")
+    (town / "home").write_text("and no home")
+    assert ask() == (61, False, 1)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(town / "elsewhere"))
+    assert ask() == (61, False, 0)
+    assert ask() == (61, True, 0)
+
+
+def test_a_full_disk_costs_time_only(town, monkeypatch):
+    def full(path, data):
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    assert ask() == (61, False, 1)
+    assert files_in(town) == []
+
+
+def test_code_kept_in_an_install_that_became_read_only_is_loaded(town, monkeypatch):
+    ask()
+
+    def refuse(**where):
+        raise PermissionError
+
+    monkeypatch.setattr(tempfile, "TemporaryFile", refuse)
+    assert ask() == (61, True, 0)
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
+def test_the_stamp_follows_every_import(source):
+    """The regular expression of imports against Python's own parser."""
+    found = set()
+    for node in ast.walk(ast.parse(source.read_text())):
+        if isinstance(node, ast.ImportFrom):
+            start = source.parents[node.level - 1] if node.level else PACKAGE.parent
+            base = start.joinpath(*(node.module or "").split("."))
+            modules = [base, *(base / alias.name for alias in node.names)]
+        elif isinstance(node, ast.Import):
+            modules = [PACKAGE.parent.joinpath(*alias.name.split(".")) for alias in node.names]
+        else:
+            continue
+        found |= {file for module in modules for file in (Path(f"{module}.py"), module / "__init__.py")}
+    assert {file for file in found if file.is_file() and file.is_relative_to(PACKAGE)} <= stamp.imported(source)
+
+
+def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, monkeypatch):
+    files = {name: town / "town" / f"{name}.py" for name in ("outer", "middle", "inner")}
+
+    def stamps():
+        forget()
+        return {name: stamp.stamp_of(file) for name, file in files.items()}
+
+    before = stamps()
+    files["middle"].write_text(MIDDLE + "\n# a word more\n")
+    after = stamps()
+    assert after["inner"] == before["inner"]
+    assert after["middle"] != before["middle"] and after["outer"] != before["outer"]
+    monkeypatch.setattr(stamp, "version_of", lambda library: "another")
+    assert not set(stamps().values()) & set(after.values())
+
+
+def test_every_compiled_function_goes_through_one_decorator():
+    jit = re.compile(r"\bn?jit\b|\bnumba\b.*\b(vectorize|cfunc|stencil)\b")
+    outside = [path for path in SOURCES if path.parent.name != "compiled"]
+    assert [path.name for path in outside if jit.search(path.read_text())] == []
