@@ -1,8 +1,16 @@
-"""The few kinds of error hiproof raises; every message is one sentence: what was expected, what came, what to try."""
+"""The few kinds of error hiproof raises; every message is one sentence: what was expected, what came, what to try.
+
+Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or another process.
+"""
+
+from .masking import masked
 
 
 class HiproofError(Exception):
     """Base of every error hiproof raises on purpose. Its text is meant for the user, without a traceback."""
+
+    def __init__(self, message: str = ""):
+        super().__init__(masked(str(message)))
 
 
 class InputError(HiproofError):
@@ -27,3 +35,6 @@ class CompositionError(HiproofError):
 
 class InputWarning(UserWarning):
     """Input that was used after putting something right (points dropped, a CRS assumed); it says what and how much."""
+
+    def __init__(self, message: str = ""):
+        super().__init__(masked(str(message)))

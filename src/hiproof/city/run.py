@@ -15,6 +15,7 @@ from pathlib import Path
 from .. import __version__
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
+from ..masking import masked, masked_values
 from ..settings import Settings
 from ..write.files import atomic
 from .executors import WorkerLost, make_executor
@@ -279,7 +280,7 @@ def summarise(request: Request, plan: Plan, ledger: Ledger, clock: Clock) -> Sum
 
 def request_name(task: str, request: Request) -> str:
     kind, key = task.split(":", 1)
-    return request.clouds[int(key)] if kind == "sort" else task
+    return masked(request.clouds[int(key)]) if kind == "sort" else task
 
 
 def median(values: list) -> float | None:
@@ -310,7 +311,7 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
         "seconds": summary.seconds,
     }
     with atomic(Path(request.out) / "run.json") as beside:
-        Path(beside).write_text(json.dumps(record, indent=1) + "\n")
+        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n")
 
 
 def metres_in(units: Units) -> dict[str, float]:

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from ..frames import Units
+from ..masking import masked
 from ..model import Building
 from ..read.assign import PointGrid
 from ..read.terrain import Terrain, TerrainChain, read_terrain
@@ -105,7 +106,7 @@ def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Buildin
 def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:
     """A building that hiproof failed on, with what the input said of it."""
     attributes = job.footprint.attributes if job.footprint else {}
-    building = Building(job.id, Status.INTERNAL_ERROR, detail, footprint=job.area, attributes=attributes)
+    building = Building(job.id, Status.INTERNAL_ERROR, masked(detail), footprint=job.area, attributes=attributes)
     return fragments(building, plan.names_of(job), plan.translate, plan.file_units)
 
 

@@ -3,11 +3,16 @@
 from __future__ import annotations
 
 import sys
+import traceback
 
 
 def main() -> None:
-    """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C exit code 130."""
+    """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C exit code 130.
+
+    An error of our own making shows its traceback, passwords masked like everywhere, and ends with exit code 1.
+    """
     from ..errors import HiproofError
+    from ..masking import masked
     from .app import app
 
     try:
@@ -18,3 +23,6 @@ def main() -> None:
     except KeyboardInterrupt:
         print("hiproof: interrupted; what was finished is kept, the same command goes on from there", file=sys.stderr)
         sys.exit(130)
+    except Exception:
+        print(masked(traceback.format_exc()), end="", file=sys.stderr)
+        sys.exit(1)

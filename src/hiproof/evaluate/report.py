@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..masking import masked_values
 from ..status import Status
 from .evaluation import summarise
 from .metrics import psd
@@ -60,7 +61,7 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
         "figures": figure_table(run),
         "distributions": distributions(run),
         "worst": worst_buildings(run, worst, shown),
-        "record": f"<pre>{escape(json.dumps(run.record, indent=1, ensure_ascii=False))}</pre>",
+        "record": f"<pre>{escape(json.dumps(masked_values(run.record), indent=1, ensure_ascii=False))}</pre>",
         "data": embedded(report_data(places, places_on_map(places))),
         "script": asset("viewer.js") + asset("report.js"),
     }

@@ -17,6 +17,7 @@ from pyproj import CRS
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
+from ..masking import masked
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
 from .thin import rank_in_cells, thin_to_grid
 
@@ -55,7 +56,7 @@ class RasterTerrain:
 
         `units` are those of `crs`, which need telling where there is none.
         """
-        self.path, self.source = str(path), f"terrain model {Path(path).name}"
+        self.path, self.source = str(path), f"terrain model {Path(masked(str(path))).name}"
         self.crs = parse_crs(crs)
         self.tiles: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()
         if self.dataset.crs is None and self.dataset.transform.is_identity:

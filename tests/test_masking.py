@@ -1,0 +1,92 @@
+"""Passwords in addresses stay where they were given: no output, error, warning or log repeats them."""
+
+import json
+import sys
+
+import pytest
+
+from hiproof.cli import main
+from hiproof.errors import HiproofError, InputError, InputWarning
+from hiproof.masking import masked, masked_values
+
+ADDRESSES = [
+    "postgresql://adm:{}@host:5432/db?table=fp",
+    "postgresql://adm@host/db?table=fp&password={}",
+    "postgresql://adm@host/db?sslpassword={}&table=fp",
+    "PG:host=db user=adm password={} dbname=x",
+    "PG:host=db password = '{} with \\' blanks' dbname=x",
+    "https://adm:{}@host/tile.laz",
+    "https://{}@host/tile.laz",
+    "/vsicurl/https://adm:{}@host/dtm.tif",
+    "/vsicurl?url=https%3A%2F%2Fadm%3A{}%40host%2Fdtm.tif",
+    "s3://key:{}@bucket/tile.laz",
+    "https://host/tile.laz?sig={}&v=2",
+    "https://host/tile.laz?X-Amz-Signature={}",
+    "https://host/tile.laz?access_token={}",
+    "MSSQL:server=x;UID=adm;PWD={};database=d",
+]
+
+
+@pytest.mark.parametrize("secret", ["s3cret", "s3%40cret", "s3c,ret", "12s3cret"])
+@pytest.mark.parametrize("address", ADDRESSES)
+def test_a_secret_is_masked_alone_and_within_a_sentence(address, secret):
+    filled = address.format(secret)
+    for text in (
+        filled,
+        f"expected points at {filled}, got: [{filled!r}]; check it",
+        json.dumps({"a": filled}, indent=1),
+    ):
+        hidden = masked(text)
+        assert "s3" not in hidden.replace("s3://", "") and "ret" not in hidden.replace("secret", "")
+        assert masked(hidden) == hidden
+    assert "host" in masked(filled) or "bucket" in masked(filled) or "server" in masked(filled)
+
+
+@pytest.mark.parametrize("password", ["se/cret", "se?cret", "se@cret", "1/cret", "se#cret"])
+def test_a_password_with_unescaped_signs_is_masked_whole(password):
+    assert "cret" not in masked(f"postgresql://adm:{password}@host/db")
+
+
+@pytest.mark.parametrize(
+    "address",
+    [
+        "https://host:8080/tile.laz",
+        "postgresql://adm@host:5432/db?table=schema.name&where=mail='a@b'",
+        "postgresql://[::1]:5432/db?table=a@b",
+        "s3://bucket/a@2/tile.laz",
+        "C:/data/tile.laz",
+        "expected points, got none; check a@b.org: it knows",
+    ],
+)
+def test_what_holds_no_secret_stays_as_it_is(address):
+    assert masked(address) == address
+
+
+def test_nested_values_are_masked_and_others_kept():
+    record = {"a": ["x://u:s3cret@h", 1, None], "b": ({"c": "password=s3cret"}, 2.5, True)}
+    assert masked_values(record) == {"a": ["x://u:...@h", 1, None], "b": [{"c": "password=..."}, 2.5, True]}
+
+
+@pytest.mark.parametrize("kind", [*HiproofError.__subclasses__(), InputWarning])
+def test_every_error_masks_its_own_text(kind):
+    assert "s3cret" not in str(kind("expected points at https://u:s3cret@host/a.laz, got none"))
+
+
+def test_an_error_of_our_own_shows_its_traceback_without_secrets(monkeypatch, capsys):
+    def fail(*_, **__):
+        raise RuntimeError("planted at https://adm:s3cret@host/a.laz")
+
+    monkeypatch.setattr("hiproof.cli.status.run", fail)
+    monkeypatch.setattr(sys, "argv", ["hiproof", "status", "."])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 1
+    told = capsys.readouterr().err
+    assert "planted" in told and "Traceback" in told and "s3cret" not in told
+
+
+def test_errors_that_cross_processes_stay_masked():
+    import pickle
+
+    error = pickle.loads(pickle.dumps(InputError("https://u:s3cret@host")))
+    assert str(error) == "https://u:...@host"
