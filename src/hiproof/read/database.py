@@ -1,10 +1,12 @@
 """Footprints from PostGIS: `postgresql://user:password@host/database?table=schema.name[&geometry=column][&where=condition]`.
 
-GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg and their geometries as WKB.
+GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg and their geometries as WKB. The
+condition is the user's own SQL: it is sent as part of one statement in a read-only transaction, and can change nothing.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -15,8 +17,10 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..masking import masked
 
 SCHEMES = ("postgresql", "postgres")
+ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")  # whose user and password, where it has any, are whole
 
 
 def is_database(source: Any) -> bool:
@@ -72,9 +76,11 @@ class Table:
         from psycopg import sql
 
         names = {"g": sql.Identifier(self.geometry), "n": sql.Literal(self.geometry)}
-        condition = sql.SQL(f" where {self.where}" if self.where else "")
+        # a line of its own: a comment at the condition's end must not swallow what follows it
+        condition = sql.SQL(f" where {self.where}\n" if self.where else "")
         table = sql.SQL("{} t").format(sql.Identifier(*self.name.split("."))) + condition
-        self.cursor.execute(sql.SQL(text).format(t=table, **names))
+        # asking for binary results takes the extended protocol, whose messages hold one statement each
+        self.cursor.execute(sql.SQL(text).format(t=table, **names), binary=True)
 
     def rows(self) -> Iterator[tuple]:
         """(geometry or None, attributes) ordered by their own content, so that storage does not matter."""
@@ -94,25 +100,31 @@ def opened(source: str) -> Iterator[Table]:
     psycopg = import_psycopg()
     try:
         with psycopg.connect(dsn, connect_timeout=10) as connection, connection.cursor() as cursor:
+            connection.read_only = True
             yield Table(cursor, table, geometry or geometry_column(cursor, table, source), where)
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
-        raise InputError(
-            f"expected a PostGIS table at {hide_password(source)}, got: {reason}; check address and table"
-        ) from error
+        raise InputError(f"expected a PostGIS table at {source}, got: {reason}; check address and table") from error
 
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
     """(dsn, table, geometry column or None, condition or None) of a source."""
-    url = urlsplit(source)
+    url = urlsplit(refuse_half_a_password(source))
     query = parse_qs(url.query)
     own = {name: query.pop(name, [None])[0] for name in ("table", "geometry", "where")}
     if not own["table"]:
-        raise InputError(
-            f"expected a table in {hide_password(source)}, got none; add ?table=schema.name to the address"
-        )
+        raise InputError(f"expected a table in {source}, got none; add ?table=schema.name to the address")
     dsn = urlunsplit(url._replace(query=urlencode(query, doseq=True)))
     return dsn, own["table"], own["geometry"], own["where"]
+
+
+def refuse_half_a_password(address: str) -> str:
+    """`address`, unless its password ends at a / ? or # of its own: the rest would be taken for a host and shown."""
+    if ADDRESS.match(masked(address)) and not ADDRESS.match(address):
+        raise InputError(
+            f"expected %2F, %3F and %23 for / ? and # in the password of {address}, got the signs themselves"
+        )
+    return address
 
 
 def geometry_column(cursor: Any, table: str, source: str) -> str:
@@ -133,10 +145,3 @@ def import_psycopg() -> Any:
     except ImportError as error:
         raise InputError("expected the extra `postgis` for databases; try: pip install 'hiproof[postgis]'") from error
     return psycopg
-
-
-def hide_password(source: str) -> str:
-    url = urlsplit(source)
-    if url.password is None:
-        return source
-    return source.replace(f":{url.password}@", ":...@", 1)
