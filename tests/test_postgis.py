@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
+from handmade import courtyard, gable_house, modelled, unmodelled
 from hiproof.errors import InputError, OutputError
-from hiproof.read.database import hide_password
 from hiproof.read.footprints import footprint_crs, read_footprints
+from hiproof.write import write_cityjson
 from hiproof.write.postgis import lie_of, load_postgis
+from hiproof.write.roof_figures import roof_figures
 from postgis_server import running, why_not
 from sample_models import write_sample_run
 
@@ -74,12 +76,38 @@ def test_a_wrong_address_gets_a_sentence(table, change, expected):
         read_footprints(change(table))
 
 
+@pytest.mark.parametrize(
+    ("condition", "expected"),
+    [
+        ("1=1; drop table houses; --", "syntax error"),
+        ("1=1; drop table houses; select 1, 2", "multiple commands"),
+        ("1=1; commit; drop table houses; select 1, 2", "multiple commands"),
+        ("nextval('counter') > 0", "read-only"),
+    ],
+)
+def test_a_condition_is_one_statement_that_changes_nothing(table, database, condition, expected):
+    with psycopg.connect(database) as connection:
+        connection.execute("create sequence if not exists counter")
+    with pytest.raises(InputError, match=expected):
+        read_footprints(f"{table}&where={condition}")
+    assert len(read_footprints(table)) == 4
+
+
+def test_a_comment_in_a_condition_does_not_swallow_the_order(table):
+    assert [f.id for f in read_footprints(f"{table}&where=storeys > 0 --")] == ["a", "b-1", "b-2"]
+
+
 def test_no_server_gets_a_sentence_and_hides_the_password(tmp_path):
-    address = f"postgresql://me:secret@/postgres?host={tmp_path}&table=houses"
-    assert "secret" not in hide_password(address)
-    with pytest.raises(InputError, match="check address and table") as caught:
-        read_footprints(address)
-    assert "secret" not in str(caught.value)
+    for address in (f"me:secret@/postgres?host={tmp_path}", f"me@/postgres?host={tmp_path}&password=secret"):
+        with pytest.raises(InputError, match="check address and table") as caught:
+            read_footprints(f"postgresql://{address}&table=houses")
+        assert "secret" not in str(caught.value)
+
+
+def test_a_password_with_a_slash_is_not_taken_for_a_host():
+    with pytest.raises(InputError, match="%2F") as caught:
+        read_footprints("postgresql://me:se/cret@host/db?table=houses")
+    assert "cret" not in str(caught.value)
 
 
 def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
@@ -102,6 +130,48 @@ def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
         ).fetchall()
         assert sorted(round(azimuth) for _, azimuth in slopes) == [90, 270]
         assert all(abs(slope - 36.87) < 0.01 for slope, _ in slopes)
+
+
+@pytest.fixture
+def run_of_two(tmp_path):
+    """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without model."""
+    buildings = [modelled(gable_house(), "house"), modelled(courtyard(), "yard", ("flat",)), unmodelled()]
+    (tmp_path / "run").mkdir()
+    write_cityjson(tmp_path / "run" / "buildings.city.jsonl", buildings, "EPSG:7415")
+    return tmp_path / "run", buildings
+
+
+def test_columns_hold_what_the_models_say(database, run_of_two):
+    folder, buildings = run_of_two
+    load_postgis(folder, database, "told")
+    with psycopg.connect(database) as connection:
+        told = connection.execute("select id, status, roof_type from told_buildings order by id").fetchall()
+        assert told == sorted((b.id, b.status.code, b.type) for b in buildings)
+        types = connection.execute("select distinct building_id, roof_type from told_roofs order by 1").fetchall()
+        assert types == [("house", "gable"), ("yard", "flat")]
+
+
+def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_two):
+    folder, buildings = run_of_two
+    load_postgis(folder, database, "volumes")
+    with psycopg.connect(database) as connection:
+        if not connection.execute("select 1 from pg_available_extensions where name = 'postgis_sfcgal'").fetchone():
+            pytest.skip("PostGIS was built without SFCGAL, which computes volumes")
+        connection.execute("create extension if not exists postgis_sfcgal")
+        sql = "select id, ST_Volume(ST_MakeSolid(geom)) from volumes_buildings where geom is not null"
+        volumes = dict(connection.execute(sql).fetchall())
+    assert volumes == pytest.approx({b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.solid}, abs=0.0005)
+
+
+def test_loading_again_replaces_the_run_whatever_its_reference_system(database, run_of_two):
+    folder, buildings = run_of_two
+    load_postgis(folder, database, "again")
+    write_cityjson(folder / "buildings.city.jsonl", buildings[1:], "EPSG:25832")
+    load_postgis(folder, database, "again")
+    with psycopg.connect(database) as connection:
+        left = connection.execute("select distinct id, ST_SRID(geom) from again_buildings order by 1").fetchall()
+        assert left == [("lost", None), ("yard", 25832)]
+        assert connection.execute("select distinct building_id from again_roofs").fetchall() == [("yard",)]
 
 
 def test_loading_needs_a_run_and_a_database(database, tmp_path):

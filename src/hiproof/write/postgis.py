@@ -1,19 +1,26 @@
 """Models into PostGIS: a polyhedral surface a building, a polygon a roof surface, with all attributes.
 
-Loading is idempotent: rows are keyed by building id, so loading a folder again replaces its rows and adds none.
+The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners of a face that are
+stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a table of their own.
+A prefix's tables hold one run: loading replaces what they held, in one transaction, so that readers see either run.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, OutputError
-from ..read.database import import_psycopg
+from ..model import ROOF, Face
+from ..read.database import import_psycopg, refuse_half_a_password
+from .building_attributes import OWN
+from .triangles import face_triangles
 
 SCHEMA = """
 create extension if not exists postgis;
@@ -29,8 +36,19 @@ create index if not exists {prefix}_roofs_type on {roofs} (roof_type);
 """
 
 
+@dataclass(frozen=True)
+class Row:
+    """A building as the tables hold it: its faces over `vertices` (n, 3) in world metres, each with its semantics."""
+
+    id: str
+    attributes: dict[str, Any]
+    vertices: np.ndarray
+    faces: tuple[Face, ...]
+    semantics: tuple[dict[str, Any], ...]
+
+
 def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 500) -> int:
-    """Load `folder`/buildings.city.jsonl into tables PREFIX_buildings and PREFIX_roofs of the database at `dsn`.
+    """Replace the tables PREFIX_buildings and PREFIX_roofs of the database at `dsn` by `folder`/buildings.city.jsonl.
 
     Returns the number of buildings loaded. Raises InputError for a folder without models, OutputError for a database
     that cannot be written.
@@ -45,18 +63,32 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
     psycopg = import_psycopg()
     names = {"buildings": f"{prefix}_buildings", "roofs": f"{prefix}_roofs", "prefix": prefix}
     try:
-        with psycopg.connect(dsn) as connection, connection.cursor() as cursor:
+        with psycopg.connect(refuse_half_a_password(dsn)) as connection, connection.cursor() as cursor:
             header, features = open_sequence(path)
-            cursor.execute(SCHEMA.format(srid=srid_of(header), **names))
-            loaded, rows = 0, []
-            for feature in features:
-                rows.append(building_row(header, feature))
-                if len(rows) == batch:
-                    loaded += insert(cursor, rows, names, srid_of(header))
-                    rows = []
-            return loaded + insert(cursor, rows, names, srid_of(header))
+            srid = srid_of(header)
+            empty_tables(cursor, names, srid)
+            rows = (building_row(header["transform"], feature) for feature in features)
+            return sum(insert(cursor, some, names, srid) for some in batched(rows, batch))
     except psycopg.Error as error:
-        raise OutputError(f"expected a PostGIS database that can be written, got: {str(error).strip()}") from error
+        reason = str(error).strip().splitlines()[0]
+        raise OutputError(
+            f"expected a PostGIS database that can be written, got: {reason}; check the address"
+        ) from error
+
+
+def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
+    """Make the tables, or empty those that are there and give them the run's reference system."""
+    cursor.execute(SCHEMA.format(srid=srid, **names))
+    cursor.execute("delete from {buildings}".format(**names))
+    for table, kind in ((names["buildings"], "PolyhedralSurfaceZ"), (names["roofs"], "PolygonZ")):
+        cursor.execute("select srid from geometry_columns where f_table_name = %s", (table,))
+        if {known for (known,) in cursor.fetchall()} != {srid}:
+            cursor.execute(f"alter table {table} alter column geom type geometry({kind}, {srid})")
+
+
+def batched(rows: Iterator[Row], size: int) -> Iterator[list[Row]]:
+    while batch := list(islice(rows, size)):
+        yield batch
 
 
 def open_sequence(path: Path) -> tuple[dict, Iterator[dict]]:
@@ -71,49 +103,45 @@ def srid_of(header: dict) -> int:
     return int(code) if code.isdigit() else 0
 
 
-def building_row(header: dict, feature: dict) -> tuple[str, dict, list[tuple[str, list[np.ndarray], dict]]]:
-    """(id, attributes, surfaces) of a feature, each surface as (semantic type, rings (m, 3), semantic attributes)."""
-    transform = header["transform"]
+def building_row(transform: dict, feature: dict) -> Row:
+    """The building of a CityJSON feature whose coordinates are integers by `transform`."""
     vertices = np.asarray(feature["vertices"], float).reshape(-1, 3) * transform["scale"] + transform["translate"]
     city_object = feature["CityObjects"][feature["id"]]
-    surfaces = []
+    faces, semantics = [], []
     for geometry in city_object.get("geometry", []):
         if geometry["type"] != "Solid":
             continue
-        semantics = geometry["semantics"]
-        for rings, index in zip(geometry["boundaries"][0], semantics["values"][0], strict=True):
-            semantic = semantics["surfaces"][index]
-            surfaces.append((semantic["type"], [vertices[ring] for ring in rings], semantic))
-    return feature["id"], city_object.get("attributes", {}), surfaces
+        surfaces, values = geometry["semantics"]["surfaces"], geometry["semantics"]["values"][0]
+        for rings, index in zip(geometry["boundaries"][0], values, strict=True):
+            semantics.append(surfaces[index])
+            faces.append(Face(tuple(map(tuple, rings)), surfaces[index]["type"]))
+    return Row(feature["id"], city_object.get("attributes", {}), vertices, tuple(faces), tuple(semantics))
 
 
-def insert(cursor: Any, rows: list, names: dict[str, str], srid: int) -> int:
-    """Insert or replace buildings together with their roof surfaces."""
-    ids = [id for id, _, _ in rows]
-    cursor.execute(f"delete from {names['buildings']} where id = any(%s)", (ids,))
+def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> int:
+    """Insert buildings together with their roof surfaces."""
     geometry = f"ST_GeomFromEWKT('SRID={srid};' || %s::text)"
     cursor.executemany(
         f"insert into {names['buildings']} values (%s, %s, %s, %s, {geometry})",
         [
-            (id, a.get("status"), a.get("roof_type", a.get("rf_roof_type")), json.dumps(a), polyhedral_wkt(surfaces))
-            for id, a, surfaces in rows
+            (r.id, r.attributes.get(f"{OWN}status"), r.attributes.get(f"{OWN}roof_type"), json.dumps(r.attributes),
+             polyhedral_wkt(r))
+            for r in rows
         ],
-    )
+    )  # fmt: skip
     cursor.executemany(
         f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, {geometry})",
-        [roof for id, _, surfaces in rows for roof in roof_rows(id, surfaces)],
+        [roof for row in rows for roof in roof_rows(row)],
     )
     return len(rows)
 
 
-def roof_rows(id: str, surfaces: list) -> Iterator[tuple]:
+def roof_rows(row: Row) -> Iterator[tuple]:
     """A row a roof surface: (building, number, type, slope, azimuth, area, WKT)."""
-    number = 0
-    for kind, rings, semantic in surfaces:
-        if kind == "RoofSurface":
-            slope, azimuth, area = lie_of(rings)
-            yield id, number, semantic.get("roof_type"), slope, azimuth, area, f"POLYGON Z {rings_wkt(rings)}"
-            number += 1
+    roofs = [(face, said) for face, said in zip(row.faces, row.semantics, strict=True) if face.kind == ROOF]
+    for number, (face, said) in enumerate(roofs):
+        rings = [row.vertices[list(ring)] for ring in face.rings]
+        yield row.id, number, said.get(f"{OWN}part_type"), *lie_of(rings), f"POLYGON Z {rings_wkt(rings)}"
 
 
 def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
@@ -125,10 +153,10 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
     return slope, azimuth, area
 
 
-def polyhedral_wkt(surfaces: list) -> str | None:
-    if not surfaces:
-        return None
-    return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt(rings) for _, rings, _ in surfaces)})"
+def polyhedral_wkt(row: Row) -> str | None:
+    """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None without one."""
+    triangles = [t for face in row.faces for t in row.vertices[face_triangles(row.vertices, face)]]
+    return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt([t]) for t in triangles)})" if triangles else None
 
 
 def rings_wkt(rings: list[np.ndarray]) -> str:
