@@ -45,9 +45,13 @@ def one_of(a: Part, b: Part) -> Part | None:
     rectangle = outline.minimum_rotated_rectangle
     if rectangle.area - a.area - b.area > 1e-3 or not np.allclose(a.pieces[0].planes, b.pieces[0].planes, atol=SAME):
         return None
+    sides = np.hypot(*np.diff(shapely.get_coordinates(rectangle)[:3], axis=0).T)
     shared = {
         name: value for name, value in a.parameters.items() if abs(value - b.parameters.get(name, math.inf)) < SAME
     }
+    for side in ("length", "width"):
+        if side in shared and np.abs(sides - shared[side]).min() > 1e-3:
+            del shared[side]
     place = np.array([np.nan, np.nan, a.translation[2]])
     return dataclasses.replace(a, pieces=(Piece(rectangle, a.pieces[0].planes),), parameters=shared, translation=place)
 

@@ -1,0 +1,117 @@
+"""Laws of the towns' benchmark: a true model is right in everything, a draw is always the same, grounds apart are buildings."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from benchmarks.delft import asked_footprints
+from benchmarks.judging import SHARED, wireframe_figures
+from benchmarks.towns import TOWNS, chosen, ground_of, read_town, touching, write_truth
+
+from handmade import box
+from hiproof.compose import compose
+from hiproof.model import Building, Roof
+from hiproof.simulate import random_compound
+from hiproof.status import Status
+from hiproof.write import write_cityjson
+
+needs_judge = pytest.mark.skipif(not (SHARED / "tools").is_dir(), reason="needs ../shared/tools")
+needs_towns = pytest.mark.skipif(not TOWNS["essen"].is_file(), reason="needs ../shared/data/towns")
+needs_delft = pytest.mark.skipif(not (SHARED / "data/delft").is_dir(), reason="needs ../shared/data/delft")
+
+
+def simulated(kind, seed):
+    """A simulated compound with its solid, as a reconstruction would return it."""
+    made = random_compound(np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0))
+    solid = compose(made.roof, 0.0).moved(made.roof.frame.origin)
+    return Building(f"{kind}-{seed}", Status.MODELLED, roof=made.roof, solid=solid)
+
+
+@pytest.fixture
+def small_town(tmp_path) -> Path:
+    """Three simulated compounds as a CityJSON file."""
+    path = tmp_path / "town.city.json"
+    write_cityjson(path, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))])
+    return path
+
+
+def test_a_town_is_read_with_its_outlines(small_town):
+    buildings = {building.id: building for building in read_town(small_town)}
+    for seed, kind in enumerate(("L", "dormered", "two_level")):
+        truth = simulated(kind, seed).roof
+        outline = shapely.transform(truth.outline, truth.frame.to_world)
+        assert buildings[f"{kind}-{seed}"].footprint.symmetric_difference(outline).area < 0.05
+    assert read_town(small_town, smallest_m2=1e4) == []
+
+
+def test_a_scan_lies_on_the_building_and_is_always_the_same(small_town):
+    building = next(b for b in read_town(small_town) if b.id == "L-0")
+    points = building.scanned(4.0)
+    assert np.array_equal(points, building.scanned(4.0))
+    made = simulated("L", 0)
+    local = made.roof.frame.to_local(points)
+    inside = shapely.contains_xy(made.roof.outline.buffer(-0.4), *local[:, :2].T)
+    gap = made.roof.height_at(local[inside, :2]) - local[inside, 2]
+    assert inside.sum() > 3.0 * made.roof.outline.buffer(-0.4).area and np.median(np.abs(gap)) < 0.08
+
+
+@needs_judge
+def test_true_models_are_right_in_everything(small_town, tmp_path):
+    buildings = read_town(small_town)
+    truth, models = tmp_path / "truth.city.json", tmp_path / "models.city.jsonl"
+    write_truth(truth, small_town, buildings)
+    write_cityjson(models, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))])
+    figures, lines = wireframe_figures(models, truth, worst=2)
+    assert figures["buildings"] == 3 and len(lines) == 2
+    assert figures["edge_f1"] == figures["corner_f1"] == 100.0
+    assert figures["faces_of_truth"] == figures["corners_of_truth"] == 1.0
+
+
+@needs_judge
+@needs_towns
+def test_a_missing_model_counts_as_missed(tmp_path):
+    buildings = chosen(read_town(TOWNS["essen"]), every=30)
+    write_truth(tmp_path / "truth.city.json", TOWNS["essen"], buildings)
+    solids = [next(iter(building.solids.values())) for building in buildings]
+    models = [
+        Building(b.id, Status.MODELLED, roof=flat_roof(b), solid=s) for b, s in zip(buildings, solids, strict=True)
+    ]
+    write_cityjson(tmp_path / "models.city.jsonl", models[1:])
+    figures, _ = wireframe_figures(tmp_path / "models.city.jsonl", tmp_path / "truth.city.json")
+    assert figures["edge_precision"] == 100.0 and 0 < figures["edge_recall"] < 100.0
+
+
+def flat_roof(building) -> Roof:
+    """Any roof: what is judged is the solid."""
+    return simulated("L", 0).roof
+
+
+def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
+    first, beside, apart = (
+        box(),
+        box().moved(np.array([4.0, 0.0, 0.0])),
+        box(2.0, 2.0).moved(np.array([20.0, 0.0, 0.0])),
+    )
+    found = touching("house", {"a": first, "b": beside, "c": apart})
+    assert [building.id for building in found] == ["house", "house~2"]
+    assert [sorted(building.solids) for building in found] == [["a", "b"], ["c"]]
+    assert found[0].footprint.equals_exact(shapely.box(0, 0, 8, 5).normalize(), 1e-6, normalize=True)
+    assert ground_of(apart).area == pytest.approx(4.0)
+
+
+def test_draws_are_parts_of_the_whole_and_always_the_same():
+    every = list(range(101))
+    even, odd = (chosen(every, parity=parity) for parity in ("even", "odd"))
+    assert sorted(even + odd) == every and even[:2] == [0, 2]
+    assert chosen(every, every=10) == every[::10]
+    drawn = chosen(every, most=12)
+    assert len(drawn) == 12 and drawn == sorted(set(drawn)) and drawn == chosen(every, most=12)
+    assert chosen(every, most=500) == every
+
+
+@needs_delft
+def test_even_and_odd_footprints_are_all_footprints():
+    path = SHARED / "data/delft/footprints.gpkg"
+    even, odd, every = ({f.id for f in asked_footprints(path, parity)} for parity in ("even", "odd", None))
+    assert even | odd == every and not even & odd and min(len(even), len(odd)) > 0.4 * len(every)
