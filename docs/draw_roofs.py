@@ -101,12 +101,12 @@ def modelled(name: str, out: Path) -> Path:
 
 def read_run(folder: Path) -> list[Drawn]:
     """The buildings of a run that have a model and points."""
-    clouds, footprints = run_inputs(folder)
+    clouds, footprints, layer = run_inputs(folder)
     if not clouds:
         raise InputError(
             f"expected the clouds of the run in {folder} where run.json says, got none; make the run again"
         )
-    run = evaluate_run(folder, clouds, footprints)
+    run = evaluate_run(folder, clouds, footprints, layer=layer)
     records = {record["id"]: record for record in read_parameters(folder / "parameters.jsonl")}
     found = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
