@@ -5,17 +5,29 @@ from __future__ import annotations
 import dataclasses
 import tomllib
 from dataclasses import dataclass, field, fields
+from numbers import Integral
 from pathlib import Path
 from typing import Any
 
 from .errors import SettingsError
 
+MOST = 10**15  # no number of a setting without bounds is larger
+
 
 def setting(
-    default: Any, help: str, unit: str = "", low: float | None = None, high: float | None = None, choices: tuple = ()
+    default: Any,
+    help: str,
+    unit: str = "",
+    low: float | None = None,
+    high: float | None = None,
+    choices: tuple = (),
+    fewest: int = 0,
 ) -> Any:
-    """Declare one setting of a section; `low` and `high` are inclusive bounds, `choices` the allowed values."""
-    metadata = {"help": help, "unit": unit, "low": low, "high": high, "choices": choices}
+    """Declare one setting of a section; `low` and `high` are inclusive bounds, `choices` the allowed values.
+
+    Of a setting of several values they hold for each, and there are at least `fewest`.
+    """
+    metadata = {"help": help, "unit": unit, "low": low, "high": high, "choices": choices, "fewest": fewest}
     return field(default=default, metadata=metadata)
 
 
@@ -23,8 +35,10 @@ def setting(
 class ReadSettings:
     """[read] which points count."""
 
-    building_classes: tuple[int, ...] = setting((6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)")
-    ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points")
+    building_classes: tuple[int, ...] = setting(
+        (6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)", "", 0, 255, fewest=1
+    )
+    ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points", "", 0, 255)
     crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say')
     unit: str = setting(
         "auto",
@@ -44,7 +58,12 @@ class FitSettings:
     types: tuple[str, ...] = setting((), "roof types to choose among; empty means the whole catalogue")
     objective: str = setting("likelihood", "objective to minimise", choices=("likelihood", "paper"))
     side_softness_m: tuple[float, ...] = setting(
-        (0.1, 0.04, 0.015, 0.006), "softness of the roof's sides tried at last, the most likely kept", "m"
+        (0.1, 0.04, 0.015, 0.006),
+        "softness of the roof's sides tried at last, the most likely kept",
+        "m",
+        0.001,
+        1.0,
+        fewest=1,
     )
     parts: str = setting("compound", "as many primitives as the evidence pays for, or one", choices=("compound", "one"))
 
@@ -129,7 +148,7 @@ class Settings:
         """Settings from a TOML file with one table a section. Raises SettingsError when it cannot be read."""
         try:
             values = tomllib.loads(Path(path).read_text())
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:  # undecodable, no TOML, or a number of 5,000 digits
             raise SettingsError(
                 f"expected a TOML settings file at {path}, got: {error}; `hiproof settings` prints one"
             ) from error
@@ -177,38 +196,51 @@ class Settings:
 
 def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
     """`value` as the declared setting's type. Raises SettingsError with the full sentence when it does not fit."""
-    default, bounds = declared.default, declared.metadata
-    try:
-        if isinstance(default, tuple):
-            value = tuple(value) if isinstance(value, (list, tuple)) else (value,)
-            if any(isinstance(v, (dict, list)) for v in value):
-                raise ValueError
-        elif isinstance(default, bool):
-            if not isinstance(value, bool):
-                raise ValueError
-        elif isinstance(default, int):
-            if isinstance(value, bool) or int(value) != value:
-                raise ValueError
-            value = int(value)
-        elif isinstance(default, float):
-            value = float(value)
-        elif not isinstance(value, str):
-            raise ValueError
-    except (TypeError, ValueError) as error:
-        kind = type(default).__name__
-        raise SettingsError(
-            f"expected {name} to be a {kind} such as {default!r}, got {value!r}; {bounds['help']}"
-        ) from error
-    low, high, choices = bounds["low"], bounds["high"], bounds["choices"]
-    if (low is not None and not value >= low) or (high is not None and not value <= high):
-        raise SettingsError(
-            f"expected {name} between {low} and {high} {bounds['unit']}, got {value}; the default is {default}".replace(
-                "  ", " "
-            )
-        )
+    default, told = declared.default, declared.metadata
+    if not isinstance(default, tuple):
+        return checked_one(name, default, told, value)
+    values = tuple(value) if isinstance(value, (list, tuple)) else (value,)
+    if len(values) < told["fewest"]:
+        raise SettingsError(f"expected {name} to hold {told['fewest']} or more values, got none; {told['help']}")
+    return tuple(checked_one(name, KINDS[declared.type], told, one) for one in values)
+
+
+KINDS = {"tuple[int, ...]": 0, "tuple[float, ...]": 0.0, "tuple[str, ...]": ""}
+"""A value of an element's type, by the declared type of a setting of several values."""
+
+
+def checked_one(name: str, like: Any, told: Any, value: Any) -> Any:
+    """One value of the type of `like`, within the bounds and among the choices declared."""
+    whole = isinstance(value, Integral) and not isinstance(value, bool)
+    if isinstance(like, (bool, str)):
+        fits = isinstance(value, type(like))
+    elif isinstance(like, int):
+        fits = whole
+    else:
+        fits = whole or isinstance(value, float)
+    if not fits:
+        kind = {bool: "true or false", str: "text", int: "a whole number", float: "a number"}[type(like)]
+        raise SettingsError(f"expected {name} to be {kind}, got {shown(value)}; {told['help']}")
+    low, high, choices = told["low"], told["high"], told["choices"]
+    # so written that NaN is in no bounds; a number without bounds must still be finite
+    if isinstance(like, (int, float)) and not isinstance(like, bool):
+        low, high = -MOST if low is None else low, MOST if high is None else high
+        if not low <= value <= high:
+            bounds = " ".join(f"between {low} and {high} {told['unit']}".split())
+            raise SettingsError(f"expected {name} {bounds}, got {shown(value)}; {told['help']}")
     if choices and value not in choices:
-        raise SettingsError(f"expected {name} to be one of {', '.join(map(str, choices))}, got {value!r}")
-    return value
+        raise SettingsError(f"expected {name} to be one of {', '.join(map(str, choices))}, got {shown(value)}")
+    return type(like)(value)
+
+
+def shown(value: Any) -> str:
+    """A value as a message shows it: whole numbers of thousands of digits and long texts cut short."""
+    if isinstance(value, int) and abs(value) > MOST:
+        return f"a number of more than {len(str(MOST)) - 1} digits"
+    if isinstance(value, (list, tuple, dict)):
+        return f"a {type(value).__name__} of {len(value)}"
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
 
 
 def describe(declared: dataclasses.Field) -> str:

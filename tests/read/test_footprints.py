@@ -13,7 +13,7 @@ import hiproof.read.polygons
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.read.overlap import check_overlap
+from hiproof.read.overlap import check_overlap, refuse_degrees
 from hiproof.read.polygons import simple_polygons
 from hiproof.settings import Settings
 
@@ -152,6 +152,81 @@ def test_any_tangle_of_edges_becomes_valid_polygons(seed):
 def test_coordinates_that_are_no_numbers_enclose_no_area():
     assert simple_polygons(shapely.Polygon([(0, 0), (1, np.nan), (1, 1)]))[0].is_empty
     assert simple_polygons(shapely.Polygon([(0, 0), (np.inf, 1), (1, 1)]))[0].is_empty
+
+
+def test_a_file_of_several_layers_needs_a_name(tmp_path):
+    path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
+    more = [np.array(["B", "C"], object)]
+    squares = shapely.to_wkb(np.array([shifted(SQUARE, 20), shifted(SQUARE, 40)], object))
+    pyogrio.raw.write(
+        path, squares, more, ["name"], layer="sheds", geometry_type="Polygon", crs="EPSG:28992", append=True
+    )
+    for read in (read_footprints, footprint_crs):
+        with pytest.raises(InputError, match="2: buildings, sheds; name one with --layer"):
+            read(path)
+    assert len(read_footprints(path, layer="sheds")) == 2 and footprint_crs(path, "buildings").to_epsg() == 28992
+
+
+def test_a_table_without_geometry_is_no_layer_to_choose_from(tmp_path):
+    path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
+    pyogrio.raw.write(path, None, [np.array(["x"], object)], ["note"], layer="notes", geometry_type=None, append=True)
+    assert len(pyogrio.list_layers(path)) == 2 and len(read_footprints(path)) == 1
+
+
+def test_features_of_several_polygons_are_said_once(tmp_path):
+    both = shapely.MultiPolygon([SQUARE, shifted(SQUARE, 20)])
+    with pytest.warns(InputWarning, match="2 features of several polygons became 4 buildings") as told:
+        read_footprints(write(tmp_path / "a.gpkg", [both, shifted(both, 60)], id=np.array(["M", "N"], object)))
+    assert len(told) == 1
+
+
+def moved(xy, source, target):
+    return np.column_stack(Transformer.from_crs(source, target, always_xy=True).transform(*xy.T))
+
+
+RD, UTM31, UTM32, WGS84 = (CRS.from_epsg(code) for code in (28992, 25831, 25832, 4326))
+HERE = np.array([[85005.0, 446005.0], [85035.0, 446005.0]])
+IN_UTM = moved(HERE, RD, UTM31)
+SLIPS = {
+    "swapped axes": (HERE[:, ::-1], RD, HERE, RD, "x and y look swapped"),
+    "swapped axes of an unknown CRS": (HERE[:, ::-1], None, HERE, None, "x and y look swapped"),
+    "degrees": (moved(HERE, RD, WGS84), None, HERE, RD, "longitude and latitude in degrees"),
+    "degrees, latitude first": (moved(HERE, RD, WGS84)[:, ::-1], None, HERE, RD, "latitude and longitude in degrees"),
+    "a cloud in degrees": (HERE, RD, moved(HERE, RD, WGS84), None, "the cloud looks like longitude and latitude"),
+    "the wrong label": (HERE, UTM31, HERE, RD, "look like the cloud's EPSG:28992"),
+    "a neighbouring zone": (IN_UTM, UTM32, IN_UTM, UTM31, "look like the cloud's EPSG:25831"),
+    "two zones off": (
+        moved(IN_UTM, UTM31, UTM32),
+        None,
+        IN_UTM,
+        UTM31,
+        r"they look like EPSG:25832 \(ETRS89 / UTM zone 32N\)",
+    ),
+    "a cloud in the next zone": (IN_UTM, UTM31, moved(IN_UTM, UTM31, UTM32), None, "the cloud looks like EPSG:25832"),
+    "feet": (HERE / 0.3048, None, HERE, None, "they look like feet"),
+    "a cloud in feet": (HERE, None, HERE / 0.3048, None, "the cloud like feet"),
+    "elsewhere": (HERE + 50000, RD, HERE, RD, "check the CRS each file names"),
+}
+
+
+@pytest.mark.parametrize("slip", SLIPS)
+def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
+    xy, named, cloud_xy, cloud, expected = SLIPS[slip]
+    in_use = xy if named is None or cloud is None else moved(xy, named, cloud)
+    footprints = [Footprint(str(i), shapely.Point(point).buffer(1e-3)) for i, point in enumerate(in_use)]
+    reach = 1e-5 if np.abs(cloud_xy).max() < 180 else 20.0
+    bounds = (*(cloud_xy.min(axis=0) - reach), *(cloud_xy.max(axis=0) + reach))
+    with pytest.raises(InputError, match=expected) as caught:
+        check_overlap(footprints, bounds, named, cloud)
+    assert str(caught.value).startswith("expected footprints that overlap the cloud in x")
+
+
+def test_what_names_no_crs_and_counts_in_degrees_is_refused():
+    low = np.array([[4.36, 52.0], [4.37, 52.01]])
+    with pytest.raises(InputError, match="look like degrees"):
+        refuse_degrees(low, low + 0.01, "the point clouds")
+    refuse_degrees(low, low + 12.0, "the point clouds")
+    refuse_degrees(HERE, HERE + 0.01, "the point clouds")
 
 
 def test_overlap_is_checked_and_both_boxes_are_named():

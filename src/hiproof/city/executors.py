@@ -15,7 +15,7 @@ from concurrent.futures.process import BrokenProcessPool
 from multiprocessing import get_context
 from typing import Any
 
-from ..errors import InputError, OutputError
+from ..errors import InputError, OutputError, warn_in_sentences
 
 CONNECT_S = 20
 
@@ -67,7 +67,7 @@ class Processes:
     def submit(self, function: Callable, task: tuple) -> Future:
         if self.pool is None:
             self.pool = ProcessPoolExecutor(
-                self.jobs, mp_context=get_context("spawn"), initializer=leave_with_parent, initargs=(os.getpid(),)
+                self.jobs, mp_context=get_context("spawn"), initializer=begin_worker, initargs=(os.getpid(),)
             )
         try:
             return self.pool.submit(function, *task)
@@ -93,6 +93,12 @@ class Processes:
         if self.pool is not None:
             self.pool.shutdown(wait=True, cancel_futures=True)
             self.pool = None
+
+
+def begin_worker(parent: int) -> None:
+    """What a worker process starts with: it warns as the main process does, and ends with it."""
+    warn_in_sentences()
+    leave_with_parent(parent)
 
 
 def leave_with_parent(parent: int) -> None:

@@ -22,6 +22,7 @@ def make_plan(request, mark: str) -> Plan:
     """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
     from ..read.crs import units_of
     from ..read.footprints import footprint_crs
+    from ..read.terrain import read_terrain
 
     headers = read_headers(request.clouds)
     cloud = crs_of_clouds(headers, request.settings)
@@ -34,6 +35,10 @@ def make_plan(request, mark: str) -> Plan:
         refuse_degrees_of(headers)
     if cloud is None:
         say_what_is_assumed(headers[0].path, footprints, units)
+    if request.terrain:
+        read_terrain(
+            request.terrain, crs, units
+        )  # only to be told now, not after all points are sorted, if it cannot be
     if request.footprints:
         jobs = jobs_from_footprints(request, headers, cloud, footprints, units)
     else:

@@ -18,6 +18,7 @@ from ..frames import METRES, Units
 from ..masking import masked, masked_values
 from ..settings import Settings
 from ..write.files import atomic
+from .checks import refuse_unusable
 from .executors import WorkerLost, make_executor
 from .ledger import Ledger
 from .merge import merge, remove_tiles
@@ -76,6 +77,7 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
     so far stays, and the same call goes on from there.
     """
     clock = Clock()
+    refuse_unusable(request)
     executor = make_executor(request.jobs, request.scheduler)
     state = open_state(request.out)
     ledger = open_ledger(state, request.restart)

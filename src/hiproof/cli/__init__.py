@@ -11,10 +11,11 @@ def main() -> None:
 
     An error of our own making shows its traceback, passwords masked like everywhere, and ends with exit code 1.
     """
-    from ..errors import HiproofError
+    from ..errors import HiproofError, warn_in_sentences
     from ..masking import masked
     from .app import app
 
+    warn_in_sentences()
     try:
         app()
     except HiproofError as error:

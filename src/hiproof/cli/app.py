@@ -60,7 +60,7 @@ def reconstruct(
     config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
     parquet: Annotated[bool | None, typer.Option(help="write the attributes as GeoParquet too (extra `city`)")] = None,
     models: Annotated[str | None, typer.Option(help="models merged, by work tiles, or both [default: merged]")] = None,
-    jobs: Annotated[int, typer.Option(min=1, help="processes on this machine")] = 1,
+    jobs: Annotated[int, typer.Option(help="processes on this machine")] = 1,
     scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
     restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
 ) -> None:
@@ -72,7 +72,11 @@ def reconstruct(
 
     options = {
         "read": {"building_classes": building_class, "ground_classes": ground_class, "crs": crs, "unit": unit},
-        "fit": {"types": types.split(",") if types else None, "objective": objective, "parts": parts},
+        "fit": {
+            "types": [name.strip() for name in types.split(",")] if types else None,
+            "objective": objective,
+            "parts": parts,
+        },
         "compound": {"detail": detail},
         "segment": {"enabled": network},
         "city": {"parquet": parquet, "models": models},

@@ -63,10 +63,11 @@ def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tupl
                 text = f"they look like {what} in degrees: name EPSG:4326 in the footprints, with longitude first"
                 yield text, reprojected(pairs, degrees, target)
         yield "the cloud looks like longitude and latitude in degrees: reproject it", reprojected(xy, own, degrees)
-        for neighbour in neighbours(own):
+        # a side that names its CRS is doubted only where the other names one, too
+        for neighbour in neighbours(own if cloud is not None else None):
             text = f"they look like {described(neighbour)}: name the right zone in the footprints"
             yield text, reprojected(xy, neighbour, target)
-        for neighbour in neighbours(target):
+        for neighbour in neighbours(target if named is not None else None):
             text = f"the cloud looks like {described(neighbour)}: name the right zone with --crs"
             yield text, reprojected(xy, own, neighbour)
     yield "they look like metres and the cloud like feet: name CRSs, or the cloud's --unit", xy / FOOT_M

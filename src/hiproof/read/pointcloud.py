@@ -24,6 +24,7 @@ LAS_SUFFIXES = (".las", ".laz")
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
 POINT_SUFFIXES = (*LAS_SUFFIXES, *TEXT_SUFFIXES, ".ply")
 FORMATS = "LAS, LAZ, COPC, PLY or text (" + " ".join(TEXT_SUFFIXES) + ")"
+PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
 CHUNK_POINTS = 1_000_000
 
 Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
@@ -161,6 +162,9 @@ def file_kind(path: str | Path) -> str:
         return "ply"
     if suffix in TEXT_SUFFIXES:
         return "text"
+    for start, program in PACKED.items():
+        if head.startswith(start):
+            raise InputError(f"expected {FORMATS} at {path}, got a packed file; unpack it first: {program} {path}")
     got = "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
     raise InputError(
         f"expected {FORMATS} at {path}, got {got} that starts with {head!r}; "

@@ -1,0 +1,61 @@
+"""What can be known to be wrong with a request before any file is read: one sentence then, and not after an hour."""
+
+from __future__ import annotations
+
+import difflib
+from typing import Any
+
+from ..errors import InputError, SettingsError
+from ..settings import Settings, shown
+
+MOST_JOBS = 1024
+
+
+def refuse_unusable(request: Any) -> None:
+    """Raise SettingsError or InputError for options of a `run.Request` that cannot be met here."""
+    if not (type(request.jobs) is int and 1 <= request.jobs <= MOST_JOBS):
+        raise SettingsError(
+            f"expected --jobs between 1 and {MOST_JOBS}, got {shown(request.jobs)}; a job a core is enough"
+        )
+    for name in ("layer", "id_attribute"):
+        if getattr(request, name) is not None and request.footprints is None:
+            option = "--" + name.replace("_", "-")
+            raise SettingsError(f"expected footprints with {option}, got none; name them with --footprints")
+    refuse_settings(request.settings)
+
+
+def refuse_settings(settings: Settings) -> None:
+    """Raise SettingsError or InputError for values that are well formed, but that nothing here can be done with."""
+    refuse_unknown_types(settings.fit.types)
+    refuse_crs(settings.read)
+    if settings.segment.enabled and (settings.segment.weights or settings.segment.device != "cpu"):
+        from ..segment.inference import SHIPPED_WEIGHTS, load
+
+        load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
+    if settings.city.parquet:
+        from ..write.geoparquet import import_pyarrow
+
+        import_pyarrow()
+
+
+def refuse_unknown_types(types: tuple[str, ...]) -> None:
+    from ..primitives import CATALOGUE
+
+    unknown = [name for name in types if name not in CATALOGUE]
+    if unknown:
+        near = [difflib.get_close_matches(name.lower(), CATALOGUE, n=1, cutoff=0.5) for name in unknown]
+        meant = [
+            f"{shown(name)} (did you mean {found[0]}?)" if found else shown(name)
+            for name, found in zip(unknown, near, strict=True)
+        ]
+        raise SettingsError(f"expected roof types among {', '.join(CATALOGUE)}, got {', '.join(meant)}")
+
+
+def refuse_crs(read: Any) -> None:
+    """The CRS that settings give the clouds must be known, projected, and of the unit that they give."""
+    from ..read.crs import parse_crs, units_of
+
+    try:
+        units_of(parse_crs(read.crs), "the point clouds", read.unit)
+    except InputError as error:
+        raise SettingsError(str(error)) from error
