@@ -26,6 +26,7 @@ from hiproof.read.crs import units_of
 from hiproof.read.las import las_crs
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
+from hiproof.write.postgis import building_row, open_sequence, roof_rows, units_of_run
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
 US_FOOT = 1200 / 3937
@@ -132,11 +133,19 @@ def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_m
     assert np.allclose(FEET.to_metres(table_ft), table_m, atol=0.001)
 
 
+def areas_to_load(out):
+    """Areas in m2 of the roof surfaces as they would go into PostGIS."""
+    header, features = open_sequence(out / "buildings.city.jsonl")
+    rows = [building_row(header["transform"], feature, units_of_run(out)) for feature in features]
+    return [area for row in rows for *_, area, _ in roof_rows(row)]
+
+
 def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
     out = run(tmp_path / "feet", FEET, "EPSG:2263+6360", "EPSG:2263")
     for name in ("buildings.gml", "buildings.city.jsonl"):
         for (_, ours), (_, theirs) in zip(read_solids(out / name), read_solids(in_metres / name), strict=True):
             assert np.allclose(np.ptp(ours.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02)
+    assert areas_to_load(out) == pytest.approx(areas_to_load(in_metres), rel=2e-3)
     cloud, footprints = tmp_path / "feet/cloud.laz", tmp_path / "feet/footprints.gpkg"
     for figures in evaluate_run(out, [str(cloud)], str(footprints)).figures:
         assert figures.quality.share_within_20cm > 0.95 and figures.quality.outline_iou > 0.99

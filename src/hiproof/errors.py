@@ -3,10 +3,10 @@
 Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or another process.
 """
 
-from .masking import masked
-
 import sys
 import warnings
+
+from .masking import masked
 
 
 class HiproofError(Exception):

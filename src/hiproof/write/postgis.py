@@ -17,9 +17,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, OutputError
+from ..frames import METRES, Units
 from ..model import ROOF, Face
 from ..read.database import import_psycopg, refuse_half_a_password
 from .building_attributes import OWN
+from .naming import units_named
 from .triangles import face_triangles
 
 SCHEMA = """
@@ -38,13 +40,14 @@ create index if not exists {prefix}_roofs_type on {roofs} (roof_type);
 
 @dataclass(frozen=True)
 class Row:
-    """A building as the tables hold it: its faces over `vertices` (n, 3) in world metres, each with its semantics."""
+    """A building as the tables hold it: its faces over `vertices` (n, 3) in `units`, each with its semantics."""
 
     id: str
     attributes: dict[str, Any]
     vertices: np.ndarray
     faces: tuple[Face, ...]
     semantics: tuple[dict[str, Any], ...]
+    units: Units = METRES
 
 
 def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 500) -> int:
@@ -67,7 +70,8 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
             header, features = open_sequence(path)
             srid = srid_of(header)
             empty_tables(cursor, names, srid)
-            rows = (building_row(header["transform"], feature) for feature in features)
+            units = units_named(header.get("metadata", {}).get("referenceSystem"), units_of_run(path.parent))
+            rows = (building_row(header["transform"], feature, units) for feature in features)
             return sum(insert(cursor, some, names, srid) for some in batched(rows, batch))
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
@@ -103,7 +107,14 @@ def srid_of(header: dict) -> int:
     return int(code) if code.isdigit() else 0
 
 
-def building_row(transform: dict, feature: dict) -> Row:
+def units_of_run(folder: Path) -> Units:
+    """Units that the record of a run tells of, metres where there is no record."""
+    record = folder / "run.json"
+    told = json.loads(record.read_text(encoding="utf-8")).get("units", {}) if record.is_file() else {}
+    return Units(told.get("metres_in_plan_unit", 1.0), told.get("metres_in_height_unit", 1.0))
+
+
+def building_row(transform: dict, feature: dict, units: Units = METRES) -> Row:
     """The building of a CityJSON feature whose coordinates are integers by `transform`."""
     vertices = np.asarray(feature["vertices"], float).reshape(-1, 3) * transform["scale"] + transform["translate"]
     city_object = feature["CityObjects"][feature["id"]]
@@ -115,7 +126,7 @@ def building_row(transform: dict, feature: dict) -> Row:
         for rings, index in zip(geometry["boundaries"][0], values, strict=True):
             semantics.append(surfaces[index])
             faces.append(Face(tuple(map(tuple, rings)), surfaces[index]["type"]))
-    return Row(feature["id"], city_object.get("attributes", {}), vertices, tuple(faces), tuple(semantics))
+    return Row(feature["id"], city_object.get("attributes", {}), vertices, tuple(faces), tuple(semantics), units)
 
 
 def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> int:
@@ -141,11 +152,17 @@ def roof_rows(row: Row) -> Iterator[tuple]:
     roofs = [(face, said) for face, said in zip(row.faces, row.semantics, strict=True) if face.kind == ROOF]
     for number, (face, said) in enumerate(roofs):
         rings = [row.vertices[list(ring)] for ring in face.rings]
-        yield row.id, number, said.get(f"{OWN}part_type"), *lie_of(rings), f"POLYGON Z {rings_wkt(rings)}"
+        yield (
+            row.id,
+            number,
+            said.get(f"{OWN}part_type"),
+            *lie_of([row.units.to_metres(ring) for ring in rings]),
+            f"POLYGON Z {rings_wkt(rings)}",
+        )
 
 
 def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
-    """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat) and true area (m2)."""
+    """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat), true area (m2) of rings in metres."""
     normal = sum(0.5 * np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0) for ring in rings)
     area = float(np.linalg.norm(normal))
     slope = float(np.degrees(np.arctan2(np.hypot(*normal[:2]), abs(normal[2]))))
