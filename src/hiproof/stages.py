@@ -19,6 +19,9 @@ from .status import Status
 FEWEST_POINTS = 4
 """A roof plane and one point to doubt it; below that a building is a flat block."""
 
+MOST_OUTLINE_VERTICES = 500
+"""Of an outline that roofs are fitted over; the time grows with the square of them, and a building has no more corners."""
+
 ASSUMED_WALL_M = 3.0
 """Height of the lowest wall where nothing is known of the terrain."""
 
@@ -82,7 +85,7 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
     """The largest polygon of a geometry, made valid; an empty polygon where there is none."""
-    geometry = geometry if geometry.is_valid else shapely.make_valid(geometry)
+    geometry = geometry if geometry.is_valid else shapely.make_valid(geometry, method="structure", keep_collapsed=False)
     polygons = [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon"]
     return max(polygons, key=lambda polygon: polygon.area, default=shapely.Polygon())
 
@@ -102,6 +105,31 @@ def on_a_line(xy: np.ndarray, width_m: float = 0.05) -> bool:
 
 def to_local(outline: shapely.Polygon | None, frame: LocalFrame) -> shapely.Polygon | None:
     return None if outline is None else shapely.transform(outline, frame.to_local)
+
+
+def without_needless_vertices(outline: shapely.Polygon | None) -> tuple[shapely.Polygon | None, str]:
+    """The outline to fit over, and what was left out: of more than MOST_OUTLINE_VERTICES those within 1 cm of the line
+    between their neighbours (Douglas and Peucker), or within 2, 4, 8 cm, ... until no more are left, and with them
+    courtyards narrower than that."""
+    count = 0 if outline is None else shapely.get_num_coordinates(outline)
+    if count <= MOST_OUTLINE_VERTICES:
+        return outline, ""
+    simple, tolerance_m = outline, 0.005
+    while shapely.get_num_coordinates(simple) > MOST_OUTLINE_VERTICES:
+        tolerance_m *= 2
+        courtyards = [ring for ring in outline.interiors if shapely.Polygon(ring).area > tolerance_m**2]
+        simple = largest_polygon(shapely.simplify(shapely.Polygon(outline.exterior, courtyards), tolerance_m))
+    left = shapely.get_num_coordinates(simple)
+    return simple, f"its outline of {count} vertices was simplified to {left}, within {tolerance_m:g} m"
+
+
+def remarked(building: Building, remark: str) -> Building:
+    """The building with a remark added to what is said of it."""
+    return (
+        dataclasses.replace(building, detail=f"{building.detail or building.status.value}; {remark}")
+        if remark
+        else building
+    )
 
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:

@@ -63,14 +63,16 @@ def absolute(name: str) -> str:
 
 def read_headers(clouds: tuple[str, ...]) -> list:
     """Headers of the readable point files; one unreadable file does not end the run."""
-    from ..read.pointcloud import read_header
+    from ..read.pointcloud import as_input_error, read_header
 
     headers, errors = [], []
     for name in clouds:
         try:
             headers.append(read_header(name))
-        except InputError as error:
-            errors.append(error)
+        except MemoryError:
+            raise
+        except Exception as error:
+            errors.append(as_input_error(error, name))
     if not headers:
         raise errors[0]
     return headers
@@ -134,6 +136,25 @@ def jobs_from_cloud(request) -> tuple[Job, ...]:
     from ..read.pointcloud import read_points
     from ..read.split import split_buildings
 
-    groups = split_buildings(read_points(*request.clouds, settings=request.settings), request.settings)
+    try:
+        cloud = read_points(*request.clouds, settings=request.settings)
+    except InputError:
+        readable = [name for name in request.clouds if is_readable(name)]
+        if len(readable) in (0, len(request.clouds)):
+            raise
+        cloud = read_points(*readable, settings=request.settings)
+    groups = split_buildings(cloud, request.settings)
     areas = [(group.id, shapely.make_valid(group.area)) for group in groups]
     return tuple(Job(i, id, area, None) for i, (id, area) in enumerate(areas))
+
+
+def is_readable(name: str) -> bool:
+    """Whether a point file can be read from end to end; the step that sorts points names those that cannot."""
+    from ..read.pointcloud import iter_points
+
+    try:
+        for _ in iter_points(name):
+            pass
+    except InputError:
+        return False
+    return True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import pickle
 import threading
@@ -19,6 +18,7 @@ from ..read.assign import PointGrid
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
 from ..reconstruct import reconstruct
+from ..stages import remarked
 from ..status import Status
 from ..write.files import atomic_file
 from ..write.run_files import Fragments, fragments
@@ -93,8 +93,7 @@ def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Buildin
         used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
         building = reconstruct(used, job.footprint, surroundings.terrain_of(job), plan.settings, id=job.id)
         if len(used) < len(points) and building.status is Status.MODELLED:
-            detail = f"{building.status.value}; fitted to {len(used)} of its {len(points)} points"
-            building = dataclasses.replace(building, detail=detail)
+            building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
         return fragments(building, plan.names_of(job), plan.translate, plan.file_units)
     except MemoryError:
         raise

@@ -17,13 +17,14 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from ..errors import OutputError
 from ..frames import Units
 from ..model import PointCloud
 from ..read.assign import PointGrid
 from ..read.cell_kernel import mask_at
 from ..read.las import is_copc
 from ..read.lax import read_lax
-from ..read.pointcloud import file_kind, iter_points, read_header
+from ..read.pointcloud import as_input_error, file_kind, iter_points, read_header
 from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import GROUND_REACH_M, lowest_in_cells
@@ -78,6 +79,7 @@ class Reaches:
         members = {tile: [i for i in own if has_area[i]] for tile, own in plan.tiles.items()}
         self.members = {tile: own for tile, own in members.items() if own}
         self.names = list(self.members)
+        self.place = {tile: number for number, tile in enumerate(self.names)}
         boxes = [self.terrain_boxes[own] for own in self.members.values()]
         self.bounds = np.array([[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]).reshape(-1, 4)
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
@@ -85,6 +87,10 @@ class Reaches:
     def near(self, box: Sequence[float]) -> list[str]:
         """Names, in plan order, of the tiles whose reach meets `box` (xmin, ymin, xmax, ymax)."""
         return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
+
+    def bounds_of(self, tiles: Sequence[str]) -> np.ndarray:
+        """Boxes (t, 4) of the tiles' reaches."""
+        return self.bounds[[self.place[tile] for tile in tiles]].reshape(-1, 4)
 
     def of(self, tile: str) -> Reach:
         own = self.members[tile]
@@ -150,25 +156,30 @@ class Gatherer:
                 np.savez(file, **{kind: np.concatenate(arrays) for kind, arrays in found.items()})
         self.found, self.held, self.flushes = {}, 0, self.flushes + 1
 
+    def discard(self) -> None:
+        """Remove what was written of this file."""
+        for written in self.folder.glob(f"*/{self.number}-*.npz"):
+            written.unlink(missing_ok=True)
+
 
 def sort_cloud(folder: str, number: int) -> dict:
     """Sort point file `number` of the plan in `folder`. Returns {"points": read, "classes": {class: count}}.
 
-    Chunks read before a damaged file breaks off are kept; the InputError is raised after they are on disk.
+    Of a file that breaks off, or is not what its header says, nothing is kept. Raises InputError for whatever reading
+    it comes to, so that a file's failure is that file's alone; what writing comes to passes through.
     """
     root = Path(folder)
     plan, reaches = load_plan(root), reaches_of(root, (root / "plan.pickle").stat().st_mtime_ns)
-    gatherer, broken = Gatherer(reaches, plan.settings.read, root / "points", number), None
+    gatherer, path = Gatherer(reaches, plan.settings.read, root / "points", number), plan.clouds[number]
     try:
-        for cloud in wanted_points(plan.clouds[number], reaches, plan.units):
+        for cloud in wanted_points(path, reaches, plan.units):
             gatherer.add(cloud)
-    except MemoryError:
+    except (MemoryError, OutputError):
         raise
     except Exception as error:
-        broken = error
+        gatherer.discard()
+        raise as_input_error(error, path) from error
     gatherer.flush()
-    if broken is not None:
-        raise broken
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
@@ -190,14 +201,21 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
     are decoded twice. A point on a border may come twice, as in files that overlap.
     """
     (xmin, ymin), (xmax, ymax) = units.to_metres(np.reshape(read_header(path).bounds, (2, 3))[:, :2])
-    for x in np.arange(np.floor(xmin / QUERY_M), np.floor(xmax / QUERY_M) + 1) * QUERY_M:
-        for y in np.arange(np.floor(ymin / QUERY_M), np.floor(ymax / QUERY_M) + 1) * QUERY_M:
-            square = (x, y, x + QUERY_M, y + QUERY_M)
-            near = np.array([reaches.of(tile).bounds for tile in reaches.near(square)])
-            if len(near):
-                low, high = near[:, :2].min(axis=0), near[:, 2:].max(axis=0)
-                box = (*np.maximum(square[:2], low), *np.minimum(square[2:], high))
-                yield from iter_points(path, box=box, units=units)
+    wanted = reaches.bounds_of(reaches.near((xmin, ymin, xmax, ymax)))
+    corners = np.floor(np.clip(wanted, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M).astype(np.int64)
+    columns_and_rows = {
+        (column, row)
+        for left, low, right, high in corners.tolist()
+        for column in range(left, right + 1)
+        for row in range(low, high + 1)
+    }
+    for column, row in sorted(columns_and_rows):
+        square = QUERY_M * np.array([column, row, column + 1, row + 1])
+        near = reaches.bounds_of(reaches.near(square))
+        if len(near):
+            low, high = near[:, :2].min(axis=0), near[:, 2:].max(axis=0)
+            box = (*np.maximum(square[:2], low), *np.minimum(square[2:], high))
+            yield from iter_points(path, box=box, units=units)
 
 
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:

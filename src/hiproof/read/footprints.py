@@ -203,7 +203,10 @@ def split_features(
     if mended:
         warnings.warn(f"{path}: {mended} invalid footprints were repaired", InputWarning)
     if empty:
-        warnings.warn(f"{path}: {empty} features enclose no area; they get no model, but a status", InputWarning)
+        warnings.warn(
+            f"{path}: {empty} features enclose no area that a building could have; they get no model, but a status",
+            InputWarning,
+        )
     return footprints
 
 

@@ -1,23 +1,31 @@
-"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk; by path or by address (see remote.py)."""
+"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk; by path or by address (see remote.py).
+
+Before laspy opens a file, `las_header` has held its header against its size; what is decoded is held against the header.
+"""
 
 from __future__ import annotations
 
-import struct
+import functools
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import laspy
 import numpy as np
 
 from ..errors import InputError, InputWarning
+from .copc import check_nodes, copc_record
 from .crs import combine
 from .geokeys import heights_of_keys
-from .remote import opened
+from .las_header import LasFacts, check_all_points, check_points, read_facts
+from .plausible import Implausible
+from .remote import is_url, opened
 
 Chunk = tuple[np.ndarray, np.ndarray | None]  # xyz (n, 3) float64, classification (n,) uint8 or None
-EVLR_HEADER_BYTES = 60
+FIELDS = laspy.DecompressionSelection
+WANTED = FIELDS.base() | FIELDS.Z | FIELDS.CLASSIFICATION | FIELDS.FLAGS
 
 
 @contextmanager
@@ -27,6 +35,11 @@ def explained(path: str | Path) -> Iterator[None]:
         yield
     except InputError:
         raise
+    except Implausible as error:
+        raise InputError(
+            f"expected a LAS, LAZ or COPC file that is what its header says at {path}, got another: {error}; copy or download it "
+            "again, or have its header written anew (`pdal translate`)"
+        ) from error
     except BaseException as error:
         # A panic inside lazrs arrives as pyo3's PanicException, which is no Exception; interrupts must pass through.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
@@ -39,22 +52,23 @@ def explained(path: str | Path) -> Iterator[None]:
 
 
 def read_las_header(path: str | Path) -> laspy.LasHeader:
-    """The header of a LAS, LAZ or COPC file. Raises InputError when it cannot be read."""
-    refuse_missing_records(path)
+    """The header of a LAS, LAZ or COPC file. Raises InputError when it cannot be read or cannot be true."""
+    facts_of(path)
     with explained(path), opened(path) as file, laspy.open(file) as reader:
         return reader.header
 
 
-def refuse_missing_records(path: str | Path) -> None:
-    """Raise InputError where LAS 1.4's extended records reach beyond the file: laspy would read on, billions of times."""
-    with explained(path), opened(path) as file:
-        head = file.read(247)
-        size = file.seek(0, 2)
-        if len(head) < 247 or head[25] < 4:
-            return
-        start, count = struct.unpack_from("<QI", head, 235)
-        if count and start + EVLR_HEADER_BYTES * count > size:
-            raise ValueError(f"its header tells of {count} records from byte {start} on, the file has {size} bytes")
+def facts_of(path: str | Path) -> LasFacts:
+    """What the header says, once it has been found possible. Raises InputError otherwise."""
+    with explained(path):
+        return facts_at(str(path), None if is_url(path) else Path(path).stat().st_mtime_ns)
+
+
+@functools.lru_cache(maxsize=64)
+def facts_at(path: str, changed: int | None) -> LasFacts:
+    """Found once a process for the file that was `changed` then: an indexed file is opened for each of its squares."""
+    with opened(path) as file:
+        return read_facts(file)
 
 
 def las_crs(header: laspy.LasHeader, path: str | Path):
@@ -81,28 +95,29 @@ def las_chunks(
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
         return
-    selection = laspy.DecompressionSelection
-    wanted = selection.base() | selection.Z | selection.CLASSIFICATION | selection.FLAGS
-    found = 0
-    with (
-        explained(path),
-        opened(path) as file,
-        laspy.open(file, decompression_selection=wanted, read_evlrs=False) as reader,
-    ):
-        runs = np.array([[0, reader.header.point_count]]) if runs is None else runs
-        expected = int((runs[:, 1] - runs[:, 0]).sum())
-        for first, end in runs.tolist():
+    facts, low, high = facts_of(path), np.full(3, np.inf), np.full(3, -np.inf)
+    with explained(path):
+        for record in records(path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()):
+            xyz = coordinates(record)
+            check_points(xyz, facts)
+            low, high = np.minimum(low, xyz.min(axis=0)), np.maximum(high, xyz.max(axis=0))
+            yield present(xyz, record, path)
+        if runs is None and facts.count:
+            check_all_points(low, high, facts)
+
+
+def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Any]:
+    """laspy's records of the `runs` of points, [first, end), at most `chunk_points` at a time and none empty."""
+    with opened(path) as file, laspy.open(file, decompression_selection=WANTED, read_evlrs=False) as reader:
+        for first, end in runs:
             if first:
                 reader.seek(first)
             for start in range(first, end, chunk_points):
-                record = reader.read_points(min(chunk_points, end - start))
-                found += len(record)
-                yield decode(record, path)
-    if found != expected:
-        raise InputError(
-            f"expected {expected} points in {path} as its header says, got {found}; "
-            "the file is truncated: copy or download it again"
-        )
+                count = min(chunk_points, end - start)
+                record = reader.read_points(count)
+                if len(record) != count:
+                    raise ValueError(f"it ends {count - len(record)} points too early")
+                yield record
 
 
 def is_copc(path: str | Path) -> bool:
@@ -113,19 +128,28 @@ def is_copc(path: str | Path) -> bool:
 
 
 def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chunk:
-    refuse_missing_records(path)
-    with explained(path), opened(path) as file, laspy.CopcReader.open(file) as reader:
-        low, high = reader.header.mins[2], reader.header.maxs[2]
-        bounds = laspy.copc.Bounds(np.array([box[0], box[1], low]), np.array([box[2], box[3], high]))
-        return decode(reader.query(bounds), path)
+    facts = facts_of(path)
+    with explained(path), opened(path) as file:
+        nodes, record = copc_record(file, facts, box, WANTED)
+        xyz = coordinates(record)
+        check_points(xyz, facts)
+        check_nodes(xyz, nodes, facts)
+        if 0 < len(xyz) == facts.count:
+            check_all_points(xyz.min(axis=0), xyz.max(axis=0), facts)
+        return present(xyz, record, path)
 
 
-def decode(record, path: str | Path) -> Chunk:
-    """World coordinates and classes of a laspy record without the points flagged as withheld, that is, deleted."""
+def coordinates(record) -> np.ndarray:
+    """World coordinates (n, 3) of a laspy record."""
     xyz = np.empty((len(record), 3))
     for axis, name in enumerate("XYZ"):
         np.multiply(record.array[name], record.scales[axis], out=xyz[:, axis])
         xyz[:, axis] += record.offsets[axis]
+    return xyz
+
+
+def present(xyz: np.ndarray, record, path: str | Path) -> Chunk:
+    """Coordinates (n, 3) and classes of a record without the points flagged as withheld, that is, deleted."""
     classification = np.asarray(record["classification"], np.uint8)
     withheld = np.asarray(record["withheld"], bool)
     if withheld.any():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,6 +21,7 @@ TYPES = {
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
+PLAIN_COUNT = re.compile("[0-9]{1,18}")
 BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 
 
@@ -37,11 +39,29 @@ def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
     """Yield the vertices of a PLY file. Raises InputError for a header or a body that is not one."""
     with opened(path) as file:
         layout = read_ply_header(file, path)
+        refuse_missing_bytes(file, layout, path)
         remaining = layout.count
         while remaining:
             table = read_vertices(file, layout, min(remaining, chunk_points), path, layout.count - remaining)
             yield np.ascontiguousarray(table[:, :3]), classes_of(table)
             remaining -= len(table)
+
+
+def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) -> None:
+    """Hold the count against the file's size before room is made for so many."""
+    start, end = file.tell(), file.seek(0, 2)
+    file.seek(start)
+    least = len("0 0 0") if layout.byte_order == "" else record_type(layout).itemsize
+    if layout.count * least > end - start:
+        raise InputError(
+            f"expected {layout.count} vertices in {path} as its header says, got {end - start} bytes of them; "
+            "the file is truncated: copy or download it again"
+        )
+
+
+def record_type(layout: PlyLayout) -> np.dtype:
+    """A vertex of a binary file."""
+    return np.dtype([(name, layout.byte_order + kind) for name, kind in layout.properties])
 
 
 def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int) -> np.ndarray:
@@ -50,7 +70,7 @@ def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Pat
         table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
         found = len(table)
     else:
-        dtype = np.dtype([(name, layout.byte_order + kind) for name, kind in layout.properties])
+        dtype = record_type(layout)
         buffer = file.read(dtype.itemsize * count)
         found = len(buffer) // dtype.itemsize
         records = np.frombuffer(buffer, dtype, found)
@@ -74,10 +94,14 @@ def read_ply_header(file: BinaryIO, path: str | Path) -> PlyLayout:
                 raise unreadable(path, f"the element {words[1]!r} before the vertices")
             element = words[1]
             if element == "vertex":
-                count = int(words[2]) if words[2].isdigit() else None
+                if count is not None or not PLAIN_COUNT.fullmatch(words[2]):
+                    raise unreadable(path, f"{words[2][:20]!r} vertices")
+                count = int(words[2])
         elif words[0] == "property" and element == "vertex":
             if len(words) != 3 or words[1] not in TYPES:
                 raise unreadable(path, f"the vertex property {' '.join(words[1:])!r}")
+            if words[2] in dict(properties):
+                raise unreadable(path, f"the vertex property {words[2]!r} twice")
             properties.append((words[2], TYPES[words[1]]))
     columns = find_columns([name for name, _ in properties])
     if byte_order is None or count is None or columns is None:

@@ -18,6 +18,7 @@ from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
 from .crs import described, parse_crs, same_heights, same_horizontal, units_of, vertical_crs
+from .plausible import MOST_HEIGHT, MOST_PLAN, is_plausible
 from .remote import is_url
 
 LAS_SUFFIXES = (".las", ".laz")
@@ -84,6 +85,7 @@ def iter_points(
         chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, chunk_points)
     dropped = 0
     for xyz, classes in chunks:
+        refuse_implausible(xyz, path)
         keep = np.isfinite(xyz)
         if not keep.all():
             keep = keep.all(axis=1)
@@ -96,6 +98,27 @@ def iter_points(
             yield PointCloud(xyz, classes, None, (str(path),), units)
     if dropped:
         warnings.warn(f"{path}: {dropped} points with NaN or infinite coordinates were left out", InputWarning)
+
+
+def as_input_error(error: Exception, path: str | Path) -> InputError:
+    """What reading one file came to, as that file's error: where a run reads many, none may end the others' work."""
+    if isinstance(error, InputError):
+        return error
+    return InputError(
+        f"expected a point cloud that can be read at {path}, got {type(error).__name__}: {error}; "
+        "copy or download it again, or write it anew as LAZ"
+    )
+
+
+def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
+    """Raise InputError for finite coordinates (n, 3) that no place on Earth has."""
+    beyond = ~is_plausible(np.nan_to_num(xyz, posinf=0.0, neginf=0.0))
+    if beyond.any():
+        point = ", ".join(f"{value:g}" for value in xyz[np.argmax(beyond)])
+        raise InputError(
+            f"expected coordinates up to {MOST_PLAN:g} and heights up to {MOST_HEIGHT:g} in {path}, got the point {point}; "
+            "put it right or leave it out"
+        )
 
 
 def read_header(path: str | Path) -> PointFileHeader:

@@ -5,9 +5,14 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from .plausible import is_plausible
+
 SLIVER_SHARE = 0.01  # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
 SLIVER_M2 = 0.5
 DEGENERATE_M2 = 1e-6
+WIDEST_M = 4000.0  # beyond any building; what is kept of terrain around one grows with the square of it
+MOST_MEETINGS = 20_000  # of edges that follow not on one another: mending takes time for each
+EDGES_A_LOOK = 256
 
 
 def simple_polygons(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
@@ -36,18 +41,37 @@ def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
 
 
 def repaired(polygon: shapely.Polygon) -> list[shapely.Polygon]:
-    """`polygon` itself where it is valid, else the valid polygons that make_valid finds, without slivers."""
-    if not shapely.get_coordinates(polygon).size or not shapely.is_valid(polygon):
-        found = polygons_in(finite_make_valid(polygon))
-    else:
-        found = [polygon]
+    """`polygon` itself where it is valid, else the valid polygons that make_valid finds, without slivers; none where
+    it is no building's: without numbers, wider than WIDEST_M, or tangled beyond MOST_MEETINGS."""
+    if not is_buildings_size(polygon):
+        return []
+    found = [polygon] if shapely.is_valid(polygon) else polygons_in(mended(polygon))
     total = sum(part.area for part in found)
     least = min(SLIVER_M2, SLIVER_SHARE * total)
     return [part for part in found if part.area > max(least if len(found) > 1 else 0.0, DEGENERATE_M2)]
 
 
-def finite_make_valid(polygon: shapely.Polygon) -> shapely.Geometry | None:
-    """make_valid, or None where the polygon has coordinates that are no numbers."""
-    if not np.isfinite(shapely.get_coordinates(polygon)).all():
+def is_buildings_size(polygon: shapely.Polygon) -> bool:
+    """Whether all coordinates are numbers on this Earth and no farther apart than the widest building is wide."""
+    xy = shapely.get_coordinates(polygon)
+    return len(xy) > 0 and bool(is_plausible(xy).all() and np.ptp(xy, axis=0).max() <= WIDEST_M)
+
+
+def mended(polygon: shapely.Polygon) -> shapely.Geometry | None:
+    """The area its rings enclose, what they enclose twice counted once; None where too many edges meet to say."""
+    if meetings(polygon) > MOST_MEETINGS:
         return None
-    return shapely.make_valid(polygon)
+    return shapely.make_valid(polygon, method="structure", keep_collapsed=False)
+
+
+def meetings(polygon: shapely.Polygon) -> int:
+    """How many pairs of edges may cross, by their boxes and without neighbours; counted to a little above the most."""
+    xy, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
+    edges = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]])
+    tree, found = shapely.STRtree(edges), 0
+    for start in range(0, len(edges), EDGES_A_LOOK):
+        first, second = tree.query(edges[start : start + EDGES_A_LOOK])
+        found += int((second > first + start + 1).sum())
+        if found > MOST_MEETINGS:
+            break
+    return found

@@ -87,8 +87,9 @@ def sniff(path: str | Path) -> TextLayout:
                 return TextLayout(number + 1, find_delimiter(following), columns)
         elif number > 20:
             break
+    start = lines[0][:60] if lines else ""
     raise InputError(
-        f"expected lines of x y z in {path}, got {lines[0][:60]!r} and nothing like a point after it; "
+        f"expected lines of x y z in {path}, got {start!r} and nothing like a point after it; "
         "give LAS, LAZ, COPC, PLY or text with one point a line"
     )
 

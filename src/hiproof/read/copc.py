@@ -1,0 +1,65 @@
+"""Points of a COPC file: of the octree's nodes whose cubes meet a box, each node held against its own cube.
+
+Only those nodes are fetched and decoded. The nodes themselves were found, once a file, when its header was checked.
+"""
+
+from __future__ import annotations
+
+from typing import BinaryIO
+
+import laspy
+import lazrs
+import numpy as np
+from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
+
+from .las_header import LasFacts
+from .plausible import Implausible
+
+Box = tuple[float, float, float, float]
+
+
+def copc_record(file: BinaryIO, facts: LasFacts, box: Box, selection: laspy.DecompressionSelection):
+    """laspy's record of all points in the nodes that meet `box` (xmin, ymin, xmax, ymax), and the first of each node."""
+    header = laspy.LasHeader.read_from(file, read_evlrs=False)
+    nodes = nodes_meeting(facts, box)
+    chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
+    content = np.zeros(sum(points for points, _ in chunks) * facts.point_bytes, np.uint8)
+    if len(nodes):
+        compressed = np.frombuffer(b"".join(bytes_of(file, node) for node in nodes), np.uint8)
+        laszip = np.frombuffer(facts.laszip, np.uint8)
+        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, selection.to_lazrs())
+    packed = PackedPointRecord.from_buffer(content, header.point_format)
+    return nodes, ScaleAwarePointRecord(packed.array, packed.point_format, header.scales, header.offsets)
+
+
+def bytes_of(file: BinaryIO, node: np.void) -> bytes:
+    file.seek(int(node["start"]))
+    return file.read(int(node["bytes"]))
+
+
+def nodes_meeting(facts: LasFacts, box: Box) -> np.ndarray:
+    """The nodes that hold points and meet `box` in plan, in the order in which they stand in the file."""
+    low, high = cubes(facts, facts.nodes)
+    meets = (low[:, :2] <= box[2:]).all(axis=1) & (high[:, :2] >= box[:2]).all(axis=1)
+    found = facts.nodes[meets]
+    return found[np.argsort(found["start"], kind="stable")]
+
+
+def cubes(facts: LasFacts, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper corners (n, 3) of the nodes' cubes, wider by what rounding may move a point."""
+    level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
+    side = np.ldexp(2 * facts.octree_half, -level)
+    low = facts.octree_centre - facts.octree_half + place * side
+    return low - facts.rounding, low + side + facts.rounding
+
+
+def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts) -> None:
+    """Raise Implausible where a node's points, which follow one another in `xyz` (n, 3), leave its cube."""
+    if not len(nodes):
+        return
+    starts = np.cumsum([0, *nodes["points"][:-1]])
+    low, high = cubes(facts, nodes)
+    outside = (np.minimum.reduceat(xyz, starts) < low) | (np.maximum.reduceat(xyz, starts) > high)
+    if outside.any():
+        level, *place = nodes["key"][np.argmax(outside.any(axis=1))].tolist()
+        raise Implausible(f"its octree's node {place} of level {level} has points outside its bounds; it is damaged")

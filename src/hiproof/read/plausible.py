@@ -1,0 +1,25 @@
+"""What no input may say: coordinates that no reference system of this Earth gives, and counts that no file has room for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+MOST_PLAN = 1e9
+"""Largest x or y, in the input's unit: the widest systems in use (Gauss-Kruger zones in feet) stay below 2e8."""
+
+MOST_HEIGHT = 1e6
+"""Largest height, in the input's unit: Everest has 29,032 feet."""
+
+
+class Implausible(ValueError):
+    """What a file says cannot be so; the message is the reason, the caller adds the file's name."""
+
+
+def is_plausible(xyz: np.ndarray) -> np.ndarray:
+    """Whether each point of (n, 2) or (n, 3) has coordinates that can be; those that are no numbers have not.
+
+    >>> is_plausible(np.array([[85000.0, 446000.0, 2.0], [1e300, 0.0, 0.0], [0.0, np.nan, 0.0]])).tolist()
+    [True, False, False]
+    """
+    most = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])[: xyz.shape[1]]
+    return (np.abs(xyz) <= most).all(axis=1)
