@@ -7,6 +7,7 @@ A building is the solids of one CityJSON building (its parts with it) whose grou
 scanned one by one (generator seeded by the id, no gaps in the cloud) and reconstructed under their true ground outline,
 or without it. `wireframe.py` compares corners, edges and faces of the written models with the true ones. `--every` takes
 each k-th building, `--parity` those at even or odd places, `--most` draws so many by chance, always the same ones.
+`--save` keeps for each town what a run would leave and `truth.city.json`, to be drawn by docs/draw_roofs.py.
 Milliseconds are the CPU time of `reconstruct`, recognition and quality included.
 """
 
@@ -30,7 +31,7 @@ from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
-from hiproof.write import write_cityjson
+from hiproof.write import write_all
 
 from .judging import SHARED, area_by_type, named_share, wireframe_figures
 
@@ -101,33 +102,42 @@ def chosen(buildings: list, every: int = 1, parity: str | None = None, most: int
 
 
 def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:
-    """The city objects of `buildings` out of the CityJSON file `source`, each under its TrueBuilding as parent."""
+    """The city objects of `buildings` out of the CityJSON file `source`, those with several as parts of one object."""
     city = json.loads(source.read_text())
-    parents = {name: building.id for building in buildings for name in building.solids}
-    city["CityObjects"] = {name: city["CityObjects"][name] | {"parents": [id]} for name, id in parents.items()}
+    objects, city["CityObjects"] = city["CityObjects"], {}
+    for building in buildings:
+        if list(building.solids) != [building.id]:
+            city["CityObjects"][building.id] = {"type": "Building", "children": list(building.solids)}
+        for name in building.solids:
+            parents = {} if name == building.id else {"type": "BuildingPart", "parents": [building.id]}
+            city["CityObjects"][name] = objects[name] | parents
     path.write_text(json.dumps(city))
 
 
-def modelled(
-    building: TrueBuilding, density: float, with_footprint: bool, settings: Settings
-) -> tuple[Building, float]:
+def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) -> None:
+    """Models and points of a town as `hiproof reconstruct` leaves them, for `hiproof report` and docs/draw_roofs.py."""
+    folder.mkdir(parents=True, exist_ok=True)
+    write_all(folder, models)
+    cloud = folder / "points.xyz"
+    np.savetxt(cloud, np.concatenate(points), fmt="%.3f")
+    (folder / "run.json").write_text(json.dumps({"inputs": {"clouds": [str(cloud)]}}))
+
+
+def modelled(building: TrueBuilding, points: np.ndarray, with_footprint: bool) -> tuple[Building, float]:
     """One building reconstructed from its scan, and the seconds it took."""
-    points = building.scanned(density)
     started = time.process_time()
-    model = reconstruct(points, building.footprint if with_footprint else None, settings=settings, id=building.id)
+    model = reconstruct(points, building.footprint if with_footprint else None, settings=Settings(), id=building.id)
     return model, time.process_time() - started
 
 
-def measured(town: str, buildings: list[TrueBuilding], models: list[Building], folder: Path, worst: int) -> str:
-    """What the judge says of the models of `buildings`, after writing models and truth to `folder`."""
-    folder.mkdir(parents=True, exist_ok=True)
-    paths = folder / f"{town}.city.jsonl", folder / f"{town}_truth.city.json"
-    write_cityjson(paths[0], [model for model in models if model.solid is not None])
-    write_truth(paths[1], TOWNS[town], buildings)
-    figures, lines = wireframe_figures(*paths, worst)
+def judged(town: str, buildings: list[TrueBuilding], models: list[Building], folder: Path, worst: int) -> str:
+    """What the judge says of the models of `buildings` in `folder`, where the truth is written too."""
+    truth = folder / "truth.city.json"
+    write_truth(truth, TOWNS[town], buildings)
+    figures, lines = wireframe_figures(folder / "buildings.city.jsonl", truth, worst)
     areas = area_by_type(models)
     types = ", ".join(f"{name} {area / areas.total():.0%}" for name, area in areas.items())
-    modelled = sum(model.status is Status.MODELLED for model in models)
+    without_reserve = sum(model.status is Status.MODELLED for model in models)
     rows = [
         "edges    precision {edge_precision}, recall {edge_recall}, F1 {edge_f1} %; {edges_of_truth} times the truth's",
         "corners  F1 {corner_f1} %; {corners_of_truth} times the truth's; {corner_offset_m} m off",
@@ -135,7 +145,7 @@ def measured(town: str, buildings: list[TrueBuilding], models: list[Building], f
         "heights  RMSE {height_rmse_m} m in the mean, {height_rmse_median_m} in the median",
         f"parts    {np.mean([len(model.parts) for model in models]):.2f} a building; named share"
         f" {named_share(models):.3f}: {types}",
-        f"status   {modelled} of {len(models)} modelled without reserve",
+        f"status   {without_reserve} of {len(models)} modelled without reserve",
     ]
     return "\n".join("  " + row.format(**figures) for row in rows + [f"worst    {line}" for line in lines])
 
@@ -149,17 +159,20 @@ def main() -> None:
     parser.add_argument("--parity", choices=("even", "odd"), help="take those at even or odd places")
     parser.add_argument("--most", type=int, help="at most so many buildings a town, drawn by chance")
     parser.add_argument("--worst", type=int, default=0, help="name the buildings with the worst edges")
-    parser.add_argument("--save", type=Path, help="keep models and truth in this folder")
+    parser.add_argument("--save", type=Path, help="keep a run and the truth of each town in this folder")
     a = parser.parse_args()
     for town in a.town:
         buildings = chosen(read_town(TOWNS[town]), a.every, a.parity, a.most)
-        modelled(buildings[0], a.density, not a.without_footprints, Settings())  # loads what is compiled
-        outcomes = [modelled(building, a.density, not a.without_footprints, Settings()) for building in buildings]
+        points = [building.scanned(a.density) for building in buildings]
+        modelled(buildings[0], points[0], not a.without_footprints)  # loads what is compiled
+        outcomes = [modelled(b, p, not a.without_footprints) for b, p in zip(buildings, points, strict=True)]
         models, ms = [model for model, _ in outcomes], 1e3 * np.array([seconds for _, seconds in outcomes])
         times = f"{np.median(ms):.1f} ms a building in the median, {ms.mean():.1f} in the mean, {ms.max():.0f} at most"
         print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {times}")
-        with tempfile.TemporaryDirectory() as folder:
-            print(measured(town, buildings, models, a.save or Path(folder), a.worst), flush=True)
+        with tempfile.TemporaryDirectory() as temporary:
+            folder = (a.save or Path(temporary)) / town
+            write_run(folder, models, points)
+            print(judged(town, buildings, models, folder, a.worst), flush=True)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
 """Draw reconstructed roofs in plan over their points, beside a view from the south, on sheets of twelve buildings.
 
 python docs/draw_roofs.py RUN|delft|amsterdam_west|stbarth|ctview [--worst 24] [--chance 24] [--ids A B] [--seed 0]
-                          [--colour height|residual] [--out FOLDER]
+                          [--truth CITYJSON] [--colour height|residual] [--out FOLDER]
 
 RUN is the output folder of `hiproof reconstruct` whose clouds are still in their place; a name stands for a set in
 ../shared/data, which is modelled first. The sheets `worst-1.png`, ... show the buildings with the smallest share of
@@ -9,7 +9,7 @@ points within 0.2 m of the roof, `chance-1.png`, ... some drawn by chance.
 
 In plan: points by height, or by residual; those more than 0.2 m off the roof as black (above it) and grey (below) crosses. Each part's
 outline in its type's colour and its type; ridges and hips red, valleys blue, steps black, seams in one plane dotted,
-the footprint dashed. In the view: roofs in the types' colours.
+the footprint dashed, roof edges of the true models dashed green. In the view: roofs in the types' colours.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ from matplotlib import patheffects
 
 from hiproof import Request, reconstruct_area
 from hiproof.errors import HiproofError, InputError
+from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run, run_inputs
 from hiproof.model import ROOF, Face, Piece, Solid
 from hiproof.write import read_parameters
@@ -81,6 +82,7 @@ class Drawn:
     points: np.ndarray
     footprint: shapely.Geometry | None
     gap: np.ndarray
+    truth: Solid | None = None
 
     @property
     def share(self) -> float:
@@ -99,8 +101,8 @@ def modelled(name: str, out: Path) -> Path:
     return out / name
 
 
-def read_run(folder: Path) -> list[Drawn]:
-    """The buildings of a run that have a model and points."""
+def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
+    """The buildings of a run that have a model and points, with the models of `truth` under the same ids."""
     clouds, footprints, layer = run_inputs(folder)
     if not clouds:
         raise InputError(
@@ -108,12 +110,14 @@ def read_run(folder: Path) -> list[Drawn]:
         )
     run = evaluate_run(folder, clouds, footprints, layer=layer)
     records = {record["id"]: record for record in read_parameters(folder / "parameters.jsonl")}
+    true_solids = {model.id: model.solid for model in read_models(truth)} if truth else {}
     found = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
         if model.solid is not None and len(points):
             parts = tuple(drawn_part(part, records[model.id]["T_G"]) for part in records[model.id]["parts"])
             gap = gaps(model.solid, points)
-            found.append(Drawn(model.id, model.status, model.solid, parts, points, footprint, gap))
+            true_solid = true_solids.get(model.id)
+            found.append(Drawn(model.id, model.status, model.solid, parts, points, footprint, gap, true_solid))
     return found
 
 
@@ -207,6 +211,10 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
             axes.plot(
                 *(shapely.get_coordinates(polygon.exterior) - origin).T, color="#666666", linewidth=0.8, linestyle="--"
             )
+    for face in building.truth.of_kind(ROOF) if building.truth else ():
+        for ring in face.rings:
+            corners = building.truth.vertices[[*ring, ring[0]], :2] - origin
+            axes.plot(*corners.T, color="#00a651", linewidth=1.3, linestyle=(0, (4, 2)), zorder=4)
     for kind, ends in roof_lines(building.solid):
         axes.plot(*(ends - origin).T, **LINES[kind], solid_capstyle="round", zorder=3)
     draw_parts(axes, building, origin)
@@ -347,6 +355,7 @@ def main(words: list[str]) -> None:
     parser.add_argument("--worst", type=int, default=COLUMNS * ROWS, help="buildings with the smallest share")
     parser.add_argument("--chance", type=int, default=COLUMNS * ROWS, help="buildings drawn by chance")
     parser.add_argument("--ids", nargs="+", default=[], help="these buildings, by id or the end of it")
+    parser.add_argument("--truth", type=Path, help="CityJSON with true models under the same ids")
     parser.add_argument("--seed", type=int, default=0, help="of the draw by chance")
     parser.add_argument(
         "--colour", choices=("height", "residual"), default="height", help="what points are coloured by"
@@ -355,7 +364,7 @@ def main(words: list[str]) -> None:
     a = parser.parse_args(words)
     a.out.mkdir(parents=True, exist_ok=True)
     try:
-        buildings = read_run(Path(a.run) if Path(a.run).is_dir() else modelled(a.run, a.out))
+        buildings = read_run(Path(a.run) if Path(a.run).is_dir() else modelled(a.run, a.out), a.truth)
     except HiproofError as error:
         sys.exit(str(error))
     drawn = np.random.default_rng(a.seed).permutation(len(buildings))[: a.chance]
