@@ -24,12 +24,11 @@ import numpy as np
 import shapely
 from scipy import ndimage
 
-from hiproof.fit.compound import CompoundFit
 from hiproof.model import Part, Roof
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, SimBuilding, random_compound, scan
 from hiproof.simulate.scene import Defects
 
-from .judging import RASTER_M, fitted, raster
+from .judging import RASTER_M, CompoundFit, fitted, raster
 from .matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
 
 STEP_M, NEAR_STEP_CELLS, NEAR_M = 0.4, 3, 0.1

@@ -17,6 +17,7 @@ import argparse
 import json
 import tempfile
 import time
+import traceback
 import zlib
 from collections import defaultdict
 from dataclasses import dataclass
@@ -124,9 +125,13 @@ def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) ->
 
 
 def modelled(building: TrueBuilding, points: np.ndarray, with_footprint: bool) -> tuple[Building, float]:
-    """One building reconstructed from its scan, and the seconds it took."""
+    """One building reconstructed from its scan, and the seconds it took; a bug costs one building, and is shown."""
     started = time.process_time()
-    model = reconstruct(points, building.footprint if with_footprint else None, settings=Settings(), id=building.id)
+    try:
+        model = reconstruct(points, building.footprint if with_footprint else None, settings=Settings(), id=building.id)
+    except Exception:
+        print(f"{building.id} failed: {traceback.format_exc()}")
+        model = Building(building.id, Status.INTERNAL_ERROR)
     return model, time.process_time() - started
 
 
