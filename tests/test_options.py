@@ -1,12 +1,15 @@
 """Options are checked before anything runs: each configuration gets one sentence and exit code 2, or the run begins."""
 
 import sys
+import warnings
 
 import pytest
 
 from hiproof.city.checks import refuse_unusable
+from hiproof.city.executors import Processes
 from hiproof.city.run import Summary
 from hiproof.cli import main
+from hiproof.errors import InputWarning, warn_in_sentences
 
 RUNS = None
 HUGE = "9" * 5000
@@ -90,6 +93,19 @@ CONFIGURATIONS = {
     "missing settings": ("", ["--config", "missing.toml"], "missing.toml"),
     "settings that are a folder": ("", ["--config", "."], "expected a TOML settings file"),
 }  # fmt: skip
+
+
+def test_warnings_are_sentences_without_their_place_in_the_source(capsys):
+    warn_in_sentences()
+    warnings.warn("a.laz: names no CRS;\n taken as metres", InputWarning)
+    assert capsys.readouterr().err == "hiproof: a.laz: names no CRS; taken as metres\n"
+
+
+def test_workers_warn_in_sentences_too(capfd):
+    executor = Processes(1)
+    list(executor.run(warnings.warn, [("3 points were left out",)]))
+    executor.close()
+    assert capfd.readouterr().err == "hiproof: 3 points were left out\n"
 
 
 @pytest.fixture

@@ -203,6 +203,7 @@ SLIPS = {
         r"they look like EPSG:25832 \(ETRS89 / UTM zone 32N\)",
     ),
     "a cloud in the next zone": (IN_UTM, UTM31, moved(IN_UTM, UTM31, UTM32), None, "the cloud looks like EPSG:25832"),
+    "a cloud in the UTM zone": (HERE, RD, IN_UTM, None, "the cloud looks like EPSG:25831"),
     "feet": (HERE / 0.3048, None, HERE, None, "they look like feet"),
     "a cloud in feet": (HERE, None, HERE / 0.3048, None, "the cloud like feet"),
     "elsewhere": (HERE + 50000, RD, HERE, RD, "check the CRS each file names"),
@@ -223,10 +224,19 @@ def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
 
 def test_what_names_no_crs_and_counts_in_degrees_is_refused():
     low = np.array([[4.36, 52.0], [4.37, 52.01]])
-    with pytest.raises(InputError, match="look like degrees"):
-        refuse_degrees(low, low + 0.01, "the point clouds")
-    refuse_degrees(low, low + 12.0, "the point clouds")
-    refuse_degrees(HERE, HERE + 0.01, "the point clouds")
+    with pytest.raises(InputError, match=r"got coordinates in x 4\.36000 to 4\.38000.* look like degrees; reproject"):
+        refuse_degrees(np.hstack([low, low + 0.01]), "the point clouds", "reproject")
+    refuse_degrees(np.hstack([low, low + 12.0]), "the point clouds", "reproject")
+    refuse_degrees(np.hstack([HERE, HERE + 0.01]), "the point clouds", "reproject")
+    refuse_degrees(np.full((1, 4), np.nan), "the point clouds", "reproject")
+
+
+@pytest.mark.parametrize("target", [None, "EPSG:7415"])
+def test_footprints_in_degrees_that_name_no_crs_are_refused_although_none_has_an_area(tmp_path, target):
+    in_degrees = shapely.transform(SQUARE, lambda xy: moved(xy, RD, WGS84))
+    path = write(tmp_path / "a.gpkg", [in_degrees, None], crs=None)
+    with pytest.raises(InputError, match=r"names no CRS, in metres, got .* look like degrees; name their CRS"):
+        read_footprints(path, target_crs=target)
 
 
 def test_overlap_is_checked_and_both_boxes_are_named():

@@ -95,8 +95,8 @@ def plan_bounds(headers: list) -> np.ndarray:
 def refuse_degrees_of(headers: list) -> None:
     from ..read.overlap import refuse_degrees
 
-    bounds = plan_bounds(headers)
-    refuse_degrees(bounds[:, :2], bounds[:, 2:], "the point clouds")
+    advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
+    refuse_degrees(plan_bounds(headers), "the point clouds", advice)
 
 
 def refuse_degrees_alone(path: str, crs) -> None:

@@ -84,7 +84,7 @@ def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
     return CRS.from_epsg(code) if code is not None else compound
 
 
-def units_of(crs: CRS | None, source: str = "the coordinates", named: str = "auto") -> Units:
+def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "auto") -> Units:
     """Units that coordinates in `crs` count in; heights of a CRS without any are taken to be in the plan's unit.
 
     `named` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS in degrees, and for a name

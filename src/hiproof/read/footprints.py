@@ -18,6 +18,7 @@ from ..model import Footprint
 from ..settings import Settings
 from .crs import described, parse_crs, same_horizontal, units_of
 from .database import is_database, read_table, table_crs
+from .overlap import refuse_degrees
 from .polygons import simple_polygons
 from .remote import is_url
 
@@ -168,6 +169,9 @@ def id_text(value: Any) -> str:
 def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path) -> np.ndarray:
     """Geometries in plan in the target CRS. Raises InputError where that is impossible or leads to no numbers."""
     geometries = shapely.force_2d(geometries)
+    if source is None:
+        advice = "name their CRS in the file (`ogr2ogr -a_srs EPSG:4326`), or reproject them"
+        refuse_degrees(shapely.bounds(geometries), f"the footprints of {path}, which names no CRS,", advice)
     if source is None and target is not None:
         warnings.warn(f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning)
     if source is None or target is None or same_horizontal(source, target):

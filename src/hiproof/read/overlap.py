@@ -67,9 +67,10 @@ def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tupl
         for neighbour in neighbours(own if cloud is not None else None):
             text = f"they look like {described(neighbour)}: name the right zone in the footprints"
             yield text, reprojected(xy, neighbour, target)
-        for neighbour in neighbours(target if named is not None else None):
-            text = f"the cloud looks like {described(neighbour)}: name the right zone with --crs"
-            yield text, reprojected(xy, own, neighbour)
+        if named is not None:
+            for near in (*neighbours(target), *utm_zones(reprojected(xy, own, degrees))):
+                text = f"the cloud looks like {described(near)}: name the right zone with --crs"
+                yield text, reprojected(xy, own, near)
     yield "they look like metres and the cloud like feet: name CRSs, or the cloud's --unit", xy / FOOT_M
     yield "they look like feet and the cloud like metres: name CRSs, or the cloud's --unit", xy * FOOT_M
 
@@ -86,6 +87,15 @@ def neighbours(crs: CRS | None) -> Iterator[CRS]:
             yield neighbour
 
 
+def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
+    """The UTM zones that positions in degrees (n, 2) lie in: Europe's, North America's, the world's."""
+    lon, lat = np.median(lon_lat, axis=0)
+    if np.isfinite((lon, lat)).all():
+        zone = int((lon + 180) // 6) % 60 + 1
+        north = ([25800 + zone] if 28 <= zone <= 38 else []) + ([26900 + zone] if zone <= 23 else []) + [32600 + zone]
+        yield from map(CRS.from_epsg, north if lat > 0 else [32700 + zone])
+
+
 def reprojected(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
     """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either is unknown."""
     if source is None or target is None or same_horizontal(source, target):
@@ -98,13 +108,14 @@ def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
     return len(shapely.STRtree(shapely.points(finite)).query(shapely.box(*boxes.T))[0]) > 0
 
 
-def refuse_degrees(low: np.ndarray, high: np.ndarray, what: str) -> None:
-    """Raise InputError where the boxes `low` to `high` (n, 2) of things without a CRS look like degrees."""
-    degrees = (np.abs(low) <= (180, 90)).all() and (np.abs(high) <= (180, 90)).all()
-    if len(low) and degrees and np.median((high - low).max(axis=1)) < DEGREES_WIDE:
+def refuse_degrees(boxes: np.ndarray, what: str, advice: str) -> None:
+    """Raise InputError where the `boxes` (n, 4) of things without a CRS look like degrees; NaN where one is empty."""
+    boxes = boxes[np.isfinite(boxes).all(axis=1)]
+    low, high = boxes[:, :2], boxes[:, 2:]
+    degrees = (np.abs(boxes) <= (180, 90, 180, 90)).all()
+    if len(boxes) and degrees and np.median((high - low).max(axis=1)) < DEGREES_WIDE:
         raise InputError(
-            f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like degrees; "
-            "reproject to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
+            f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like degrees; {advice}"
         )
 
 
