@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import warnings
 from pathlib import Path
 
-import numpy as np
 import shapely
 
-from ..errors import InputError, InputWarning
-from ..frames import Units
-from ..settings import Settings
+from ..errors import InputError
 from ..write.naming import FileUnits
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 
@@ -20,39 +16,25 @@ MOST_BUILDINGS_A_TILE = 100
 
 def make_plan(request, mark: str) -> Plan:
     """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
-    from ..read.crs import units_of
-    from ..read.footprints import footprint_crs
     from ..read.terrain import read_terrain
+    from .frame import settle_frame
 
     headers = read_headers(request.clouds)
-    cloud = crs_of_clouds(headers, request.settings)
-    footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
-    if cloud is None and footprints is not None:
-        refuse_degrees_alone(request.footprints, footprints)
-    crs = cloud or footprints
-    units = units_of(crs, "the point clouds", request.settings.read.unit)
-    if crs is None:
-        refuse_degrees_of(headers)
-    if cloud is None:
-        say_what_is_assumed(headers[0].path, footprints, units)
+    frame = settle_frame(request, headers)
     if request.terrain:
-        read_terrain(
-            request.terrain, crs, units
-        )  # only to be told now, not after all points are sorted, if it cannot be
-    if request.footprints:
-        jobs = jobs_from_footprints(request, headers, cloud, footprints, units)
-    else:
-        jobs = jobs_from_cloud(request)
+        # only to be told now if it cannot be read, and not after all points are sorted
+        read_terrain(request.terrain, frame.crs, frame.units)
+    jobs = jobs_from_footprints(request, headers, frame) if request.footprints else jobs_from_cloud(request)
     return Plan(
         clouds=tuple(map(absolute, request.clouds)),
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, MOST_BUILDINGS_A_TILE),
-        crs_wkt=crs.to_wkt() if crs is not None else None,
+        crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
         terrain=absolute(request.terrain) if request.terrain else None,
         settings=request.settings,
         fingerprint=mark,
         names=unusual_names(jobs),
-        translate=offset_of_jobs(jobs, FileUnits.of(crs, units).cityjson),
+        translate=offset_of_jobs(jobs, FileUnits.of(frame.crs, frame.units).cityjson),
     )
 
 
@@ -78,56 +60,17 @@ def read_headers(clouds: tuple[str, ...]) -> list:
     return headers
 
 
-def crs_of_clouds(headers: list, settings: Settings) -> object:
-    """The CRS that the settings give the clouds, else the one their headers agree on, None where none names one."""
-    from ..read.crs import parse_crs
-    from ..read.pointcloud import common_crs
-
-    return common_crs({header.path: header.crs for header in headers}, parse_crs(settings.read.crs))
-
-
-def plan_bounds(headers: list) -> np.ndarray:
-    """Boxes (n, 4) of the point files in plan, in their own unit; those without points left out."""
-    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
-    return bounds[np.isfinite(bounds).all(axis=1)]
-
-
-def refuse_degrees_of(headers: list) -> None:
-    from ..read.overlap import refuse_degrees
-
-    advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
-    refuse_degrees(plan_bounds(headers), "the point clouds", advice)
-
-
-def refuse_degrees_alone(path: str, crs) -> None:
-    """Footprints in degrees cannot stand in for the CRS of clouds that name none."""
-    from ..read.crs import described
-
-    if crs.is_geographic:
-        raise InputError(
-            f"expected footprints that tell the CRS of clouds that name none, got {path} in {described(crs)}, which is in "
-            "degrees; name the clouds' CRS with --crs, or reproject the footprints"
-        )
-
-
-def say_what_is_assumed(path: str, footprints: object, units: Units) -> None:
-    """One line where no cloud names a CRS: whatever is then taken for granted would else be taken in silence."""
-    from ..read.crs import described
-
-    taken = f"taken to be in the footprints' {described(footprints)}" if footprints else f"its unit is taken as {units}"
-    warnings.warn(f"{path}: names no CRS; {taken}; say otherwise with --crs or --unit", InputWarning)
-
-
-def jobs_from_footprints(request, headers: list, cloud_crs, footprints_crs, units: Units) -> tuple[Job, ...]:
+def jobs_from_footprints(request, headers: list, frame) -> tuple[Job, ...]:
     from ..read.footprints import read_footprints
     from ..read.overlap import check_overlap
+    from .frame import plan_bounds
 
     footprints = read_footprints(
-        request.footprints, request.layer, request.id_attribute, cloud_crs, settings=request.settings
+        request.footprints, request.layer, request.id_attribute, frame.cloud, settings=request.settings
     )
-    bounds = units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
+    bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     if len(bounds):
-        check_overlap(footprints, bounds, footprints_crs, cloud_crs, units)
+        check_overlap(footprints, bounds, frame.footprints, frame.cloud, frame.units)
     return jobs_of_footprints(footprints)
 
 

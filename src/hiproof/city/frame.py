@@ -1,0 +1,75 @@
+"""In which CRS and units an area is worked out: what its clouds and its footprints name, and what is assumed if they do not."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, InputWarning
+from ..frames import Units
+from ..read.crs import described, parse_crs, units_of
+from ..read.footprints import footprint_crs
+from ..read.overlap import refuse_degrees
+from ..read.pointcloud import PointFileHeader, common_crs
+
+
+@dataclass(frozen=True)
+class AreaFrame:
+    """The pyproj CRSs that the clouds and the footprints name, None where they name none, and the units of the area's."""
+
+    cloud: Any
+    footprints: Any
+    units: Units
+
+    @property
+    def crs(self) -> Any:
+        """The CRS of everything written: the clouds', else the footprints', None where neither names one."""
+        return self.cloud or self.footprints
+
+
+def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
+    """The frame of a `run.Request` whose point files have `headers`.
+
+    The CRS that the settings give the clouds goes before that of their headers, and clouds that name none are taken to be
+    in the footprints'; whatever is assumed is said by an InputWarning. Raises InputError for clouds of several CRSs and
+    for degrees.
+    """
+    read = request.settings.read
+    cloud = common_crs({header.path: header.crs for header in headers}, parse_crs(read.crs))
+    footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
+    if cloud is None:
+        refuse_degrees_of_either(request.footprints, footprints, headers)
+    frame = AreaFrame(cloud, footprints, units_of(cloud or footprints, named=read.unit))
+    if cloud is None:
+        say_what_is_assumed(headers[0].path, frame)
+    return frame
+
+
+def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
+    """Boxes (n, 4) of the point files in plan, in their own unit; those without points left out."""
+    bounds = np.array([header.bounds for header in headers], float).reshape(-1, 6)[:, [0, 1, 3, 4]]
+    return bounds[np.isfinite(bounds).all(axis=1)]
+
+
+def refuse_degrees_of_either(path: str | None, footprints: Any, headers: list[PointFileHeader]) -> None:
+    """Clouds that name no CRS may not count in degrees, nor can footprints in degrees stand in for their CRS."""
+    if footprints is not None and footprints.is_geographic:
+        raise InputError(
+            f"expected footprints that tell the CRS of clouds that name none, got {path} in {described(footprints)}, which "
+            "is in degrees; name the clouds' CRS with --crs, or reproject the footprints"
+        )
+    advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
+    if footprints is None:
+        refuse_degrees(plan_bounds(headers), "the point clouds", advice)
+
+
+def say_what_is_assumed(path: str, frame: AreaFrame) -> None:
+    """One line where no cloud names a CRS: what is then taken for granted would else be taken in silence."""
+    if frame.footprints is None:
+        taken = f"its unit is taken as {frame.units}"
+    else:
+        taken = f"taken to be in the footprints' {described(frame.footprints)}"
+    warnings.warn(f"{path}: names no CRS; {taken}; say otherwise with --crs or --unit", InputWarning)
