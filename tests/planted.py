@@ -25,19 +25,19 @@ def counted(points, footprint, terrain, settings, id):
     return Building(id, Status.NO_POINTS, f"{len(points)} points", None, None, quality, ground, terrain.source)
 
 
-def solve_with(reconstruct, folder, tile, avoid):
+def solve_with(reconstruct, folder, tile, terrain, avoid):
     original, solve.reconstruct = solve.reconstruct, reconstruct
     try:
-        return solve.solve_tile(folder, tile, avoid)
+        return solve.solve_tile(folder, tile, terrain, avoid)
     finally:
         solve.reconstruct = original
 
 
-def solve_quickly(folder, tile, avoid=()):
-    return solve_with(counted, folder, tile, avoid)
+def solve_quickly(folder, tile, terrain=None, avoid=()):
+    return solve_with(counted, folder, tile, terrain, avoid)
 
 
-def solve_killed_once(folder, tile, avoid=()):
+def solve_killed_once(folder, tile, terrain=None, avoid=()):
     """The worker that first comes to the deadly building is killed, as if from outside."""
 
     def reconstruct(points, footprint, terrain, settings, id):
@@ -47,10 +47,10 @@ def solve_killed_once(folder, tile, avoid=()):
             os.kill(os.getpid(), signal.SIGKILL)
         return counted(points, footprint, terrain, settings, id)
 
-    return solve_with(reconstruct, folder, tile, avoid)
+    return solve_with(reconstruct, folder, tile, terrain, avoid)
 
 
-def solve_deadly(folder, tile, avoid=()):
+def solve_deadly(folder, tile, terrain=None, avoid=()):
     """One building kills every worker that tries it."""
 
     def reconstruct(points, footprint, terrain, settings, id):
@@ -58,10 +58,10 @@ def solve_deadly(folder, tile, avoid=()):
             os.kill(os.getpid(), signal.SIGKILL)
         return counted(points, footprint, terrain, settings, id)
 
-    return solve_with(reconstruct, folder, tile, avoid)
+    return solve_with(reconstruct, folder, tile, terrain, avoid)
 
 
-def solve_hungry(folder, tile, avoid=()):
+def solve_hungry(folder, tile, terrain=None, avoid=()):
     """One building wants more memory than the worker may have."""
 
     def reconstruct(points, footprint, terrain, settings, id):
@@ -70,9 +70,9 @@ def solve_hungry(folder, tile, avoid=()):
             np.ones(1 << 30)
         return counted(points, footprint, terrain, settings, id)
 
-    return solve_with(reconstruct, folder, tile, avoid)
+    return solve_with(reconstruct, folder, tile, terrain, avoid)
 
 
 def jobs_of(path):
     """A stand-in for reading footprints that takes those of `path`, whatever address is asked for."""
-    return lambda request, headers, crs: jobs_of_footprints(read_footprints(path))
+    return lambda *_: jobs_of_footprints(read_footprints(path))

@@ -2,9 +2,13 @@
 
 import json
 import sys
+import warnings
 
 import pytest
 
+import planted
+from hiproof.city import run as city_run
+from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.masking import masked, masked_values
@@ -70,6 +74,22 @@ def test_nested_values_are_masked_and_others_kept():
 @pytest.mark.parametrize("kind", [*HiproofError.__subclasses__(), InputWarning])
 def test_every_error_masks_its_own_text(kind):
     assert "s3cret" not in str(kind("expected points at https://u:s3cret@host/a.laz, got none"))
+
+
+def test_a_run_leaves_no_secret_in_any_of_its_files(town_files, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    monkeypatch.setattr("hiproof.city.prepare.jobs_from_footprints", planted.jobs_of(town_files[1]))
+    monkeypatch.setattr("hiproof.read.footprints.footprint_crs", lambda *_: None)
+    broken = "https://adm:s3cret@localhost:1/missing.laz"
+    address = "postgresql://adm:s3cret@host/db?table=fp&password=s3cret"
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        summary = reconstruct_area(Request((town_files[0], broken), tmp_path, address))
+    assert summary.exit_code == 2
+    assert "s3cret" not in repr(summary)
+    files = [path for path in tmp_path.rglob("*") if path.is_file()]
+    assert {"run.json", "ledger.sqlite"} <= {path.name for path in files}
+    assert [path.name for path in files if b"s3cret" in path.read_bytes()] == []
 
 
 def test_an_error_of_our_own_shows_its_traceback_without_secrets(monkeypatch, capsys):

@@ -129,7 +129,7 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished, files, tmp_path,
     assert not (tmp_path / "buildings.gml").exists()
     solved = []
     original = city_run.solve_tile
-    monkeypatch.setattr(city_run, "solve_tile", lambda folder, tile: solved.append(tile) or original(folder, tile))
+    monkeypatch.setattr(city_run, "solve_tile", lambda *task: solved.append(task[1]) or original(*task))
     reconstruct_area(request)
     assert len(solved) == 2
     assert records(tmp_path) == records(finished[0])
@@ -138,7 +138,7 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished, files, tmp_path,
 def test_a_killed_run_goes_on_and_ends_the_same(finished, files, tmp_path):
     command = [sys.executable, "-m", "hiproof", "reconstruct", str(files[0]), "--footprints", str(files[1]), "--out"]
     process = subprocess.Popen([*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"})
-    while not (tmp_path / ".hiproof" / "plan.pickle").exists() and process.poll() is None:
+    while not (tmp_path / ".hiproof" / "plan.jsonl").exists() and process.poll() is None:
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
     process.wait()

@@ -17,7 +17,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "reconstruct_area": "city.run",
-    "Request": "city.run",
+    "Request": "city.request",
     "fit_roof": "fit",
     "check_solid": "compose",
     "read_points": "read",

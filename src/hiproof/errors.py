@@ -45,8 +45,16 @@ def warn_in_sentences() -> None:
     warnings.showwarning = show
 
 
-class InputWarning(UserWarning):
-    """Input that was used after putting something right (points dropped, a CRS assumed); it says what and how much."""
+class HiproofWarning(UserWarning):
+    """Base of the warnings: what was put right on the way, in one sentence."""
 
     def __init__(self, message: str = ""):
         super().__init__(masked(str(message)))
+
+
+class InputWarning(HiproofWarning):
+    """Input that was used after putting something right (points dropped, a CRS assumed); it says what and how much."""
+
+
+class OutputWarning(HiproofWarning):
+    """Output that was found other than it was left, and what is done about it."""

@@ -18,7 +18,9 @@ create table if not exists task (
 create table if not exists building (
     position integer primary key, id text, task text, status text, type text, detail text, share real, psd real,
     seconds real);
+create table if not exists output (name text primary key, bytes integer, digest text);
 """
+TABLES = ("run", "task", "building", "output")
 
 
 class Ledger:
@@ -44,6 +46,21 @@ class Ledger:
     def get(self, key: str) -> str | None:
         row = self.database.execute("select value from run where key = ?", (key,)).fetchone()
         return row[0] if row else None
+
+    def claim(self, rows: list[tuple[str, int, str]]) -> None:
+        """Enter the (name, bytes, digest) rows of all files written, and with them that the run is finished."""
+        self.database.execute("begin")
+        self.database.executemany("insert or replace into output values (?, ?, ?)", rows)
+        self.set(merged="yes")
+        self.database.execute("commit")
+
+    def claims(self) -> list[tuple[str, int, str]]:
+        return self.database.execute("select name, bytes, digest from output order by name").fetchall()
+
+    def forget(self) -> None:
+        """Drop all that is known of a run."""
+        for table in TABLES:
+            self.database.execute(f"delete from {table}")
 
     def add_tasks(self, rows: list[tuple[str, str, int, int]]) -> None:
         """Enter (name, kind, position, buildings) rows that are not there yet."""

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import pickle
 import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..write.run_files import Fragments, join_fragments
+from ..write.fragments import Fragments, load_fragments
+from ..write.run_files import join_fragments
 from .plan import Plan
 
 MODELS = {"gml": "buildings.gml", "cityjson": "buildings.city.jsonl"}
@@ -23,23 +23,42 @@ def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int]
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
-    city = plan.settings.city
-    names = (MODELS if city.models != "tiles" else {}) | TABLES | (PARQUET if city.parquet else {})
-    files = {kind: out / name for kind, name in names.items()}
-    join_fragments(files, parts_of(plan, state, progress), plan.translate, plan.crs())
+    join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.translate, plan.crs())
 
 
 def parts_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
     for number, tile in enumerate(plan.tiles):
         progress("merge", number, len(plan.tiles))
-        yield from pickle.loads((state / "tiles" / f"{tile}.pickle").read_bytes())
+        yield from load_fragments(tile_parts(state, tile))
+
+
+def tile_parts(state: Path, tile: str) -> Path:
+    """Where the buildings of a work tile wait to be joined."""
+    return state / "tiles" / f"{tile}.npz"
+
+
+def output_files(plan: Plan, out: Path) -> list[Path]:
+    """All files that a run of this plan says it has written, the record of the run aside."""
+    tiles = plan.tiles if plan.settings.city.models != "merged" else ()
+    return [*whole_files(plan, out).values(), *(file for tile in tiles for file in tile_files(out, tile).values())]
+
+
+def whole_files(plan: Plan, out: Path) -> dict[str, Path]:
+    """Files of the whole area by what they hold."""
+    city = plan.settings.city
+    names = (MODELS if city.models != "tiles" else {}) | TABLES | (PARQUET if city.parquet else {})
+    return {kind: out / name for kind, name in names.items()}
+
+
+def tile_files(out: Path, tile: str) -> dict[str, Path]:
+    """Files of one work tile's models by what they hold."""
+    return {kind: out / TILE_FOLDER / f"{tile}{ending}" for kind, ending in TILE_ENDINGS.items()}
 
 
 def write_tile(plan: Plan, out: Path, tile: str, parts: list[Fragments]) -> None:
     """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
     if plan.settings.city.models != "merged":
-        files = {kind: out / TILE_FOLDER / f"{tile}{ending}" for kind, ending in TILE_ENDINGS.items()}
-        join_fragments(files, parts, plan.translate, plan.crs())
+        join_fragments(tile_files(out, tile), parts, plan.translate, plan.crs())
 
 
 def remove_tiles(out: Path, pattern: str = "*") -> None:

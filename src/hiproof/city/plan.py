@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import functools
-import hashlib
 import json
 import math
-import pickle
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,14 +12,15 @@ from typing import Any
 import numpy as np
 import shapely
 
-from .. import __version__
-from ..errors import InputError
+from ..errors import InputError, OutputError
 from ..frames import Units
 from ..model import Footprint
 from ..settings import Settings
 from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
 from ..write.naming import FileUnits, UniqueNames, gml_name
+
+PLAN_FILE = "plan.jsonl"
 
 
 @dataclass(frozen=True)
@@ -36,19 +35,17 @@ class Job:
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything a worker needs to know; pickled once into the run's folder.
+    """Everything a worker needs to know, kept as JSON in the run's folder: a line for the whole, then a line a building.
 
+    What a task reads (its point file, the terrain model) comes with the task: an address may hold a password.
     `names` are the CityJSON id and the gml:id of those buildings whose own id will not do; `translate` is the offset of
     the CityJSON file. Both are settled here, so that a building's text does not depend on what is written before it.
     """
 
-    clouds: tuple[str, ...]
     jobs: tuple[Job, ...]
     tiles: dict[str, tuple[int, ...]]
     crs_wkt: str | None
-    terrain: str | None
     settings: Settings
-    fingerprint: str
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     translate: np.ndarray = field(default_factory=lambda: np.zeros(3))
 
@@ -74,16 +71,50 @@ class Plan:
         return CRS.from_wkt(self.crs_wkt) if self.crs_wkt else None
 
     def save(self, path: Path) -> None:
-        path.write_bytes(pickle.dumps(self, protocol=5))
+        whole = {
+            "tiles": self.tiles,
+            "crs": self.crs_wkt,
+            "settings": self.settings.to_dict(),
+            "names": [[index, *pair] for index, pair in self.names.items()],
+            "translate": self.translate.tolist(),
+        }
+        areas = shapely.to_wkb([job.area for job in self.jobs], hex=True)
+        with path.open("w", encoding="utf-8") as file:
+            file.write(json.dumps(whole) + "\n")
+            for job, area in zip(self.jobs, areas, strict=True):
+                attributes = job.footprint.attributes if job.footprint else None
+                file.write(json.dumps([job.id, area, attributes], default=str) + "\n")
 
     @staticmethod
     def load(path: Path) -> Plan:
-        return pickle.loads(path.read_bytes())
+        """The plan at `path`. Raises OutputError where it is missing or damaged."""
+        try:
+            with path.open(encoding="utf-8") as file:
+                whole, rows = json.loads(file.readline()), [json.loads(line) for line in file]
+            areas = shapely.from_wkb([area for _, area, _ in rows])
+            return Plan(
+                jobs=tuple(job_of_row(i, *row) for i, row in enumerate(zip(rows, areas, strict=True))),
+                tiles={name: tuple(members) for name, members in whole["tiles"].items()},
+                crs_wkt=whole["crs"],
+                settings=Settings.from_dict(whole["settings"]),
+                names={index: tuple(pair) for index, *pair in whole["names"]},
+                translate=np.array(whole["translate"]),
+            )
+        except (OSError, ValueError, KeyError, TypeError, shapely.errors.GEOSException) as error:
+            raise OutputError(
+                f"expected the plan of a run in {path}, got: {error}; begin anew with --restart"
+            ) from error
+
+
+def job_of_row(index: int, row: list, area: shapely.Polygon) -> Job:
+    """A building of the plan's file: [id, area, attributes], the last null where there is no footprint."""
+    id, _, attributes = row
+    return Job(index, id, area, None if attributes is None else Footprint(id, area, attributes))
 
 
 def load_plan(folder: Path) -> Plan:
     """The plan of the run whose state is in `folder`, read once a process."""
-    path = folder / "plan.pickle"
+    path = folder / PLAN_FILE
     return loaded_plan(path, path.stat().st_mtime_ns)
 
 
@@ -122,16 +153,6 @@ def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str,
         for number, start in enumerate(range(0, len(members), most)):
             tiles[f"{column}_{row}_{number}"] = tuple(members[start : start + most])
     return tiles
-
-
-def fingerprint(clouds: tuple[str, ...], footprints: str | None, terrain: str | None, settings: Settings) -> str:
-    """A digest of inputs, settings and version: a run continues only where all of them are the same."""
-    stamps: list[Any] = [__version__, settings.to_dict()]
-    for name in (*clouds, footprints, terrain):
-        path = Path(name) if name else None
-        stat = path.stat() if path is not None and path.is_file() else None
-        stamps.append([str(name), stat.st_size if stat else None, stat.st_mtime_ns if stat else None])
-    return hashlib.sha256(json.dumps(stamps, sort_keys=True).encode()).hexdigest()
 
 
 def jobs_of_footprints(footprints: tuple[Footprint, ...]) -> tuple[Job, ...]:

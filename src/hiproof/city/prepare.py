@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import shapely
 
 from ..errors import InputError
 from ..write.naming import FileUnits
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
+from .request import Request
 
 TILE_M = 250.0
 MOST_BUILDINGS_A_TILE = 100
 
 
-def make_plan(request, mark: str) -> Plan:
-    """Plan of a `run.Request`; `mark` is its fingerprint. Raises InputError when nothing can be read."""
+def make_plan(request: Request) -> Plan:
+    """Plan of a request. Raises InputError when nothing can be read."""
     from ..read.terrain import read_terrain
     from .frame import settle_frame
 
@@ -26,21 +25,13 @@ def make_plan(request, mark: str) -> Plan:
         read_terrain(request.terrain, frame.crs, frame.units)
     jobs = jobs_from_footprints(request, headers, frame) if request.footprints else jobs_from_cloud(request)
     return Plan(
-        clouds=tuple(map(absolute, request.clouds)),
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, MOST_BUILDINGS_A_TILE),
         crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
-        terrain=absolute(request.terrain) if request.terrain else None,
         settings=request.settings,
-        fingerprint=mark,
         names=unusual_names(jobs),
         translate=offset_of_jobs(jobs, FileUnits.of(frame.crs, frame.units).cityjson),
     )
-
-
-def absolute(name: str) -> str:
-    """A path that means the same to a worker started elsewhere; addresses stay as they are."""
-    return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
 
 
 def read_headers(clouds: tuple[str, ...]) -> list:

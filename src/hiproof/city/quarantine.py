@@ -29,17 +29,18 @@ def run_alone(executor: Any, function: Callable, task: tuple) -> tuple[Any, Exce
         alone.close()
 
 
-def solve_in_quarantine(executor: Any, function: Callable, folder: str, tile: str) -> tuple[Any, Exception | None]:
-    """The rows of `solve_tile`, without the buildings that kill their process: they become internal errors.
+def solve_in_quarantine(executor: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
+    """The rows of `solve_tile` for its arguments `task` (folder, tile, terrain), without the buildings that kill their process: they become internal errors.
 
     Where the tile as a whole kills its process even alone, its buildings are tried one by one.
     """
-    result, error = run_alone(executor, function, (folder, tile))
+    result, error = run_alone(executor, function, task)
     if not isinstance(error, (WorkerLost, MemoryError)):
         return result, error
+    folder, tile, _ = task
     members, deadly = load_plan(Path(folder)).tiles[tile], []
     for index in members:
         others = tuple(i for i in members if i != index)
-        if isinstance(run_alone(executor, function, (folder, tile, others))[1], (WorkerLost, MemoryError)):
+        if isinstance(run_alone(executor, function, (*task, others))[1], (WorkerLost, MemoryError)):
             deadly.append(index)
-    return run_alone(executor, function, (folder, tile, tuple(deadly)))
+    return run_alone(executor, function, (*task, tuple(deadly)))

@@ -2,49 +2,38 @@
 
 from __future__ import annotations
 
+import functools
 import json
+import secrets
 import shutil
 import sqlite3
 import time
+import warnings
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 from .. import __version__
-from ..errors import InputError, OutputError
+from ..errors import InputError, OutputError, OutputWarning
 from ..frames import METRES, Units
 from ..masking import masked, masked_values
-from ..settings import Settings
 from ..write.files import atomic
 from .checks import refuse_unusable
 from .executors import WorkerLost, make_executor
 from .ledger import Ledger
-from .merge import merge, remove_tiles
-from .plan import Plan, fingerprint
+from .lock import held
+from .merge import merge, output_files, remove_tiles
+from .outputs import broken_claims, claims
+from .plan import PLAN_FILE, Plan
 from .prepare import make_plan
 from .quarantine import run_alone, solve_in_quarantine
+from .request import Request, inputs_of, mark_of
 from .tasks import solve_tile, sort_cloud
 
 MOST_LOSSES = 3
 Progress = Callable[[str, int, int], None]
-
-
-@dataclass(frozen=True)
-class Request:
-    """What the user asked for."""
-
-    clouds: tuple[str, ...]
-    out: Path
-    footprints: str | None = None
-    terrain: str | None = None
-    id_attribute: str | None = None
-    layer: str | None = None
-    settings: Settings = field(default_factory=Settings)
-    jobs: int = 1
-    scheduler: str | None = None
-    restart: bool = False
 
 
 @dataclass(frozen=True)
@@ -73,27 +62,35 @@ class Summary:
 def reconstruct_area(request: Request, progress: Progress = lambda step, done, total: None) -> Summary:
     """Reconstruct every building of an area into `request.out`; see the package's docstring for the steps.
 
-    Raises InputError, SettingsError or OutputError (full sentences) when the run cannot start or go on; what was done
-    so far stays, and the same call goes on from there.
+    Raises InputError, SettingsError or OutputError (full sentences) when the run cannot start or go on, or when another
+    one works in that folder; what was done so far stays, and the same call goes on from there.
     """
-    clock = Clock()
     refuse_unusable(request)
-    executor = make_executor(request.jobs, request.scheduler)
     state = open_state(request.out)
+    with held(state):
+        return reconstruct_alone(request, state, progress)
+
+
+def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summary:
+    """The steps of a run that has its folder `state` to itself."""
+    clock = Clock()
+    executor = make_executor(request.jobs, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
         plan = resume_or_plan(request, state, ledger)
         clock.lap("plan")
-        work_off(ledger, executor, "sort", sort_cloud, state, progress)
+        arguments = functools.partial(task_arguments, request, state)
+        work_off(ledger, executor, "sort", sort_cloud, arguments, progress)
         refuse_without_points(plan, ledger)
         clock.lap("sort")
-        work_off(ledger, executor, "solve", solve_tile, state, progress)
+        work_off(ledger, executor, "solve", solve_tile, arguments, progress)
         clock.lap("solve")
         if ledger.get("merged") != "yes":
             merge(plan, state, Path(request.out), progress)
         summary = summarise(request, plan, ledger, clock)
         write_run_record(request, plan, summary)
-        ledger.set(merged="yes")
+        if ledger.get("merged") != "yes":
+            ledger.claim(claims(output_files(plan, Path(request.out)), Path(request.out)))
         clean(state)
         return summary
     except sqlite3.OperationalError as error:
@@ -151,48 +148,69 @@ def open_state(out: Path) -> Path:
 
 
 def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
-    """The plan of an unfinished run of the same inputs and settings, else a new one."""
-    mark = fingerprint(request.clouds, request.footprints, request.terrain, request.settings)
-    known = ledger.get("fingerprint")
-    if known is not None and not request.restart:
-        if known != mark:
-            raise OutputError(
-                f"expected {request.out} to be new or to hold a run of the same inputs, settings and version, got another "
-                "run's; choose another --out, or begin anew with --restart"
-            )
-        return Plan.load(state / "plan.pickle")
-    if known is not None:
-        forget(state, ledger)
-    plan = make_plan(request, mark)
-    with atomic(state / "plan.pickle") as beside:
+    """The plan of an earlier run of the same request whose files stand as it left them, else a new one."""
+    inputs = inputs_of(request)
+    if ledger.get("mark") is not None and not request.restart:
+        refuse_other_inputs(request.out, inputs, ledger)
+        if stands(request.out, ledger):
+            return Plan.load(state / PLAN_FILE)
+    forget(state, ledger)
+    plan, salt = make_plan(request), secrets.token_hex(16)
+    with atomic(state / PLAN_FILE) as beside:
         plan.save(Path(beside))
-    ledger.add_tasks([(f"sort:{i}", "sort", i, 0) for i in range(len(plan.clouds))])
+    ledger.add_tasks([(f"sort:{i}", "sort", i, 0) for i in range(len(request.clouds))])
     tiles = enumerate(plan.tiles.items())
     ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
-    ledger.set(fingerprint=mark, version=__version__, started=str(time.time()))
+    told = json.dumps(masked_values(inputs), default=str)
+    ledger.set(inputs=told, salt=salt, mark=mark_of(inputs, salt), started=str(time.time()))
     return plan
+
+
+def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
+    """Raise OutputError, naming what differs, where the folder holds a run of another request."""
+    if ledger.get("mark") == mark_of(inputs, ledger.get("salt")):
+        return
+    known, told = json.loads(ledger.get("inputs")), json.loads(json.dumps(masked_values(inputs), default=str))
+    other = [name for name in told | known if told.get(name) != known.get(name)]
+    raise OutputError(
+        f"expected {out} to be new or to hold a run of the same inputs, settings and version, got a run that differs in "
+        f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or begin anew with --restart"
+    )
+
+
+def stands(out: Path, ledger: Ledger) -> bool:
+    """Whether a run may go on from what is there: not where files of a finished run were removed or changed since."""
+    broken = broken_claims(ledger.claims(), Path(out)) if ledger.get("merged") == "yes" else []
+    if broken:
+        names = ", ".join(broken[:5]) + (" and others" if len(broken) > 5 else "")
+        warnings.warn(f"{out}: {names} is gone or not as the run left it; all is made again", OutputWarning)
+    return not broken
 
 
 def forget(state: Path, ledger: Ledger) -> None:
     """Drop all that an earlier run in this folder has left of its state (its output files stay until replaced)."""
     remove_tiles(state.parent)
-    for table in ("run", "task", "building"):
-        ledger.database.execute(f"delete from {table}")
+    ledger.forget()
     for name in ("tiles", "points"):
         shutil.rmtree(state / name, ignore_errors=True)
         (state / name).mkdir()
 
 
-def work_off(ledger: Ledger, executor, kind: str, function: Callable, state: Path, progress: Progress) -> None:
-    """Run all open tasks of a kind; one whose process dies is tried again, and after MOST_LOSSES alone."""
+def work_off(
+    ledger: Ledger, executor, kind: str, function: Callable, arguments: Callable[[str], tuple], progress: Progress
+) -> None:
+    """Run all open tasks of a kind; one whose process dies is tried again, and after MOST_LOSSES alone.
+
+    `arguments` are those of `function` by the name of a task.
+    """
     total = len([row for row in ledger.tasks() if row[1] == kind])
     while names := ledger.open_tasks(kind):
         done = total - len(names)
         progress(kind, done, total)
         suspects = [name for name in names if ledger.losses(name) >= MOST_LOSSES]
         for name in suspects:
-            work_off_alone(ledger, executor, kind, name, function, state)
-        tasks = started(ledger, kind, [name for name in names if name not in set(suspects)], state)
+            work_off_alone(ledger, executor, kind, name, function, arguments(name))
+        tasks = started(ledger, [name for name in names if name not in set(suspects)], arguments)
         for task, result, error in executor.run(function, tasks):
             name = f"{kind}:{task[1]}"
             if isinstance(error, (WorkerLost, MemoryError)):
@@ -203,16 +221,25 @@ def work_off(ledger: Ledger, executor, kind: str, function: Callable, state: Pat
             progress(kind, done, total)
 
 
-def started(ledger: Ledger, kind: str, names: list[str], state: Path) -> Iterator[tuple]:
+def started(ledger: Ledger, names: list[str], arguments: Callable[[str], tuple]) -> Iterator[tuple]:
     """The tasks' arguments, each entered as running when an executor takes it."""
     for name in names:
         ledger.start(name)
-        yield task_arguments(kind, name, state)
+        yield arguments(name)
 
 
-def task_arguments(kind: str, name: str, state: Path) -> tuple:
-    key = name.split(":", 1)[1]
-    return (str(state.absolute()), int(key) if kind == "sort" else key)
+def task_arguments(request: Request, state: Path, name: str) -> tuple:
+    """The arguments of a task: the run's folder, the number or name of what it works on, and the address that it reads."""
+    kind, key = name.split(":", 1)
+    folder = str(state.absolute())
+    if kind == "sort":
+        return folder, int(key), absolute(request.clouds[int(key)])
+    return folder, key, request.terrain and absolute(request.terrain)
+
+
+def absolute(name: str) -> str:
+    """A path that means the same to a worker started elsewhere; addresses stay as they are."""
+    return name if "://" in name or name.startswith("/vsi") else str(Path(name).absolute())
 
 
 def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None) -> None:
@@ -228,11 +255,10 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
         raise error
 
 
-def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, state: Path) -> None:
+def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple) -> None:
     """A task whose process died again and again, in a process of its own; see quarantine.py."""
-    task = task_arguments(kind, name, state)
     if kind == "solve":
-        result, error = solve_in_quarantine(executor, function, *task)
+        result, error = solve_in_quarantine(executor, function, task)
     else:
         result, error = run_alone(executor, function, task)
     if isinstance(error, (WorkerLost, MemoryError)):

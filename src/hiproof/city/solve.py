@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import pickle
 import threading
 import time
 import traceback
@@ -21,9 +20,10 @@ from ..reconstruct import reconstruct
 from ..stages import remarked
 from ..status import Status
 from ..write.files import atomic_file
-from ..write.run_files import Fragments, fragments
+from ..write.fragments import Fragments, save_fragments
+from ..write.run_files import fragments
 from .ground import GROUND_REACH_M, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
-from .merge import write_tile
+from .merge import tile_parts, write_tile
 from .plan import Job, Plan, load_plan, neighbourhood
 from .sort import load_points
 
@@ -49,8 +49,8 @@ class Surroundings:
         return TerrainChain([self.model, GroundAround(self.ground, box), LowestAround(self.low, box)])
 
 
-def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tuple]:
-    """Reconstruct all buildings of `tile` and write its part file.
+def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[tuple]:
+    """Reconstruct all buildings of `tile` over the terrain model `terrain` and write its part file.
 
     `avoid` are the buildings that killed their worker before: they become internal errors without being tried again.
     Returns a row a building for the ledger: (position, id, status, type, detail, share, psd, seconds).
@@ -58,7 +58,7 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
     root = Path(folder)
     plan = load_plan(root)
     surroundings = Surroundings(
-        load_points(root, tile), terrain_model(plan.terrain, plan.crs_wkt, plan.units, threading.get_ident())
+        load_points(root, tile), terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident())
     )
     parts, rows = [], []
     for index in plan.tiles[tile]:
@@ -70,8 +70,8 @@ def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tupl
         parts.append(part)
         rows.append(ledger_row(index, building, time.perf_counter() - start))
     write_tile(plan, root.parent, tile, parts)
-    with atomic_file(root / "tiles" / f"{tile}.pickle") as file:
-        pickle.dump(parts, file, protocol=5)
+    with atomic_file(tile_parts(root, tile)) as file:
+        save_fragments(file, parts)
     return rows
 
 

@@ -28,7 +28,7 @@ from ..read.pointcloud import as_input_error, file_kind, iter_points, read_heade
 from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import GROUND_REACH_M, lowest_in_cells
-from .plan import Plan, load_plan
+from .plan import PLAN_FILE, Plan, load_plan
 
 NOISE_CLASSES = (7, 18)
 KINDS = ("roof", "ground", "low")
@@ -162,23 +162,24 @@ class Gatherer:
             written.unlink(missing_ok=True)
 
 
-def sort_cloud(folder: str, number: int) -> dict:
-    """Sort point file `number` of the plan in `folder`. Returns {"points": read, "classes": {class: count}}.
+def sort_cloud(folder: str, number: int, address: str) -> dict:
+    """Sort the point file at `address`, file `number` of the plan in `folder`.
 
+    Returns {"points": read, "classes": {class: count}}.
     Of a file that breaks off, or is not what its header says, nothing is kept. Raises InputError for whatever reading
     it comes to, so that a file's failure is that file's alone; what writing comes to passes through.
     """
     root = Path(folder)
-    plan, reaches = load_plan(root), reaches_of(root, (root / "plan.pickle").stat().st_mtime_ns)
-    gatherer, path = Gatherer(reaches, plan.settings.read, root / "points", number), plan.clouds[number]
+    plan, reaches = load_plan(root), reaches_of(root, (root / PLAN_FILE).stat().st_mtime_ns)
+    gatherer = Gatherer(reaches, plan.settings.read, root / "points", number)
     try:
-        for cloud in wanted_points(path, reaches, plan.units):
+        for cloud in wanted_points(address, reaches, plan.units):
             gatherer.add(cloud)
     except (MemoryError, OutputError):
         raise
     except Exception as error:
         gatherer.discard()
-        raise as_input_error(error, path) from error
+        raise as_input_error(error, address) from error
     gatherer.flush()
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 

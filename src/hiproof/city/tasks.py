@@ -4,15 +4,15 @@ without compiled code, the network and the readers of points."""
 from __future__ import annotations
 
 
-def sort_cloud(folder: str, number: int) -> dict:
+def sort_cloud(folder: str, number: int, address: str) -> dict:
     """See sort.py."""
     from . import sort
 
-    return sort.sort_cloud(folder, number)
+    return sort.sort_cloud(folder, number, address)
 
 
-def solve_tile(folder: str, tile: str, avoid: tuple[int, ...] = ()) -> list[tuple]:
+def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[tuple]:
     """See solve.py."""
     from . import solve
 
-    return solve.solve_tile(folder, tile, avoid)
+    return solve.solve_tile(folder, tile, terrain, avoid)

@@ -9,9 +9,10 @@ from .building_attributes import building_attributes
 from .citygml import CityGMLWriter, write_citygml
 from .cityjson import CityJSONWriter, write_cityjson
 from .files import atomic, atomic_file
+from .fragments import Fragments, load_fragments, save_fragments
 from .parameters import ParametersWriter, read_parameters, write_parameters
 from .roof_figures import RoofFigures, roof_figures
-from .run_files import Fragments, fragments, join_fragments, write_all
+from .run_files import fragments, join_fragments, write_all
 from .writer import BuildingWriter
 
 __all__ = [
@@ -27,8 +28,10 @@ __all__ = [
     "building_attributes",
     "fragments",
     "join_fragments",
+    "load_fragments",
     "read_parameters",
     "roof_figures",
+    "save_fragments",
     "write_all",
     "write_attributes",
     "write_citygml",

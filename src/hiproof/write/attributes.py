@@ -6,8 +6,8 @@ to building: rows wait in a temporary file until the last building has settled t
 
 from __future__ import annotations
 
+import json
 import os
-import pickle
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -70,7 +70,8 @@ class AttributesWriter(BuildingWriter):
         """Write a building that `table_row` made, here or in another process."""
         for name, value in row[1].items():
             self.kinds.setdefault(name, set()).add(kind_of(value))
-        pickle.dump(row, self.waiting)
+        outline, values = row
+        self.waiting.write(json.dumps([outline and outline.hex(), values]).encode() + b"\n")
         self.count += 1
 
     def finish(self) -> None:
@@ -84,7 +85,8 @@ class AttributesWriter(BuildingWriter):
         left = self.count
         while True:
             size = min(left, ROWS_AT_ONCE)
-            yield [pickle.load(self.waiting) for _ in range(size)]
+            waiting = (json.loads(self.waiting.readline()) for _ in range(size))
+            yield [(outline and bytes.fromhex(outline), values) for outline, values in waiting]
             left -= size
             if not left:
                 return

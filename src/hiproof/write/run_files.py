@@ -10,7 +10,6 @@ import dataclasses
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +17,12 @@ import numpy as np
 
 from ..model import Building
 from ..status import Status
-from .attributes import AttributesWriter, Row, table_row
+from .attributes import AttributesWriter, table_row
 from .building_attributes import building_attributes, figures_of
-from .citygml import CityGMLWriter, Member, gml_member
-from .cityjson import SCALE, CityJSONWriter, Feature, feature_line
+from .citygml import CityGMLWriter, gml_member
+from .cityjson import SCALE, CityJSONWriter, feature_line
 from .cityjson_geometry import Vertices
+from .fragments import Fragments
 from .geoparquet import GeoParquetWriter
 from .naming import FileUnits
 from .parameters import ParametersWriter, parameters_line
@@ -56,16 +56,6 @@ def write_all(folder: str | os.PathLike, buildings: Iterable[Building], crs: Any
             for writer in writers:
                 writer.add(building, figures)
     return broken
-
-
-@dataclass(frozen=True)
-class Fragments:
-    """One building as each file of a run holds it."""
-
-    gml: Member
-    cityjson: Feature
-    parameters: bytes
-    row: Row
 
 
 def fragments(

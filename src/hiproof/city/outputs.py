@@ -1,0 +1,43 @@
+"""What a run says that it has written, and whether it still stands: size and digest of each file, kept in the ledger."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable
+from pathlib import Path
+
+CHUNK_BYTES = 1 << 20
+SQLITE = b"SQLite format 3\0"
+# bytes of an SQLite file's head that change when a viewer opens it: how it is locked, and counters of that
+RESTLESS = ((18, 20), (24, 28), (92, 100))
+
+
+def claims(files: Iterable[Path], out: Path) -> list[tuple[str, int, str]]:
+    """(name within `out`, bytes, digest) of each of `files`."""
+    return [(file.relative_to(out).as_posix(), file.stat().st_size, digest(file)) for file in files]
+
+
+def broken_claims(known: Iterable[tuple[str, int, str]], out: Path) -> list[str]:
+    """Names of those files that are gone or not as they were written; sizes are asked before digests."""
+    return [name for name, size, was in known if not stands(out / name, size, was)]
+
+
+def stands(file: Path, size: int, was: str) -> bool:
+    try:
+        return file.stat().st_size == size and digest(file) == was
+    except OSError:
+        return False
+
+
+def digest(file: Path) -> str:
+    """SHA-256 of a file's content, without what changes in a GeoPackage that is merely looked at."""
+    sha = hashlib.sha256()
+    with open(file, "rb") as content:
+        head = bytearray(content.read(CHUNK_BYTES))
+        if head.startswith(SQLITE):
+            for start, end in RESTLESS:
+                head[start:end] = bytes(end - start)
+        sha.update(head)
+        while chunk := content.read(CHUNK_BYTES):
+            sha.update(chunk)
+    return sha.hexdigest()

@@ -1,0 +1,268 @@
+"""An output folder belongs to one request and to one run at a time, and holds what the run says it holds."""
+
+import dataclasses
+import os
+import pickle
+import signal
+import sqlite3
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from typer.testing import CliRunner
+
+import hiproof
+import planted
+from handmade import courtyard, gable_house, modelled, unmodelled
+from hiproof.city import run as city_run
+from hiproof.city.lock import held
+from hiproof.city.outputs import broken_claims, claims
+from hiproof.city.plan import Job, Plan
+from hiproof.city.request import Request, file_stamps, inputs_of, mark_of
+from hiproof.city.run import reconstruct_area
+from hiproof.cli.app import app
+from hiproof.errors import OutputError
+from hiproof.model import Footprint
+from hiproof.settings import Settings
+from hiproof.write.fragments import load_fragments, save_fragments
+from hiproof.write.naming import FileUnits
+from hiproof.write.run_files import fragments
+from run_records import records
+
+REQUEST = Request(("a.laz",), Path("out"))
+NO_MATTER = {"out", "jobs", "scheduler", "restart"}
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+
+
+def other(value):
+    """A value of the same kind that is another."""
+    if dataclasses.is_dataclass(value):
+        first = dataclasses.fields(value)[0].name
+        return dataclasses.replace(value, **{first: other(getattr(value, first))})
+    if isinstance(value, bool):
+        return not value
+    if isinstance(value, (int, float)):
+        return value + 1
+    return (*value, 99) if isinstance(value, tuple) else Path("else") if isinstance(value, Path) else f"{value} else"
+
+
+def mark(request):
+    return mark_of(inputs_of(request), "salt")
+
+
+@pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(Request)])
+def test_every_field_of_a_request_is_in_its_mark_unless_declared_otherwise(name):
+    changed = dataclasses.replace(REQUEST, **{name: other(getattr(REQUEST, name))})
+    assert (mark(changed) == mark(REQUEST)) == (name in NO_MATTER)
+
+
+def test_a_field_added_later_is_in_the_mark():
+    later = dataclasses.make_dataclass("Later", [("later", int, 0)], bases=(Request,), frozen=True)
+    assert mark(later(("a.laz",), Path("out"))) != mark(later(("a.laz",), Path("out"), later=1))
+
+
+@pytest.mark.parametrize("section", [f.name for f in dataclasses.fields(Settings)])
+def test_every_setting_is_in_the_mark(section):
+    values = getattr(Settings(), section)
+    for declared in dataclasses.fields(values):
+        changed = dataclasses.replace(values, **{declared.name: other(getattr(values, declared.name))})
+        settings = dataclasses.replace(Settings(), **{section: changed})
+        assert inputs_of(dataclasses.replace(REQUEST, settings=settings)) != inputs_of(REQUEST), declared.name
+
+
+@pytest.mark.parametrize("beside", ["a.shp", "a.dbf", "a.prj"])
+def test_the_mark_sees_the_files_that_make_up_an_input(tmp_path, beside):
+    for name in ("a.shp", "a.dbf", "a.prj", "b.dbf"):
+        (tmp_path / name).write_text("before")
+    request = dataclasses.replace(REQUEST, footprints=str(tmp_path / "a.shp"))
+    before = mark(request)
+    (tmp_path / "b.dbf").write_text("someone else's")
+    assert mark(request) == before
+    (tmp_path / beside).write_text("after, and longer")
+    assert mark(request) != before
+
+
+def test_a_folder_is_stamped_by_its_files_and_no_text_by_accident(tmp_path):
+    (tmp_path / "towns.gdb").mkdir()
+    (tmp_path / "towns.gdb" / "a00000001.gdbtable").write_text("rows")
+    assert len(file_stamps(tmp_path / "towns.gdb")) == 1
+    assert file_stamps(Path("x" * 5000)) == file_stamps(Path("a\0b")) == []
+
+
+def test_another_id_attribute_is_refused_by_name_and_the_same_request_is_not(town_files, tmp_path, quick):
+    request = Request((town_files[0],), tmp_path, town_files[1])
+    reconstruct_area(request)
+    assert reconstruct_area(request).buildings == 4
+    with pytest.raises(OutputError, match=r"differs in id_attribute; .*--restart"):
+        reconstruct_area(dataclasses.replace(request, id_attribute="id"))
+    one = Settings.from_dict({"fit": {"parts": "one"}})
+    with pytest.raises(OutputError, match=r"differs in settings\.fit\.parts;"):
+        reconstruct_area(dataclasses.replace(request, settings=one))
+
+
+def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tmp_path, quick):
+    request, told = Request((town_files[0],), tmp_path, town_files[1]), []
+
+    def second(step, done, total):
+        if step == "solve" and not told:
+            with pytest.raises(OutputError, match="another run works in"):
+                reconstruct_area(dataclasses.replace(request, restart=True))
+            told.append(CliRunner().invoke(app, ["status", str(tmp_path)]).output)
+
+    assert reconstruct_area(request, second).buildings == 4
+    assert "buildings done: 0 of 4" in told[0] and "not finished" in told[0]
+
+
+def test_a_lock_holds_across_processes_and_ends_with_kill_9(tmp_path):
+    code = "import sys, time\nfrom pathlib import Path\nfrom hiproof.city.lock import held\n"
+    code += "with held(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)"
+    path = {**os.environ, "PYTHONPATH": str(Path(hiproof.__file__).parents[1])}
+    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, env=path) as other:
+        assert other.stdout.readline() == b"held\n"
+        with pytest.raises(OutputError, match="wait for its end"), held(tmp_path):
+            pass
+        other.send_signal(signal.SIGKILL)
+        other.wait(timeout=30)
+        with held(tmp_path):
+            pass
+
+
+def test_a_folder_that_cannot_be_locked_says_so(tmp_path):
+    (tmp_path / "lock.sqlite").mkdir()
+    with pytest.raises(OutputError, match="to lock"), held(tmp_path):
+        pass
+
+
+@pytest.mark.parametrize("harm", ["removed", "cut", "one byte"])
+@pytest.mark.parametrize("name", ["buildings.gml", "parameters.jsonl", "buildings.gpkg"])
+def test_a_file_that_was_lost_or_damaged_is_made_again(harm, name, town_files, undisturbed, tmp_path, quick):
+    request = Request((town_files[0],), tmp_path, town_files[1])
+    reconstruct_area(request)
+    file = tmp_path / name
+    content = bytearray(file.read_bytes())
+    if harm == "removed":
+        file.unlink()
+    else:
+        content[len(content) // 2] ^= 1
+        file.write_bytes(content if harm == "one byte" else content[:-1])
+    with pytest.warns(UserWarning, match=f"{name} is gone or not as the run left it"):
+        reconstruct_area(request)
+    assert records(tmp_path) == records(undisturbed)
+    assert file.read_bytes() == (undisturbed / name).read_bytes()
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        reconstruct_area(request)
+
+
+def test_models_of_work_tiles_are_claimed_too(town_files, tmp_path, quick):
+    settings = Settings.from_dict({"city": {"models": "tiles"}})
+    request = Request((town_files[0],), tmp_path, town_files[1], settings=settings)
+    reconstruct_area(request)
+    lost = next((tmp_path / "models").glob("*.gml"))
+    before = lost.read_bytes()
+    lost.unlink()
+    with pytest.warns(UserWarning, match=lost.name):
+        reconstruct_area(request)
+    assert lost.read_bytes() == before
+
+
+def test_a_table_that_was_only_looked_at_stands(town_files, tmp_path, quick):
+    request = Request((town_files[0],), tmp_path, town_files[1])
+    reconstruct_area(request)
+    table = tmp_path / "buildings.gpkg"
+    known, before = claims([table], tmp_path), table.read_bytes()
+    viewer = sqlite3.connect(table)
+    viewer.execute("pragma journal_mode=wal")
+    assert viewer.execute("select count(*) from buildings").fetchone() == (4,)
+    viewer.execute("pragma journal_mode=delete")
+    viewer.close()
+    assert table.read_bytes() != before and broken_claims(known, tmp_path) == []
+    with sqlite3.connect(table) as editor:
+        editor.execute("update gpkg_contents set description = 'other'")
+    editor.close()
+    assert broken_claims(known, tmp_path) == ["buildings.gpkg"]
+
+
+class Bomb:
+    """Unpickling it would make a file."""
+
+    def __init__(self, mark):
+        self.mark = mark
+
+    def __reduce__(self):
+        return (open, (str(self.mark), "w"))
+
+
+def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, quick):
+    request, exploded = Request((town_files[0],), tmp_path / "out", town_files[1]), tmp_path / "exploded"
+
+    def stopped(step, done, total):
+        if step == "merge":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        reconstruct_area(request, stopped)
+    state = tmp_path / "out" / ".hiproof"
+    for file in [state / "plan.jsonl", *(state / "tiles").iterdir()]:
+        whole = file.read_bytes()
+        np.save(bomb := tmp_path / "bomb.npy", np.array([Bomb(exploded)], object), allow_pickle=True)
+        for planted_bytes in (pickle.dumps(Bomb(exploded)), bomb.read_bytes(), b""):
+            file.write_bytes(planted_bytes)
+            with pytest.raises(OutputError, match="--restart"):
+                reconstruct_area(request)
+        file.write_bytes(whole)
+    assert not exploded.exists()
+    assert reconstruct_area(request).buildings == 4
+
+
+def test_no_module_that_runs_cities_knows_pickle():
+    home = Path(hiproof.__file__).parent
+    for room in ("city", "write", "read"):
+        assert [file.name for file in (home / room).glob("*.py") if "import pickle" in file.read_text()] == []
+
+
+def test_a_plan_comes_back_as_it_was(tmp_path):
+    square, hole = shapely.box(0.1, 0.2, 30, 40), shapely.box(3, 3, 5, 5)
+    attributes = {"a": "é\ud800", "b": 1 / 3, "c": 2**70, "d": None, "e": [1, {"f": True}], "": -0.0}
+    jobs = (
+        Job(0, "one", square.difference(hole), Footprint("one", square.difference(hole), attributes)),
+        Job(1, "empty", shapely.Polygon(), Footprint("empty", shapely.Polygon(), {})),
+        Job(2, "of the cloud", square, None),
+    )
+    settings = Settings.from_dict({"fit": {"types": ["gable"], "side_softness_m": [0.1]}, "read": {"split_gap_m": 0.3}})
+    plan = Plan(
+        jobs, {"0_0_0": (0, 2), "-1_0_0": (1,)}, "EPSG:7415", settings, {1: ("x", "y")}, np.array([1e5, 0.1, 0])
+    )
+    plan.save(tmp_path / "plan.jsonl")
+    again = Plan.load(tmp_path / "plan.jsonl")
+    assert np.array_equal(again.translate, plan.translate)
+    assert list(again.tiles) == list(plan.tiles)
+    assert dataclasses.replace(again, translate=plan.translate) == plan
+
+
+def test_texts_of_buildings_come_back_as_they_were(tmp_path):
+    odd = {"n": 2**70, "x": 0.1 + 0.2, "no": None, "yes": True, "t": "ä\n\x7f'"}
+    buildings = [modelled(gable_house(), "a", attributes=odd), unmodelled(), modelled(courtyard(), "b")]
+    units = FileUnits.of(None, hiproof.frames.METRES)
+    parts = [fragments(b, (b.id, b.id), np.zeros(3), units)[1] for b in buildings]
+    with open(tmp_path / "tile.npz", "wb") as file:
+        save_fragments(file, parts)
+    for was, got in zip(parts, load_fragments(tmp_path / "tile.npz"), strict=True):
+        assert (got.gml.text, got.cityjson, got.parameters, got.row) == (
+            was.gml.text,
+            was.cityjson,
+            was.parameters,
+            was.row,
+        )
+        assert np.array_equal([got.gml.low, got.gml.high], [was.gml.low, was.gml.high])
+    with open(tmp_path / "none.npz", "wb") as file:
+        save_fragments(file, [])
+    assert list(load_fragments(tmp_path / "none.npz")) == []
