@@ -17,6 +17,7 @@ from hiproof.simulate import demo_files
 
 def main(out: Path, clouds: list[str], footprints: str) -> None:
     with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+        cluster.adapt(minimum=2, maximum=2)  # workers that die are replaced
         request = Request(tuple(clouds), out, footprints, scheduler=cluster.scheduler_address, restart=True)
         summary = reconstruct_area(request)
     print(f"{summary.buildings} buildings by two Dask workers: {summary.by_status}")

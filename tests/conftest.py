@@ -5,7 +5,16 @@ import pytest
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.warm import make_ready
+from hiproof.compiled import news
 from tiny_town import write_town
+
+
+def pytest_configure(config):
+    """Compile before several processes test, so that no two compile the same."""
+    if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
+        news.listener = news.Lines(print)
+        make_ready()
 
 
 @pytest.fixture(scope="session")

@@ -9,7 +9,7 @@ import pytest
 import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.errors import InputError
+from hiproof.errors import InputError, OutputError
 from run_records import records
 
 dask = pytest.importorskip("dask", reason="needs dask[distributed], the extra `city`")
@@ -23,6 +23,8 @@ def cluster():
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
         distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
     ):
+        # a worker that dies while its nanny still starts it is not started again by the nanny
+        cluster.adapt(minimum=2, maximum=2)
         yield cluster
 
 
@@ -51,6 +53,16 @@ def test_an_address_without_a_scheduler_gets_one_sentence(town_files, tmp_path, 
     monkeypatch.setattr("hiproof.city.executors.CONNECT_S", 1)
     with pytest.raises(InputError, match=r"Dask scheduler at tcp://127.0.0.1:9"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler="tcp://127.0.0.1:9"))
+
+
+def test_a_cluster_without_workers_ends_the_run_with_one_sentence(town_files, tmp_path, monkeypatch):
+    monkeypatch.setattr("hiproof.city.executors.WORKERLESS_S", 1)
+    monkeypatch.setattr("hiproof.city.executors.POLL_S", 0.5)
+    with (
+        distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=":0") as empty,
+        pytest.raises(OutputError, match="expected workers at the Dask scheduler"),
+    ):
+        reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=empty.scheduler_address))
 
 
 def test_the_example_runs(town_files, tmp_path):

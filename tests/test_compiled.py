@@ -16,7 +16,9 @@ import numba
 import pytest
 
 import hiproof
-from hiproof.compiled import kept, stamp
+from hiproof.city import warm
+from hiproof.compiled import kept, news, stamp
+from hiproof.errors import NotKeptWarning
 
 PACKAGE = Path(hiproof.__file__).parent
 SOURCES = sorted(PACKAGE.rglob("*.py"))
@@ -84,7 +86,7 @@ def ask():
         warnings.simplefilter("always")
         answer = importlib.import_module("town.outer").answer
         got = answer(10)
-    return got, bool(answer._cache_hits), len([w for w in said if w.category is kept.NotKeptWarning])
+    return got, bool(answer._cache_hits), len([w for w in said if w.category is NotKeptWarning])
 
 
 def files_in(folder):
@@ -209,6 +211,39 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
     assert after["middle"] != before["middle"] and after["outer"] != before["outer"]
     monkeypatch.setattr(stamp, "version_of", lambda library: "another")
     assert not set(stamps().values()) & set(after.values())
+
+
+def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):
+    runs = []
+    monkeypatch.setattr(warm, "run_neighbourhood", runs.append)
+    monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "kept",))
+    kept.remove_outdated.cache_clear()
+    for stamped in ("a", "a", "b", "b"):
+        monkeypatch.setattr(warm, "stamp_of_all", lambda stamped=stamped: stamped)
+        warm.make_ready(tmp_path)
+    assert runs == [tmp_path, tmp_path]
+    assert len(files_in(tmp_path)) == 1
+
+
+def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setattr(warm, "run_neighbourhood", lambda scratch: pytest.fail("compiled for nothing"))
+    monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "file" / "folder",))
+    kept.warn_not_kept.cache_clear()
+    with pytest.warns(NotKeptWarning, match="NUMBA_CACHE_DIR"):
+        warm.make_ready(tmp_path)
+
+
+@pytest.mark.parametrize("total", [1, 7, 222])
+def test_the_news_of_compiling_is_a_headline_and_ten_lines_at_most(total):
+    lines = []
+    tell = news.Lines(lines.append)
+    for done in range(total):
+        tell(done, total)  # before a function is compiled
+        tell(done + 1, total)  # and after
+    assert lines[0].startswith(f"compiling about {total} functions")
+    assert min(total, 10) <= len(lines) <= 11
+    assert all(line.startswith("compiled") for line in lines[1:])
 
 
 def test_every_compiled_function_goes_through_one_decorator():

@@ -14,8 +14,10 @@ import pytest
 import shapely
 from typer.testing import CliRunner
 
+import planted
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.warm import make_ready
 from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
@@ -64,7 +66,7 @@ def test_the_run_record_names_settings_version_inputs_and_counts(finished):
     assert Settings.from_dict(record["settings"]) == Settings()
     assert record["buildings"] == 4
     assert record["inputs"]["footprints"].endswith("footprints.geojson")
-    assert set(record["seconds"]) == {"plan", "sort", "solve", "merge"}
+    assert set(record["seconds"]) == {"plan", "prepare", "sort", "solve", "merge"}
 
 
 def test_heights_are_the_towns(finished):
@@ -110,8 +112,10 @@ def test_how_the_area_is_cut_changes_no_byte(finished, tmp_path):
     assert records(tmp_path / "out") == records(finished[0])
 
 
-def test_two_workers_change_no_byte(finished, files, tmp_path, monkeypatch):
+def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
+    make_ready(tmp_path)
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), jobs=2))
     assert records(tmp_path) == records(finished[0])
 

@@ -58,3 +58,7 @@ class InputWarning(HiproofWarning):
 
 class OutputWarning(HiproofWarning):
     """Output that was found other than it was left, and what is done about it."""
+
+
+class NotKeptWarning(HiproofWarning):
+    """Compiled functions cannot be kept, so that every process compiles them again; it says what to do."""

@@ -1,5 +1,6 @@
 """Where tasks run: in this process, in processes of this machine, or on a Dask cluster. One verb: `run`.
 
+`prepare(scratch)` comes first: compiled code is made before workers start, so that no two make the same.
 `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that dies does not end the
 run: its tasks come back with a `WorkerLost`, and the caller decides whether to try them again. `isolated()` is an
 executor whose worker's death harms nobody else. Tasks are taken from their iterable only when a worker is near.
@@ -9,15 +10,24 @@ from __future__ import annotations
 
 import os
 import threading
+import warnings
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
+from contextlib import suppress
 from multiprocessing import get_context
+from pathlib import Path
+from queue import Empty, SimpleQueue
 from typing import Any
+from urllib.parse import urlsplit
 
-from ..errors import InputError, OutputError, warn_in_sentences
+from ..compiled import news
+from ..compiled.stamp import count_compiled
+from ..errors import InputError, NotKeptWarning, OutputError, warn_in_sentences
+from .tasks import make_ready
 
 CONNECT_S = 20
+WORKERLESS_S, POLL_S = 300, 5
 
 
 class WorkerLost(Exception):
@@ -26,6 +36,9 @@ class WorkerLost(Exception):
 
 class InProcess:
     """One task after the other in this process."""
+
+    def prepare(self, scratch: Path) -> None:
+        """Nothing: this process compiles a function when it first calls it."""
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
         for task in tasks:
@@ -47,6 +60,9 @@ class Processes:
     def __init__(self, jobs: int):
         self.jobs = jobs
         self.pool: ProcessPoolExecutor | None = None
+
+    def prepare(self, scratch: Path) -> None:
+        make_ready(str(scratch))
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
         waiting, running = iter(tasks), {}
@@ -96,8 +112,12 @@ class Processes:
 
 
 def begin_worker(parent: int) -> None:
-    """What a worker process starts with: it warns as the main process does, and ends with it."""
+    """What a worker process starts with: it warns as the main process does, and ends with it.
+
+    That compiled code cannot be kept, the main process has said.
+    """
     warn_in_sentences()
+    warnings.simplefilter("ignore", NotKeptWarning)
     leave_with_parent(parent)
 
 
@@ -127,21 +147,51 @@ class Dask:
         except (OSError, ValueError) as error:
             raise InputError(f"expected a Dask scheduler at {address}, got: {error}; check the address") from error
 
-    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        from distributed import as_completed
+    def prepare(self, scratch: Path) -> None:
+        """One worker of each host compiles, the others then load it; a host that joins later has to compile while it works."""
+        one_of_each = {urlsplit(address).hostname: address for address in self.client.nthreads()}
+        ends: SimpleQueue = SimpleQueue()
+        tasks = [
+            self.submit(ends, make_ready, (str(scratch),), workers=[address], allow_other_workers=True)
+            for address in one_of_each.values()
+        ]
+        patience = threading.Timer(POLL_S, news.listener, (0, count_compiled()))
+        patience.start()
+        try:
+            for _ in tasks:
+                self.outcome(self.next_end(ends))
+        finally:
+            patience.cancel()
 
-        waiting, running, finished = iter(tasks), {}, as_completed()
+    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        waiting, running = iter(tasks), {}
+        ends: SimpleQueue = SimpleQueue()
         while True:
             threads = sum(self.client.nthreads().values())
             while len(running) < max(2 * threads, 2) and (task := next(waiting, None)) is not None:
-                future = self.client.submit(function, *task, pure=False)
-                running[future] = task
-                finished.add(future)
+                running[self.submit(ends, function, task)] = task
             if not running:
                 return
-            future = next(finished)
-            task = running.pop(future)
-            yield task, *self.outcome(future)
+            future = self.next_end(ends)
+            yield running.pop(future), *self.outcome(future)
+
+    def submit(self, ends: SimpleQueue, function: Callable, task: tuple, **where: Any) -> Any:
+        """A future that is put into `ends` when it has ended."""
+        future = self.client.submit(function, *task, pure=False, **where)
+        future.add_done_callback(ends.put)
+        return future
+
+    def next_end(self, ends: SimpleQueue) -> Any:
+        """The next future that ends. Where all workers are gone and none comes, the run ends: Dask itself would wait for ever."""
+        without = 0
+        while without < WORKERLESS_S:
+            with suppress(Empty):
+                return ends.get(timeout=POLL_S)
+            without = 0 if self.client.nthreads() else without + POLL_S
+        raise OutputError(
+            f"expected workers at the Dask scheduler {self.address}, got none for {WORKERLESS_S} s; start some, the same "
+            "command then goes on from here"
+        )
 
     def outcome(self, future: Any) -> tuple[Any, Exception | None]:
         """(result, error). Dask has tried a task whose worker died on other workers before it gives up with KilledWorker."""
@@ -149,10 +199,13 @@ class Dask:
 
         if future.status == "cancelled":
             raise OutputError(f"lost the Dask scheduler at {self.address}; the same command goes on from here")
-        error = future.exception()
-        if isinstance(error, KilledWorker):
-            return None, WorkerLost("a worker process died")
-        return (None, error) if error else (future.result(), None)
+        if future.status == "error":
+            error = future.exception()
+            return None, WorkerLost("a worker process died") if isinstance(error, KilledWorker) else error
+        try:
+            return future.result(timeout=WORKERLESS_S), None
+        except (TimeoutError, CancelledError, KilledWorker):  # the worker died before its result was fetched
+            return None, WorkerLost("a worker process died with its result")
 
     def isolated(self) -> Dask:
         return Dask(self.address)

@@ -79,6 +79,9 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
     try:
         plan = resume_or_plan(request, state, ledger)
         clock.lap("plan")
+        if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
+            executor.prepare(state)
+        clock.lap("prepare")
         arguments = functools.partial(task_arguments, request, state)
         work_off(ledger, executor, "sort", sort_cloud, arguments, progress)
         refuse_without_points(plan, ledger)

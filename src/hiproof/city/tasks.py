@@ -3,6 +3,8 @@ without compiled code, the network and the readers of points."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:
     """See sort.py."""
@@ -16,3 +18,10 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
     from . import solve
 
     return solve.solve_tile(folder, tile, terrain, avoid)
+
+
+def make_ready(scratch: str) -> None:
+    """See warm.py."""
+    from . import warm
+
+    warm.make_ready(Path(scratch))

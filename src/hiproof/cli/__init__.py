@@ -11,11 +11,13 @@ def main() -> None:
 
     An error of our own making shows its traceback, passwords masked like everywhere, and ends with exit code 1.
     """
+    from ..compiled import news
     from ..errors import HiproofError, warn_in_sentences
     from ..masking import masked
     from .app import app
 
     warn_in_sentences()
+    news.listener = news.Lines(lambda text: print(f"hiproof: {text}", file=sys.stderr, flush=True))
     try:
         app()
     except HiproofError as error:

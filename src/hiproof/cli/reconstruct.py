@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, ClassVar
 
 from ..city.run import Request, Summary, reconstruct_area
+from ..compiled import news
 from ..read.pointcloud import expand_paths
 from ..settings import Settings
 from ..status import Status
@@ -47,7 +49,12 @@ def run_request(request: Request) -> int:
 class Bar:
     """A progress bar on standard error, none when that is no terminal."""
 
-    STEPS: ClassVar = {"sort": "reading points", "solve": "fitting roofs", "merge": "writing models"}
+    STEPS: ClassVar = {
+        "compile": "compiling, once for each version",
+        "sort": "reading points",
+        "solve": "fitting roofs",
+        "merge": "writing models",
+    }
 
     def __enter__(self) -> Bar:
         from rich.console import Console
@@ -57,9 +64,13 @@ class Bar:
         self.bar = Progress(console=console, transient=True, disable=not console.is_terminal)
         self.tasks: dict[str, Any] = {}
         self.bar.start()
+        self.lines = news.listener
+        if console.is_terminal:
+            news.listener = functools.partial(self.update, "compile")
         return self
 
     def __exit__(self, *_: object) -> None:
+        news.listener = self.lines
         self.bar.stop()
 
     def update(self, step: str, done: int, total: int) -> None:

@@ -22,15 +22,12 @@ import numba
 from numba.core import caching, compiler
 from numba.core.serialize import dumps
 
+from ..errors import NotKeptWarning
 from . import news
 from .stamp import stamp_of
 
 PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
 DAMAGED = (EOFError, pickle.UnpicklingError)
-
-
-class NotKeptWarning(UserWarning):
-    """Compiled functions cannot be kept: every process compiles them again."""
 
 
 class Kept:
@@ -41,7 +38,6 @@ class Kept:
         self.module, self.stamp = file.stem, stamp_of(file)
         self.start = f"{file.stem}.{function.__qualname__}-{self.stamp}"
         self.folders = folders(function, str(file))
-        news.known.add(self.name)
 
     @property
     def cache_path(self) -> str:

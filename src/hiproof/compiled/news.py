@@ -1,14 +1,49 @@
-"""News of compiling, for whoever wants to show it: how many functions there are, and how many are ready."""
+"""News of compiling: how many functions are ready, and who shows it while the user waits.
+
+`listener` is called before and after a function is compiled, with the numbers of ready and of all functions. Compiling
+takes minutes, once for each version, and silence would look like a hang; where nobody listens the news goes into the log.
+"""
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 
-known: set[str] = set()  # all functions that would be compiled when called
-ready: set[str] = set()  # those that have been compiled or loaded
-news: Callable[[int, int], None] | None = None  # called with (ready, known) before and after a function is compiled
+from .stamp import count_compiled
+
+ready: set[str] = set()  # functions that were compiled or loaded in this process
+
+
+def headline(done: int, total: int) -> str:
+    """What is going on and how long it takes at most: a function takes a second or so.
+
+    >>> headline(20, 220)
+    'compiling about 200 functions for this machine, once for each version; up to 4 min'
+    """
+    number = total - done
+    return f"compiling about {number} functions for this machine, once for each version; up to {-(-number // 60)} min"
+
+
+class Lines:
+    """The news as a few lines: the headline before anything is compiled, then one at every further tenth."""
+
+    def __init__(self, say: Callable[[str], None]):
+        self.say = say
+        self.due: float | None = None
+
+    def __call__(self, done: int, total: int) -> None:
+        if self.due is None:
+            self.say(headline(done, total))
+        elif done >= self.due:
+            self.say(f"compiled {done} of about {total} functions")
+        else:
+            return
+        self.due = done + max(1.0, total / 10)
+
+
+listener: Callable[[int, int], None] = Lines(logging.getLogger("hiproof").info)
 
 
 def tell() -> None:
-    if news is not None:
-        news(len(ready), len(known))
+    """Tell the listener how things stand."""
+    listener(len(ready), max(count_compiled(), len(ready)))

@@ -30,6 +30,21 @@ def stamp_of(file: Path) -> str:
     return digest(closure(file))
 
 
+def stamp_of_all() -> str:
+    """One stamp of everything that hiproof's compiled functions stand on."""
+    return digest(set().union(*map(closure, compiled_files())))
+
+
+@functools.cache
+def count_compiled() -> int:
+    """How many functions hiproof compiles."""
+    return sum(text_of(file).count(b"\n@compiled") for file in compiled_files())
+
+
+def compiled_files() -> list[Path]:
+    return [file for file in PACKAGE.rglob("*.py") if b"\n@compiled" in text_of(file)]
+
+
 def digest(files: Iterable[Path]) -> str:
     """One stamp of several files, whatever their order and wherever their package lies."""
     said = hashlib.sha256(" ".join([sys.version, *map(version_of, VERSIONS)]).encode())
