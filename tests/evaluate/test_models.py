@@ -48,7 +48,7 @@ def test_what_is_no_cityjson_is_refused_in_a_sentence(tmp_path, text):
 
 
 def test_missing_files_are_refused(tmp_path):
-    with pytest.raises(InputError, match="expected a CityJSON file"):
+    with pytest.raises(InputError, match="expected a readable text file"):
         list(read_models(tmp_path / "none.json"))
     with pytest.raises(InputError, match="hiproof reconstruct"):
         run_models(tmp_path)

@@ -24,6 +24,7 @@ def convert(
     """Convert the models of a run to glTF binary or OBJ, with building ids and roof types as properties."""
     from ..evaluate.models import read_models, run_models
     from ..evaluate.run import run_record, run_units
+    from ..read.cityjson_text import documents, reference_system
     from ..write.gltf import write_glb
     from ..write.obj import write_obj
 
@@ -32,13 +33,6 @@ def convert(
     write = {Format.glb: write_glb, Format.obj: write_obj}[format]
     found = read_models(models, run_units(run_record(folder)))
     buildings = ((m.id, m.roof_type, m.solid, m.attributes) for m in found if m.solid is not None)
-    count = write(path, buildings, crs=reference_system(models))
+    header, _ = next(documents(models))
+    count = write(path, buildings, crs=reference_system(header))
     typer.echo(f"{path}: {count} buildings")
-
-
-def reference_system(models: Path) -> str | None:
-    """The CRS that the first line of the models names."""
-    import json
-
-    with models.open(encoding="utf-8") as file:
-        return json.loads(file.readline()).get("metadata", {}).get("referenceSystem")

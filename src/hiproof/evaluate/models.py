@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,6 +12,8 @@ import numpy as np
 from ..errors import InputError
 from ..frames import METRES, Units
 from ..model import ROOF, WALL, Face, Solid
+from ..read.cityjson_text import UNUSABLE, documents, reference_system
+from ..read.plausible import is_plausible
 from ..write.naming import units_named
 
 RUN_MODELS = "buildings.city.jsonl"
@@ -29,12 +30,17 @@ class BuildingModel:
     @property
     def roof_type(self) -> str:
         """hiproof's roof type where the model says one, else "unknown"."""
-        return self.attributes.get("hiproof_roof_type") or "unknown"
+        return self.text("hiproof_roof_type") or "unknown"
 
     @property
     def status(self) -> str:
         """Code of what became of the building; of a foreign file, whether it has a solid."""
-        return self.attributes.get("hiproof_status") or ("modelled" if self.solid is not None else "no_model")
+        return self.text("hiproof_status") or ("modelled" if self.solid is not None else "no_model")
+
+    def text(self, name: str) -> str:
+        """An attribute that is text, else ""."""
+        value = self.attributes.get(name)
+        return value if isinstance(value, str) else ""
 
 
 def run_models(folder: Path) -> Path:
@@ -51,45 +57,40 @@ def read_models(path: str | Path, otherwise: Units = METRES) -> Iterator[Buildin
     Of several solids of one object that with the highest level of detail counts. `otherwise` are the units of a file
     that names no CRS. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
     """
-    path = Path(path)
-    try:
-        transform, units = {"scale": [1, 1, 1], "translate": [0, 0, 0]}, otherwise
-        for document in _documents(path):
-            transform = document.get("transform", transform)
-            if name := document.get("metadata", {}).get("referenceSystem"):
-                units = units_named(name, otherwise)
+    transform, units = {"scale": [1, 1, 1], "translate": [0, 0, 0]}, otherwise
+    for document, place in documents(Path(path)):
+        transform = document.get("transform", transform)
+        if name := reference_system(document):
+            units = units_named(name, otherwise)
+        try:
             yield from _buildings(document, transform, units)
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"expected a CityJSON file at {path}, got: {error}; check the path") from error
-    except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-        raise InputError(f"expected CityJSON in {path}, got a document without its members ({error!r})") from error
-
-
-def _documents(path: Path) -> Iterator[dict[str, Any]]:
-    if path.suffix != ".jsonl":
-        yield json.loads(path.read_text(encoding="utf-8"))
-        return
-    with path.open(encoding="utf-8") as file:
-        yield from (json.loads(line) for line in file if line.strip())
+        except UNUSABLE as error:
+            raise InputError(
+                f"expected CityJSON whose solids can be used in {place}, got {error!r}; `hiproof check` may tell more"
+            ) from error
 
 
 def _buildings(document: dict[str, Any], transform: dict[str, Any], units: Units) -> Iterator[BuildingModel]:
-    vertices = np.asarray(document["vertices"], float).reshape(-1, 3) * transform["scale"] + transform["translate"]
-    vertices = units.to_metres(vertices)
+    vertices = np.asarray(document["vertices"], float).reshape(-1, 3)
+    with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are refused below
+        vertices = units.to_metres(vertices * transform["scale"] + transform["translate"])
     objects = document["CityObjects"]
     for id, city_object in objects.items():
         if city_object["type"] != "Building":
             continue
         family = [city_object, *(objects[child] for child in city_object.get("children", ()) if child in objects)]
         faces = tuple(face for member in family for face in _faces(member))
-        yield BuildingModel(id, city_object.get("attributes", {}), _compact(vertices, faces) if faces else None)
+        attributes = city_object.get("attributes") or {}
+        if not isinstance(attributes, dict):
+            raise TypeError(f"attributes of {id!r} that are no object")
+        yield BuildingModel(id, attributes, _compact(vertices, faces) if faces else None)
 
 
 def _faces(city_object: dict[str, Any]) -> Iterator[Face]:
-    solids = [geometry for geometry in city_object.get("geometry", ()) if geometry["type"] == "Solid"]
+    solids = [geometry for geometry in city_object.get("geometry") or () if geometry["type"] == "Solid"]
     if not solids:
         return
-    solid = max(solids, key=lambda geometry: float(geometry["lod"]))
+    solid = max(solids, key=_level_of_detail)
     semantics = solid.get("semantics") or {"surfaces": [], "values": None}
     kinds = semantics["values"][0] if semantics["values"] else [None] * len(solid["boundaries"][0])
     for rings, kind in zip(solid["boundaries"][0], kinds, strict=True):
@@ -97,9 +98,24 @@ def _faces(city_object: dict[str, Any]) -> Iterator[Face]:
         yield Face(tuple(tuple(ring) for ring in rings), name, 0 if name == ROOF else -1)
 
 
+def _level_of_detail(geometry: dict[str, Any]) -> float:
+    try:
+        return float(geometry["lod"])
+    except (KeyError, TypeError, ValueError):
+        return 0.0
+
+
 def _compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
-    """A solid with only the vertices its faces use."""
-    used = sorted({index for face in faces for ring in face.rings for index in ring})
+    """A solid with only the vertices its faces use, each of which must be a place; ValueError or IndexError otherwise."""
+    rings = [ring for face in faces for ring in (face.rings or ((),))]
+    least = min(len(set(ring)) for ring in rings)
+    if least < 3:
+        raise ValueError(f"a ring of {least} points")
+    used = sorted({index for ring in rings for index in ring})
+    if used[0] < 0 or used[-1] >= len(vertices):
+        raise IndexError(f"vertex {used[0] if used[0] < 0 else used[-1]} of {len(vertices)}")
+    if not is_plausible(vertices[used]).all():
+        raise ValueError("coordinates of no place on Earth")
     place = {index: i for i, index in enumerate(used)}
     renumbered = (
         Face(tuple(tuple(place[i] for i in ring) for ring in face.rings), face.kind, face.part) for face in faces

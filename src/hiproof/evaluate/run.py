@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,10 +12,24 @@ import shapely
 
 from ..errors import InputError
 from ..frames import Units
+from ..read.cityjson_text import parsed, read_text
 from ..settings import Settings
 from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
+
+RECORD = {
+    ("settings",): dict,
+    ("settings", "read"): dict,
+    ("settings", "read", "building_classes"): list,
+    ("settings", "read", "unit"): str,
+    ("inputs",): dict,
+    ("inputs", "clouds"): list,
+    ("inputs", "footprints"): str,
+    ("inputs", "layer"): (str, int),
+    ("crs",): str,
+}
+"""What of run.json is used, and what it must be where it is there."""
 
 
 @dataclass(frozen=True)
@@ -65,27 +78,36 @@ def evaluate_run(
 
 
 def run_record(folder: Path) -> dict[str, Any]:
-    """Content of run.json, empty where the folder has none."""
+    """Content of run.json, empty where the folder has none. Raises InputError where it is no record of a run."""
     path = Path(folder) / "run.json"
-    try:
-        return json.loads(path.read_text(encoding="utf-8")) if path.is_file() else {}
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"expected the record of a run in {path}, got: {error}; run `hiproof reconstruct` again"
-        ) from error
+    record = parsed(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
+    for names, kind in RECORD.items():
+        value: Any = record
+        for name in names:
+            value = value.get(name) if value is not None else None
+        if not (value is None or isinstance(value, kind)):
+            raise InputError(
+                f"expected the record of a run in {path}, got {'.'.join(names)} = {value!r:.40}; "
+                "run `hiproof reconstruct` again"
+            )
+    return record
 
 
 def run_inputs(folder: Path) -> tuple[list[str], str | None, str | None]:
     """Clouds, footprints and their layer that a run was made from, as far as they are still where they were."""
-    inputs = run_record(folder).get("inputs", {})
-    clouds = [path for path in inputs.get("clouds") or [] if Path(path).exists()]
+    inputs = run_record(folder).get("inputs") or {}
+    clouds = [path for path in inputs.get("clouds") or [] if isinstance(path, str) and exists(path)]
     footprints = inputs.get("footprints")
-    return clouds, footprints if footprints and Path(footprints).exists() else None, inputs.get("layer")
+    return clouds, footprints if footprints and exists(footprints) else None, inputs.get("layer")
+
+
+def exists(path: str) -> bool:
+    return "\0" not in path and Path(path).exists()
 
 
 def run_settings(record: dict[str, Any]) -> Settings:
     """The settings a run was made with, as far as this version knows them."""
-    read = record.get("settings", {}).get("read", {})
+    read = (record.get("settings") or {}).get("read") or {}
     known = {name: read[name] for name in ("building_classes", "unit") if read.get(name)}
     return Settings.from_dict({"read": {**known, "crs": record.get("crs") or ""}})
 

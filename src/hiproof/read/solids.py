@@ -7,7 +7,6 @@ it is a footprint (LoD 0); that it is rarely closed is for the check to say.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -19,6 +18,7 @@ from ..errors import InputError
 from ..frames import METRES, Units
 from ..model import WALL, Face, Solid
 from ..write.naming import units_named
+from .cityjson_text import UNUSABLE, documents, reference_system
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
@@ -38,7 +38,7 @@ def read_solids(path: str | Path) -> Iterator[tuple[str, Solid]]:
     suffix = path.suffix.lower()
     readers = {
         ".json": cityjson_solids,
-        ".jsonl": cityjsonseq_solids,
+        ".jsonl": cityjson_solids,
         ".gml": citygml_solids,
         ".xml": citygml_solids,
         ".citygml": citygml_solids,
@@ -62,61 +62,13 @@ def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
 # CityJSON
 
 
-def parsed(text: str, place: str) -> dict[str, Any]:
-    """A JSON object. Raises InputError naming the place."""
-    try:
-        value = json.loads(text)
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error
-    if not isinstance(value, dict):
-        raise InputError(f"expected a JSON object in {place}, got {type(value).__name__}; is this CityJSON?")
-    return value
-
-
-def read_text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
-
-
 def cityjson_solids(path: Path) -> Iterator[tuple[str, Solid]]:
-    """Shells of a CityJSON 1.x or 2.0 file."""
-    city = parsed(read_text(path), str(path))
-    if city.get("type") != "CityJSON":
-        raise InputError(
-            f'expected "type": "CityJSON" in {path}, got {city.get("type")!r}; is this another kind of JSON?'
-        )
-    yield from feature_solids(city, city.get("transform"), units_of_city(city), str(path))
-
-
-def cityjsonseq_solids(path: Path) -> Iterator[tuple[str, Solid]]:
-    """Shells of a CityJSONSeq file: a CityJSON line with the transform, then one CityJSONFeature a line."""
-    transform, units, seen_header = None, METRES, False
-    try:
-        with path.open(encoding="utf-8") as lines:
-            for number, line in enumerate(lines, 1):
-                if not line.strip():
-                    continue
-                value, place = parsed(line, f"line {number} of {path}"), f"line {number} of {path}"
-                if value.get("type") == "CityJSON":
-                    transform, units, seen_header = value.get("transform"), units_of_city(value), True
-                elif not seen_header or value.get("type") != "CityJSONFeature":
-                    raise InputError(
-                        f"expected a CityJSON line followed by CityJSONFeatures, got {value.get('type')!r} in {place}"
-                    )
-                yield from feature_solids(value, transform, units, place)
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
-    if not seen_header:
-        raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file")
-
-
-def units_of_city(city: dict[str, Any]) -> Units:
-    """Units of the CRS that a CityJSON object names, metres where it names none."""
-    metadata = city.get("metadata")
-    name = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
-    return units_named(name if isinstance(name, str) else None)
+    """Shells of a CityJSON 1.x or 2.0 file, or of a CityJSONSeq file: the transform is that of the line before."""
+    transform, units = None, METRES
+    for document, place in documents(path):
+        if document["type"] == "CityJSON":
+            transform, units = document.get("transform"), units_named(reference_system(document))
+        yield from feature_solids(document, transform, units, place)
 
 
 def feature_solids(
@@ -125,16 +77,17 @@ def feature_solids(
     """Shells of all city objects of one CityJSON object or feature."""
     try:
         vertices = np.array(value.get("vertices", []), float).reshape(-1, 3)
-        if transform:
-            vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
-        vertices = units.to_metres(vertices)
+        with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are findings of the check
+            if transform:
+                vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
+            vertices = units.to_metres(vertices)
         objects = value.get("CityObjects", {}).items()
         found = [
             (
                 name,
                 [
                     solid
-                    for geometry in city_object.get("geometry", ())
+                    for geometry in city_object.get("geometry") or ()
                     if not str(geometry.get("lod", "")).startswith("0")
                     for solid in geometry_shells(geometry, vertices)
                 ],
@@ -142,7 +95,7 @@ def feature_solids(
             for name, city_object in objects
             if str(city_object.get("type")).startswith("Building")
         ]
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+    except UNUSABLE as error:
         raise InputError(
             f"expected CityJSON with vertices, a transform and boundaries in {place}, got {error!r}; validate the file first"
         ) from error

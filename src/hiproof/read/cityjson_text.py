@@ -1,0 +1,75 @@
+"""The JSON documents of a CityJSON or CityJSONSeq file one by one, or a sentence that says why they cannot be read."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+
+UNUSABLE = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
+"""What comes of taking a document apart that is JSON, but not what CityJSON says it is."""
+
+
+def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
+    """(document, its place in the file): of CityJSON the one, of CityJSONSeq (`.jsonl`) each line, the header first.
+
+    Raises InputError for what is no text, no JSON, no object, or of another type.
+    """
+    if path.suffix.lower() != ".jsonl":
+        document = parsed(read_text(path), str(path))
+        if document.get("type") != "CityJSON":
+            raise InputError(
+                f'expected "type": "CityJSON" in {path}, got {document.get("type")!r}; is this another kind of JSON?'
+            )
+        yield document, str(path)
+        return
+    seen_header = False
+    try:
+        with path.open(encoding="utf-8") as lines:
+            for number, line in enumerate(lines, 1):
+                if not line.strip():
+                    continue
+                place = f"line {number} of {path}"
+                document = parsed(line, place)
+                kind = document.get("type")
+                if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
+                    raise InputError(f"expected a CityJSON line followed by CityJSONFeatures, got {kind!r} in {place}")
+                seen_header = True
+                yield document, place
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
+    if not seen_header:
+        raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file")
+
+
+def parsed(text: str, place: str) -> dict[str, Any]:
+    """A JSON object. Raises InputError naming the place."""
+    try:
+        value = json.loads(text, parse_constant=refuse_constant)
+    except (ValueError, RecursionError) as error:  # a ValueError too for numbers of thousands of digits
+        raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error
+    if not isinstance(value, dict):
+        raise InputError(f"expected a JSON object in {place}, got {type(value).__name__}; is this the right file?")
+    return value
+
+
+def refuse_constant(name: str) -> None:
+    """NaN and Infinity, which Python reads but JSON does not know."""
+    raise ValueError(f"{name}, which is no number")
+
+
+def read_text(path: Path) -> str:
+    try:
+        return path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
+
+
+def reference_system(document: dict[str, Any]) -> str | None:
+    """The CRS that a document's metadata name."""
+    metadata = document.get("metadata")
+    name = metadata.get("referenceSystem") if isinstance(metadata, dict) else None
+    return name if isinstance(name, str) and name else None

@@ -1,0 +1,103 @@
+"""What `check`, `convert` and `report` answer to damaged files of a run: a sentence, never a traceback or a wrong file."""
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzz.damaged_models import RECORDS, damaged_models, invalid_models, odd_models, sound_lines
+from hiproof.cli import check
+from hiproof.cli.convert import Format, convert
+from hiproof.cli.report import report
+from hiproof.errors import HiproofError
+from hiproof.evaluate.models import read_models
+from hiproof.read.solids import read_solids
+from sample_models import SOLIDS, write_sample_run
+
+MODELS = "buildings.city.jsonl"
+COMMANDS = {
+    "convert to glb": lambda folder: convert(folder, Format.glb, None),
+    "convert to obj": lambda folder: convert(folder, Format.obj, None),
+    "report": lambda folder: report(folder, None, None, None, None),
+}
+
+
+def answer(command, *arguments):
+    """(exit code, what is said) of a command; an exception that is not for the user is raised."""
+    try:
+        return command(*arguments) or 0, ""
+    except HiproofError as error:
+        return 2, str(error)
+
+
+@pytest.fixture
+def run_folder(tmp_path):
+    write_sample_run(tmp_path / "run")
+    return tmp_path / "run"
+
+
+def cases(make, tmp_path_factory):
+    return make(tmp_path_factory.mktemp("models"))
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("make", [damaged_models, invalid_models])
+def test_damaged_models_are_answered_with_a_sentence(make, command, run_folder, tmp_path_factory):
+    for name, content in cases(make, tmp_path_factory).items():
+        (run_folder / MODELS).write_bytes(content)
+        code, said = answer(COMMANDS[command], run_folder)
+        assert code == 2 and said.startswith("expected") and "got" in said and str(run_folder) in said, name
+    assert sorted(path.name for path in run_folder.iterdir() if path.suffix != ".mtl") == [MODELS, "run.json"]
+
+
+def test_damaged_models_cannot_be_checked(run_folder, tmp_path_factory):
+    for name, content in cases(damaged_models, tmp_path_factory).items():
+        (run_folder / MODELS).write_bytes(content)
+        code, said = answer(check.run, [run_folder / MODELS], 0.01)
+        assert code == 2 and said.startswith("expected") and "got" in said, name
+
+
+def test_solids_that_are_none_are_found_invalid(run_folder, tmp_path_factory, capsys):
+    for name, content in cases(invalid_models, tmp_path_factory).items():
+        (run_folder / MODELS).write_bytes(content)
+        assert answer(check.run, [run_folder / MODELS], 0.01)[0] == 1, name
+        assert "2 solids, 1 valid, 1 invalid" in capsys.readouterr().out, name
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_unusual_models_are_used(command, run_folder, tmp_path_factory):
+    for name, content in cases(odd_models, tmp_path_factory).items():
+        (run_folder / MODELS).write_bytes(content)
+        assert answer(COMMANDS[command], run_folder)[0] == 0, name
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("name", RECORDS)
+def test_a_damaged_record_is_answered_with_a_sentence_or_does_not_matter(name, command, run_folder):
+    (run_folder / "run.json").write_bytes(RECORDS[name])
+    code, said = answer(COMMANDS[command], run_folder)
+    assert code == (0 if name in ("clouds are numbers", "a path with a zero") else 2)
+    assert code == 0 or "expected" in said
+
+
+@pytest.fixture(scope="module")
+def sound_text(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("changed")
+    sound_lines(folder)
+    return folder, (folder / MODELS).read_text()
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@given(data=st.data())
+def test_any_change_of_the_text_is_read_or_answered(data, sound_text):
+    folder, text = sound_text
+    start = data.draw(st.integers(0, len(text) - 1))
+    length = data.draw(st.integers(0, 20))
+    inserted = data.draw(st.sampled_from(["", "null", "-1", "1e999", "[]", "{}", '"', "9" * 400, "0.5", "[[", "NaN"]))
+    (folder / MODELS).write_text(text[:start] + inserted + text[start + length :])
+    for read in (read_models, read_solids):
+        try:
+            found = list(read(folder / MODELS))
+        except HiproofError as error:
+            assert str(error).startswith("expected")
+        else:
+            assert len(found) <= len(SOLIDS) + 1
