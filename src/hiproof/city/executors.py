@@ -9,6 +9,7 @@ executor whose worker's death harms nobody else. Tasks are taken from their iter
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator
@@ -122,7 +123,11 @@ def begin_worker(parent: int) -> None:
 
 
 def leave_with_parent(parent: int) -> None:
-    """Make a worker end when its parent is gone, so that kill -9 of the main process leaves nothing running."""
+    """Make a worker end when its parent is gone, so that kill -9 of the main process leaves nothing running.
+
+    Ctrl-C, which a terminal sends to all, is the parent's to answer: it lets the worker finish its task, and end.
+    """
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
         tick = threading.Event()

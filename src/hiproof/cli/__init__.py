@@ -5,6 +5,8 @@ from __future__ import annotations
 import sys
 import traceback
 
+INTERRUPTED = 130
+
 
 def main() -> None:
     """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C exit code 130.
@@ -23,9 +25,14 @@ def main() -> None:
     except HiproofError as error:
         print(f"hiproof: {error}", file=sys.stderr)
         sys.exit(2)
-    except KeyboardInterrupt:
-        print("hiproof: interrupted; what was finished is kept, the same command goes on from there", file=sys.stderr)
-        sys.exit(130)
+    except SystemExit as end:
+        if end.code == INTERRUPTED:  # Ctrl-C, of which typer says nothing
+            print(
+                "hiproof: interrupted; no file is left half written. What a run had finished is kept: the same command "
+                "goes on from there",
+                file=sys.stderr,
+            )
+        raise
     except Exception:
         print(masked(traceback.format_exc()), end="", file=sys.stderr)
         sys.exit(1)

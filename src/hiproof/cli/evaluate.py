@@ -51,4 +51,4 @@ def print_summary(summary: dict, has_reference: bool) -> None:
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]
         table.add_row(kind, str(figures["buildings"]), *("" if mean is None else f"{mean:.3f}" for mean in means))
-    Console(soft_wrap=True).print(table)
+    Console(soft_wrap=True, markup=False).print(table)  # a roof type from outside may look like markup

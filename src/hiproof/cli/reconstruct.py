@@ -83,8 +83,9 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
     """The table at the end: buildings by status and by type, figures, time, and every failure by name."""
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
-    console = Console(soft_wrap=True)
+    console = Console(soft_wrap=True, markup=False)  # names from outside may look like markup
     show = show or console.print
     table = Table("buildings", "outcome", title=f"{summary.buildings} buildings")
     for code, number in summary.by_status.items():
@@ -101,7 +102,7 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
         show(f"coordinates are in {summary.units}, as in the input; attributes and parameters in metres")
     show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
     for name, why in summary.broken_inputs:
-        show(f"[red]could not be read:[/red] {name}: {why}")
+        show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
     for id, why in summary.failures:
-        show(f"[red]internal error:[/red] building {id}: {why}")
-    show(f"models: {summary.out / 'buildings.gml'}, {summary.out / 'buildings.city.jsonl'}")
+        show(Text.assemble(("internal error:", "red"), f" building {id}: {why}"))
+    show(Text(f"models: {summary.out / 'buildings.gml'}, {summary.out / 'buildings.city.jsonl'}"))

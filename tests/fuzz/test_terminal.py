@@ -1,0 +1,87 @@
+"""What reaches the terminal: a word at Ctrl-C, and names from outside as they are, whatever they look like."""
+
+import os
+import signal
+import sys
+import warnings
+
+import pytest
+
+import planted
+from fuzz.damaged_models import changed, sound_lines
+from hiproof import cli
+from hiproof.city import run as city_run
+from hiproof.city.executors import Processes
+from hiproof.cli.evaluate import evaluate
+from hiproof.compiled import news
+from tiny_town import make_town, write_town
+
+
+@pytest.fixture
+def hiproof(monkeypatch):
+    """Runs the command line in this process; gives its exit code."""
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    monkeypatch.setattr(news, "listener", news.listener)
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+
+    def run(*arguments):
+        monkeypatch.setattr(sys, "argv", ["hiproof", *map(str, arguments)])
+        with pytest.raises(SystemExit) as end:
+            cli.main()
+        return end.value.code
+
+    return run
+
+
+@pytest.fixture
+def town(tmp_path):
+    return write_town(tmp_path / "town", make_town(2, 3.0))
+
+
+def test_an_interrupted_run_says_what_is_kept_and_goes_on(hiproof, town, tmp_path, monkeypatch, capsys):
+    command = ("reconstruct", town[0], "--footprints", town[1], "--out", tmp_path / "out")
+    with monkeypatch.context() as patch:
+
+        def interrupt(*_):
+            os.kill(os.getpid(), signal.SIGINT)
+
+        patch.setattr(city_run, "merge", interrupt)
+        assert hiproof(*command) == 130
+    said = capsys.readouterr().err
+    assert "interrupted" in said and "the same command goes on from there" in said
+    assert hiproof(*command) == 0
+    assert "solve 0.0 s" in capsys.readouterr().out
+
+
+def interrupted_worker():
+    os.kill(os.getpid(), signal.SIGINT)
+    return "finished"
+
+
+def test_workers_leave_an_interrupt_to_their_parent():
+    processes = Processes(1)
+    try:
+        ((_, result, error),) = processes.run(interrupted_worker, [()])
+    finally:
+        processes.close()
+    assert (result, error) == ("finished", None)
+
+
+def test_a_file_that_is_named_like_markup_is_named_as_it_is(hiproof, town, tmp_path, capsys):
+    broken = tmp_path / "[" / "red].laz"
+    broken.parent.mkdir()
+    broken.write_bytes(town[0].read_bytes()[:500])
+    out = tmp_path / "[bold]out[" / "bold]"
+    assert hiproof("reconstruct", town[0], broken, "--footprints", town[1], "--out", out) == 2
+    said = capsys.readouterr().out
+    assert f"could not be read: {broken}: expected" in said
+    assert f"models: {out}" in said
+
+
+def test_a_roof_type_that_looks_like_markup_is_shown_as_it_is(tmp_path, capsys):
+    lines = sound_lines(tmp_path)
+    attributes = (1, "CityObjects", ..., "attributes")
+    marked = changed(lines, *attributes, by=lambda known: known | {"hiproof_roof_type": "[/red]"})
+    (tmp_path / "buildings.city.jsonl").write_bytes(marked)
+    evaluate(tmp_path, None, None, None, None, None)
+    assert "[/red]" in capsys.readouterr().out
