@@ -16,6 +16,9 @@ from rasterio.transform import from_origin
 
 import hiproof.frames
 import hiproof.write.naming
+import planted
+from hiproof.city import run as city_run
+from hiproof.city.ledger import Ledger
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
@@ -27,6 +30,8 @@ from hiproof.read.las import las_crs
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write.postgis import building_row, open_sequence, roof_rows, units_of_run
+from read.test_lax import write_lax
+from read.test_pointcloud import write_copc
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
 
 US_FOOT = 1200 / 3937
@@ -151,6 +156,12 @@ def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
         assert figures.quality.share_within_20cm > 0.95 and figures.quality.outline_iou > 0.99
 
 
+def test_clouds_of_another_crs_than_the_run_are_not_measured_against(in_metres, tmp_path):
+    cloud = write_cloud(tmp_path / "feet.laz", TOWN.xyz, TOWN.classification, "EPSG:2263")
+    with pytest.raises(InputError, match=r"EPSG:7415 .* in the run and EPSG:2263 .* in .*feet\.laz"):
+        evaluate_run(in_metres, [str(cloud)])
+
+
 def test_a_unit_without_a_crs_is_known_again_by_evaluate(tmp_path):
     settings = Settings.from_dict({"read": {"unit": "us-survey-foot"}})
     with warnings.catch_warnings():
@@ -216,6 +227,40 @@ def test_the_unit_of_heights_that_geotiff_keys_name_counts(tmp_path):
         assert units_of(las_crs(file.header, "a.las")).height == pytest.approx(US_FOOT)
     keys.geo_keys.pop()
     assert units_of(las_crs(header, "a.las")).height == 1.0
+
+
+def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
+    """COPC and `.lax` save points, but none that a building needs."""
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
+    monkeypatch.setattr("hiproof.read.lax.JOINED_POINTS", 50)
+    along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
+    xyz, classes, origin = FEET.from_metres(TOWN.xyz[along]), TOWN.classification[along], FEET.from_metres(ORIGIN)
+    alone = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}
+    footprints = str(write_footprints(tmp_path / "alone.gpkg", alone, "EPSG:2263"))
+    clouds = [
+        write_cloud(tmp_path / "plain.laz", xyz, classes, None, origin),
+        write_cloud(tmp_path / "indexed.laz", xyz, classes, None, origin),
+        write_copc(tmp_path / "cloud.copc.laz", xyz, classes),
+    ]
+    write_lax(tmp_path / "indexed.lax", xyz)
+    settings, found = Settings.from_dict({"read": {"crs": "EPSG:2263"}}), []
+    for number, cloud in enumerate(clouds):
+        out = tmp_path / str(number)
+        reconstruct_area(Request((str(cloud),), out, footprints, settings=settings))
+        found.append(
+            (
+                parameters(out),
+                [
+                    json.loads(row[5])["points"]
+                    for row in Ledger(out / ".hiproof/ledger.sqlite").tasks()
+                    if row[1] == "sort"
+                ],
+            )
+        )
+    (plain, (all_points,)), (indexed, (some,)), (copc, (of_copc,)) = found
+    assert plain[0]["points"] == indexed[0]["points"] == copc[0]["points"] > 100
+    assert plain == indexed and some < all_points and of_copc < all_points
 
 
 @pytest.mark.parametrize(("first", "second"), [("EPSG:7415", "EPSG:25832"), ("EPSG:2263+6360", "EPSG:2263+5703")])

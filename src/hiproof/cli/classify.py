@@ -13,6 +13,8 @@ def classify(
         list[Path], typer.Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)")
     ],
     out: Annotated[Path, typer.Option(help="LAZ file for the labelled points; the table lies beside it as CSV")],
+    crs: Annotated[str | None, typer.Option(help="CRS of the clouds [default: as they say]")] = None,
+    unit: Annotated[str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")] = None,
     weights: Annotated[str, typer.Option(help="ONNX file with other weights than the shipped ones")] = "",
     device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
@@ -25,7 +27,8 @@ def classify(
     from ..segment.files import classify_files
     from ..settings import Settings
 
-    settings = Settings().replace({"segment": {"weights": weights, "device": device}})
+    read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
+    settings = Settings().replace({"read": read, "segment": {"weights": weights, "device": device}})
     failures = classify_files(clouds, out, settings)
     for path, why in failures.items():
         typer.echo(f"{path}: {why}", err=True)

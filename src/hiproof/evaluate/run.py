@@ -108,15 +108,25 @@ def exists(path: str) -> bool:
 def run_settings(record: dict[str, Any]) -> Settings:
     """The settings a run was made with, as far as this version knows them."""
     read = (record.get("settings") or {}).get("read") or {}
-    known = {name: read[name] for name in ("building_classes", "unit") if read.get(name)}
-    return Settings.from_dict({"read": {**known, "crs": record.get("crs") or ""}})
+    known = {name: read[name] for name in ("building_classes", "crs", "unit") if read.get(name)}
+    return Settings.from_dict({"read": known})
+
+
+def run_crs(record: dict[str, Any]) -> Any:
+    """The pyproj CRS of a run, None where it has none."""
+    from ..read.crs import parse_crs
+
+    return parse_crs(record.get("crs"))
 
 
 def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]) -> np.ndarray:
     """Points (n, 3) of the building classes around `areas`; all points of clouds without classes."""
-    from ..read.pointcloud import read_points
+    from ..read.pointcloud import expand_paths, read_points, refuse_other_crs
 
     settings = run_settings(record)
+    if not settings.read.crs:
+        refuse_other_crs(expand_paths(tuple(clouds)), run_crs(record), "the run")
+        settings = settings.replace({"read": {"crs": record.get("crs") or ""}})
     box = shapely.total_bounds(np.array([area for area in areas if area is not None], dtype=object))
     cloud = read_points(*clouds, settings=settings, box=tuple(box) if np.isfinite(box).all() else None)
     if cloud.classification is None or not cloud.classification.any():
@@ -132,7 +142,7 @@ def footprint_of_each(
         return [None] * len(models)
     from ..read.footprints import read_footprints
 
-    footprints = read_footprints(path, layer, settings=run_settings(record))
+    footprints = read_footprints(path, layer, target_crs=run_crs(record), settings=run_settings(record))
     areas = [(f.id, shapely.make_valid(f.polygon)) for f in footprints]
     matches = match_by_id_or_overlap(models, areas)
     return [None if match is None else areas[match][1] for match in matches]
@@ -140,10 +150,9 @@ def footprint_of_each(
 
 def run_units(record: dict[str, Any]) -> Units:
     """Units of the coordinates a run was made from; metres where nothing is known of it."""
-    from ..read.crs import parse_crs, units_of
+    from ..read.crs import units_of
 
-    read = run_settings(record).read
-    return units_of(parse_crs(read.crs), "the run", read.unit)
+    return units_of(run_crs(record), "the run", run_settings(record).read.unit)
 
 
 def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:

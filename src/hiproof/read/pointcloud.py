@@ -211,18 +211,14 @@ def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
         overruled = [path for path, crs in named.items() if not same_horizontal(crs, given)]
         if overruled:
             warnings.warn(
-                f"{overruled[0]}{and_others(overruled)}: taken in {described(given)}, as --crs says, "
+                f"{overruled[0]}{and_others(overruled)}: taken in {described(given)}, as told, "
                 f"although its header names {described(named[overruled[0]])}",
                 InputWarning,
             )
         return given
     first = next(iter(named), None)
     for path, crs in named.items():
-        if not (same_horizontal(named[first], crs) and same_heights(named[first], crs)):
-            raise InputError(
-                f"expected all clouds in one CRS, got {described(named[first])} in {first} and {described(crs)} in "
-                f"{path}; reproject one of them, or say with --crs which is right where a header is wrong"
-            )
+        refuse_two(named[first], first, crs, path)
     unnamed = [path for path in crs_of if path not in named]
     if first is not None and unnamed:
         warnings.warn(
@@ -230,6 +226,23 @@ def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
             InputWarning,
         )
     return max(named.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
+
+
+def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
+    """Raise InputError where one of the files names another CRS than `crs`, that of `source`; unknown goes with any."""
+    for file in files if crs is not None else ():
+        own = file_crs(file)
+        if own is not None:
+            refuse_two(crs, source, own, str(file))
+
+
+def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -> None:
+    """Raise InputError where two CRSs differ in plan or in heights."""
+    if not (same_horizontal(first, second) and same_heights(first, second)):
+        raise InputError(
+            f"expected all clouds in one CRS, got {described(first)} in {first_source} and {described(second)} in "
+            f"{second_source}; reproject one of them, or say with --crs which is right where a header is wrong"
+        )
 
 
 def and_others(paths: list[str]) -> str:

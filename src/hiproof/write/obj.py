@@ -42,7 +42,10 @@ def write_obj(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, A
 
 def header(library: str, origin: np.ndarray, crs: str | None) -> str:
     where = " ".join(f"{value:.0f}" for value in origin)
-    return f"# hiproof; add the origin {where} to every vertex for world metres\n# crs: {crs}\nmtllib {library}\n"
+    return (
+        f"# hiproof; in metres; the origin {where} is to be added to every vertex\n"
+        f"# crs: {crs}; its coordinates are metres divided by its unit\nmtllib {library}\n"
+    )
 
 
 def building_text(id: str, roof_type: str, solid: Solid, origin: np.ndarray, first: int) -> str:
