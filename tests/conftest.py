@@ -1,8 +1,11 @@
 """Fixtures that several test files share."""
 
+import warnings
+
 import pytest
 
 import planted
+from hiproof import log
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.warm import make_ready
@@ -15,6 +18,15 @@ def pytest_configure(config):
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         news.listener = news.Lines(print)
         make_ready()
+
+
+@pytest.fixture(autouse=True)
+def log_as_it_was():
+    """What a test starts of the log ends with it."""
+    handlers, level, show = log.LOGGER.handlers[:], log.LOGGER.level, warnings.showwarning
+    yield
+    log.LOGGER.handlers[:], warnings.showwarning = handlers, show
+    log.LOGGER.setLevel(level)
 
 
 @pytest.fixture(scope="session")

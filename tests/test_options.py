@@ -5,11 +5,12 @@ import warnings
 
 import pytest
 
+from hiproof import log
 from hiproof.city.checks import refuse_unusable
 from hiproof.city.executors import Processes
 from hiproof.city.run import Summary
 from hiproof.cli import main
-from hiproof.errors import InputWarning, warn_in_sentences
+from hiproof.errors import InputWarning
 
 RUNS = None
 HUGE = "9" * 5000
@@ -96,7 +97,7 @@ CONFIGURATIONS = {
 
 
 def test_warnings_are_sentences_without_their_place_in_the_source(capsys):
-    warn_in_sentences()
+    log.start()
     warnings.warn("a.laz: names no CRS;\n taken as metres", InputWarning)
     assert capsys.readouterr().err == "hiproof: a.laz: names no CRS; taken as metres\n"
 

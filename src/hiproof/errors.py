@@ -3,9 +3,6 @@
 Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or another process.
 """
 
-import sys
-import warnings
-
 from .masking import masked
 
 
@@ -34,15 +31,6 @@ class FitError(HiproofError):
 
 class CompositionError(HiproofError):
     """A roof that cannot become a valid solid; the caller falls back to a simpler roof."""
-
-
-def warn_in_sentences() -> None:
-    """Show this process's warnings as users read them: the sentence alone, without the place in the source."""
-
-    def show(message: Warning | str, category: type, filename: str, lineno: int, file=None, line=None) -> None:
-        print(f"hiproof: {' '.join(str(message).split())}", file=file or sys.stderr)
-
-    warnings.showwarning = show
 
 
 class HiproofWarning(UserWarning):

@@ -22,9 +22,10 @@ from queue import Empty, SimpleQueue
 from typing import Any
 from urllib.parse import urlsplit
 
+from .. import log
 from ..compiled import news
 from ..compiled.stamp import count_compiled
-from ..errors import InputError, NotKeptWarning, OutputError, warn_in_sentences
+from ..errors import InputError, NotKeptWarning, OutputError
 from .tasks import make_ready
 
 CONNECT_S = 20
@@ -84,7 +85,10 @@ class Processes:
     def submit(self, function: Callable, task: tuple) -> Future:
         if self.pool is None:
             self.pool = ProcessPoolExecutor(
-                self.jobs, mp_context=get_context("spawn"), initializer=begin_worker, initargs=(os.getpid(),)
+                self.jobs,
+                mp_context=get_context("spawn"),
+                initializer=begin_worker,
+                initargs=(os.getpid(), log.started()),
             )
         try:
             return self.pool.submit(function, *task)
@@ -112,12 +116,12 @@ class Processes:
             self.pool = None
 
 
-def begin_worker(parent: int) -> None:
-    """What a worker process starts with: it warns as the main process does, and ends with it.
+def begin_worker(parent: int, logging: tuple) -> None:
+    """What a worker process starts with: it logs as the main process does, and ends with it.
 
     That compiled code cannot be kept, the main process has said.
     """
-    warn_in_sentences()
+    log.start(*logging)
     warnings.simplefilter("ignore", NotKeptWarning)
     leave_with_parent(parent)
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import json
+import logging
 import secrets
 import shutil
 import sqlite3
@@ -18,7 +19,9 @@ from pathlib import Path
 from .. import __version__
 from ..errors import InputError, OutputError, OutputWarning
 from ..frames import METRES, Units
+from ..log import LOGGER
 from ..masking import masked, masked_values
+from ..status import Status
 from ..write.files import atomic
 from .checks import refuse_unusable
 from .executors import WorkerLost, make_executor
@@ -91,6 +94,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         if ledger.get("merged") != "yes":
             merge(plan, state, Path(request.out), progress)
         summary = summarise(request, plan, ledger, clock)
+        LOGGER.info("%d buildings: %s; seconds: %s", summary.buildings, summary.by_status, summary.seconds)
         write_run_record(request, plan, summary)
         if ledger.get("merged") != "yes":
             ledger.claim(claims(output_files(plan, Path(request.out)), Path(request.out)))
@@ -156,6 +160,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
     if ledger.get("mark") is not None and not request.restart:
         refuse_other_inputs(request.out, inputs, ledger)
         if stands(request.out, ledger):
+            LOGGER.info("version %s goes on in %s", __version__, request.out)
             return Plan.load(state / PLAN_FILE)
     forget(state, ledger)
     plan, salt = make_plan(request), secrets.token_hex(16)
@@ -166,6 +171,13 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
     ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
     told = json.dumps(masked_values(inputs), default=str)
     ledger.set(inputs=told, salt=salt, mark=mark_of(inputs, salt), started=str(time.time()))
+    LOGGER.info(
+        "version %s begins in %s: %d buildings in %d work tiles",
+        __version__,
+        request.out,
+        len(plan.jobs),
+        len(plan.tiles),
+    )
     return plan
 
 
@@ -218,6 +230,7 @@ def work_off(
             name = f"{kind}:{task[1]}"
             if isinstance(error, (WorkerLost, MemoryError)):
                 ledger.lose(name)
+                LOGGER.warning("%s was lost (%s) and is tried again", name, error or "out of memory")
                 continue
             done += 1
             record(ledger, kind, name, result, error)
@@ -252,14 +265,20 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
             ledger.finish(name, "done", json.dumps(result))
         else:
             ledger.finish(name, "done", "", result)
+            for _, id, status, _, detail, *_ in result:
+                level = logging.ERROR if status == Status.INTERNAL_ERROR.code else logging.DEBUG
+                LOGGER.log(level, "building %s: %s", id, detail)
+        LOGGER.info("%s is done: %s", name, f"{len(result)} buildings" if kind == "solve" else result)
     elif kind == "sort" and isinstance(error, InputError):
         ledger.finish(name, "failed", str(error))
+        LOGGER.error("%s could not be read: %s", name, error)
     else:
         raise error
 
 
 def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple) -> None:
     """A task whose process died again and again, in a process of its own; see quarantine.py."""
+    LOGGER.warning("%s was lost %d times and is now tried alone", name, ledger.losses(name))
     if kind == "solve":
         result, error = solve_in_quarantine(executor, function, task)
     else:

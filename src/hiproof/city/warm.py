@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..compiled import kept
 from ..compiled.stamp import PACKAGE, stamp_of_all
+from ..log import without_progress
 
 
 def make_ready(scratch: Path | None = None) -> None:
@@ -42,5 +43,5 @@ def run_neighbourhood(scratch: Path | None) -> None:
     from .run import Request, reconstruct_area
 
     files = {name: str(path) for name, path in demo_files().items()}
-    with tempfile.TemporaryDirectory(dir=scratch) as out:
+    with tempfile.TemporaryDirectory(dir=scratch) as out, without_progress():
         reconstruct_area(Request((files["cloud"],), Path(out), files["footprints"], files["terrain"]))

@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from .. import __version__
+from ..log import Level, start
 from .classify import classify
 from .convert import convert
 from .evaluate import evaluate
@@ -63,6 +64,8 @@ def reconstruct(
     jobs: Annotated[int, typer.Option(help="processes on this machine")] = 1,
     scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
     restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
+    log_file: Annotated[Path | None, typer.Option(help="keep the log from progress on here, added at the end")] = None,
+    log_level: Annotated[Level, typer.Option(help="what of the log to show; debug also in the file")] = Level.warning,
 ) -> None:
     """Reconstruct the buildings of point clouds into CityGML, CityJSON, parameters and attributes.
 
@@ -70,6 +73,7 @@ def reconstruct(
     """
     from .reconstruct import run
 
+    start(log_level, log_file)
     options = {
         "read": {"building_classes": building_class, "ground_classes": ground_class, "crs": crs, "unit": unit},
         "fit": {

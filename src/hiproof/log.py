@@ -1,0 +1,104 @@
+"""What the program says while it works: standard logging under the name `hiproof`, warnings among it, secrets masked.
+
+The library logs and leaves it to its user what becomes of that; the command line shows warnings and errors on standard
+error, and with `--log-file` keeps everything from progress on, with time and process, in a file. Worker processes of this
+machine write to the same places; those of a Dask cluster to Dask's own logs.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from enum import StrEnum
+from pathlib import Path
+
+from .errors import OutputError
+from .masking import masked
+
+LOGGER = logging.getLogger("hiproof")
+FILE_FORMAT = "%(asctime)s %(levelname)s %(process)d %(message)s"
+
+
+class Level(StrEnum):
+    """What of the log is shown: that of this level and above."""
+
+    debug = "debug"
+    info = "info"
+    warning = "warning"
+    error = "error"
+
+    @property
+    def number(self) -> int:
+        return getattr(logging, self.name.upper())
+
+
+class Masking(logging.Formatter):
+    """Formats a record and masks the passwords in all of it, tracebacks too."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        return masked(super().format(record))
+
+
+class Console(logging.Handler):
+    """Standard error as it is when a record comes: a progress bar may have taken it over since."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        print(self.format(record), file=sys.stderr, flush=True)
+
+
+def start(level: Level = Level.warning, file: Path | None = None) -> None:
+    """Show the log of `level` and above on standard error, and keep that of `info` and above (`debug`, if that is the
+    level) at the end of `file`. What was started before ends. Raises OutputError where the file cannot be written."""
+    handlers: list[logging.Handler] = [handler_of(Console(), "hiproof: %(message)s", level.number)]
+    if file is not None:
+        try:
+            Path(file).parent.mkdir(parents=True, exist_ok=True)
+            kept = logging.FileHandler(file, encoding="utf-8")
+        except OSError as error:
+            raise OutputError(
+                f"expected a --log-file that can be written, got {file}: {error}; name another"
+            ) from error
+        handlers.append(handler_of(kept, FILE_FORMAT, min(level.number, logging.INFO)))
+    for before in LOGGER.handlers[:]:
+        LOGGER.removeHandler(before)
+        before.close()
+    for handler in handlers:
+        LOGGER.addHandler(handler)
+    LOGGER.setLevel(min(handler.level for handler in handlers))
+    warnings.showwarning = log_warning
+
+
+def handler_of(handler: logging.Handler, form: str, level: int) -> logging.Handler:
+    handler.setFormatter(Masking(form))
+    handler.setLevel(level)
+    return handler
+
+
+def started() -> tuple:
+    """The arguments of `start` that a worker process needs to log as this one does; none where nothing was started."""
+    console = next((handler for handler in LOGGER.handlers if isinstance(handler, Console)), None)
+    if console is None:
+        return ()
+    file = next((Path(handler.baseFilename) for handler in LOGGER.handlers if hasattr(handler, "baseFilename")), None)
+    return Level(logging.getLevelName(console.level).lower()), file
+
+
+@contextmanager
+def without_progress() -> Iterator[None]:
+    """Log warnings and errors alone for the block: what goes on in it is not what the user asked for."""
+    level = LOGGER.level
+    LOGGER.setLevel(max(level, logging.WARNING))
+    try:
+        yield
+    finally:
+        LOGGER.setLevel(level)
+
+
+def log_warning(
+    message: Warning | str, category: type, filename: str, lineno: int, file: object = None, line: str | None = None
+) -> None:
+    """A warning as users read it: the sentence alone, without the place in the source."""
+    LOGGER.warning(" ".join(str(message).split()))

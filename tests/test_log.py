@@ -1,0 +1,121 @@
+"""What goes to the console and what to the file, from this process and its workers; no secret to either."""
+
+import logging
+import sys
+import warnings
+
+import pytest
+
+import planted
+from hiproof import log
+from hiproof.city import run as city_run
+from hiproof.city.executors import Processes
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli import main
+from hiproof.errors import InputError, OutputError
+
+
+def said(path):
+    """(level, message) of each line of a log file."""
+    return [tuple(line.split(" ", 4)[i] for i in (2, 4)) for line in path.read_text().splitlines()]
+
+
+@pytest.mark.parametrize(
+    ("level", "console", "file"),
+    [
+        ("debug", ["debug", "info", "warning", "error"], ["debug", "info", "warning", "error"]),
+        ("info", ["info", "warning", "error"], ["info", "warning", "error"]),
+        ("warning", ["warning", "error"], ["info", "warning", "error"]),
+        ("error", ["error"], ["info", "warning", "error"]),
+    ],
+)
+def test_each_place_gets_its_levels(level, console, file, tmp_path, capsys):
+    log.start(log.Level(level), tmp_path / "deep" / "run.log")
+    for name in ("debug", "info", "warning", "error"):
+        log.LOGGER.log(log.Level(name).number, name)
+    assert capsys.readouterr().err.splitlines() == [f"hiproof: {name}" for name in console]
+    assert said(tmp_path / "deep" / "run.log") == [(name.upper(), name) for name in file]
+
+
+def test_secrets_are_masked_in_messages_arguments_and_tracebacks(tmp_path, capsys):
+    log.start(file=tmp_path / "run.log")
+    try:
+        raise ValueError("https://u:s3cret@host")
+    except ValueError:
+        log.LOGGER.error("at %s", "postgresql://u:s3cret@host", exc_info=True)
+    warnings.warn("https://u:s3cret@host/a.laz is odd")
+    told = capsys.readouterr().err + (tmp_path / "run.log").read_text()
+    assert told.count("Traceback") == told.count("is odd") == 2 and "s3cret" not in told
+
+
+def test_starting_again_adds_to_the_file_and_repeats_nothing(tmp_path, capsys):
+    for _ in range(2):
+        log.start(file=tmp_path / "run.log")
+        log.LOGGER.warning("once")
+    assert said(tmp_path / "run.log") == [("WARNING", "once")] * 2
+    assert capsys.readouterr().err == "hiproof: once\n" * 2
+
+
+def test_work_that_nobody_asked_for_shows_its_warnings_alone(tmp_path):
+    log.start(log.Level.debug, tmp_path / "run.log")
+    with log.without_progress():
+        log.LOGGER.info("sorted")
+        log.LOGGER.warning("compiling")
+    log.LOGGER.info("begun")
+    assert said(tmp_path / "run.log") == [("WARNING", "compiling"), ("INFO", "begun")]
+
+
+def test_a_file_that_cannot_be_written_gets_one_sentence(tmp_path):
+    with pytest.raises(OutputError, match="--log-file"):
+        log.start(file=tmp_path)
+
+
+def test_workers_write_to_the_same_places(tmp_path, capfd):
+    log.start(file=tmp_path / "run.log")
+    executor = Processes(1)
+    list(executor.run(warnings.warn, [("3 points of https://u:s3cret@host were left out",)]))
+    executor.close()
+    assert said(tmp_path / "run.log") == [("WARNING", "3 points of https://u:...@host were left out")]
+    assert capfd.readouterr().err == "hiproof: 3 points of https://u:...@host were left out\n"
+
+
+def test_the_file_tells_of_every_step_and_of_lost_workers(town_files, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
+    log.start(log.Level.debug, tmp_path / "run.log")
+    reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], jobs=2))
+    lines = said(tmp_path / "run.log")
+    told = "\n".join(f"{level} {text}" for level, text in lines)
+    assert "INFO version" in told and "4 buildings in 1 work tiles" in told
+    assert "INFO sort:0 is done" in told and "is done: 4 buildings" in told
+    assert "WARNING solve:" in told and "was lost (a worker process died) and is tried again" in told
+    assert sum(level == "DEBUG" and text.startswith("building house-") for level, text in lines) == 4
+    assert lines[-1][1].startswith("4 buildings: {")
+
+
+def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, capsys):
+    def refuse(request, progress):
+        raise InputError("expected points at https://u:s3cret@host, got none")
+
+    monkeypatch.setattr("hiproof.cli.reconstruct.reconstruct_area", refuse)
+    (tmp_path / "a.laz").write_bytes(b"LASF")
+    asked = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
+    monkeypatch.setattr(
+        sys, "argv", ["hiproof", *asked, "--log-file", str(tmp_path / "run.log"), "--log-level", "error"]
+    )
+    with pytest.raises(SystemExit) as ended:
+        main()
+    assert ended.value.code == 2
+    assert said(tmp_path / "run.log") == [("ERROR", "expected points at https://u:...@host, got none")]
+    assert capsys.readouterr().err == "hiproof: expected points at https://u:...@host, got none\n"
+
+
+def test_the_library_itself_sets_nothing_up():
+    assert logging.getLogger("hiproof").handlers == []
+
+
+def test_lines_of_several_workers_stay_whole(tmp_path):
+    log.start(file=tmp_path / "run.log")
+    executor = Processes(2)
+    list(executor.run(warnings.warn, [(f"task {i}",) for i in range(40)]))
+    executor.close()
+    assert sorted(said(tmp_path / "run.log")) == sorted(("WARNING", f"task {i}") for i in range(40))
