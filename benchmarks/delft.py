@@ -19,6 +19,7 @@ import argparse
 import re
 import tempfile
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -84,28 +85,48 @@ def asked_footprints(path: Path, parity: str | None) -> list[Footprint]:
     return [f for f in footprints if int(re.search(r"\d+$", f.id)[0]) % 2 == (parity == "odd")]
 
 
-def measure(buildings: list[Building], footprints: list[Footprint], clouds: list[Path], tools: Path) -> dict:
-    """What roof_residuals.py says of the written models within `footprints`, on all points of `clouds`."""
-    with tempfile.TemporaryDirectory() as folder:
-        models, asked = Path(folder) / "models.city.jsonl", Path(folder) / "asked.gpkg"
-        write_cityjson(models, buildings)
-        outlines = shapely.to_wkb([footprint.polygon for footprint in footprints])
-        pyogrio.raw.write(asked, outlines, [], [], geometry_type="Polygon", crs="EPSG:28992")
-        return tool("roof_residuals", tools).measure(models, asked, clouds)
+@dataclass(frozen=True)
+class Asked:
+    """The `footprints` of a set, the files of its cloud, and the points (n, 3) of those footprints that have any."""
+
+    footprints: list[Footprint]
+    clouds: list[Path]
+    own_points: list[tuple[np.ndarray, Footprint]]
 
 
-def row(share: float, footprints: list[Footprint], clouds: list[Path], tools: Path, settings: Settings) -> str:
+def asked_of(name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None) -> Asked:
+    """The set `name`, its cloud thinned to `share`; `data` is its folder where that is another."""
+    data = data or SHARED / "data" / name
+    footprints, clouds = asked_footprints(data / SETS[name], parity), sorted(data.glob("*.laz"))
     cloud = thinned(clouds, share)
-    own_points = [cloud[index] for index in points_of_footprints(cloud, footprints)]
-    asked = [(p, f) for p, f in zip(own_points, footprints, strict=True) if len(p)]
-    model(*asked[0], settings)  # compiles or loads what is compiled
-    outcomes = [model(p, f, settings) for p, f in asked]
-    buildings = [building for building, _ in outcomes if building is not None]
-    figures = measure(buildings, footprints, clouds, tools)
-    columns = {name: np.array([f[name] for _, f in outcomes]) for name in outcomes[0][1]}
+    indices = points_of_footprints(cloud, footprints)
+    return Asked(footprints, clouds, [(cloud[i], f) for i, f in zip(indices, footprints, strict=True) if len(i)])
+
+
+def models_of(asked: Asked, settings: Settings) -> tuple[list[Building], dict[str, np.ndarray]]:
+    """All buildings that could be composed, and the figures of `model` for every building asked for."""
+    model(*asked.own_points[0], settings)  # compiles or loads what is compiled
+    outcomes = [model(points, footprint, settings) for points, footprint in asked.own_points]
+    columns = {name: np.array([figures[name] for _, figures in outcomes]) for name in outcomes[0][1]}
+    return [building for building, _ in outcomes if building is not None], columns
+
+
+def measure(buildings: list[Building], asked: Asked, tools: Path = SHARED / "tools") -> dict:
+    """What roof_residuals.py says of the written models within the footprints, on all points of the cloud."""
+    with tempfile.TemporaryDirectory() as folder:
+        models, footprints = Path(folder) / "models.city.jsonl", Path(folder) / "asked.gpkg"
+        write_cityjson(models, buildings)
+        outlines = shapely.to_wkb([footprint.polygon for footprint in asked.footprints])
+        pyogrio.raw.write(footprints, outlines, [], [], geometry_type="Polygon", crs="EPSG:28992")
+        return tool("roof_residuals", tools).measure(models, footprints, asked.clouds)
+
+
+def row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
+    buildings, columns = models_of(asked, settings)
+    figures = measure(buildings, asked, tools)
     both, areas = 1e3 * (columns["fit"] + columns["compose"]), area_by_type(buildings)
     return (
-        f"{share:<6g} share {figures['share_within_20cm']:.4f}  modelled {figures['modelled']}"
+        f"{share:<6g} {len(asked.footprints)} footprints  share {figures['share_within_20cm']:.4f}  modelled {figures['modelled']}"
         f"  faces median {figures['median_roof_faces']:.0f} ({np.median(columns['faces']):.0f}) mean {columns['faces'].mean():.2f}"
         f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named {named_share(buildings):.3f}"
         f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(both):.1f} mean {both.mean():.1f} max {both.max():.0f}"
@@ -122,12 +143,9 @@ def main() -> None:
     parser.add_argument("--shares", type=float, nargs="+", default=[1.0, 0.5, 0.25, 0.125])
     parser.add_argument("--parity", choices=("even", "odd"), help="footprints whose id is such a number")
     arguments = parser.parse_args()
-    data = arguments.data or SHARED / "data" / arguments.set
-    footprints = asked_footprints(data / SETS[arguments.set], arguments.parity)
-    clouds = sorted(data.glob("*.laz"))
-    print(f"{arguments.set}: {len(footprints)} footprints")
     for share in arguments.shares:
-        print(row(share, footprints, clouds, arguments.tools, Settings()), flush=True)
+        asked = asked_of(arguments.set, share, arguments.parity, arguments.data)
+        print(row(share, asked, arguments.tools, Settings()), flush=True)
 
 
 if __name__ == "__main__":

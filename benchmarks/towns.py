@@ -1,12 +1,14 @@
 """Is the roof drawn as a person would? Real towns' LoD2 solids, scanned by simulation, modelled again and compared.
 
 usage: python -m benchmarks.towns [--town essen nrw_5657 denhaag] [--density 5] [--without-footprints]
-           [--every K] [--parity even|odd] [--most N] [--worst N] [--save DIR]
+           [--every K] [--parity even|odd] [--most N] [--worst N] [--save DIR] [--composed-truth]
 
 A building is the solids of one CityJSON building (its parts with it) whose grounds touch; those of 30 m2 or more are
 scanned one by one (generator seeded by the id, no gaps in the cloud) and reconstructed under their true ground outline,
 or without it. `wireframe.py` compares corners, edges and faces of the written models with the true ones. `--every` takes
 each k-th building, `--parity` those at even or odd places, `--most` draws so many by chance, always the same ones.
+`--composed-truth` judges the true roof faces themselves, composed as one shell a building: towns draw the parts of a building
+one by one, and where their steps cross a single shell has other edges, so that this is about the best there is.
 `--save` keeps for each town what a run would leave and `truth.city.json`, to be drawn by docs/draw_roofs.py.
 Milliseconds are the CPU time of `reconstruct`, recognition and quality included.
 """
@@ -20,6 +22,7 @@ import time
 import traceback
 import zlib
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -27,7 +30,9 @@ import numpy as np
 import shapely
 
 from hiproof import reconstruct
-from hiproof.model import GROUND, Building, Solid
+from hiproof.compose import compose
+from hiproof.frames import LocalFrame
+from hiproof.model import GROUND, ROOF, Building, Part, Piece, Roof, Solid
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
@@ -42,6 +47,7 @@ TOWNS = {
     "denhaag": SHARED / "data/denhaag/DenHaag_01.city.json",
 }
 SMALLEST_M2 = 30.0
+STEEPEST = 0.1  # cosine of the slope: 84 degrees
 TOUCH_M = 0.01
 
 
@@ -135,6 +141,42 @@ def modelled(building: TrueBuilding, points: np.ndarray, with_footprint: bool) -
     return model, time.process_time() - started
 
 
+def all_modelled(
+    buildings: list[TrueBuilding], points: list[np.ndarray], with_footprint: bool
+) -> tuple[list[Building], str]:
+    """Every building reconstructed, and how long that took, in words."""
+    modelled(buildings[0], points[0], with_footprint)  # loads what is compiled
+    outcomes = [modelled(b, p, with_footprint) for b, p in zip(buildings, points, strict=True)]
+    ms = 1e3 * np.array([seconds for _, seconds in outcomes])
+    times = f"{np.median(ms):.1f} ms a building in the median, {ms.mean():.1f} in the mean, {ms.max():.0f} at most"
+    return [model for model, _ in outcomes], times
+
+
+def composed(building: TrueBuilding) -> Building:
+    """The true roof faces themselves as one shell: what a perfect reconstruction would score."""
+    frame = LocalFrame(np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0))
+    solids = [solid.moved(-frame.origin) for solid in building.solids.values()]
+    parts = tuple(Part("free", (piece,)) for solid in solids for piece in roof_pieces(solid))
+    roof = Roof(parts, shapely.transform(building.footprint, frame.to_local), frame)
+    solid = compose(roof, min(float(solid.vertices[:, 2].min()) for solid in solids))
+    return Building(building.id, Status.MODELLED, roof=roof, solid=solid.moved(frame.origin))
+
+
+def roof_pieces(solid: Solid) -> Iterator[Piece]:
+    """A piece for each polygon of the roof's faces; those that stand upright are none."""
+    for face in solid.of_kind(ROOF):
+        ring = solid.vertices[list(face.rings[0])]
+        centre = ring.mean(axis=0)
+        normal = np.cross(ring - centre, np.roll(ring - centre, -1, axis=0)).sum(axis=0)
+        if normal[2] < STEEPEST * np.linalg.norm(normal):
+            continue
+        a, b = -normal[:2] / normal[2]
+        outer, *holes = (solid.vertices[list(other), :2] for other in face.rings)
+        for polygon in shapely.get_parts(shapely.make_valid(shapely.Polygon(outer, holes))):
+            if polygon.geom_type == "Polygon" and polygon.area > 1e-3:
+                yield Piece(polygon, np.array([[a, b, centre[2] - a * centre[0] - b * centre[1]]]))
+
+
 def judged(town: str, buildings: list[TrueBuilding], models: list[Building], folder: Path, worst: int) -> str:
     """What the judge says of the models of `buildings` in `folder`, where the truth is written too."""
     truth = folder / "truth.city.json"
@@ -165,15 +207,16 @@ def main() -> None:
     parser.add_argument("--most", type=int, help="at most so many buildings a town, drawn by chance")
     parser.add_argument("--worst", type=int, default=0, help="name the buildings with the worst edges")
     parser.add_argument("--save", type=Path, help="keep a run and the truth of each town in this folder")
+    parser.add_argument("--composed-truth", action="store_true", help="judge the true roofs as one shell a building")
     a = parser.parse_args()
     for town in a.town:
         buildings = chosen(read_town(TOWNS[town]), a.every, a.parity, a.most)
         points = [building.scanned(a.density) for building in buildings]
-        modelled(buildings[0], points[0], not a.without_footprints)  # loads what is compiled
-        outcomes = [modelled(b, p, not a.without_footprints) for b, p in zip(buildings, points, strict=True)]
-        models, ms = [model for model, _ in outcomes], 1e3 * np.array([seconds for _, seconds in outcomes])
-        times = f"{np.median(ms):.1f} ms a building in the median, {ms.mean():.1f} in the mean, {ms.max():.0f} at most"
-        print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {times}")
+        if a.composed_truth:
+            models, done = [composed(building) for building in buildings], "their true roofs composed"
+        else:
+            models, done = all_modelled(buildings, points, not a.without_footprints)
+        print(f"{town}: {len(buildings)} buildings, {a.density:g} points/m2; {done}")
         with tempfile.TemporaryDirectory() as temporary:
             folder = (a.save or Path(temporary)) / town
             write_run(folder, models, points)

@@ -8,7 +8,7 @@ import shapely
 from benchmarks.compounds import compared, sigma_report
 from benchmarks.judging import area_by_type, named_share, raster, visible_areas
 from benchmarks.matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
-from benchmarks.named_roofs import parts_in
+from benchmarks.named_roofs import demo, judged, parts_in
 
 from hiproof.frames import LocalFrame
 from hiproof.model import Building, Roof
@@ -121,3 +121,14 @@ def test_a_roof_keeps_its_place_in_another_frame():
     )
     xy = raster(roof.outline)[::7]
     assert np.allclose(moved.height_at(xy + (10.0, -20.0)), roof.height_at(xy) + 17.0)
+
+
+def test_the_demos_truth_is_right_and_a_flat_block_is_not():
+    for truth, points, footprint in demo():
+        assert len(points) > 50
+        model = Building(footprint.id, Status.MODELLED, roof=truth.roof)
+        assert judged(truth, model) == (True, True)
+        assert truth.footprint.symmetric_difference(footprint.polygon).area < 0.05 * truth.footprint.area
+        flat = dataclasses.replace(truth.roof.parts[0], type="flat")
+        block = dataclasses.replace(model, roof=dataclasses.replace(truth.roof, parts=(flat,)))
+        assert judged(truth, block) == (truth.type == "flat", truth.type == "flat" and truth.kind == "single")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import shapely
 from benchmarks.delft import asked_footprints
-from benchmarks.judging import SHARED, wireframe_figures
-from benchmarks.towns import TOWNS, chosen, ground_of, read_town, touching, write_truth
+from benchmarks.judging import SHARED, raster, wireframe_figures
+from benchmarks.towns import TOWNS, chosen, composed, ground_of, read_town, touching, write_truth
 
 from handmade import box
 from hiproof.compose import compose
@@ -66,6 +66,16 @@ def test_true_models_are_right_in_everything(small_town, tmp_path):
     assert figures["buildings"] == 3 and len(lines) == 2
     assert figures["edge_f1"] == figures["corner_f1"] == 100.0
     assert figures["faces_of_truth"] == figures["corners_of_truth"] == 1.0
+
+
+def test_true_roofs_composed_anew_have_the_true_heights(small_town):
+    for building in read_town(small_town):
+        kind, seed = building.id.rsplit("-", 1)
+        truth, again = simulated(kind, int(seed)), composed(building)
+        xy = raster(truth.roof.outline.buffer(-0.05)) + truth.roof.frame.origin[:2]
+        heights = [b.roof.height_at(xy - b.roof.frame.origin[:2]) + b.roof.frame.origin[2] for b in (truth, again)]
+        assert np.mean(np.abs(heights[0] - heights[1]) < 0.02) > 0.98
+        assert again.solid.of_kind("RoofSurface")
 
 
 @needs_judge
