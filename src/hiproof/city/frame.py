@@ -43,7 +43,7 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     if cloud is None:
         refuse_degrees_of_either(request.footprints, footprints, headers)
     frame = AreaFrame(cloud, footprints, units_of(cloud or footprints, named=read.unit))
-    if cloud is None:
+    if cloud is None and (footprints is not None or read.unit == "auto"):
         say_what_is_assumed(headers[0].path, frame)
     return frame
 
