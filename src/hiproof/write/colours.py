@@ -13,6 +13,13 @@ TYPE_COLOURS = {
     "mansard": "#2a9d5c",
     "gambrel": "#93c54b",
     "shed": "#c98bdb",
+    "side_hip": "#4fa3c7",
+    "side_half_hip": "#8fd6ee",
+    "corner": "#1f6f8b",
+    "half_mansard": "#6fbf8f",
+    "truncated_gable": "#4cb27a",
+    "corner_mansard": "#1e7a46",
+    "side_mansard": "#35a866",
     "free": "#a3785f",
     "unknown": "#b5b5b5",
 }

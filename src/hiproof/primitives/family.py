@@ -1,0 +1,349 @@
+"""One family of roof shapes: a rectangle, its direction, and at most five planes along its two axes.
+
+A member has a plane rising from its eave on some of the four sides of its rectangle, and perhaps a level top:
+
+    front (from -v), back (from +v), left (from -u), right (from +u), top
+
+Which it has is its name; heights of the eaves, pitches and the top are its parameters. Where these are as regular as a shape of the
+catalogue (level eaves, equal pitches) its parameters are that shape's, else they are given side by side:
+
+    width, length   the rectangle across and along (m)
+    height          of a level top above T_L (m)
+    pitch_SIDE      the slope of the side's plane (degrees)
+    eave_SIDE       the height of that side's eave in its middle above T_L (m), which is the lowest eave
+    skew_SIDE       how far the side's plane faces off its axis (degrees), where it does
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+import shapely
+
+from ..errors import FitError
+from ..model import Part, Piece
+from .catalogue import CATALOGUE, get
+
+LEFT, RIGHT, FRONT, BACK = range(4)
+SIDES = ("left", "right", "front", "back")
+AXIS = np.array([0, 0, 1, 1])
+SIGN = np.array([1.0, -1.0, 1.0, -1.0])  # the plane from the left rises to +u, from the right to -u, ...
+QUARTER_TURN = [
+    FRONT,
+    BACK,
+    RIGHT,
+    LEFT,
+]  # which side becomes left, right, front, back when the axes turn by 90 degrees
+SAME = 1e-9
+HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
+
+# name by (has a top, planes along u, planes across v), and which sides have planes in the direction that is kept
+SHAPES = {
+    (True, 0, 0): ("flat", ()),
+    (False, 0, 1): ("monopitch", (FRONT,)),
+    (False, 0, 2): ("gable", (FRONT, BACK)),
+    (False, 1, 1): ("corner", (FRONT, RIGHT)),
+    (False, 1, 2): ("side_hip", (FRONT, BACK, RIGHT)),
+    (False, 2, 2): ("hip", (FRONT, BACK, LEFT, RIGHT)),
+    (True, 0, 1): ("half_mansard", (FRONT,)),
+    (True, 0, 2): ("truncated_gable", (FRONT, BACK)),
+    (True, 1, 1): ("corner_mansard", (FRONT, RIGHT)),
+    (True, 1, 2): ("side_mansard", (FRONT, BACK, RIGHT)),
+    (True, 2, 2): ("mansard", (FRONT, BACK, LEFT, RIGHT)),
+}
+# CityGML (SIG3D) and AdV codes of the members that the catalogue does not have: the nearest that the lists know.
+CODES = {
+    "corner": ("1040", "3200"),
+    "side_hip": ("1040", "3200"),
+    "side_half_hip": ("1050", "3300"),
+    "half_mansard": ("1060", "3400"),
+    "truncated_gable": ("1060", "3400"),
+    "corner_mansard": ("1060", "3400"),
+    "side_mansard": ("1060", "3400"),
+}
+NAMES = (*CATALOGUE, *CODES)
+# Shapes of as many planes on the same sides, told apart by their eaves and pitches: one may be described as the other.
+KIN = (("hip", "half_hip", "pyramid"), ("side_hip", "side_half_hip"), ("gable", "asymmetric_gable"))
+COMPONENTS = {
+    "gambrel": ("gable", "truncated_gable"),
+    "shed": ("monopitch",),
+}  # what the larger shapes are put together from
+
+
+def citygml_code(name: str) -> str | None:
+    """SIG3D code of a roof type, None for "free" and what is no type."""
+    if name in CATALOGUE:
+        return CATALOGUE[name].citygml_code
+    return CODES[name][0] if name in CODES else None
+
+
+@dataclass(frozen=True)
+class Member:
+    """A shape of the family: `kappa` (rad), `centre` (2,) and `half` (2,) extents along u and v, heights of the eaves (4,) at
+    their own sides, infinite where a side has no plane, `slopes` (4,), and the height of the level `top`, infinite without one.
+    `leans` (4,) are what the planes rise along their sides, as shares of their slopes.
+
+    >>> gable = Member(0.0, np.zeros(2), np.array([6.0, 4.0]), np.array([np.inf, np.inf, 5.0, 5.0]), np.array([0, 0, 0.5, 0.5]))
+    >>> gable.name, gable.describe()[0]
+    ('gable', {'width': 8.0, 'length': 12.0, 'height': 2.0})
+    """
+
+    kappa: float
+    centre: np.ndarray
+    half: np.ndarray
+    eaves: np.ndarray
+    slopes: np.ndarray
+    top: float = math.inf
+    leans: np.ndarray = field(default_factory=lambda: np.zeros(4))
+
+    @cached_property
+    def has(self) -> np.ndarray:
+        """Which sides (4,) have a plane."""
+        return np.isfinite(self.eaves)
+
+    @property
+    def base(self) -> float:
+        """Height of the lowest eave, of the top where there is none: z of T_L."""
+        return float(min(self.eaves.min(), self.top)) if not self.has.any() else float(self.eaves.min())
+
+    def own_planes(self) -> np.ndarray:
+        """Planes (k, 3) over u, v about the centre: those of the sides in order, then the top."""
+        planes = []
+        for side in np.nonzero(self.has)[0]:
+            plane = np.zeros(3)
+            plane[AXIS[side]] = SIGN[side] * self.slopes[side]
+            plane[1 - AXIS[side]] = self.leans[side] * self.slopes[side]
+            plane[2] = self.eaves[side] + self.slopes[side] * self.half[AXIS[side]]
+            planes.append(plane)
+        if math.isfinite(self.top):
+            planes.append(np.array([0.0, 0.0, self.top]))
+        return np.array(planes)
+
+    def planes(self) -> np.ndarray:
+        """Planes (k, 3) over x, y of the frame that `kappa` and `centre` are given in."""
+        c, s = math.cos(self.kappa), math.sin(self.kappa)
+        planes = self.own_planes() @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        planes[:, 2] -= planes[:, :2] @ self.centre
+        return planes
+
+    def apex(self, axis: int) -> float:
+        """Height at which the planes of the two sides across `axis` meet, infinite where one is missing."""
+        (low, high), (one, other) = self.eaves[2 * axis : 2 * axis + 2], self.slopes[2 * axis : 2 * axis + 2]
+        if not (math.isfinite(low) and math.isfinite(high)):
+            return math.inf
+        run = (high - low + 2.0 * self.half[axis] * other) / (one + other)  # from the low side's eave to the ridge
+        return float(low + one * run)
+
+    def turned(self) -> Member:
+        """The same surface with its axes turned by 90 degrees."""
+        return replace(
+            self,
+            kappa=math.remainder(self.kappa + 0.5 * math.pi, 2.0 * math.pi),
+            half=self.half[::-1].copy(),
+            eaves=self.eaves[QUARTER_TURN],
+            slopes=self.slopes[QUARTER_TURN],
+            leans=self.leans[QUARTER_TURN] * [-1.0, -1.0, 1.0, 1.0],
+        )
+
+    def canonical(self) -> Member:
+        """The same surface in the direction in which it is named: the ridge along u, planes on the sides that SHAPES says."""
+        member = self
+        for _ in range(self.quarter_turns):
+            member = member.turned()
+        return member
+
+    @cached_property
+    def quarter_turns(self) -> int:
+        """How many turns lead to the canonical direction."""
+        along, across = int(self.has[:2].sum()), int(self.has[2:].sum())
+        _, sides = SHAPES[math.isfinite(self.top), min(along, across), max(along, across)]
+        wanted = [side in sides for side in range(4)]
+        turns = [self]
+        for _ in range(3):
+            turns.append(turns[-1].turned())
+        named = [k for k, member in enumerate(turns) if member.has.tolist() == wanted and member.lies_along()]
+        return min(named, key=lambda k: turns[k].order(), default=0)
+
+    def order(self) -> tuple[float, ...]:
+        """Of members of the same surface the least comes first: steeper, then lower, in front and on the left."""
+        slopes, eaves = self.slopes, np.where(self.has, self.eaves, 0.0)
+        apart = [
+            slopes[BACK] - slopes[FRONT],
+            eaves[FRONT] - eaves[BACK],
+            slopes[RIGHT] - slopes[LEFT],
+            eaves[LEFT] - eaves[RIGHT],
+        ]
+        ahead = -0.5 * math.pi < self.kappa <= 0.5 * math.pi
+        return (*np.round(apart, 6).tolist(), not ahead)
+
+    def lies_along(self) -> bool:
+        """Whether the longer way is u: along the ridge of the sides that meet lower, else of the rectangle."""
+        low, high = self.apex(1), self.apex(0)
+        if math.isfinite(low) and math.isfinite(high) and abs(low - high) > SAME:
+            return low < high
+        square_like = self.has.all() or not self.has.any()
+        return not square_like or self.half[0] >= self.half[1] - SAME
+
+    @cached_property
+    def name(self) -> str:
+        """The roof type: a name of the catalogue or of the family."""
+        along, across = sorted((int(self.has[:2].sum()), int(self.has[2:].sum())))
+        name, _ = SHAPES[math.isfinite(self.top), along, across]
+        member = self.canonical()
+        if name == "gable":
+            return "gable" if abs(member.slopes[FRONT] - member.slopes[BACK]) < SAME else "asymmetric_gable"
+        if name in ("hip", "side_hip"):
+            ends = [side for side in (LEFT, RIGHT) if member.has[side]]
+            sides = member.eaves[2:].max()
+            drop = min(member.eaves[side] for side in ends) - sides
+            if drop > HALF_HIP_SHARE * (member.apex(1) - sides):
+                return name.replace("hip", "half_hip")
+            if name == "hip" and abs(member.apex(0) - member.apex(1)) < SAME:
+                return "pyramid"
+        return name
+
+    def is_regular(self) -> bool:
+        """Whether the catalogue's shape of this name is the same surface."""
+        name, e = self.name, self.eaves
+        if name not in CATALOGUE or self.leans.any():
+            return False
+        even = {
+            "gable": self.mirrored(1),
+            "hip": self.mirrored(0) and self.mirrored(1) and same(e[FRONT], e[RIGHT]),
+            "half_hip": self.mirrored(0) and self.mirrored(1),
+            "pyramid": self.mirrored(0) and self.mirrored(1) and same(e[FRONT], e[RIGHT]),
+            "mansard": self.mirrored(0) and self.mirrored(1) and same(e[FRONT], e[RIGHT]),
+        }
+        return even.get(name, True)
+
+    def theta(self, name: str) -> np.ndarray:
+        """theta (9,) of the catalogue's shape `name`, by the front and the right side where the others are as these."""
+        e, s = self.eaves, self.slopes
+        across, along = (e[FRONT], s[FRONT]), (e[RIGHT], s[RIGHT])
+        u, v = self.half
+        q = {
+            "flat": lambda: [self.top],
+            "monopitch": lambda: [across[0] + across[1] * v, across[1]],
+            "gable": lambda: [self.apex(1), across[1]],
+            "asymmetric_gable": lambda: [
+                self.apex(1),
+                s[FRONT],
+                s[BACK],
+                (self.apex(1) - e[FRONT]) / s[FRONT] / v - 1.0,
+            ],
+            "hip": lambda: [self.apex(1), across[1], along[1]],
+            "half_hip": lambda: [self.apex(1), across[1], along[1], (self.apex(1) - along[0]) / (across[1] * v)],
+            "pyramid": lambda: [self.apex(1), across[1]],
+            "mansard": lambda: [self.top, across[1], along[1], (self.top - across[0]) / (across[1] * v)],
+        }[name]()
+        return get(name).canonical_theta(np.array([*self.centre, self.kappa, v, u, *q, *[0.0] * (4 - len(q))]))
+
+    def mirrored(self, axis: int) -> bool:
+        """Whether the two sides across `axis` have the same eave and pitch."""
+        one, other = 2 * axis, 2 * axis + 1
+        return same(self.eaves[one], self.eaves[other]) and same(self.slopes[one], self.slopes[other])
+
+    def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
+        """(parameters by name, kappa, T_L (3,)) of this member in its canonical direction."""
+        member = self.canonical()
+        if as_catalogue and member.is_regular():
+            return get(self.name).from_theta(member.theta(self.name))
+        return member.side_by_side()
+
+    def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
+        """(parameters by name, kappa, T_L (3,)) of this member, each side's own."""
+        parameters = {"width": 2.0 * self.half[1], "length": 2.0 * self.half[0]}
+        if math.isfinite(self.top):
+            parameters["height"] = self.top - self.base
+        for side in np.nonzero(self.has)[0]:
+            parameters[f"pitch_{SIDES[side]}"] = math.degrees(math.atan(self.slopes[side]))
+            parameters[f"eave_{SIDES[side]}"] = self.eaves[side] - self.base
+            if self.leans[side]:
+                parameters[f"skew_{SIDES[side]}"] = math.degrees(math.atan(self.leans[side]))
+        parameters = {name: float(value) for name, value in parameters.items()}
+        return parameters, self.kappa, np.array([*self.centre, self.base])
+
+    def sigma(self, changes: list[Member], as_catalogue: bool = True) -> dict[str, float]:
+        """Standard deviations by parameter (and t_z) where `changes` are this member after independent changes of one each."""
+
+        def values(member: Member) -> np.ndarray:
+            if as_catalogue and self.is_regular():
+                described = get(self.name).from_theta(member.theta(self.name))
+            else:
+                described = member.side_by_side()
+            return np.array([*described[0].values(), described[2][2]])
+
+        centre = values(self)
+        variance = sum(((values(member) - centre) ** 2 for member in changes), np.zeros(len(centre)))
+        names = [*self.describe(as_catalogue)[0], "t_z"]
+        return {name: math.sqrt(v) for name, v in zip(names, variance.tolist(), strict=True) if v > 1e-18}
+
+    def part(
+        self, outlines: list[shapely.Polygon], name: str | None = None, changes: list[Member] | None = None
+    ) -> Part:
+        """A part of this shape that roofs `outlines`, in the frame of `kappa` and `centre`; called `name` if that is its kin.
+
+        `changes` are as in `sigma`, in the same direction as this member, which must be its canonical one.
+        """
+        as_catalogue = name in (None, self.name)
+        parameters, kappa, translation = self.describe(as_catalogue)
+        name = name or self.name
+        planes = planes_of(name, parameters, kappa, translation)
+        sigma = self.sigma(changes or [], as_catalogue)
+        return Part(name, tuple(Piece(o, planes) for o in outlines), parameters, kappa, translation, sigma)
+
+
+def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
+    """`name` or, where it is not `allowed`, that of its kin which is; None where none is. All are where `allowed` is empty.
+
+    >>> name_among("pyramid", ("gable", "hip")), name_among("corner", ("gable",))
+    ('hip', None)
+    """
+    if not allowed or name in allowed:
+        return name
+    return next((kin for kins in KIN if name in kins for kin in kins if kin in allowed), None)
+
+
+def same(one: float, other: float) -> bool:
+    return one == other or abs(one - other) < SAME
+
+
+def planes_of(name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> np.ndarray:
+    """Planes (k, 3) over x, y of the roof type `name` with its parameters: the inverse of `Member.describe`.
+
+    Raises FitError for a name that is no type or parameters that are not its own.
+
+    >>> planes_of("monopitch", {"width": 4.0, "length": 9.0, "height": 2.0}, 0.0, np.array([0.0, 0.0, 5.0])).tolist()
+    [[0.0, 0.5, 6.0]]
+    """
+    if name in CATALOGUE and not any(key.startswith("pitch_") for key in parameters):
+        shape = get(name).variant(parameters)
+        theta = shape.to_theta(parameters, kappa, translation)
+        return np.concatenate([piece.planes for piece in shape.part(theta).pieces])
+    return member_of(name, parameters, kappa, translation).planes()
+
+
+def member_of(name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> Member:
+    """The member with parameters given side by side. Raises FitError where one is missing."""
+    shapes = {shape: (top, sides) for (top, _, _), (shape, sides) in SHAPES.items()}
+    base = name.replace("half_hip", "hip").replace("asymmetric_", "").replace("pyramid", "hip")
+    if base not in shapes:
+        raise FitError(f"expected a roof type ({', '.join(NAMES)}), got {name!r}; choose one of these")
+    top, sides = shapes[base]
+    eaves, slopes, leans = np.full(4, np.inf), np.zeros(4), np.zeros(4)
+    try:
+        for side in sides:
+            eaves[side] = translation[2] + parameters[f"eave_{SIDES[side]}"]
+            slopes[side] = math.tan(math.radians(parameters[f"pitch_{SIDES[side]}"]))
+            leans[side] = math.tan(math.radians(parameters.get(f"skew_{SIDES[side]}", 0.0)))
+        height = translation[2] + parameters["height"] if top else math.inf
+        half = 0.5 * np.array([parameters["length"], parameters["width"]])
+    except KeyError as missing:
+        raise FitError(
+            f"expected the parameter {missing.args[0]} of a {name} roof, got {', '.join(parameters)}; give every one"
+        ) from missing
+    return Member(kappa, np.asarray(translation[:2], float), half, eaves, slopes, height, leans)
