@@ -28,7 +28,7 @@ from hiproof.model import Part, Roof
 from hiproof.simulate import COMPOUND_KINDS, ScanSettings, SimBuilding, random_compound, scan
 from hiproof.simulate.scene import Defects
 
-from .judging import RASTER_M, CompoundFit, fitted, raster
+from .judging import RASTER_M, BuildingFit, fitted, raster
 from .matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
 
 STEP_M, NEAR_STEP_CELLS, NEAR_M = 0.4, 3, 0.1
@@ -47,7 +47,7 @@ class Outcome:
     ratios: tuple[tuple[str, float], ...]
 
 
-def errors(truth: Roof, fit: CompoundFit) -> tuple[float, float]:
+def errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
     """RMSE (m) over the roof's raster, and over it without the surroundings of the true roof's steps."""
     x0, y0, x1, y1 = truth.outline.bounds
     x, y = np.meshgrid(np.arange(x0, x1, RASTER_M), np.arange(y0, y1, RASTER_M), indexing="ij")

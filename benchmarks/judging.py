@@ -14,7 +14,7 @@ from types import ModuleType
 import numpy as np
 import shapely
 
-from hiproof.fit.compound import CompoundFit, fit_building
+from hiproof.fit.union import BuildingFit, fit_building
 from hiproof.model import Building, Part, Roof
 from hiproof.settings import Settings
 
@@ -22,7 +22,7 @@ SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 RASTER_M = 0.2
 
 
-def fitted(points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None) -> CompoundFit:
+def fitted(points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None) -> BuildingFit:
     """The roof of one building: the only place where benchmarks name the search they measure."""
     return fit_building(points_local, outline, settings or Settings())
 

@@ -183,7 +183,8 @@ def test_the_network_adds_its_opinion():
     building = hiproof.reconstruct(gable_points(), FOOTPRINT)
     assert building.type == "gable"
     assert sum(building.recognised.values()) == pytest.approx(1.0)
-    assert sum(building.types.values()) == pytest.approx(1.0)
+    alone = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=Settings.from_dict({"fit": {"parts": "one"}}))
+    assert sum(alone.types.values()) == pytest.approx(1.0)
 
 
 def test_a_footprint_with_attributes_keeps_them():

@@ -73,7 +73,7 @@ class CompoundSettings:
     """[compound] several parts chosen by evidence."""
 
     detail: str = setting("full", "main leaves out dormers and small parts", choices=("full", "main"))
-    tolerance_m: float = setting(0.2, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
+    tolerance_m: float = setting(0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
     evidence_points: float = setting(1.1, "points that one unit of structure must explain at least", "", 0.1, 100.0)
     evidence_area_m2: float = setting(0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0)
 

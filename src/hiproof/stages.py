@@ -33,7 +33,6 @@ class Recognised:
 
     weights: np.ndarray | None = None
     types: dict[str, float] = field(default_factory=dict)
-    log_prior: dict[str, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -136,14 +135,14 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
     """The network's opinion of the points (paper section 3.1), none where it is switched off or cannot tell."""
     if not settings.segment.enabled:
         return Recognised()
-    from .segment import fit_prior, segment
+    from .segment import segment
 
     try:
         found = segment(points, settings)
     except FitError:
         return Recognised()
     weights = found.weights if settings.fit.parts == "one" or settings.fit.objective == "paper" else None
-    return Recognised(weights, found.types, fit_prior(found.types))
+    return Recognised(weights, found.types)
 
 
 def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
@@ -162,11 +161,11 @@ def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recogni
 def fit_several(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """As many parts as the evidence pays for, all fitted to all points together."""
-    from .fit.compound import fit_building
+    """As many volumes as the evidence pays for; what the network says of the whole building does not bear on them."""
+    from .fit.union import fit_building
 
-    found = fit_building(points, outline, settings, recognised.log_prior)
-    return Fitted(found.roof_parts, found.outline, found.objective, found.types)
+    found = fit_building(points, outline, settings)
+    return Fitted(found.roof_parts, found.outline, found.objective)
 
 
 def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:

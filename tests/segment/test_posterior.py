@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hiproof.segment import combine, fit_prior, most_probable
+from hiproof.segment import combine, most_probable
 from hiproof.segment.posterior import EVIDENCE_EXPONENT, OUTLIER_DISTANCE_M, SMALLEST_PRIOR, expected_distance
 
 TYPES = {"gable": 0.6, "hip": 0.3, "flat": 0.1}
@@ -31,16 +31,6 @@ def test_adding_a_constant_to_all_bics_changes_nothing():
     bics = {"gable": 10.0, "hip": 14.0, "flat": 90.0}
     shifted = {name: bic + 1e4 for name, bic in bics.items()}
     assert combine(TYPES, bics) == pytest.approx(combine(TYPES, shifted))
-
-
-def test_fit_prior_chooses_as_combine_does():
-    rng = np.random.default_rng(1)
-    for _ in range(50):
-        prior = dict(zip("abcde", rng.dirichlet(np.ones(5)), strict=True))
-        bics = {name: rng.normal(0, 20) for name in prior}
-        log_prior = fit_prior(prior)
-        chosen = min(prior, key=lambda name: bics[name] / 2 - log_prior[name])
-        assert chosen == next(iter(combine(prior, bics)))
 
 
 def test_a_zero_probability_is_bounded_so_that_evidence_can_undo_it():

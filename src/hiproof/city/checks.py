@@ -26,7 +26,7 @@ def refuse_unusable(request: Any) -> None:
 
 def refuse_settings(settings: Settings) -> None:
     """Raise SettingsError or InputError for values that are well formed, but that nothing here can be done with."""
-    refuse_unknown_types(settings.fit.types)
+    refuse_unknown_types(settings.fit)
     refuse_crs(settings.read)
     if settings.segment.enabled and (settings.segment.weights or settings.segment.device != "cpu"):
         from ..segment.inference import SHIPPED_WEIGHTS, load
@@ -38,17 +38,20 @@ def refuse_settings(settings: Settings) -> None:
         import_pyarrow()
 
 
-def refuse_unknown_types(types: tuple[str, ...]) -> None:
+def refuse_unknown_types(fit: Any) -> None:
+    """Roof types must be those that the kind of fit knows: one primitive takes the catalogue's, volumes the whole family's."""
     from ..primitives import CATALOGUE
+    from ..primitives.family import NAMES
 
-    unknown = [name for name in types if name not in CATALOGUE]
+    known = tuple(CATALOGUE) if fit.parts == "one" or fit.objective == "paper" else NAMES
+    unknown = [name for name in fit.types if name not in known]
     if unknown:
-        near = [difflib.get_close_matches(name.lower(), CATALOGUE, n=1, cutoff=0.5) for name in unknown]
+        near = [difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5) for name in unknown]
         meant = [
             f"{shown(name)} (did you mean {found[0]}?)" if found else shown(name)
             for name, found in zip(unknown, near, strict=True)
         ]
-        raise SettingsError(f"expected roof types among {', '.join(CATALOGUE)}, got {', '.join(meant)}")
+        raise SettingsError(f"expected roof types among {', '.join(known)}, got {', '.join(meant)}")
 
 
 def refuse_crs(read: Any) -> None:

@@ -10,6 +10,6 @@ scores      figures of a classification
 from __future__ import annotations
 
 from .inference import NOT_ROOF, Segmentation, segment
-from .posterior import combine, fit_prior, most_probable
+from .posterior import combine, most_probable
 
-__all__ = ["NOT_ROOF", "Segmentation", "combine", "fit_prior", "most_probable", "segment"]
+__all__ = ["NOT_ROOF", "Segmentation", "combine", "most_probable", "segment"]

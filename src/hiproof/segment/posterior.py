@@ -67,12 +67,6 @@ def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str,
     return {name: float(np.log(max(types.get(name, mean_prior), SMALLEST_PRIOR))) for name in names or tuple(types)}
 
 
-def fit_prior(types: dict[str, float]) -> dict[str, float]:
-    """Log prior by type on the scale of the fit's own evidence, for `fit_roof(type_log_prior=...)`: the tempering of
-    the evidence turned round."""
-    return {name: value / EVIDENCE_EXPONENT for name, value in log_prior(types).items()}
-
-
 def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]) -> tuple[Fit, dict[str, float]]:
     """The fit to build, and the posterior by type, best first.
 

@@ -15,15 +15,12 @@ from ...compiled import compiled
 
 # Units of complexity: what a piece of structure must pay for in evidence.
 FLAT, AXIS_SLOPE, FREE_SLOPE = 1.0, 1.4, 1.9
-SYMMETRIC_GABLE_EXTRA, HIP_EXTRA = 0.5, 0.5
-CUT, CUT_AT_VERTEX, OVERLAY, REUSED_PLANE = 1.0, 0.5, 1.0, 0.3
 KIND_COST = np.array([FLAT, AXIS_SLOPE, AXIS_SLOPE, FREE_SLOPE])
 
 MAX_SLOPE = 2.5
 MIN_AXIS_SLOPE = 0.05
 MAX_PLANES = 5  # of one part
 SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
-MIN_SIDE_M = 0.6
 NEIGHBOUR_RADIUS_M = 2.5
 LOCAL_POINTS = (9, 17)  # neighbours of a local plane, the point itself among them
 RIDGE_STEP_M = 0.4
@@ -155,40 +152,6 @@ def fit_plane(cloud, members, start, tau, evidence):
         if cost < best_cost:
             best_cost, best = cost, plane
     return best, best_cost
-
-
-@compiled
-def is_symmetric_gable(planes, count):
-    """Two planes whose opposite slopes along one axis are the same."""
-    if count != 2:
-        return False
-    kind = kind_of(planes[0])
-    opposite = abs(planes[0, 0] + planes[1, 0]) + abs(planes[0, 1] + planes[1, 1]) < 1e-6
-    return (kind == 1 or kind == 2) and kind_of(planes[1]) == kind and opposite
-
-
-@compiled
-def is_symmetric_hip(planes, count):
-    """Two pairs of planes, each with opposite slopes along one axis: pyramid or hip."""
-    return (
-        count == 4
-        and is_symmetric_gable(planes[:2], 2)
-        and is_symmetric_gable(planes[2:4], 2)
-        and kind_of(planes[0]) != kind_of(planes[2])
-    )
-
-
-@compiled
-def planes_complexity(planes, count):
-    """Units of complexity of a min of planes: symmetric gables and hips count as one thing, others plane by plane."""
-    if is_symmetric_gable(planes, count):
-        return KIND_COST[kind_of(planes[0])] + SYMMETRIC_GABLE_EXTRA
-    if is_symmetric_hip(planes, count):
-        return AXIS_SLOPE + SYMMETRIC_GABLE_EXTRA + HIP_EXTRA
-    total = 0.0
-    for k in range(count):
-        total += KIND_COST[kind_of(planes[k])]
-    return total
 
 
 @compiled
@@ -649,25 +612,3 @@ def gable_pool(cloud, grid, pool, tau, evidence, most):
                 gables[k, :2] = fitted
         lower_costs(cloud, members, candidates[m], counts[m], tau, current)
     return gables, gable_counts
-
-
-@compiled
-def without_twins(pool, cloud):
-    """The planes of `pool` that differ by more than 4 cm on average from every one kept before."""
-    kept = np.zeros((len(pool), 3))
-    n = 0
-    for plane in pool:
-        new = True
-        for q in range(n):
-            gap = 0.0
-            for i in range(len(cloud.u)):
-                gap += abs(
-                    (plane[0] - kept[q, 0]) * cloud.u[i] + (plane[1] - kept[q, 1]) * cloud.v[i] + plane[2] - kept[q, 2]
-                )
-            if gap <= 0.04 * len(cloud.u):
-                new = False
-                break
-        if new:
-            kept[n] = plane
-            n += 1
-    return kept[:n]

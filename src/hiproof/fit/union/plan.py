@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
-from .kernels import Cloud, Ghosts, Grid
+from .planes import Cloud, Ghosts, Grid
 
 MIN_STRUCTURE_POINTS = 4
 BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this close to the border: facade returns

@@ -1,0 +1,98 @@
+"""A building's roof as a union of few parametric volumes, found by evidence and fitted to all of its points.
+
+z(x, y) = max over volumes whose rectangle holds (x, y)  of  min over its at most five planes
+
+plan        the building's frame, the points that count, a grid, ghosts of unseen roof
+scene       these in each of the building's directions, as the compiled search reads them
+planes      compiled: planes and gables that explain rectangles of points
+candidates  volumes of these planes, and where each would gain most
+volumes     compiled: a volume as a row of numbers, heights of the roof
+objective   compiled: what a roof costs: misfit, volumes, edges that show
+edges, refit, moves  compiled: a volume's edges and planes, structure that comes and goes
+grow        volumes added one by one from a level base, all improved after each
+trim        hidden edges drawn in
+search      these in order, and the simplification that a draughtsman would make
+sides       each side on the line of the outline that it all but follows
+finish      all planes to all points, along their sides, eaves level where the points allow it
+regions     where each volume roofs the outline
+names       volume -> named part of the family of roof shapes
+larger      saw-teeth and gambrels put together
+clamp       no height far beyond those of the points
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from ...errors import FitError
+from ...model import Part, Piece
+from ...primitives.family import name_among
+from ...settings import Settings
+from .clamp import clamped
+from .finish import finished
+from .fit import BuildingFit
+from .larger import put_together
+from .names import part_of
+from .objective import base_shows
+from .outline import outline_of_points
+from .plan import lay_out_plan
+from .regions import polygons_of, regions_of
+from .search import find_volumes
+from .sides import sides_of
+from .volumes import roof_heights
+
+__all__ = ["BuildingFit", "fit_building"]
+
+
+def fit_building(
+    points_local: np.ndarray, outline: shapely.Polygon | None = None, settings: Settings | None = None
+) -> BuildingFit:
+    """Fit the roof of one building to `points_local` (n, 3), in metres of a local frame, over `outline` (same frame).
+
+    Without an outline it is estimated from the points; with one, points outside it do not count. Where `settings.fit.types`
+    names types, parts have these only, or are flat. Raises FitError where nothing can be fitted: no points inside the outline, or
+    none given and points that span no area.
+
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4)))
+    >>> roof = np.column_stack([x, y, np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)])
+    >>> fit = fit_building(roof, shapely.box(0, 0, 12, 7))
+    >>> sorted(part.type for part in fit.roof_parts), fit.unexplained
+    (['flat', 'gable'], 0.0)
+    """
+    settings = settings or Settings()
+    points_local = np.asarray(points_local, float).reshape(-1, 3)
+    points_local = points_local[np.isfinite(points_local).all(axis=1)]
+    if outline is None:
+        outline = outline_of_points(points_local, settings)
+    outline = max(polygons_of(shapely.make_valid(outline)), key=lambda polygon: polygon.area, default=outline)
+    plan = lay_out_plan(points_local, outline)
+    if len(plan.cloud.u) == 0:
+        raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
+    types = settings.fit.types
+    volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
+    sides = sides_of(volumes, plan, outline, scene)
+    planes = finished(volumes, sides, scene)
+    regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
+    parts = [
+        part_of(*each, own, plan, scene, types)
+        for *each, own in zip(volumes, planes, sides, regions, strict=True)
+        if own
+    ]
+    parts = [as_allowed(part, types, points_local) for part in put_together(parts, types)]
+    parts = clamped(parts, *(plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max())))
+    z, _ = roof_heights(volumes, scene.U, scene.V)
+    far = np.abs(scene.z - z)[: scene.n] > settings.compound.tolerance_m
+    return BuildingFit(tuple(parts), outline, value, scene.n, float(np.mean(far)))
+
+
+def as_allowed(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
+    """The part, or a flat one at its points' median height (n, 3) where its type is none of `types`."""
+    if name_among(part.type, types) or part.type == "flat":
+        return part
+    inside = np.any([shapely.contains_xy(p.outline, points[:, 0], points[:, 1]) for p in part.pieces], axis=0)
+    z = points[inside, 2] if inside.any() else np.array([part.translation[2]])
+    level = np.array([[0.0, 0.0, float(np.sort(z)[len(z) // 2])]])
+    pieces = tuple(Piece(piece.outline, level) for piece in part.pieces)
+    size = {name: part.parameters[name] for name in ("width", "length") if name in part.parameters}
+    return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], level[0, 2]]))

@@ -1,0 +1,182 @@
+"""Volumes worth trying: the planes and gables that explain rectangles of points, and where each would gain most."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .objective import point_cost
+from .plan import cells_of
+from .planes import (
+    Cloud,
+    Grid,
+    best_rectangle,
+    gable_pool,
+    hypotheses,
+    kind_of,
+    plane_pool,
+    reach_of_rows,
+)
+from .scene import Scene
+from .volumes import (
+    ALL,
+    COLUMNS,
+    DIRECTION,
+    LEVEL,
+    OFFSET,
+    OPPOSITE,
+    PLANES,
+    SIDES,
+    SLOPE,
+    TIE,
+    coefficients,
+    lowest,
+    volume_cost,
+)
+
+POOL_POINTS, SEEDS, PAIRS = 500, 100, 200
+MOST_GABLES = 6
+ALONG_AXIS = 0.12  # a plane that leans so little off an axis is taken along it
+RIDGE_INSIDE_M = 0.4
+MOST_TOPS, MOST_PAIRS = 2, 3  # level tops and pairs of slopes, strongest first, that make hips and mansards
+WRONG_COVER = 0.02  # of a point: what covering one without explaining it costs
+NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
+
+
+def candidates_of(scene: Scene, members: np.ndarray, grids: list[Grid], most_planes: int) -> np.ndarray:
+    """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction."""
+    found = [
+        volume
+        for direction, grid in enumerate(grids)
+        for volume in candidates_in(scene, members, direction, grid, most_planes)
+    ]
+    return np.array(found).reshape(-1, COLUMNS)
+
+
+def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int) -> list[np.ndarray]:
+    """Those of one direction: every plane of the pool along an axis, the gables, and all pairs that form a ridge."""
+    every = members[np.arange(min(len(members), POOL_POINTS)) * len(members) // min(len(members), POOL_POINTS)]
+    u, v, z = (np.ascontiguousarray(x[every]) for x in (scene.U[direction], scene.V[direction], scene.z))
+    few = Cloud(u, v, z, cells_of(grid.u, u), cells_of(grid.v, v))
+    evidence, tolerance = scene.evidence * len(every) / len(members), scene.dead + scene.width
+    pool = plane_pool(few, grid, hypotheses(few, SEEDS, PAIRS), tolerance, evidence, most_planes)
+    if len(pool) == 0:
+        return []
+    gables, counts = gable_pool(few, grid, pool, tolerance, evidence, MOST_GABLES)
+    middle = np.array([np.median(u), np.median(v)])
+    along = [plane for plane in (along_axis(plane, middle) for plane in pool) if plane is not None]
+    pairs = [list(g[:c]) for g, c in zip(gables, counts, strict=True)]
+    pairs += [[p, q] for i, p in enumerate(along) for q in along[:i] if has_ridge(p, q, grid)]
+    groups = [[plane] for plane in along] + pairs + larger_groups(along, pairs)
+    volumes = (volume_of(direction, planes) for planes in groups)
+    return [volume for volume in volumes if volume is not None]
+
+
+def larger_groups(planes: list[np.ndarray], pairs: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
+    """Hips of two pairs across each other, and pairs and hips with a level top: those of the strongest few."""
+    flats = [plane for plane in planes if kind_of(plane) == 0][:MOST_TOPS]
+    across = [[pair for pair in pairs if len(pair) == 2 and kind_of(pair[0]) == kind][:MOST_PAIRS] for kind in (1, 2)]
+    hips = [one + other for one in across[0] for other in across[1]]
+    return hips + [group + [flat] for flat in flats for group in (*across[0], *across[1], *hips)]
+
+
+def along_axis(plane: np.ndarray, middle: np.ndarray) -> np.ndarray | None:
+    """The plane without the little it leans along the other axis, turned about the points' `middle`; None if that is much."""
+    if kind_of(plane) != 3:
+        return plane
+    axis = int(abs(plane[0]) > abs(plane[1]))
+    if abs(plane[axis]) >= ALONG_AXIS * abs(plane[1 - axis]):
+        return None
+    plane = plane.copy()
+    plane[2] += plane[axis] * middle[axis]
+    plane[axis] = 0.0
+    return plane
+
+
+def has_ridge(one: np.ndarray, other: np.ndarray, grid: Grid) -> bool:
+    """Whether two planes fall away from a ridge inside the plan."""
+    kind = kind_of(one)
+    if kind not in (1, 2) or kind_of(other) != kind or one[kind - 1] * other[kind - 1] >= 0.0:
+        return False
+    rising, falling = (one, other) if one[kind - 1] > 0.0 else (other, one)
+    at = (falling[2] - rising[2]) / (rising[kind - 1] - falling[kind - 1])
+    lines = (grid.u, grid.v)[kind - 1]
+    return bool(lines[0] + RIDGE_INSIDE_M < at < lines[-1] - RIDGE_INSIDE_M)
+
+
+def volume_of(direction: int, planes: list[np.ndarray]) -> np.ndarray | None:
+    """A volume of planes (a, b, c) along the axes; None where two face the same way or one leans along neither axis."""
+    volume = np.zeros(COLUMNS)
+    volume[DIRECTION], volume[OFFSET : OFFSET + PLANES] = direction, np.inf
+    for plane in planes:
+        kind = kind_of(plane)
+        if kind == 3:
+            return None
+        place = LEVEL if kind == 0 else 2 * (kind - 1) + (plane[kind - 1] < 0.0)
+        if volume[OFFSET + place] < np.inf:
+            return None
+        volume[OFFSET + place] = plane[2]
+        if kind:
+            volume[SLOPE + place] = abs(plane[kind - 1])
+    volume[TIE] = tie_of(volume)
+    return volume
+
+
+def tie_of(volume: np.ndarray) -> float:
+    """The tightest tie that holds of a volume's slopes."""
+    there, slope = np.isfinite(volume[OFFSET : OFFSET + SIDES]), volume[SLOPE : SLOPE + SIDES]
+    if there.sum() < 2:
+        return 0.0
+    if there.all() and np.ptp(slope) < 1e-6:
+        return ALL
+    pairs = [abs(slope[k] - slope[k + 1]) < 1e-6 for k in (0, 2) if there[k] and there[k + 1]]
+    return OPPOSITE if all(pairs) else 0.0
+
+
+@compiled
+def best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, replacing):
+    """For each candidate the rectangle of cells (m, 4) in which it gains most, and that gain (m,) less its price.
+
+    `cell_u`, `cell_v` (directions, n + g) are the cells of points and ghosts, `shape` (directions, 2) their numbers. Joining
+    the max a candidate only counts where it is above the roof `z_now`; `replacing` it counts everywhere. Candidates that
+    cannot come near the best found are left out (minus infinity).
+    """
+    gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
+    threshold = 0.0
+    for m in range(len(candidates)):
+        direction = int(candidates[m, DIRECTION])
+        nu, nv = shape[direction]
+        cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
+        price = scene.evidence * (volume_cost(candidates[m]) + NEW_EDGES)
+        if gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacing, cells) <= price + threshold:
+            continue
+        reach_of_rows(cells, reach)
+        if reach[0] <= price + threshold:
+            continue
+        score, i0, i1, j0, j1 = best_rectangle(cells, max(price + threshold, 1e-6), reach, column)
+        if i1 > i0:
+            gains[m] = score - price
+            rectangles[m] = (i0, i1, j0, j1)
+            threshold = max(threshold, 0.5 * gains[m])
+    return gains, rectangles
+
+
+@compiled
+def gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacing, cells):
+    """Add to `cells` what candidate m would gain at each point and ghost; returns the sum of what is gained."""
+    direction = int(candidates[m, DIRECTION])
+    c = coefficients(candidates, m)
+    u, v, i_of, j_of = scene.U[direction], scene.V[direction], cell_u[direction], cell_v[direction]
+    gained = 0.0
+    for i in range(len(z_now)):
+        h = lowest(c, u[i], v[i])
+        if h <= z_now[i] + 1e-9 and not replacing:
+            continue
+        if i < scene.n:
+            cost = point_cost(scene.z[i], h, scene.dead, scene.width)
+            gain = cost_now[i] - (cost if cost < 1.0 else 1.0 + WRONG_COVER)
+        else:
+            gain = cost_now[i] - (scene.weight[i] if h < scene.low or h > scene.high else 0.0)
+        cells[i_of[i], j_of[i]] += gain
+        gained += max(gain, 0.0)
+    return gained

@@ -1,0 +1,161 @@
+"""The edges of a volume's rectangle: each moved to where the objective is lowest. Compiled.
+
+How the misfit depends on one edge is a running sum over the points in order of their distance; only the steps that a move can
+change are charged anew, and only where the rest leaves room for a gain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .objective import BASE_SHARE, costs, edge_cost
+from .volumes import (
+    BASE_COST,
+    DIRECTION,
+    LEVEL,
+    OFFSET,
+    SLOPE,
+    U0,
+    U1,
+    V0,
+    V1,
+    volume_cost,
+    with_and_without,
+)
+
+MIN_SIDE_M = 0.8
+BEYOND_M = 0.6  # an edge outside the outline by so much does not show
+NEAR_VERTEX_M = 1.5
+SMALL_STEPS, SMALL_STEP_M = 4, 0.1
+TOUCH_M = 0.04
+LEAST_GAIN = 1e-6
+EVERYWHERE = 60.0  # m: no edge is further from where it may go
+
+
+@compiled
+def move_edges(volumes, scene, k, value, reach):
+    """Move each edge of volume k (in place) by at most `reach` to the place of the lowest objective; returns that."""
+    everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+    before = costs(without, scene)
+    gain = np.where(everywhere != without, costs(everywhere, scene) - before, 0.0)
+    base = volumes[0, OFFSET + LEVEL]
+    bare = np.where((without == base) & (everywhere != base), scene.weight, 0.0)
+    bare[: scene.n] = 0.0
+    always_bare = scene.weight[scene.n :][without[scene.n :] == base].sum()
+    fixed = before.sum()
+    for j in range(1, len(volumes)):
+        fixed += scene.evidence * volume_cost(volumes[j])
+    charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
+    known = False
+    u, v = scene.U[int(volumes[k, DIRECTION])], scene.V[int(volumes[k, DIRECTION])]
+    for edge in range(4):
+        places, m = places_of(volumes, scene, k, edge)
+        start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
+        x, across = (u, v) if edge < 2 else (v, u)
+        low, high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+        sign = -1.0 if edge % 2 == 0 else 1.0
+        members = np.nonzero((across >= low) & (across <= high) & (sign * (x - opposite) >= 0.0))[0]
+        distance = sign * x[members]
+        order = np.argsort(distance)
+        distance = distance[order]
+        gains, covered = np.cumsum(gain[members[order]]), np.cumsum(bare[members[order]])
+        best, chosen = value - LEAST_GAIN, start
+        for q in range(m):
+            t = places[q]
+            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
+                continue
+            p = np.searchsorted(distance, sign * t, side="right")
+            trial = fixed + (gains[p - 1] if p > 0 else 0.0)
+            if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
+                trial += scene.evidence * BASE_COST
+            if trial >= best:
+                continue
+            if not known:
+                charge_all(volumes, scene, int(volumes[k, DIRECTION]), charge, boxes)
+                known = True
+            trial = charged(volumes, scene, k, edge, t, trial, best, charge, boxes)
+            if trial < best:
+                best, chosen = trial, t
+        if chosen != start:
+            volumes[k, U0 + edge] = chosen
+            value, known = best, False
+    return value
+
+
+@compiled
+def places_of(volumes, scene, k, edge):
+    """Where an edge may go: grid lines, corners of the outline, small steps, other volumes' edges and ridges, outside."""
+    direction, axis, start = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
+    lines, vertices = scene.lines[direction, axis], scene.vertices[direction, axis]
+    places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 1)
+    m, last = 0, lines[0]
+    for x in lines:
+        if x < np.inf:
+            places[m] = last = x
+            m += 1
+    for x in vertices:
+        if abs(x - start) < NEAR_VERTEX_M:
+            places[m] = x
+            m += 1
+    for q in range(-SMALL_STEPS, SMALL_STEPS + 1):
+        if q != 0:
+            places[m] = start + SMALL_STEP_M * q
+            m += 1
+    for j in range(1, len(volumes)):
+        if j != k and int(volumes[j, DIRECTION]) == direction:
+            places[m], places[m + 1] = volumes[j, U0 + 2 * axis], volumes[j, U1 + 2 * axis]
+            m += 2
+            rising, falling = volumes[j, OFFSET + 2 * axis], volumes[j, OFFSET + 2 * axis + 1]
+            if rising < np.inf and falling < np.inf:
+                places[m] = (falling - rising) / (volumes[j, SLOPE + 2 * axis] + volumes[j, SLOPE + 2 * axis + 1])
+                m += 1
+    places[m] = lines[0] - BEYOND_M if edge % 2 == 0 else last + BEYOND_M
+    return places, m + 1
+
+
+@compiled
+def charge_all(volumes, scene, direction, charge, boxes):
+    """Fill the cost of every edge (k, 4) and its bounds (k, 4, 4) in the axes of `direction`."""
+    c, s = scene.turn[direction]
+    for j in range(1, len(volumes)):
+        other = int(volumes[j, DIRECTION])
+        cosine = scene.turn[other, 0] * c + scene.turn[other, 1] * s
+        sine = scene.turn[other, 1] * c - scene.turn[other, 0] * s
+        for e in range(4):
+            charge[j, e] = edge_cost(volumes, scene, j, e)
+            boxes[j, e, 0] = boxes[j, e, 2] = np.inf
+            boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
+            for end in range(2):
+                a = volumes[j, U0 + e] if e < 2 else volumes[j, U0 + end]
+                b = volumes[j, V0 + end] if e < 2 else volumes[j, U0 + e]
+                x, y = cosine * a - sine * b, sine * a + cosine * b
+                boxes[j, e, 0], boxes[j, e, 1] = min(boxes[j, e, 0], x), max(boxes[j, e, 1], x)
+                boxes[j, e, 2], boxes[j, e, 3] = min(boxes[j, e, 2], y), max(boxes[j, e, 3], y)
+
+
+@compiled
+def charged(volumes, scene, k, edge, t, trial, best, charge, boxes):
+    """`trial` and all edges' costs were edge `edge` of volume k at `t`; given up as soon as it is not below `best`."""
+    start = volumes[k, U0 + edge]
+    low, high = min(start, t) - TOUCH_M, max(start, t) + TOUCH_M
+    cross_low, cross_high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+    along, cross = (0, 2) if edge < 2 else (2, 0)
+    touched = np.zeros((len(volumes), 4), np.bool_)
+    for j in range(1, len(volumes)):
+        for e in range(4):
+            if j == k:
+                touched[j, e] = e != edge ^ 1
+            else:
+                box = boxes[j, e]
+                meets = box[along] <= high and box[along + 1] >= low
+                touched[j, e] = meets and box[cross] <= cross_high + TOUCH_M and box[cross + 1] >= cross_low - TOUCH_M
+            if not touched[j, e]:
+                trial += scene.evidence * charge[j, e]
+    volumes[k, U0 + edge] = t
+    for j in range(1, len(volumes)):
+        for e in range(4):
+            if trial < best and touched[j, e]:
+                trial += scene.evidence * edge_cost(volumes, scene, j, e)
+    volumes[k, U0 + edge] = start
+    return trial

@@ -1,0 +1,142 @@
+"""From the base to a roof: volumes added one by one where they gain most, all of them improved after each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .candidates import best_rectangles, candidates_of
+from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
+from .moves import improve
+from .objective import costs, objective
+from .plan import Plan, cells_of
+from .planes import Grid
+from .refit import refit
+from .scene import Scene
+from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, base_only, roof_heights
+
+MOST_VOLUMES, MOST_ADDITIONS = 24, 20
+MOST_PLANES, MOST_NEW_PLANES = 16, 10
+TRIED_EACH_WAY = 3
+UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
+BASE_QUANTILE = 0.02
+MOST_SLOPES = 5
+FINAL_ROUNDS = 3
+CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
+
+
+def grow(scene: Scene, grids: list[Grid]) -> tuple[np.ndarray, float]:
+    """Volumes (k, COLUMNS) and their objective, found greedily from the base alone."""
+    volumes = base_only(float(np.quantile(scene.z[: scene.n], BASE_QUANTILE, method="lower")))
+    value = objective(volumes, scene, np.inf)
+    candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
+    slopes = typical_slopes(candidates)
+    fresh = False
+    for _ in range(MOST_ADDITIONS):
+        far = unexplained(volumes, scene)
+        if len(far) < FEWEST_UNEXPLAINED or len(volumes) >= MOST_VOLUMES:
+            break
+        found = best_addition(volumes, scene, value, grids, candidates)
+        if found is not None:
+            (volumes, value), fresh = improve(*found[:1], scene, found[1], slopes, 1), False
+        elif fresh:
+            break
+        else:
+            volumes, value = improve(volumes, scene, value, slopes, 2)
+            far = unexplained(volumes, scene)
+            if len(far) < FEWEST_UNEXPLAINED:
+                break
+            candidates, fresh = candidates_of(scene, far, grids, MOST_NEW_PLANES), True
+    return improve(volumes, scene, value, slopes, FINAL_ROUNDS)
+
+
+def unexplained(volumes: np.ndarray, scene: Scene) -> np.ndarray:
+    """Points (m,) that the roof leaves unexplained."""
+    z, _ = roof_heights(volumes, scene.U, scene.V)
+    return np.nonzero(costs(z, scene)[: scene.n] > UNEXPLAINED)[0]
+
+
+def typical_slopes(candidates: np.ndarray) -> np.ndarray:
+    """At most MOST_SLOPES slopes (m,) of the candidates, spread over all that they have."""
+    slopes = candidates[:, SLOPE : SLOPE + SIDES][np.isfinite(candidates[:, OFFSET : OFFSET + SIDES])]
+    slopes = np.unique(np.round(slopes, 2))
+    return (
+        slopes[np.linspace(0, len(slopes) - 1, MOST_SLOPES).round().astype(int)]
+        if len(slopes) > MOST_SLOPES
+        else slopes
+    )
+
+
+def grids_of(plan: Plan, scene: Scene) -> list[Grid]:
+    """A grid of cells for each direction."""
+    grids = [plan.grid]
+    for lines in scene.lines[1:]:
+        u, v = (axis[np.isfinite(axis)] for axis in lines)
+        grids.append(Grid(u, v, np.zeros(len(u), bool), np.zeros(len(v), bool)))
+    return grids
+
+
+def best_addition(
+    volumes: np.ndarray, scene: Scene, value: float, grids: list[Grid], candidates: np.ndarray
+) -> tuple[np.ndarray, float] | None:
+    """The volumes with the one more that lowers the objective most, and that objective; None where none does."""
+    if len(candidates) == 0:
+        return None
+    z_now, _ = roof_heights(volumes, scene.U, scene.V)
+    cost_now = costs(z_now, scene)
+    cell_u = np.array([cells_of(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
+    cell_v = np.array([cells_of(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
+    shape = np.array([(len(grid.u) - 1, len(grid.v) - 1) for grid in grids])
+    best = None
+    for replacing in (False, True):
+        gains, cells = best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, replacing)
+        for m in np.argsort(-gains, kind="stable")[:TRIED_EACH_WAY]:
+            if not gains[m] > 0.0:
+                break
+            volume, grid = candidates[m].copy(), grids[int(candidates[m, DIRECTION])]
+            (i0, i1), (j0, j1) = cells[m, :2], cells[m, 2:]
+            volume[U0 : V1 + 1] = grid.u[i0], grid.u[i1], grid.v[j0], grid.v[j1]
+            for trial in ways_in(volumes, volume, replacing and len(volumes) > 1):
+                trial, found = inserted(trial, scene, value if best is None else best[1])
+                if found < np.inf:
+                    best = trial, found
+    return best
+
+
+def ways_in(volumes: np.ndarray, volume: np.ndarray, replacing: bool) -> list[np.ndarray]:
+    """The volumes with one more: in the max, or replacing what it covers, or with a neighbour cut back to where it begins."""
+    joined = np.vstack([volumes, volume])
+    if not replacing:
+        return [joined]
+    replaced = joined.copy()
+    replaced[-1, REPLACES] = 1.0
+    ways = [replaced]
+    for j in range(1, len(volumes)):
+        if volumes[j, DIRECTION] != volume[DIRECTION] or not overlap(volumes[j], volume):
+            continue
+        for edge in range(4):
+            low, high = volumes[j, U0 + (edge & 2)], volumes[j, U1 + (edge & 2)]
+            stop = volume[U0 + (edge ^ 1)]
+            over = stop - low if edge % 2 == 0 else high - stop
+            if CUT_LEAST_M < over < CUT_MOST_SHARE * (high - low) and high - low - over >= MIN_SIDE_M:
+                cut = joined.copy()
+                cut[j, U0 + edge] = stop
+                ways.append(cut)
+    return ways
+
+
+def overlap(one: np.ndarray, other: np.ndarray) -> bool:
+    low = np.maximum(one[[U0, V0]], other[[U0, V0]])
+    high = np.minimum(one[[U1, V1]], other[[U1, V1]])
+    return bool((high - low > CUT_LEAST_M).all())
+
+
+@compiled
+def inserted(volumes, scene, value):
+    """Volumes whose last one is new, that one fitted and its edges moved twice; infinite where that is not below `value`."""
+    k = len(volumes) - 1
+    found = np.inf
+    for _ in range(2):
+        refit(volumes, scene, k)
+        found = move_edges(volumes, scene, k, objective(volumes, scene, np.inf), EVERYWHERE)
+    return volumes, found if found < value - LEAST_GAIN else np.inf

@@ -1,0 +1,174 @@
+"""The two shapes of more than five planes, put together from parts: a row of equal monopitches is a saw-tooth, a gable on a
+truncated gable's top is a gambrel."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from ...model import Part, Piece
+from ...primitives import get
+from ...primitives.shed import TEETH
+from .regions import GRID_M, polygons_of
+
+SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
+ON_TOP_M = 0.3  # a gable whose eave is so near another's top stands on it
+
+
+def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]:
+    """`parts` with saw-teeth and gambrels in place of what they are made of, where those types are `allowed`."""
+    if not allowed or "shed" in allowed:
+        parts = with_saw_teeth(parts)
+    if not allowed or "gambrel" in allowed:
+        parts = with_gambrels(parts)
+    return parts
+
+
+def with_saw_teeth(parts: list[Part]) -> list[Part]:
+    """`parts` with every row of equal monopitches replaced by one saw-tooth ("shed")."""
+    teeth = [part for part in parts if is_tooth(part)]
+    others = [part for part in parts if not is_tooth(part)]
+    while teeth:
+        row = [teeth.pop(0)]
+        grown = True
+        while grown and len(row) < max(TEETH):
+            neighbour = next((part for part in teeth if follows(row[-1], part) or follows(part, row[0])), None)
+            grown = neighbour is not None
+            if grown:
+                teeth = [part for part in teeth if part is not neighbour]
+                row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
+        others += [saw_tooth(row)] if len(row) >= min(TEETH) else row
+    return others
+
+
+def is_tooth(part: Part) -> bool:
+    return part.type == "monopitch" and len(part.pieces) == 1 and "height" in part.parameters
+
+
+def follows(tooth: Part, next_tooth: Part) -> bool:
+    """Whether `next_tooth` is the like of `tooth` and lies right behind its upper edge."""
+    one, other = tooth.parameters, next_tooth.parameters
+    turn = math.remainder(next_tooth.kappa - tooth.kappa, 2.0 * math.pi)
+    same_slope = abs(one["height"] / one["width"] - other["height"] / other["width"]) < SLOPE_ALIKE
+    same_size = all(
+        abs(one[name] - other[name]) < SIZE_ALIKE * max(one[name], other[name]) for name in ("width", "length")
+    )
+    step = next_tooth.translation - tooth.translation
+    across = np.array([-math.sin(tooth.kappa), math.cos(tooth.kappa)]) @ step[:2]
+    along = np.array([math.cos(tooth.kappa), math.sin(tooth.kappa)]) @ step[:2]
+    spacing = 0.5 * (one["width"] + other["width"])
+    return (
+        abs(turn) < TURN_ALIKE_RAD
+        and same_slope
+        and same_size
+        and abs(step[2]) < HEIGHT_ALIKE_M
+        and abs(across - spacing) < SIZE_ALIKE * spacing
+        and abs(along) < SIZE_ALIKE * one["length"]
+    )
+
+
+def saw_tooth(row: list[Part]) -> Part:
+    """One shed part of equal monopitches, in order from the lowest v to the highest."""
+    mean = {name: float(np.mean([part.parameters[name] for part in row])) for name in ("width", "length", "height")}
+    parameters = {**mean, "width": len(row) * mean["width"], "teeth": float(len(row))}
+    translation = np.mean([part.translation for part in row], axis=0)
+    shape = get("shed").variant(parameters)
+    whole = shape.part(shape.to_theta(parameters, row[0].kappa, translation))
+    covered = shapely.union_all([piece.outline for part in row for piece in part.pieces])
+    c, s = math.cos(row[0].kappa), math.sin(row[0].kappa)
+    across = ((shapely.get_coordinates(covered) - translation[:2]) @ (-s, c)).tolist()
+    along = ((shapely.get_coordinates(covered) - translation[:2]) @ (c, s)).tolist()
+    breaks = np.linspace(-0.5, 0.5, len(row) + 1) * parameters["width"]
+    breaks[[0, -1]] = min(across) - 1.0, max(across) + 1.0
+    pieces = []
+    for low, high, piece in zip(breaks[:-1], breaks[1:], whole.pieces, strict=True):
+        strip = shapely.box(min(along) - 1.0, low, max(along) + 1.0, high)
+        strip = shapely.transform(strip, lambda uv: uv @ np.array([[c, s], [-s, c]]) + translation[:2])
+        pieces += [Piece(polygon, piece.planes) for polygon in polygons_of(shapely.intersection(covered, strip))]
+    return Part("shed", tuple(pieces), parameters, row[0].kappa, translation)
+
+
+def with_gambrels(parts: list[Part]) -> list[Part]:
+    """`parts` with every gable on a truncated gable's top, or between two steeper slopes, united with these."""
+    for upper in parts:
+        below = [part for part in parts if part is not upper]
+        for lower in [(part,) for part in below] + list(combinations(below, 2)):
+            found = gambrel_of(upper, slopes_below(upper, lower))
+            if found is not None:
+                rest = [part for part in below if not any(part is one for one in lower)]
+                return with_gambrels([*rest, found])
+    return parts
+
+
+@dataclass(frozen=True)
+class Slope:
+    """One lower side of a gambrel: the line of its eave across the ridge (m, from the upper gable's), its height, its slope."""
+
+    at: float
+    eave: float
+    slope: float
+    outlines: tuple[shapely.Polygon, ...]
+
+
+def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
+    """The slopes on the two sides below the gable `upper`: of a truncated gable, or of a monopitch on each side; else none."""
+    across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
+    found = []
+    for part in lower:
+        turn = math.remainder(part.kappa - upper.kappa, 2.0 * math.pi)
+        step, p = float(across @ (part.translation - upper.translation)[:2]), part.parameters
+        outlines = tuple(piece.outline for piece in part.pieces)
+        if part.type == "monopitch" and len(lower) == 2 and "height" in p:
+            side = -1.0 if abs(turn) < TURN_ALIKE_RAD else 1.0
+            if side > 0.0 and abs(abs(turn) - math.pi) > TURN_ALIKE_RAD:
+                return []
+            found.append(Slope(step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"], outlines))
+        elif part.type == "truncated_gable" and len(lower) == 1 and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD:
+            for side, name in ((-1.0, "front"), (1.0, "back")):
+                slope = math.tan(math.radians(p[f"pitch_{name}"]))
+                eave = part.translation[2] + p[f"eave_{name}"]
+                found.append(Slope(step + side * 0.5 * p["width"], eave, slope, outlines))
+        else:
+            return []
+    return sorted(found, key=lambda slope: slope.at)
+
+
+def gambrel_of(upper: Part, below: list[Slope]) -> Part | None:
+    """The gable `upper` and the slopes on its two sides as one gambrel, None where they are none."""
+    top = upper.parameters
+    if upper.type != "gable" or "height" not in top or len(below) != 2:
+        return None
+    front, back = below
+    slope, upper_slope = 0.5 * (front.slope + back.slope), 2.0 * top["height"] / top["width"]
+    width, eave = back.at - front.at, 0.5 * (front.eave + back.eave)
+    rise = upper.translation[2] + top["height"] - eave
+    half_break = (0.5 * slope * width - rise) / (slope - upper_slope) if slope > upper_slope + 0.1 else 0.0
+    reach = [one.eave + one.slope * (0.5 * (width - top["width"])) for one in below]
+    fits = (
+        abs(front.at + back.at) < 2.0 * ON_TOP_M
+        and abs(front.eave - back.eave) < 2.0 * ON_TOP_M
+        and abs(front.slope - back.slope) < SIZE_ALIKE * slope
+        and all(abs(height - upper.translation[2]) < 2.0 * ON_TOP_M for height in reach)
+        and 0.1 < 2.0 * half_break / max(width, 1e-6) < 0.95
+    )
+    if not fits:
+        return None
+    parameters = {
+        "width": width,
+        "length": top["length"],
+        "height": rise,
+        "break_width": 2.0 * half_break,
+        "break_height": rise - upper_slope * half_break,
+    }
+    across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
+    centre = upper.translation[:2] + 0.5 * (front.at + back.at) * across
+    translation = np.array([*centre, eave])
+    shape = get("gambrel")
+    planes = shape.part(shape.to_theta(parameters, upper.kappa, translation)).pieces[0].planes
+    outlines = [piece.outline for piece in upper.pieces] + [o for one in below for o in one.outlines]
+    covered = polygons_of(shapely.union_all(outlines, grid_size=GRID_M))
+    return Part("gambrel", tuple(Piece(polygon, planes) for polygon in covered), parameters, upper.kappa, translation)

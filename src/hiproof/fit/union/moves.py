@@ -1,0 +1,363 @@
+"""Moves that change a roof's structure, each taken where it lowers the objective. Compiled.
+
+    refit one volume, move its edges      after every other move
+    drop a volume, a plane                what does not pay goes
+    flatten                               slopes next to level become a level top
+    tie, untie                            equal slopes
+    add an end, a level top               a gable becomes a hip, a hip a mansard
+    let it join again                     a volume that replaces becomes part of the max
+    merge                                 one volume over the rectangles of two
+
+All functions take volumes (k, COLUMNS) and the objective's value, and return the better of what they got and what they found.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .edges import BEYOND_M, EVERYWHERE, LEAST_GAIN, move_edges
+from .objective import objective
+from .refit import refit
+from .volumes import (
+    DIRECTION,
+    LEVEL,
+    OFFSET,
+    PARAMETER_COST,
+    PLANES,
+    REPLACES,
+    SIDES,
+    SLOPE,
+    TIE,
+    U0,
+    U1,
+    V0,
+    V1,
+    coefficients,
+    equalise_slopes,
+    lowest,
+    plane_count,
+    roof_heights,
+    slope_count,
+    with_and_without,
+)
+
+HOPELESS_UNITS, HOPELESS_SHARE = 2.0, 0.01  # a trial that starts further above the best than this is given up
+MOST_SLOPES, SLOPES_APART = 9, 0.02
+END_SEEDS = 16  # points through which a new plane is tried
+MERGE_REACH_M = 2.0
+ALMOST_LEVEL = 0.15
+
+
+@compiled
+def settled(trial, scene, k, value, reach):
+    """`trial` with volume k refitted, its edges moved and refitted, and its objective, infinite where that is above `value`."""
+    refit(trial, scene, k)
+    found = objective(trial, scene, value + HOPELESS_UNITS * scene.evidence + HOPELESS_SHARE * scene.n)
+    if found == np.inf:
+        return trial, found
+    found = move_edges(trial, scene, k, found, reach)
+    again = trial.copy()
+    refit(again, scene, k)
+    better = objective(again, scene, found)
+    if better < found:
+        trial, found = again, better
+    return (trial, found) if found < value - LEAST_GAIN else (trial, np.inf)
+
+
+@compiled
+def without(volumes, k):
+    """The volumes but for the k-th."""
+    return np.concatenate((volumes[:k], volumes[k + 1 :]))
+
+
+@compiled
+def refit_each(volumes, scene, value):
+    """Every volume refitted once, where that helps."""
+    for k in range(len(volumes)):
+        trial = volumes.copy()
+        refit(trial, scene, k)
+        found = objective(trial, scene, value)
+        if found < value - LEAST_GAIN:
+            volumes, value = trial, found
+    return volumes, value
+
+
+@compiled
+def move_all_edges(volumes, scene, value, reach):
+    """The edges of every volume moved, in place."""
+    for k in range(1, len(volumes)):
+        value = move_edges(volumes, scene, k, value, reach)
+    return value
+
+
+@compiled
+def drop_volumes(volumes, scene, value):
+    """Volumes that do not pay go."""
+    k = 1
+    while k < len(volumes):
+        trial = without(volumes, k)
+        found = objective(trial, scene, value - LEAST_GAIN)
+        if found < np.inf:
+            volumes, value = trial, found
+        else:
+            k += 1
+    return volumes, value
+
+
+@compiled
+def drop_planes(volumes, scene, value, k, steepest):
+    """Planes of volume k no steeper than `steepest` that do not pay go."""
+    for plane in range(PLANES):
+        if volumes[k, OFFSET + plane] == np.inf or plane_count(volumes[k]) < 2:
+            continue
+        if plane < LEVEL and volumes[k, SLOPE + plane] > steepest:
+            continue
+        trial = volumes.copy()
+        trial[k, OFFSET + plane] = np.inf
+        if plane < LEVEL:
+            trial[k, SLOPE + plane] = 0.0
+        trial, found = settled(trial, scene, k, value, EVERYWHERE)
+        if found < np.inf:
+            volumes, value = trial, found
+    return volumes, value
+
+
+@compiled
+def flatten(volumes, scene, value, k):
+    """The all but level planes of volume k become one level top."""
+    flat = (volumes[k, OFFSET : OFFSET + SIDES] < np.inf) & (volumes[k, SLOPE : SLOPE + SIDES] < ALMOST_LEVEL)
+    if not flat.any() or volumes[k, OFFSET + LEVEL] < np.inf:
+        return volumes, value
+    trial = volumes.copy()
+    u, v = 0.5 * (volumes[k, U0] + volumes[k, U1]), 0.5 * (volumes[k, V0] + volumes[k, V1])
+    total = 0.0
+    for plane in range(SIDES):
+        if flat[plane]:
+            x = u if plane < 2 else v
+            total += volumes[k, OFFSET + plane] + volumes[k, SLOPE + plane] * (x if plane % 2 == 0 else -x)
+            trial[k, OFFSET + plane], trial[k, SLOPE + plane] = np.inf, 0.0
+    trial[k, OFFSET + LEVEL] = total / flat.sum()
+    trial, found = settled(trial, scene, k, value, EVERYWHERE)
+    return (trial, found) if found < np.inf else (volumes, value)
+
+
+@compiled
+def change_ties(volumes, scene, value, k):
+    """Other slopes of volume k equal; and it may join the max instead of replacing what it covers."""
+    if volumes[k, REPLACES] > 0.0:
+        trial = volumes.copy()
+        trial[k, REPLACES] = 0.0
+        trial, found = settled(trial, scene, k, value, EVERYWHERE)
+        if found < np.inf:
+            volumes, value = trial, found
+    for tie in range(3):
+        if tie == volumes[k, TIE]:
+            continue
+        trial = volumes.copy()
+        trial[k, TIE] = tie
+        if slope_count(trial[k]) == slope_count(volumes[k]):
+            continue
+        equalise_slopes(trial[k])
+        trial, found = settled(trial, scene, k, value, 0.6)
+        if found < np.inf:
+            volumes, value = trial, found
+    return volumes, value
+
+
+@compiled
+def add_planes(volumes, scene, value, k, slopes):
+    """A further plane for volume k: an end, a side or a level top; its rectangle may reach beyond the outline there."""
+    z_now, _ = roof_heights(volumes, scene.U, scene.V)
+    everywhere, beneath = with_and_without(volumes, scene.U, scene.V, k)
+    for plane in range(PLANES):
+        if volumes[k, OFFSET + plane] < np.inf:
+            continue
+        tried = slopes_to_try(volumes[k], plane, slopes)
+        least = 0.6 * scene.evidence * PARAMETER_COST
+        gain, slope, offset = best_plane(volumes, scene, k, plane, tried, z_now, everywhere, beneath, least)
+        wide = volumes.copy()
+        if plane < LEVEL:
+            wide[k, U0 + plane] = beyond(scene, int(volumes[k, DIRECTION]), plane)
+            more, other_slope, other_offset = best_plane(wide, scene, k, plane, tried, z_now, everywhere, beneath, gain)
+            if more > gain + LEAST_GAIN:
+                gain, slope, offset = more, other_slope, other_offset
+            else:
+                wide = volumes.copy()
+        if gain <= least:
+            continue
+        for tie in range(int(volumes[k, TIE]), 3):
+            trial = wide.copy()
+            trial[k, OFFSET + plane] = offset
+            if plane < LEVEL:
+                trial[k, SLOPE + plane] = slope
+            trial[k, TIE] = tie
+            equalise_slopes(trial[k])
+            trial, found = settled(trial, scene, k, value, EVERYWHERE)
+            if found < np.inf:
+                volumes, value = trial, found
+                z_now, _ = roof_heights(volumes, scene.U, scene.V)
+                everywhere, beneath = with_and_without(volumes, scene.U, scene.V, k)
+                break
+    return volumes, value
+
+
+@compiled
+def beyond(scene, direction, edge):
+    """A place outside the outline for an edge."""
+    lines = scene.lines[direction, edge // 2]
+    if edge % 2 == 0:
+        return lines[0] - BEYOND_M
+    last = lines[0]
+    for x in lines:
+        if x < np.inf:
+            last = x
+    return last + BEYOND_M
+
+
+@compiled
+def slopes_to_try(row, plane, slopes):
+    """The slopes that the volume has and `slopes`, distinct; none for a level plane."""
+    tried = np.zeros(MOST_SLOPES)
+    if plane == LEVEL:
+        return tried[:1]
+    count = 0
+    for q in range(SIDES + len(slopes)):
+        if q < SIDES and row[OFFSET + q] == np.inf:
+            continue
+        slope = row[SLOPE + q] if q < SIDES else slopes[q - SIDES]
+        if count < MOST_SLOPES and (np.abs(tried[:count] - slope) >= SLOPES_APART).all():
+            tried[count] = slope
+            count += 1
+    return tried[:count]
+
+
+@compiled
+def best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath, least):
+    """The plane in place `plane` of volume k that lowers the misfit most, by more than `least`: (gain, slope, offset).
+
+    It goes through one of the points that lie well below the volume.
+    """
+    direction, n = int(volumes[k, DIRECTION]), scene.n
+    u, v = scene.U[direction], scene.V[direction]
+    c, replaces = coefficients(volumes, k), volumes[k, REPLACES] > 0.0
+    dead, width, z_points = scene.dead, scene.width, scene.z
+    z, x, own, under = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    seeds = np.empty(n, np.int64)
+    m = count = 0
+    unchanged = 0.0
+    for i in range(n):
+        inside = volumes[k, U0] <= u[i] <= volumes[k, U1] and volumes[k, V0] <= v[i] <= volumes[k, V1]
+        h = lowest(c, u[i], v[i])
+        if not inside or everywhere[i] != h:  # or something else shows there
+            continue
+        t = 0.0 if plane == LEVEL else u[i] if plane < 2 else v[i]
+        z[m], x[m], own[m] = z_points[i], -t if plane % 2 == 1 else t, h
+        under[m] = -np.inf if replaces else beneath[i]
+        r = min(max(abs(z_now[i] - z[m]) - dead, 0.0) / width, 1.0)
+        unchanged += r * r
+        if h - z[m] > 0.5 * (dead + width) and (r > 0.5 or z[m] > under[m] - dead - width):
+            seeds[count] = m
+            count += 1
+        m += 1
+    best, best_slope, best_offset = least, 0.0, 0.0
+    if count < 3:
+        return best, best_slope, best_offset
+    for slope in slopes:
+        for g in range(0, count, max(1, count // END_SEEDS)):
+            offset = z[seeds[g]] - slope * x[seeds[g]]
+            gain = unchanged
+            for p in range(m):
+                h = max(min(own[p], offset + slope * x[p]), under[p])
+                r = max(abs(z[p] - h) - dead, 0.0) / width
+                gain -= min(r * r, 1.0)
+                if gain < best:
+                    break
+            if gain > best:
+                best, best_slope, best_offset = gain, slope, offset
+    return best, best_slope, best_offset
+
+
+@compiled
+def merge_volumes(volumes, scene, value, steepest):
+    """Two volumes become one over both rectangles, where neither is steeper than `steepest`."""
+    k = 1
+    while k < len(volumes):
+        merged = False
+        for j in range(1, len(volumes)):
+            if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or max_slope(volumes, j, k) > steepest:
+                continue
+            trial = volumes.copy()
+            for edge in range(4):
+                a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
+                trial[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
+            trial, found = settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
+            if found < np.inf:
+                volumes, value, merged = trial, found, True
+                break
+        k = 1 if merged else k + 1
+    return volumes, value
+
+
+@compiled
+def max_slope(volumes, j, k):
+    return max(volumes[j, SLOPE : SLOPE + SIDES].max(), volumes[k, SLOPE : SLOPE + SIDES].max())
+
+
+@compiled
+def without_base(volumes, scene, value):
+    """The base below everything, where the volumes can cover the outline by themselves."""
+    if volumes[0, OFFSET + LEVEL] <= scene.low - 0.6:
+        return volumes, value
+    trial = volumes.copy()
+    trial[0, OFFSET + LEVEL] = scene.low - 0.7
+    found = objective(trial, scene, value + 0.3 * scene.n)
+    if found < np.inf:
+        found = move_all_edges(trial, scene, found, EVERYWHERE)
+    return (trial, found) if found < value - LEAST_GAIN else (volumes, value)
+
+
+@compiled
+def improve(volumes, scene, value, slopes, rounds):
+    """All moves in turn, for at most `rounds` rounds or until one brings next to nothing."""
+    for _ in range(rounds):
+        before = value
+        volumes, value = refit_each(volumes, scene, value)
+        value = move_all_edges(volumes, scene, value, EVERYWHERE)
+        volumes, value = drop_volumes(volumes, scene, value)
+        for k in range(1, len(volumes)):
+            volumes, value = drop_planes(volumes, scene, value, k, np.inf)
+            volumes, value = flatten(volumes, scene, value, k)
+            volumes, value = change_ties(volumes, scene, value, k)
+            volumes, value = add_planes(volumes, scene, value, k, slopes)
+        volumes, value = merge_volumes(volumes, scene, value, np.inf)
+        volumes, value = without_base(volumes, scene, value)
+        if value > before - 0.05 * scene.evidence:
+            break
+    return volumes, value
+
+
+@compiled
+def simplify(volumes, scene, value, steepest):
+    """Volumes and planes no steeper than `steepest` that do not pay under `scene` (a more tolerant one) go or are merged."""
+    for _ in range(4):
+        before = value
+        k = 1
+        while k < len(volumes):
+            if volumes[k, SLOPE : SLOPE + SIDES].max() <= steepest:
+                trial = without(volumes, k)
+                found = objective(
+                    trial, scene, value + HOPELESS_UNITS * scene.evidence + 2.0 * HOPELESS_SHARE * scene.n
+                )
+                if found < np.inf:
+                    found = move_all_edges(trial, scene, found, EVERYWHERE)
+                    trial, found = refit_each(trial, scene, found)
+                    if found < value - LEAST_GAIN:
+                        volumes, value = trial, found
+                        continue
+            volumes, value = drop_planes(volumes, scene, value, k, steepest)
+            k += 1
+        volumes, value = merge_volumes(volumes, scene, value, steepest)
+        if value > before - LEAST_GAIN:
+            break
+    return volumes, value

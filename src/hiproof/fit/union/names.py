@@ -1,0 +1,159 @@
+"""From volumes to named parts: each a member of the family of roof shapes."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import shapely
+
+from ...model import Part
+from ...primitives.family import AXIS, SIGN, Member, name_among
+from .finish import Planes
+from .plan import Plan
+from .scene import Scene
+from .sides import Side
+from .volumes import DIRECTION, LEVEL, SIDES
+
+LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
+APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
+STRAIGHT = 1e-9
+
+
+def part_of(
+    volume: np.ndarray,
+    planes: Planes,
+    sides: list[Side],
+    regions: list[shapely.Polygon],
+    plan: Plan,
+    scene: Scene,
+    allowed: tuple[str, ...] = (),
+) -> Part:
+    """The volume over its `regions` (local coordinates) as a part of the family, called as `allowed` has it where that can be."""
+    c, s = scene.turn[int(volume[DIRECTION])]
+    rotation = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
+    corners = np.concatenate([shapely.get_coordinates(region) for region in regions]) - plan.frame.origin[:2]
+    rows = np.where(showing(planes.rows, corners @ rotation.T)[:, None], planes.rows, np.nan)
+    turn = common_lean(rows)
+    rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ rotation
+    rows = turned(rows, turn)
+    low, high = rectangle_of([moved(side, k, turn) for k, side in enumerate(sides)], corners @ rotation.T)
+    member = with_one_apex(level(member_of(rows, low, high)))
+    kappa = math.atan2(rotation[0, 1], rotation[0, 0])
+    centre = plan.frame.xy_local((member.centre @ rotation @ plan.frame.rotation.T)[None])[0]
+
+    def in_place(member: Member) -> Member:
+        z = plan.frame.origin[2]
+        return replace(member, kappa=kappa, centre=centre, eaves=member.eaves + z, top=member.top + z)
+
+    changes = [in_place(changed(member, turned(mode, turn))) for mode in planes.modes]
+    member = in_place(member)
+    for _ in range(member.quarter_turns):
+        member, changes = member.turned(), [change.turned() for change in changes]
+    return member.part(regions, name_among(member.name, allowed), changes)
+
+
+def showing(rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Which planes (5,) are not everywhere above some single other one over the regions' `corners` (n, 2)."""
+    there = np.isfinite(rows[:, 2])
+    z = rows @ np.column_stack([corners, np.ones(len(corners))]).T
+    for k in np.nonzero(there)[0]:
+        if any(j != k and (z[j] <= z[k] + 1e-9).all() for j in np.nonzero(there)[0]):
+            there[k] = False
+    return there
+
+
+def common_lean(rows: np.ndarray) -> float:
+    """The angle (rad) by which axes must turn for a pair of planes that face each other to face along them; 0 if none does."""
+    for low, high, axis in ((2, 3, 1), (0, 1, 0)):
+        gradients = [rows[k, :2] for k in (low, high) if np.isfinite(rows[k, 2])]
+        if not gradients:
+            continue
+        angles = [math.remainder(math.atan2(g[1], g[0]) - axis * 0.5 * math.pi, math.pi) for g in gradients]
+        if len(angles) == 1 or abs(angles[0] - angles[1]) < STRAIGHT:
+            return angles[0]
+    return 0.0
+
+
+def turned(rows: np.ndarray, angle: float) -> np.ndarray:
+    """Planes over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
+    c, s = math.cos(angle), math.sin(angle)
+    rows = rows @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    for k in range(SIDES):
+        if abs(rows[k, 1 - AXIS[k]]) < 1e-8:
+            rows[k, 1 - AXIS[k]] = 0.0
+    return rows
+
+
+def moved(side: Side, edge: int, angle: float) -> Side:
+    """The side seen from axes turned by `angle`."""
+    if angle == 0.0:
+        return side
+    slope = math.atan(side.lean) + (angle if edge < 2 else -angle)
+    scale = math.cos(math.atan(side.lean)) / math.cos(slope)
+    return replace(side, at=side.at * scale, lean=math.tan(slope))
+
+
+def rectangle_of(sides: list[Side], corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest and highest u, v (2,) of the sides in their middle, no further out than the regions' `corners` (n, 2) are."""
+    least, most = corners.min(axis=0), corners.max(axis=0)
+    middle = 0.5 * (least + most)
+    at = [side.at + side.lean * middle[1 - AXIS[k]] for k, side in enumerate(sides)]
+    low = np.array([at[k] if sides[k].anchored else max(at[k], least[AXIS[k]]) for k in (0, 2)])
+    high = np.array([at[k] if sides[k].anchored else min(at[k], most[AXIS[k]]) for k in (1, 3)])
+    narrow = high - low < 1e-3
+    return np.where(narrow, least, low), np.where(narrow, most, high)
+
+
+def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray) -> Member:
+    """The member over the rectangle with planes `rows` (5, 3), in the axes they are given in."""
+    centre, half = 0.5 * (low + high), 0.5 * (high - low)
+    eaves, slopes, leans = np.full(SIDES, np.inf), np.zeros(SIDES), np.zeros(SIDES)
+    for k in range(SIDES):
+        if np.isfinite(rows[k, 2]):
+            slopes[k] = SIGN[k] * rows[k, AXIS[k]]
+            leans[k] = rows[k, 1 - AXIS[k]] / slopes[k]
+            eaves[k] = rows[k] @ (*centre, 1.0) - slopes[k] * half[AXIS[k]]
+    top = float(rows[LEVEL, 2]) if np.isfinite(rows[LEVEL, 2]) else math.inf
+    return Member(0.0, centre, half, eaves, slopes, top, leans)
+
+
+def changed(member: Member, change: np.ndarray) -> Member:
+    """The member with its planes changed by `change` (5, 3), its sides where they are."""
+    slopes = member.slopes + np.where(member.has, SIGN * change[np.arange(SIDES), AXIS], 0.0)
+    middles = np.tile(member.centre, (SIDES, 1))  # of the sides
+    middles[np.arange(SIDES), AXIS] -= SIGN * member.half[AXIS]
+    eaves = member.eaves + (change[:SIDES, :2] * middles).sum(axis=1) + change[:SIDES, 2]
+    return replace(member, eaves=eaves, slopes=slopes, top=member.top + change[LEVEL, 2])
+
+
+def level(member: Member) -> Member:
+    """The member with sides moved out to the lowest eave's height where that is near."""
+    if not member.has.any():
+        return member
+    lowest = member.eaves.min()
+    outwards = np.zeros(SIDES)
+    for side in np.nonzero(member.has)[0]:
+        further = (member.eaves[side] - lowest) / member.slopes[side]
+        outwards[side] = further if further < LEVEL_EAVE_M else 0.0
+    low = member.centre - member.half - outwards[[0, 2]]
+    high = member.centre + member.half + outwards[[1, 3]]
+    centre, half = 0.5 * (low + high), 0.5 * (high - low)
+    rows = np.full((SIDES + 1, 3), np.nan)
+    for k in np.nonzero(member.has)[0]:
+        rows[k, AXIS[k]], rows[k, 1 - AXIS[k]] = SIGN[k] * member.slopes[k], member.leans[k] * member.slopes[k]
+        rows[k, 2] = member.eaves[k] + member.slopes[k] * member.half[AXIS[k]] - rows[k, :2] @ member.centre
+    again = member_of(rows, low, high)
+    near = np.abs(again.eaves - lowest) < 1e-6
+    return replace(member, centre=centre, half=half, eaves=np.where(near & member.has, lowest, again.eaves))
+
+
+def with_one_apex(member: Member) -> Member:
+    """A hip whose two pairs of sides meet at nearly the same height with all four meeting in one point."""
+    one, other = member.apex(0), member.apex(1)
+    if not (math.isfinite(one) and math.isfinite(other)) or math.isfinite(member.top) or abs(one - other) > APEX_M:
+        return member
+    if member.leans.any() or not (member.mirrored(0) and member.mirrored(1)):
+        return member
+    return replace(member, slopes=(0.5 * (one + other) - member.eaves) / member.half[AXIS])

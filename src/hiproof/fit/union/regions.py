@@ -1,0 +1,129 @@
+"""Where each volume roofs the outline: inside its four sides, less what a later one replaces."""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from .finish import Planes, lowest_of
+from .plan import Plan
+from .scene import Scene
+from .sides import Side, corners_of
+from .volumes import DIRECTION, LEVEL, OFFSET, REPLACES, U0, V1
+
+GRID_M = 1e-6  # of the polygons' coordinates: overlays of snapped polygons do not fail
+THICK_M = 0.25  # a gap may be the base's where a disc of this radius fits
+SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
+SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
+
+
+def regions_of(
+    volumes: np.ndarray,
+    planes: list[Planes],
+    sides: list[list[Side]],
+    plan: Plan,
+    outline: shapely.Polygon,
+    scene: Scene,
+    base: bool,
+) -> list[list]:
+    """For each volume the polygons (local coordinates) of `outline` that it may roof; overlapping, as volumes do.
+
+    What a later volume replaces is cut out. With `base`, what no other covers is the base's, and what rises through others.
+    """
+    quads = [None] + [quad_of(volume, own, plan, scene) for volume, own in zip(volumes[1:], sides[1:], strict=True)]
+    regions: list[list] = [polygons_of(outline) if base or len(volumes) == 1 else []]
+    for k in range(1, len(volumes)):
+        own = shapely.intersection(quads[k], outline, grid_size=GRID_M)
+        if volumes[k, REPLACES]:
+            regions = [
+                [q for p in before for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
+                for before in regions
+            ]
+        elif not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, plan, scene):
+            regions[0] = [q for p in regions[0] for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
+        regions.append(polygons_of(own))
+    return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, quads, outline, plan, scene)
+
+
+def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> shapely.Polygon:
+    """A volume's plan in local coordinates: inside its sides, or its rectangle where these cross within it."""
+    c, s = scene.turn[int(volume[DIRECTION])]
+    for corners in (corners_of(sides), corners_of([Side(float(x)) for x in volume[U0 : V1 + 1]])):
+        quad = shapely.Polygon(plan.frame.xy_local(corners @ np.array([[c, s], [-s, c]])))
+        if quad.is_valid and quad.exterior.is_ccw:
+            return quad
+    return quad
+
+
+def rises_through(
+    base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, plan: Plan, scene: Scene
+) -> bool:
+    """Whether the level base is noticeably above the volume somewhere over its region."""
+    corners = shapely.get_coordinates(region)
+    return bool(len(corners)) and bool((heights_over(volume, planes, corners, plan, scene) < base - SHOWS_M).any())
+
+
+def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan, scene: Scene) -> np.ndarray:
+    """Heights (n,) of a volume, in the plan's z, at local `xy` (n, 2)."""
+    c, s = scene.turn[int(volume[DIRECTION])]
+    uv = (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
+    return lowest_of(planes.rows, np.column_stack([uv, np.ones(len(uv))]))[1]
+
+
+def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
+    return [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon" and g.area > 1e-9]
+
+
+def gaps_filled(
+    volumes: np.ndarray,
+    planes: list[Planes],
+    regions: list[list],
+    quads: list,
+    outline: shapely.Polygon,
+    plan: Plan,
+    scene: Scene,
+) -> list[list]:
+    """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
+    rest = shapely.difference(outline, shapely.union_all(quads[1:]), grid_size=GRID_M)
+    xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
+    for gap in polygons_of(rest):
+        near = shapely.buffer(gap, 1e-3, quad_segs=1)
+        beside = [
+            (shapely.intersection(near, polygon, grid_size=GRID_M).area, k, q)
+            for k, own in enumerate(regions[1:], 1)
+            for q, polygon in enumerate(own)
+        ]
+        shared, k, q = max(beside, default=(0.0, 0, 0))
+        if shared > 0.0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], xy, plan, scene)):
+            merged = polygons_of(
+                shapely.intersection(shapely.union_all([regions[k][q], near]), outline, grid_size=GRID_M)
+            )
+            if len(merged) == 1:
+                regions[k][q] = merged[0]
+                regions[0] = [
+                    p for own in regions[0] for p in polygons_of(shapely.difference(own, near, grid_size=GRID_M))
+                ]
+                continue
+        if not regions[0] or not shapely.covers(shapely.union_all(regions[0]).buffer(1e-3), gap):
+            regions[0].append(gap)
+    return regions
+
+
+def is_base(
+    gap: shapely.Polygon,
+    base: np.ndarray,
+    volume: np.ndarray,
+    planes: Planes,
+    xy: np.ndarray,
+    plan: Plan,
+    scene: Scene,
+) -> bool:
+    """Whether a gap is wide enough to be drawn and its points lie on the base rather than on its neighbour continued."""
+    if shapely.buffer(gap, -THICK_M).is_empty:
+        return False
+    inside = shapely.contains_xy(gap, xy[:, 0], xy[:, 1])
+    z = scene.z[: scene.n][inside]
+    continued = heights_over(volume, planes, xy[inside], plan, scene)
+    level = np.full(len(z), base[OFFSET + LEVEL])
+    cost = [np.clip((np.abs(z - h) - scene.dead) / scene.width, 0.0, 1.0) ** 2 for h in (continued, level)]
+    return not len(z) or bool(cost[0].sum() > cost[1].sum() + SHAPE_UNITS * scene.evidence)

@@ -1,0 +1,149 @@
+"""What the search sees of one building: its points in each of its directions, unseen roof, lines, and the outline."""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+import shapely
+
+from ...primitives.family import COMPONENTS, KIN, NAMES, SHAPES
+from .plan import Plan, grid_lines, ring_edges, signed_depth
+
+MOST_DIRECTIONS = 2
+APART_RAD, NEAR_RAD = math.radians(7.0), math.radians(3.0)  # directions differ by more; edges support one within
+LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for a further direction
+RASTER_M, RASTER_CELLS = 0.2, 120
+
+# U, V (directions, n + g): the points, then the ghosts of unseen roof; z, weight (n + g); n: how many points.
+# low, high: heights a roof may take over a ghost. turn (directions, 2): cosine and sine of each from the first.
+# depth (a, b): signed depth inside the outline on a raster from (corner_u, corner_v) every `pitch` metres, first direction.
+# lines, vertices: places an edge may move to, by direction and axis, infinite where there are no more.
+# evidence: points a unit of structure must explain; dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
+# allowed (2, 3, 3, 2): which shapes a volume may have, see `volumes.is_allowed`.
+# edge_prices: units for an edge that shows, a metre of it, a metre of it lower than low_step (m), and if in line with no corner.
+Scene = namedtuple(
+    "Scene",
+    "U V z weight n low high turn depth corner_u corner_v pitch lines vertices evidence dead width edge_prices allowed",
+)
+EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose")
+EDGE_PRICES = EdgePrices(0.5, 0.08, 0.15, 0.5, 0.4)
+
+
+def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
+    """Angles (rad) of the building's directions from the plan's own, which comes first: those its outline's edges have."""
+    step = np.diff(shapely.get_coordinates(outline.exterior), axis=0) @ plan.frame.rotation.T
+    length, angle = np.hypot(step[:, 0], step[:, 1]), np.arctan2(step[:, 1], step[:, 0]) % (math.pi / 2)
+    found = [0.0]
+    while len(found) < MOST_DIRECTIONS:
+        new = np.all([np.abs(quarter_gap(angle, other)) > APART_RAD for other in found], axis=0)
+        if not new.any():
+            break
+        gaps = quarter_gap(angle[None, :], angle[new][:, None])
+        support = (length * np.exp(-0.5 * (gaps / NEAR_RAD) ** 2)).sum(axis=1)
+        best = int(np.argmax(support))
+        if support[best] < max(LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE * length.sum()):
+            break
+        found.append(float(angle[new][best]))
+    return found
+
+
+def quarter_gap(one, other):
+    """Angles between directions modulo 90 degrees, in [-45, 45] degrees (rad)."""
+    return np.angle(np.exp(4j * (one - other))) / 4.0
+
+
+def scene_of(
+    plan: Plan,
+    outline: shapely.Polygon,
+    kept: np.ndarray,
+    angles: list[float],
+    evidence: float,
+    tolerance_m: float,
+    allowed: np.ndarray,
+) -> Scene:
+    """The building as the search sees it through the `kept` (m,) of the plan's points.
+
+    A point further than `tolerance_m` from the roof counts as unexplained.
+    """
+    cloud, ghosts = plan.cloud, plan.ghosts
+    share = len(kept) / max(len(cloud.u), 1)
+    u, v = np.r_[cloud.u[kept], ghosts.u], np.r_[cloud.v[kept], ghosts.v]
+    turn = np.array([[math.cos(a), math.sin(a)] for a in angles])
+    depth, corner, pitch = depth_raster(plan, outline)
+    ring = (shapely.get_coordinates(outline.exterior)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    lines, vertices = lines_of(plan, ring, turn)
+    return Scene(
+        np.array([c * u + s * v for c, s in turn]),
+        np.array([c * v - s * u for c, s in turn]),
+        np.r_[cloud.z[kept], np.zeros(len(ghosts.u))],
+        np.r_[np.ones(len(kept)), ghosts.weight * share],
+        len(kept),
+        float(ghosts.low),
+        float(ghosts.high),
+        turn,
+        depth,
+        float(corner[0]),
+        float(corner[1]),
+        pitch,
+        lines,
+        vertices,
+        evidence,
+        DEAD_M,
+        max(tolerance_m - DEAD_M, LEAST_WIDTH_M),
+        EDGE_PRICES,
+        allowed,
+    )
+
+
+def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
+    """Which shapes (2, 3, 3, 2) volumes may have to become parts of these `types` (all where there are none)."""
+    allowed = np.zeros((2, 3, 3, 2), bool)
+    names = {part for name in types or NAMES for part in (name, *COMPONENTS.get(name, ()))} | {"flat"}
+    kin = {name: base for base, *others in KIN for name in others}
+    for (top, along, across), (shape, _) in SHAPES.items():
+        ties = [tied for tied in (0, 1) if shape != "gable" or ("gable", "asymmetric_gable")[tied] in names]
+        if shape in names or any(kin.get(name) == shape for name in names):
+            for tied in ties:
+                allowed[int(top), along, across, tied] = allowed[int(top), across, along, tied] = True
+    return allowed
+
+
+DEAD_M, LEAST_WIDTH_M = (
+    0.06,
+    0.02,
+)  # residuals that cost nothing; over how much more they grow to a whole point at least
+
+
+def depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray, float]:
+    """Signed depth inside the outline on a raster of the first direction, its lowest corner (2,) and its pitch (m)."""
+    ring = (shapely.get_coordinates(outline.exterior) - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    low, high = ring.min(axis=0), ring.max(axis=0)
+    pitch = max(RASTER_M, float((high - low).max()) / RASTER_CELLS)
+    axes = [np.arange(a, b + pitch, pitch) for a, b in zip(low, high, strict=True)]
+    nodes = plan.frame.xy_local(np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2))
+    depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(outline))
+    return depth.reshape(len(axes[0]), len(axes[1])), low, pitch
+
+
+def lines_of(plan: Plan, ring: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Grid lines and vertex lines (directions, 2, m), ascending, padded with infinity."""
+    cell = float(np.median(np.diff(plan.grid.u)))
+    lines, vertices = [], []
+    for number, (c, s) in enumerate(turn):
+        own = ring @ np.array([[c, -s], [s, c]])
+        for axis in range(2):
+            x = own[:, axis]
+            first = number == 0
+            lines.append((plan.grid.u, plan.grid.v)[axis] if first else grid_lines(x.min(), x.max(), x, cell)[0])
+            vertices.append(np.unique(np.round(x, 3)))
+    return padded(lines), padded(vertices)
+
+
+def padded(rows: list[np.ndarray]) -> np.ndarray:
+    """Rows of several lengths, two a direction, as (directions, 2, m), filled up with infinity."""
+    filled = np.full((len(rows), max(map(len, rows))), np.inf)
+    for row, values in zip(filled, rows, strict=True):
+        row[: len(values)] = values
+    return filled.reshape(len(rows) // 2, 2, -1)

@@ -1,0 +1,65 @@
+"""From a plan to volumes: structure from some of the points, simplified as a draughtsman would, settled on all of them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import shapely
+
+from .grow import grids_of, grow
+from .moves import move_all_edges, refit_each, simplify
+from .objective import objective
+from .plan import Plan
+from .scene import Scene, allowed_shapes, directions_of, scene_of
+from .trim import trim
+
+SEARCH_POINTS = 600
+SETTLE_REACH_M = 0.7
+MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
+COMMON_HOUSE_M2, LARGEST_FACTOR = 60.0, 16.0  # larger roofs ask more of each volume
+# What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
+LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.13, 0.04, 0.18, 0.15
+
+
+def evidence_per_unit(density: float, area_m2: float, settings) -> float:
+    """Points that one unit of structure must explain: those of an area that grows with the roof's, and never too few."""
+    share = settings.evidence_area_m2 * (MAIN_ROOF_FACTOR if settings.detail == "main" else 1.0)
+    share *= math.sqrt(min(max(area_m2 / COMMON_HOUSE_M2, 1.0), LARGEST_FACTOR))
+    return float(max(settings.evidence_points, share * density))
+
+
+def find_volumes(
+    plan: Plan, outline: shapely.Polygon, settings, types: tuple[str, ...] = ()
+) -> tuple[np.ndarray, float, Scene]:
+    """Volumes (k, COLUMNS) of the roof over `outline`, their objective (points) and the scene of all points.
+
+    `settings` are those of [compound]; volumes have only shapes that parts of `types` need (any where there are none).
+    """
+    count = len(plan.cloud.u)
+    few = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
+    angles = directions_of(outline, plan)
+    allowed = allowed_shapes(types)
+    evidence = [evidence_per_unit(plan.density * share, outline.area, settings) for share in (len(few) / count, 1.0)]
+    scene = scene_of(plan, outline, few, angles, evidence[0], settings.tolerance_m, allowed)
+    every = scene_of(plan, outline, np.arange(count), angles, evidence[1], settings.tolerance_m, allowed)
+    volumes, _ = grow(scene, grids_of(plan, scene))
+    volumes, value = settled_on_all(volumes, every)
+    lenient = lenient_scene(scene, outline.area)
+    volumes, _ = simplify(volumes, lenient, objective(volumes, lenient, np.inf), LENIENT_SLOPE)
+    volumes, value = settled_on_all(volumes, every)
+    volumes, value = trim(volumes, every, value)
+    return volumes, value, every
+
+
+def settled_on_all(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float]:
+    """The volumes refitted and their edges moved a little on every point."""
+    volumes, value = refit_each(volumes, scene, objective(volumes, scene, np.inf))
+    value = move_all_edges(volumes, scene, value, SETTLE_REACH_M)
+    return refit_each(volumes, scene, value)
+
+
+def lenient_scene(scene: Scene, area_m2: float) -> Scene:
+    """The scene with a larger residual free of cost."""
+    dead = LENIENT_M + LENIENT_MORE_M * min(max((area_m2 - COMMON_HOUSE_M2) / 100.0, 0.0), 1.0)
+    return scene._replace(dead=dead, width=LENIENT_SOFT_M)

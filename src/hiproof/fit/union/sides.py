@@ -1,0 +1,163 @@
+"""The sides of the volumes as straight lines: along the outline, between its corners, or shared with a neighbour.
+
+Walls are seldom quite at right angles. Lines near a side of a volume's rectangle compete for it: edges of the outline, lines
+between two of its corners, and the side as it was found. Each costs what its points say and, the less outline lies along
+it, up to the price of a loose edge.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from .objective import costs
+from .plan import Plan
+from .scene import Scene
+from .volumes import DIRECTION, U0, U1, V0, V1, with_and_without
+
+LEAN = 0.25  # of a line that a side may take
+GAP_M = 0.6  # how far off it may be, in the middle of the side and at the ends
+ALONG_M, BESIDE_M, SHORTEST_M = 0.12, 6.0, 0.7  # outline so near a line lies along it; edges so far beside carry on
+CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line between corners may be
+SHARED_M = 0.3
+LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 0.45, 0.4, 0.1
+FACING = 1e-9
+
+
+@dataclass(frozen=True)
+class Side:
+    """A line x = at + lean * y in the axes of its volume's direction: x across the side, y along it.
+
+    `anchored` to the outline: its eave is where the outline is.
+    """
+
+    at: float
+    lean: float = 0.0
+    anchored: bool = False
+
+
+def sides_of(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> list[list[Side]]:
+    """The four sides (u low, u high, v low, v high) of every volume; those of the base are far away."""
+    edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
+    sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
+    for k in range(1, len(volumes)):
+        direction = int(volumes[k, DIRECTION])
+        c, s = scene.turn[direction]
+        turn = np.array([[c, -s], [s, c]])
+        everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+        gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
+        uv = np.stack([scene.U[direction], scene.V[direction]])
+        sides.append([side_of(volumes[k], e, edges @ turn, chords @ turn, uv, gain, scene.evidence) for e in range(4)])
+    return [[shared(volumes, sides, k, edge) for edge in range(4)] for k in range(len(volumes))]
+
+
+def plan_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
+    """Starts and ends (2, m, 2) of the outline's edges in the plan's first direction."""
+    rings = [outline.exterior, *outline.interiors]
+    corners = [(shapely.get_coordinates(r) - plan.frame.origin[:2]) @ plan.frame.rotation.T for r in rings]
+    return np.array([np.concatenate([c[:-1] for c in corners]), np.concatenate([c[1:] for c in corners])])
+
+
+def plan_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
+    """Starts and ends (2, m, 2) of the straight lines inside the outline between two of its corners; none of too many."""
+    corners = np.unique(shapely.get_coordinates(outline), axis=0)
+    if len(corners) > MOST_CORNERS:
+        return np.zeros((2, 0, 2))
+    i, j = np.triu_indices(len(corners), 1)
+    lines = shapely.linestrings(np.stack([corners[i], corners[j]], axis=1))
+    within = shapely.covers(shapely.buffer(outline, ALONG_M), lines)
+    ends = np.stack([corners[i][within], corners[j][within]])
+    return (ends - plan.frame.origin[:2]) @ plan.frame.rotation.T
+
+
+def side_of(
+    volume: np.ndarray,
+    edge: int,
+    edges: np.ndarray,
+    chords: np.ndarray,
+    uv: np.ndarray,
+    gain: np.ndarray,
+    evidence: float,
+) -> Side:
+    """The cheapest line for one side of a volume; `gain` (n,) is what its points at `uv` (2, n) cost more within it."""
+    axis, own = edge // 2, Side(float(volume[U0 + edge]))
+    low, high = (volume[V0], volume[V1]) if axis == 0 else (volume[U0], volume[U1])
+    y_edges = edges[:, :, 1 - axis]
+    low, high = max(low, y_edges.min()), min(high, y_edges.max())
+    candidates = [own]
+    for ends, beyond in ((edges, BESIDE_M), (chords, CHORD_END_M)):
+        candidates += [Side(*line, True) for line in lines_near(ends, axis, own.at, low, high, beyond)]
+    if len(candidates) == 1:
+        return own
+    x, y = uv[axis], uv[1 - axis]
+    sign = -1.0 if edge % 2 == 0 else 1.0
+    opposite = volume[U0 + (edge ^ 1)]
+    strip = (y >= low) & (y <= high) & (sign * (x - opposite) >= 0.0)
+    x, y, gain = x[strip], y[strip], gain[strip]
+
+    def price(side: Side) -> float:
+        points = gain[sign * (x - side.at - side.lean * y) <= 0.0].sum()
+        if not side.anchored:
+            return float(points + evidence * LOOSE_UNITS)
+        bare = 1.0 - min(support(side, edges, axis, low, high) / max(high - low, 1e-6), 1.0)
+        off = abs(side.at + side.lean * 0.5 * (low + high) - own.at)
+        return float(points + evidence * (UNSUPPORTED_UNITS * bare + FAR_UNITS_A_METRE * off))
+
+    return min(candidates, key=price)
+
+
+def lines_near(
+    ends: np.ndarray, axis: int, at: float, low: float, high: float, beyond: float
+) -> list[tuple[float, float]]:
+    """(at, lean) of those of the lines through `ends` (2, m, 2) that may be the side x = at from y = low to high."""
+    y, step = ends[:, :, 1 - axis], ends[1] - ends[0]
+    steep = np.abs(step[:, 1 - axis]) < FACING
+    lean = np.where(steep, 1e9, step[:, axis] / np.where(steep, 1.0, step[:, 1 - axis]))
+    start = ends[0, :, axis] - lean * ends[0, :, 1 - axis]
+    near = (np.abs(lean) < LEAN) & (np.hypot(*step.T) > SHORTEST_M)
+    near &= (
+        (y.min(axis=0) > low - beyond) & (y.max(axis=0) < high + beyond)
+        if beyond < BESIDE_M
+        else ((y.max(axis=0) > low - beyond) & (y.min(axis=0) < high + beyond))
+    )
+    for place in (0.5 * (low + high), np.clip(y[0], low, high), np.clip(y[1], low, high)):
+        near &= np.abs(start + lean * place - at) < GAP_M
+    return list(dict.fromkeys(zip(start[near].tolist(), lean[near].tolist(), strict=True)))
+
+
+def support(side: Side, edges: np.ndarray, axis: int, low: float, high: float) -> float:
+    """Length (m) of outline along the side, between `low` and `high`."""
+    x, y = edges[:, :, axis], edges[:, :, 1 - axis]
+    along = (np.abs(x - side.at - side.lean * y) < ALONG_M).all(axis=0)
+    overlap = np.minimum(y.max(axis=0), high) - np.maximum(y.min(axis=0), low)
+    return float(np.clip(overlap[along], 0.0, None).sum())
+
+
+def shared(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> Side:
+    """The side, or the anchored line of another volume whose edge lies where this one's does."""
+    own = sides[k][edge]
+    if own.anchored or k == 0:
+        return own
+    axis = edge // 2
+    middle = 0.5 * (volumes[k, V0 - 2 * axis] + volumes[k, V1 - 2 * axis])
+    best = None
+    for j in range(1, len(volumes)):
+        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
+            continue
+        for other in (sides[j][2 * axis], sides[j][2 * axis + 1]):
+            gap = abs(other.at + other.lean * middle - own.at)
+            if other.anchored and gap < SHARED_M and (best is None or gap < best[0]):
+                best = gap, other
+    return own if best is None else Side(best[1].at, best[1].lean)
+
+
+def corners_of(sides: list[Side]) -> np.ndarray:
+    """The corners (4, 2) where a volume's sides meet, in order around it, in its direction's axes."""
+    found = []
+    for i, j in ((0, 2), (1, 2), (1, 3), (0, 3)):
+        a, b = sides[i], sides[j]
+        u = (a.at + a.lean * b.at) / (1.0 - a.lean * b.lean)
+        found.append((u, b.at + b.lean * u))
+    return np.array(found)

@@ -1,0 +1,84 @@
+"""What lies hidden of a volume is drawn in: no rectangle reaches further under another than it has to."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .moves import without
+from .objective import objective
+from .scene import Scene
+from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
+
+HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
+NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
+SLACK_UNITS = 0.02
+
+
+def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+    """The volumes without those that nowhere show, hidden edges drawn in to what shows of each; and the objective."""
+    U, V = raster(scene)
+    _, top = roof_heights(volumes, U, V)
+    shown = [top == k for k in range(len(volumes))]
+    k = 1
+    for seen in shown[1:]:
+        if not seen.any():
+            trial = without(volumes, k)
+            found = objective(trial, scene, value + 1e-9)
+            if np.isfinite(found):
+                volumes, value = trial, found
+                continue
+        else:
+            direction = int(volumes[k, DIRECTION])
+            u, v = U[direction][seen], V[direction][seen]
+            for edge, seen_to in zip((U0, U1, V0, V1), (u.min(), u.max(), v.min(), v.max()), strict=True):
+                volumes, value = drawn_in(volumes, scene, value, k, edge, float(seen_to), U, V)
+        k += 1
+    return volumes, value
+
+
+def raster(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes inside the outline: U, V (directions, n)."""
+    i, j = np.nonzero(scene.depth >= 0.0)
+    u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
+    c, s = scene.turn[:, :1], scene.turn[:, 1:]
+    return c * u + s * v, c * v - s * u
+
+
+def drawn_in(
+    volumes: np.ndarray,
+    scene: Scene,
+    value: float,
+    k: int,
+    edge: int,
+    seen_to: float,
+    U: np.ndarray,
+    V: np.ndarray,
+) -> tuple[np.ndarray, float]:
+    """Edge `edge` (a column) of volume k drawn in to the line near `seen_to` that others have, or just beyond it.
+
+    It may cost next to nothing, or whatever its steps cost where no height at the nodes U, V changes.
+    """
+    low = edge in (U0, V0)
+    hidden = seen_to - volumes[k, edge] if low else volumes[k, edge] - seen_to
+    if hidden < HIDDEN_M:
+        return volumes, value
+    just_beyond = seen_to - COVER_M if low else seen_to + COVER_M
+    for place in (*lines_near(volumes, scene, k, edge, seen_to), just_beyond):
+        trial = volumes.copy()
+        trial[k, edge] = place
+        found = objective(trial, scene, value + SLACK_UNITS * scene.evidence)
+        if np.isfinite(found):
+            return trial, found
+        if np.array_equal(roof_heights(trial, U, V)[0], roof_heights(volumes, U, V)[0]):
+            return trial, objective(trial, scene, np.inf)
+    return volumes, value
+
+
+def lines_near(volumes: np.ndarray, scene: Scene, k: int, edge: int, seen_to: float) -> list[float]:
+    """The nearest line to `seen_to` that another volume's edge or a corner of the outline has; none if none is near."""
+    axis = (edge - U0) // 2
+    others = [j for j in range(1, len(volumes)) if j != k and volumes[j, DIRECTION] == volumes[k, DIRECTION]]
+    edges = volumes[others][:, [U0 + 2 * axis, U1 + 2 * axis]].ravel()
+    vertices = scene.vertices[int(volumes[k, DIRECTION]), axis]
+    near = np.r_[edges[np.abs(edges - seen_to) < NEAR_EDGE_M], vertices[np.abs(vertices - seen_to) < NEAR_VERTEX_M]]
+    return [float(near[np.argmin(np.abs(near - seen_to))])] if len(near) else []

@@ -1,0 +1,160 @@
+"""A roof under construction: volumes as rows of one array, their heights and what they cost, compiled.
+
+A volume is a rectangle in one of the building's directions and a min of at most five planes in its own axes u, v:
+
+    rising along +u, rising along -u, rising along +v, rising along -v, level
+
+The roof is the max of the volumes in whose rectangle a place lies, but a volume that replaces (a recess cut into a slope, a
+low annex beside a gable's wall) is all that shows within it of what came before. Row 0 is the base: level, everywhere.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+
+# Columns of a volume's row: its direction's number, rectangle (metres in that direction's axes), the slopes of the four
+# inclined planes, the offsets of all five (z at u = v = 0; infinite where it has no such plane), tie and whether it replaces.
+DIRECTION = 0
+U0, U1, V0, V1 = 1, 2, 3, 4
+SLOPE, OFFSET = 5, 9
+TIE, REPLACES = 14, 15
+COLUMNS = 16
+SIDES, PLANES, LEVEL = 4, 5, 4
+
+FREE, OPPOSITE, ALL = 0.0, 1.0, 2.0  # which slopes are equal: none, those that face each other, all
+SLOPE_LOW, SLOPE_HIGH = 0.04, 2.75
+
+# Units of complexity: what a volume costs, each of its offsets and its own slopes, and that it replaces.
+PART_COST, PARAMETER_COST, REPLACING_COST, BASE_COST = 0.5, 0.45, 0.5, 0.95
+
+
+def base_only(height: float) -> np.ndarray:
+    """Volumes (1, COLUMNS): the level base at `height`."""
+    volumes = np.zeros((1, COLUMNS))
+    volumes[0, OFFSET : OFFSET + PLANES] = np.inf
+    volumes[0, OFFSET + LEVEL] = height
+    volumes[0, U0 : V1 + 1] = (-1e4, 1e4, -1e4, 1e4)
+    return volumes
+
+
+@compiled
+def coefficients(volumes, k):
+    """The nine numbers of volume k's planes: five offsets, four slopes (as scalars they stay in registers)."""
+    row = volumes[k]
+    return row[9], row[10], row[11], row[12], row[13], row[5], row[6], row[7], row[8]
+
+
+@compiled(inline="always")
+def lowest(c, u, v):
+    """Height at u, v of the volume whose `coefficients` are c, its rectangle not asked."""
+    along, across = min(c[0] + c[5] * u, c[1] - c[6] * u), min(c[2] + c[7] * v, c[3] - c[8] * v)
+    return min(min(along, across), c[4])
+
+
+@compiled
+def lowest_plane(c, u, v):
+    """Height at u, v and which of the planes is the lowest there."""
+    best, plane = c[4], LEVEL
+    for k, z in enumerate((c[0] + c[5] * u, c[1] - c[6] * u, c[2] + c[7] * v, c[3] - c[8] * v)):
+        if z < best:
+            best, plane = z, k
+    return best, plane
+
+
+@compiled
+def roof_heights(volumes, U, V):
+    """Height (n,) of the roof and the volume (n,) that shows, at U, V (directions, n)."""
+    n = U.shape[1]
+    z, top = np.full(n, -np.inf), np.zeros(n, np.int64)
+    for k in range(len(volumes)):
+        u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
+        u0, u1, v0, v1 = volumes[k, U0], volumes[k, U1], volumes[k, V0], volumes[k, V1]
+        c, replaces = coefficients(volumes, k), volumes[k, REPLACES] > 0.0
+        for i in range(n):
+            if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
+                h = lowest(c, u[i], v[i])
+                if h > z[i] or replaces:
+                    z[i], top[i] = h, k
+    return z, top
+
+
+@compiled
+def with_and_without(volumes, U, V, k):
+    """Heights (n,) of the roof were volume k everywhere, and without it."""
+    n = U.shape[1]
+    everywhere, without = np.full(n, -np.inf), np.full(n, -np.inf)
+    for j in range(len(volumes)):
+        u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
+        u0, u1, v0, v1 = volumes[j, U0], volumes[j, U1], volumes[j, V0], volumes[j, V1]
+        c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
+        if j == k:
+            for i in range(n):
+                h = lowest(c, u[i], v[i])
+                everywhere[i] = h if replaces else max(h, without[i])
+            continue
+        for i in range(n):
+            if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
+                h = lowest(c, u[i], v[i])
+                without[i] = h if replaces else max(h, without[i])
+                everywhere[i] = h if replaces else max(h, everywhere[i])
+    return everywhere, without
+
+
+@compiled
+def slope_count(row):
+    """How many slopes of its own a volume has under its tie."""
+    along = int(row[OFFSET] < np.inf) + int(row[OFFSET + 1] < np.inf)
+    across = int(row[OFFSET + 2] < np.inf) + int(row[OFFSET + 3] < np.inf)
+    if row[TIE] == FREE:
+        return along + across
+    if row[TIE] == OPPOSITE:
+        return min(along, 1) + min(across, 1)
+    return min(along + across, 1)
+
+
+@compiled
+def plane_count(row):
+    count = 0
+    for k in range(PLANES):
+        count += int(row[OFFSET + k] < np.inf)
+    return count
+
+
+@compiled
+def volume_cost(row):
+    """Units of complexity of one volume, its edges not counted."""
+    replacing = REPLACING_COST if row[REPLACES] > 0.0 else 0.0
+    return PART_COST + PARAMETER_COST * (plane_count(row) + slope_count(row)) + replacing
+
+
+@compiled
+def is_allowed(row, allowed):
+    """Whether a volume's shape is among `allowed` (2, 3, 3, 2): has a top, planes along and across, free slopes."""
+    along = int(row[OFFSET] < np.inf) + int(row[OFFSET + 1] < np.inf)
+    across = int(row[OFFSET + 2] < np.inf) + int(row[OFFSET + 3] < np.inf)
+    return allowed[int(row[OFFSET + LEVEL] < np.inf), along, across, int(row[TIE] == FREE)]
+
+
+@compiled
+def equalise_slopes(row):
+    """Make the slopes that the tie calls equal so; each plane turns about the middle of its half of the rectangle."""
+    if row[TIE] == FREE:
+        return
+    step = SIDES if row[TIE] == ALL else 2
+    for first in range(0, SIDES, step):
+        total = count = 0.0
+        for k in range(first, first + step):
+            if row[OFFSET + k] < np.inf:
+                total += row[SLOPE + k]
+                count += 1.0
+        if count < 2.0:
+            continue
+        for k in range(first, first + step):
+            if row[OFFSET + k] < np.inf:
+                low, high = (row[U0], row[U1]) if k < 2 else (row[V0], row[V1])
+                middle, quarter = 0.5 * (low + high), 0.25 * (high - low)
+                x = middle - quarter if k % 2 == 0 else -(middle + quarter)
+                row[OFFSET + k] += (row[SLOPE + k] - total / count) * x
+                row[SLOPE + k] = total / count
