@@ -1,0 +1,99 @@
+"""The compiled search for planes and the plan's grid against slow oracles in plain Python."""
+
+import numpy as np
+import pytest
+
+from hiproof.fit.union.plan import grid_lines, signed_depth
+from hiproof.fit.union.planes import (
+    NEIGHBOUR_RADIUS_M,
+    Cloud,
+    best_rectangle,
+    distinct,
+    gain_by_point,
+    neighbours_of,
+    reach_of_rows,
+    truncated,
+)
+from union_scenes import brute_rectangle
+
+
+def found_rectangle(gain, least):
+    reach = np.empty(len(gain) + 1)
+    reach_of_rows(gain, reach)
+    return best_rectangle(gain, least, reach, np.empty(gain.shape[1]))
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_best_rectangle_is_that_of_brute_force(seed):
+    gain = np.random.default_rng(seed).normal(-0.1, 1.0, (1 + seed % 5, 6))
+    score, i0, i1, j0, j1 = found_rectangle(gain, -np.inf)
+    assert score == pytest.approx(brute_rectangle(gain))
+    assert gain[i0:i1, j0:j1].sum() == pytest.approx(score)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_rectangle_is_found_only_above_what_is_asked(seed):
+    gain = np.random.default_rng(seed).normal(-0.1, 1.0, (5, 6))
+    best = brute_rectangle(gain)
+    assert found_rectangle(gain, best - 1e-9)[0] == pytest.approx(best)
+    score, i0, i1, j0, j1 = found_rectangle(gain, best + 1e-9)
+    assert score == best + 1e-9
+    assert (i1 - i0) * (j1 - j0) == 0
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_rectangle_reaches_beyond_its_rows(seed):
+    gain = np.random.default_rng(seed).normal(-0.3, 1.0, (4, 5))
+    reach = np.empty(5)
+    reach_of_rows(gain, reach)
+    for first in range(4):
+        assert brute_rectangle(gain[first:]) <= reach[first] + 1e-12
+
+
+@pytest.mark.parametrize("n", [1, 6, 200])
+def test_neighbours_are_those_of_sorting_all_distances(n):
+    u, v = np.random.default_rng(n).uniform(0.0, 8.0, (2, n))
+    cell = np.zeros(n, np.int64)
+    near, nearest = np.empty(n, np.int64), np.empty(17, np.int64)
+    count, kept = neighbours_of(Cloud(u, v, u, cell, cell), n // 2, near, np.empty(17), nearest)
+    distance = np.hypot(u - u[n // 2], v - v[n // 2])
+    assert near[:count].tolist() == np.nonzero(distance < NEIGHBOUR_RADIUS_M)[0].tolist()
+    assert kept == min(count, 17)
+    assert nearest[:kept].tolist() == np.argsort(distance)[:kept].tolist()
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_the_gain_of_a_min_of_planes_is_the_drop_of_truncated_cost(count):
+    rng = np.random.default_rng(count)
+    u, v, z = rng.uniform(-3.0, 3.0, (3, 60))
+    cell = np.zeros(60, np.int64)
+    planes, current, gain = rng.normal(0.0, 0.5, (5, 3)), rng.random(60), np.empty(60)
+    total = gain_by_point(Cloud(u, v, z, cell, cell), planes, count, current, 0.2, gain)
+    roof = (planes[:count, :1] * u + planes[:count, 1:2] * v + planes[:count, 2:]).min(axis=0)
+    expected = current - np.array([truncated(dz, 0.2) for dz in z - roof])
+    assert gain == pytest.approx(expected)
+    assert total == pytest.approx(expected[expected > 0.0].sum())
+
+
+def test_hypotheses_of_one_bin_become_one():
+    planes = np.array([[0.5, 0.0, 1.0], [0.501, 0.0, 1.001], [0.0, 0.0, 1.0], [0.5, 0.0, 2.0]])
+    assert distinct(planes, 0.0, 0.0).tolist() == planes[[0, 2, 3]].tolist()
+
+
+def test_depth_is_the_distance_to_the_border_negative_outside_and_in_holes():
+    ring, hole = (
+        np.array([(0, 0), (10, 0), (10, 10), (0, 10)], float),
+        np.array([(4, 4), (6, 4), (6, 6), (4, 6)], float),
+    )
+    starts = np.concatenate([ring, hole])
+    ends = np.concatenate([np.roll(ring, -1, axis=0), np.roll(hole, -1, axis=0)])
+    x, y = np.array([1.0, 5.0, -2.0, 5.0]), np.array([5.0, 5.0, 5.0, 3.5])
+    assert signed_depth(x, y, starts, ends) == pytest.approx([1.0, -1.0, -2.0, 0.5])
+
+
+@pytest.mark.parametrize("vertices", [0, 3, 40, 500])
+def test_grid_lines_are_few_whatever_the_outline(vertices):
+    at = np.random.default_rng(0).uniform(0.0, 30.0, vertices)
+    lines, at_vertex = grid_lines(0.0, 30.0, at, 0.5)
+    assert len(lines) <= 29 and len(lines) == len(at_vertex)
+    assert (np.diff(lines) > 0).all() and lines[0] == 0.0 and lines[-1] == 30.0

@@ -1,0 +1,391 @@
+"""Laws of the union's compiled search: heights, what a roof costs, and moves that keep the books of that cost."""
+
+import numpy as np
+import pytest
+
+from hiproof.fit.union.candidates import best_rectangles, gain_by_cell
+from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
+from hiproof.fit.union.moves import improve, merge_volumes, refit_each, settled, simplify
+from hiproof.fit.union.objective import (
+    BASE_SHARE,
+    INSIDE_M,
+    LEAST_STEP_LENGTH_M,
+    STEP_M,
+    TOUCH_M,
+    costs,
+    edge_cost,
+    objective,
+)
+from hiproof.fit.union.refit import refit
+from hiproof.fit.union.trim import NEAR_EDGE_M, SLACK_UNITS, drawn_in, raster, trim
+from hiproof.fit.union.volumes import (
+    BASE_COST,
+    DIRECTION,
+    FREE,
+    LEVEL,
+    OFFSET,
+    OPPOSITE,
+    PARAMETER_COST,
+    PART_COST,
+    PLANES,
+    REPLACES,
+    REPLACING_COST,
+    SIDES,
+    SLOPE,
+    SLOPE_LOW,
+    TIE,
+    U0,
+    V1,
+    base_only,
+    coefficients,
+    equalise_slopes,
+    is_allowed,
+    lowest_plane,
+    roof_heights,
+    volume_cost,
+    with_and_without,
+)
+from union_scenes import brute_rectangle, heights, random_scene, random_volume, random_volumes
+
+SLOPES = np.array([0.3, 0.7, 1.0])
+SEEDS = range(12)
+
+
+def drawn(seed, **options):
+    """A generator, random volumes, and a scene of points near the roof of some others."""
+    rng = np.random.default_rng(seed)
+    volumes = random_volumes(rng)
+    return rng, volumes, random_scene(rng, random_volumes(rng), **options)
+
+
+def is_true(volumes, scene, value):
+    return value == pytest.approx(objective(volumes, scene, np.inf), rel=1e-9, abs=1e-6)
+
+
+# --- heights ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_height_of_a_roof_is_a_few_lines_of_numpy(seed):
+    _, volumes, scene = drawn(seed)
+    z, top = roof_heights(volumes, scene.U, scene.V)
+    expected, expected_top = heights(volumes, scene.U, scene.V)
+    np.testing.assert_allclose(z, expected, atol=1e-12)
+    assert (top == expected_top).all()
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_roof_with_and_without_a_volume_is_a_few_lines_of_numpy(seed):
+    _, volumes, scene = drawn(seed)
+    for k in range(1, len(volumes)):
+        wide = volumes.copy()
+        wide[k, U0 : V1 + 1] = -1e3, 1e3, -1e3, 1e3
+        everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+        np.testing.assert_allclose(everywhere, heights(wide, scene.U, scene.V)[0], atol=1e-12)
+        np.testing.assert_allclose(without, heights(np.delete(volumes, k, axis=0), scene.U, scene.V)[0], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_hidden_volume_changes_no_height_and_no_misfit(seed):
+    rng, volumes, scene = drawn(seed)
+    hidden = random_volume(rng, replacing=0.0)
+    below = heights(volumes, scene.U, scene.V)[0].min() - 0.1
+    hidden[OFFSET + LEVEL] = min(hidden[OFFSET + LEVEL], below)
+    place = rng.integers(1, len(volumes) + 1)
+    more = np.insert(volumes, place, hidden, axis=0)
+    assert (roof_heights(more, scene.U, scene.V)[0] == roof_heights(volumes, scene.U, scene.V)[0]).all()
+    assert sum(edge_cost(more, scene, place, edge) for edge in range(4)) == 0.0
+    paid = objective(more, scene, np.inf) - objective(volumes, scene, np.inf)
+    assert paid == pytest.approx(scene.evidence * volume_cost(hidden), rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_order_of_volumes_that_join_does_not_matter(seed):
+    rng = np.random.default_rng(seed)
+    volumes = random_volumes(rng, replacing=0.0)
+    scene = random_scene(rng, volumes)
+    other = np.vstack([volumes[:1], rng.permutation(volumes[1:])])
+    assert (roof_heights(other, scene.U, scene.V)[0] == roof_heights(volumes, scene.U, scene.V)[0]).all()
+    assert objective(other, scene, np.inf) == pytest.approx(objective(volumes, scene, np.inf))
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_roof_united_with_itself_moved_under_it_is_itself(seed):
+    rng = np.random.default_rng(seed)
+    volumes = random_volumes(rng, replacing=0.0)
+    scene = random_scene(rng, volumes)
+    under = volumes.copy()
+    under[:, OFFSET : OFFSET + PLANES] -= rng.uniform(0.01, 2.0)
+    united = np.vstack([volumes, under])
+    z, top = roof_heights(united, scene.U, scene.V)
+    assert (z == roof_heights(volumes, scene.U, scene.V)[0]).all()
+    assert top.max() < len(volumes)
+
+
+# --- what a roof costs -----------------------------------------------------------------------------------------------
+
+
+def units_of(row):
+    """Units of complexity of a volume: itself, its offsets, the slopes that its tie leaves it, and that it replaces."""
+    there = np.isfinite(row[OFFSET : OFFSET + PLANES])
+    along, across = there[:2].sum(), there[2:SIDES].sum()
+    slopes = {FREE: along + across, OPPOSITE: min(along, 1) + min(across, 1)}.get(row[TIE], min(along + across, 1))
+    return PART_COST + PARAMETER_COST * (there.sum() + slopes) + REPLACING_COST * (row[REPLACES] > 0)
+
+
+def grown_by_touch(volumes):
+    """The volumes, all a touch larger: what meets an edge counts as beside it."""
+    wide = volumes.copy()
+    wide[:, [U0, U0 + 2]] -= TOUCH_M
+    wide[:, [U0 + 1, V1]] += TOUCH_M
+    return wide
+
+
+def beside_edge(volumes, scene, k, edge, t):
+    """Heights just inside and just outside volume k at places `t` of one of its edges, and how deep in the outline they lie."""
+    row = volumes[k]
+    at = np.full(len(t), row[U0 + edge])
+    own = np.stack([at, t] if edge < 2 else [t, at])
+    c, s = scene.turn[int(row[DIRECTION])]
+    first = np.array([[c, -s], [s, c]]) @ own
+    UV = np.stack([[[c, s], [-s, c]] @ first for c, s in scene.turn])
+    wide = grown_by_touch(volumes)
+    inside = heights(wide, UV[:, 0], UV[:, 1])[0]
+    outside = heights(np.delete(wide, k, axis=0), UV[:, 0], UV[:, 1])[0]
+    i, j = np.rint((first - [[scene.corner_u], [scene.corner_v]]) / scene.pitch).astype(int)
+    on = (i >= 0) & (j >= 0) & (i < scene.depth.shape[0]) & (j < scene.depth.shape[1])
+    deep = np.full(len(t), -np.inf)
+    deep[on] = scene.depth[i[on], j[on]]
+    return inside, outside, deep
+
+
+def slow_edge_cost(volumes, scene, k, edge, spacing):
+    """What shows of an edge, from samples `spacing` (m) apart at most."""
+    low, high = volumes[k, [U0 + 2, V1]] if edge < 2 else volumes[k, [U0, U0 + 1]]
+    count = max(2, int((high - low) / spacing) + 1)
+    step = (high - low) / count
+    inside, outside, deep = beside_edge(volumes, scene, k, edge, low + (np.arange(count) + 0.5) * step)
+    gap = np.abs(inside - outside)[deep >= INSIDE_M]
+    prices = scene.edge_prices
+    shown, low_steps = step * (gap > STEP_M).sum(), step * ((gap > STEP_M) & (gap < prices.low_step)).sum()
+    if shown < LEAST_STEP_LENGTH_M:
+        return 0.0
+    corner = np.abs(scene.vertices[int(volumes[k, DIRECTION]), edge // 2] - volumes[k, U0 + edge]).min() < 1e-6
+    loose = 0.0 if corner else prices.loose
+    return prices.any_step + prices.a_metre * shown + prices.low_a_metre * low_steps + loose
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_an_edge_costs_what_shows_of_it(seed):
+    _, volumes, scene = drawn(seed)
+    for k in range(1, len(volumes)):
+        for edge in range(4):
+            cost = edge_cost(volumes, scene, k, edge)
+            assert cost == pytest.approx(slow_edge_cost(volumes, scene, k, edge, 0.5), abs=1e-9)
+
+
+def test_an_edge_costs_nearly_what_dense_samples_of_it_say():
+    differences = []
+    for seed in SEEDS:
+        _, volumes, scene = drawn(seed)
+        for k in range(1, len(volumes)):
+            for edge in range(4):
+                dense = slow_edge_cost(volumes, scene, k, edge, 0.01)
+                differences.append(abs(edge_cost(volumes, scene, k, edge) - dense))
+    a_sample = 0.5 * (scene.edge_prices.a_metre + scene.edge_prices.low_a_metre)
+    assert np.median(differences) < a_sample
+    assert np.mean(np.array(differences) < 3 * a_sample) > 0.95
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_the_objective_is_misfit_and_complexity_counted_plainly(seed):
+    _, volumes, scene = drawn(seed)
+    z, top = heights(volumes, scene.U, scene.V)
+    residual = np.clip(np.abs(scene.z - z)[: scene.n] - scene.dead, 0.0, None) / scene.width
+    ghosts, weight = z[scene.n :], scene.weight[scene.n :]
+    misfit = np.minimum(residual**2, 1.0).sum() + weight[(ghosts < scene.low) | (ghosts > scene.high)].sum()
+    units = sum(units_of(row) for row in volumes[1:])
+    units += sum(slow_edge_cost(volumes, scene, k, e, 0.5) for k in range(1, len(volumes)) for e in range(4))
+    units += BASE_COST * (weight[top[scene.n :] == 0].sum() > BASE_SHARE * scene.n)
+    assert objective(volumes, scene, np.inf) == pytest.approx(misfit + scene.evidence * units, rel=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_limit_only_gives_up_what_is_above_it(seed):
+    _, volumes, scene = drawn(seed)
+    value = objective(volumes, scene, np.inf)
+    assert objective(volumes, scene, value + 1e-9) == value
+    assert objective(volumes, scene, value - 1e-6) == np.inf
+
+
+def test_shapes_that_are_not_allowed_cost_infinitely_much():
+    for seed in SEEDS:
+        rng = np.random.default_rng(seed)
+        volumes = random_volumes(rng)
+        scene = random_scene(rng, types=("gable", "flat"))
+        every = all(is_allowed(row, scene.allowed) for row in volumes[1:])
+        assert np.isfinite(objective(volumes, scene, np.inf)) == every
+
+
+# --- moves -----------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_moving_edges_keeps_the_books_and_never_costs(seed):
+    rng, volumes, scene = drawn(seed)
+    value = objective(volumes, scene, np.inf)
+    for k in range(1, len(volumes)):
+        before, rest = value, np.delete(volumes, k, axis=0)
+        value = move_edges(volumes, scene, k, value, rng.choice([0.5, 2.0, 60.0]))
+        assert value <= before + 1e-9
+        assert is_true(volumes, scene, value)
+        assert (np.delete(volumes, k, axis=0) == rest).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_moved_edges_leave_a_rectangle(seed):
+    _, volumes, scene = drawn(seed)
+    value = objective(volumes, scene, np.inf)
+    for k in range(1, len(volumes)):
+        before = volumes[k].copy()
+        move_edges(volumes, scene, k, value, 60.0)
+        for low in (U0, U0 + 2):
+            moved = (volumes[k, low : low + 2] != before[low : low + 2]).any()
+            assert not moved or volumes[k, low + 1] - volumes[k, low] >= MIN_SIDE_M - 1e-9
+
+
+MOVES = {
+    "settle": lambda volumes, scene, value: settled(volumes.copy(), scene, len(volumes) - 1, value, 60.0),
+    "refit": refit_each,
+    "improve": lambda volumes, scene, value: improve(volumes, scene, value, SLOPES, 2),
+    "simplify": lambda volumes, scene, value: simplify(volumes, scene, value, 0.6),
+    "merge": lambda volumes, scene, value: merge_volumes(volumes, scene, value, np.inf),
+}
+
+
+@pytest.mark.parametrize("move", MOVES)
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
+    _, volumes, scene = drawn(seed)
+    value = objective(volumes, scene, np.inf)
+    moved, found = MOVES[move](volumes.copy(), scene, value)
+    if move == "settle" and found == np.inf:  # it says so where it found nothing better
+        return
+    assert found <= value + 1e-9
+    assert is_true(moved, scene, found)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_changes(seed):
+    rng, volumes, scene = drawn(seed)
+    value, (U, V) = objective(volumes, scene, np.inf), raster(scene)
+    for k in range(1, len(volumes)):
+        for edge in (U0, U0 + 1, U0 + 2, V1):
+            seen_to = rng.uniform(volumes[k, edge - (edge - U0) % 2], volumes[k, edge - (edge - U0) % 2 + 1])
+            trial, found = drawn_in(volumes, scene, value, k, edge, seen_to, U, V)
+            assert is_true(trial, scene, found)
+            same = (roof_heights(trial, U, V)[0] == roof_heights(volumes, U, V)[0]).all()
+            assert same or found <= value + SLACK_UNITS * scene.evidence + 1e-6
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_trimming_gives_the_true_objective_and_no_volume_reaches_further_than_before(seed):
+    _, volumes, scene = drawn(seed)
+    trimmed, found = trim(volumes.copy(), scene, objective(volumes, scene, np.inf))
+    assert is_true(trimmed, scene, found)
+    planes = {tuple(row[OFFSET : OFFSET + PLANES]): row for row in volumes}
+    for row in trimmed:
+        before = planes[tuple(row[OFFSET : OFFSET + PLANES])]
+        assert (row[[U0, U0 + 2]] >= before[[U0, U0 + 2]] - NEAR_EDGE_M).all()
+        assert (row[[U0 + 1, V1]] <= before[[U0 + 1, V1]] + NEAR_EDGE_M).all()
+
+
+# --- planes and candidates -------------------------------------------------------------------------------------------
+
+
+def tied_volume(rng):
+    """A volume over all of the scene with one to four slopes, and a level top now and then."""
+    row = base_only(np.inf)[0]
+    row[U0 : V1 + 1] = -8.0, 8.0, -8.0, 8.0
+    for k in rng.permutation(SIDES)[: rng.integers(1, SIDES + 1)]:
+        row[SLOPE + k], row[OFFSET + k] = rng.uniform(0.3, 1.0), rng.uniform(4.5, 5.5)
+    row[OFFSET + LEVEL] = np.inf if rng.random() < 0.5 else 4.0
+    row[TIE] = rng.integers(3)
+    equalise_slopes(row)
+    return row
+
+
+def planes_that_show(volumes, scene):
+    """Which plane (n,) of the second volume is the lowest at each point."""
+    c = coefficients(volumes, 1)
+    return [lowest_plane(c, u, v)[1] for u, v in zip(scene.U[0, : scene.n], scene.V[0, : scene.n], strict=True)]
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_refitting_finds_the_planes_of_points_without_noise(seed):
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng)
+    shares = np.zeros(1)
+    while shares.min() < 0.1:  # every plane shows over a tenth of the points
+        true = np.vstack([base_only(-50.0), tied_volume(rng)])
+        there = np.isfinite(true[1, OFFSET : OFFSET + PLANES])
+        shares = np.bincount(planes_that_show(true, scene), minlength=PLANES)[there] / scene.n
+    scene = scene._replace(z=heights(true, scene.U, scene.V)[0])
+    near = true.copy()
+    near[1, OFFSET : OFFSET + PLANES][there] += rng.uniform(-0.05, 0.05, there.sum())
+    for _ in range(25):
+        refit(near, scene, 1)
+    z, _ = roof_heights(near, scene.U, scene.V)
+    np.testing.assert_allclose(z[: scene.n], scene.z[: scene.n], atol=1e-3)
+
+
+def test_a_plane_without_points_stays_where_it_is():
+    rng = np.random.default_rng(0)
+    scene = random_scene(rng)
+    volumes = np.vstack([base_only(-50.0), tied_volume(rng)])
+    volumes[1, OFFSET + LEVEL] = 1.0  # far below the slopes: only this one shows
+    volumes[1, OFFSET : OFFSET + SIDES][np.isfinite(volumes[1, OFFSET : OFFSET + SIDES])] = 60.0
+    before = volumes.copy()
+    refit(volumes, scene._replace(z=np.full(len(scene.z), 1.1)), 1)
+    assert volumes[1, OFFSET + LEVEL] == pytest.approx(1.1)
+    assert (volumes[1, OFFSET : OFFSET + SIDES] == before[1, OFFSET : OFFSET + SIDES]).all()
+    assert (volumes[1, SLOPE : SLOPE + SIDES][before[1, SLOPE : SLOPE + SIDES] > 0] >= SLOPE_LOW).all()
+
+
+@pytest.mark.parametrize("replacing", [False, True])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
+    rng, volumes, scene = drawn(seed)
+    candidates = np.array([random_volume(rng, 0.0) for _ in range(6)])
+    cell_u, cell_v = rng.integers(0, 6, (2, *scene.U.shape))
+    shape = np.full((2, 2), 6)
+    z_now, _ = roof_heights(volumes, scene.U, scene.V)
+    cost_now = costs(z_now, scene)
+    gains, cells = best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, replacing)
+    brute, found = np.empty(6), np.empty(6)
+    for m, (i0, i1, j0, j1) in enumerate(cells):
+        gain = np.zeros((6, 6))
+        gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacing, gain)
+        price = scene.evidence * (volume_cost(candidates[m]) + 0.5)
+        brute[m], found[m] = brute_rectangle(gain) - price, gain[i0:i1, j0:j1].sum() - price
+    assert gains.max() == pytest.approx(brute.max()) if brute.max() > 1e-6 else not np.isfinite(gains).any()
+    told = np.isfinite(gains)
+    assert gains[told] == pytest.approx(brute[told])
+    assert gains[told] == pytest.approx(found[told])
+    assert (brute[~told] <= max(0.5 * brute.max(), 1e-6) + 1e-9).all()
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
+    rng, volumes, scene = drawn(seed)
+    candidate = random_volume(rng, 0.0)[None]
+    cell = np.zeros(scene.U.shape, int)
+    z_now, _ = roof_heights(volumes, scene.U, scene.V)
+    cost_now, gain = costs(z_now, scene), np.zeros((1, 1))
+    gain_by_cell(scene, candidate, 0, cell, cell, cost_now, z_now, False, gain)
+    wide = candidate.copy()
+    wide[0, U0 : V1 + 1] = -1e3, 1e3, -1e3, 1e3
+    h = heights(wide, scene.U, scene.V)[0]
+    cost = costs(h, scene)
+    cost[: scene.n][cost[: scene.n] >= 1.0] += 0.02  # what covers a point without explaining it
+    assert gain[0, 0] == pytest.approx((cost_now - cost)[h > z_now + 1e-9].sum())

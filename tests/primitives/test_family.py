@@ -1,0 +1,162 @@
+"""Laws of the family of roof shapes: one surface, whichever way it is turned, named or written down."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.errors import FitError
+from hiproof.primitives import CATALOGUE, get
+from hiproof.primitives.family import CODES, KIN, NAMES, SHAPES, citygml_code, name_among, planes_of
+from union_scenes import lowest_of, member_of_shape, rectangle_of
+
+SHAPE_NAMES = [name for name, _ in SHAPES.values()]
+each_shape = pytest.mark.parametrize("shape", SHAPE_NAMES)
+
+
+def members(shape, count=12):
+    """Members of that shape: irregular ones, regular ones (those of the catalogue) and skewed ones in turn."""
+    for seed in range(count):
+        rng = np.random.default_rng([seed, SHAPE_NAMES.index(shape)])
+        yield member_of_shape(rng, shape, regular=seed % 3 == 1, skewed=seed % 3 == 2)
+
+
+def over_plan(member):
+    """Places (200, 2) strewn over a member's plan and a little beyond."""
+    corners = rectangle_of(member)
+    shares = np.random.default_rng(0).uniform(-0.1, 1.1, (200, 2))
+    return corners[0] + shares @ np.array([corners[1] - corners[0], corners[3] - corners[0]])
+
+
+def in_one_order(planes):
+    return planes[np.lexsort(np.round(planes.T, 6))]
+
+
+@each_shape
+def test_planes_follow_from_the_description(shape):
+    for member in members(shape):
+        planes = planes_of(member.name, *member.describe())
+        assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
+
+
+@each_shape
+def test_planes_follow_from_the_description_side_by_side(shape):
+    for member in members(shape):
+        parameters, kappa, translation = member.describe(as_catalogue=False)
+        if member.has.any():  # a flat roof has no side to be described by
+            planes = planes_of(member.name, parameters, kappa, translation)
+            assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
+
+
+@each_shape
+def test_planes_follow_from_written_parameters_to_a_millimetre(shape):
+    for member in members(shape):
+        parameters, kappa, translation = member.describe()
+        written = {name: round(value, 6) for name, value in parameters.items()}
+        planes = planes_of(member.name, written, round(kappa, 6), np.round(translation, 6))
+        xy = over_plan(member)
+        assert lowest_of(planes, xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-3)
+
+
+@each_shape
+def test_turning_the_axes_keeps_surface_plan_and_name(shape):
+    for member in members(shape):
+        turned, xy = member, over_plan(member)
+        for _ in range(4):
+            turned = turned.turned()
+            assert lowest_of(turned.planes(), xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-9)
+            assert shapely.equals_exact(plan_of(turned), plan_of(member), 1e-9, normalize=True)
+            assert turned.name == member.name
+        assert turned.kappa == pytest.approx(member.kappa)
+
+
+def plan_of(member):
+    return shapely.Polygon(rectangle_of(member))
+
+
+@each_shape
+def test_however_its_axes_were_turned_a_member_is_described_alike(shape):
+    for member in members(shape):
+        described = member.describe()
+        assert described[0] == pytest.approx(member.turned().describe()[0], abs=1e-9)
+        once = member.canonical()
+        assert np.array_equal(once.has, once.canonical().has) and once.kappa == once.canonical().kappa
+
+
+@each_shape
+def test_a_member_over_its_whole_plan_is_the_lowest_of_its_planes(shape):
+    for member in members(shape, 6):
+        part = member.part([plan_of(member)])
+        xy = over_plan(member)
+        assert part.type == member.name
+        assert part.pieces[0].height_at(xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-9)
+        assert part.translation[2] == pytest.approx(member.base)
+
+
+@each_shape
+def test_eaves_lie_where_the_parameters_say(shape):
+    """In the middle of a side its own plane is as high above T_L as its eave, and as steep as its pitch."""
+    side_by_side = [member for member in members(shape) if member.has.any()]
+    for member in side_by_side:
+        parameters, kappa, translation = member.describe(as_catalogue=False)
+        c, s = math.cos(kappa), math.sin(kappa)
+        half = 0.5 * np.array([parameters["length"], parameters["width"]])
+        planes = planes_of(member.name, parameters, kappa, translation)
+        for name, way in {"left": (-1, 0), "right": (1, 0), "front": (0, -1), "back": (0, 1)}.items():
+            if f"eave_{name}" not in parameters:
+                continue
+            middle = translation[:2] + (half * way) @ np.array([[c, s], [-s, c]])
+            inwards = -np.array(way) @ np.array([[c, s], [-s, c]])
+            eave, pitch = parameters[f"eave_{name}"], math.tan(math.radians(parameters[f"pitch_{name}"]))
+            own = np.abs(planes[:, :2] @ inwards - pitch) + np.abs(planes @ (*middle, 1.0) - translation[2] - eave)
+            assert own.min() < 1e-9
+
+
+def test_names_are_told_from_planes_eaves_and_pitches():
+    for shape in SHAPE_NAMES:
+        for member in members(shape):
+            kin = next((names for names in KIN if shape in names), (shape,))
+            assert member.name in kin
+    rng = np.random.default_rng(0)
+    gable = member_of_shape(rng, "gable", regular=True)
+    assert gable.name == "gable" and set(gable.describe()[0]) == set(get("gable").parameters)
+
+
+@pytest.mark.parametrize("name", [name for name in CATALOGUE if name not in ("shed", "gambrel")])
+def test_a_shape_of_the_catalogue_is_told_by_its_own_parameters(name):
+    """A regular member's description is that of the catalogue: the primitive of these parameters has the same planes."""
+    primitive = get(name)
+    rng = np.random.default_rng(len(name))
+    for _ in range(10):
+        width = rng.uniform(6.0, 12.0)
+        theta_p = primitive.typical(width, width * rng.uniform(1.2, 2.5), rng.uniform(1.5, 4.0))
+        theta = primitive.to_theta(theta_p, rng.uniform(-1.5, 1.5), rng.normal(0.0, 20.0, 3))
+        planes = planes_of(name, *primitive.from_theta(theta))
+        expected = np.concatenate([piece.planes for piece in primitive.part(theta).pieces])
+        assert planes == pytest.approx(expected, abs=1e-9)
+
+
+def test_every_name_has_codes_and_free_has_none():
+    assert len(set(NAMES)) == len(NAMES) == len(CATALOGUE) + len(CODES)
+    assert set(SHAPE_NAMES) <= set(NAMES)
+    assert all(len(citygml_code(name)) == 4 and citygml_code(name).isdigit() for name in NAMES)
+    assert all(len(code) == 4 and code.isdigit() for codes in CODES.values() for code in codes)
+    assert citygml_code("free") is None
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_name_stands_for_itself_its_kin_or_nothing(name):
+    assert name_among(name, ()) == name_among(name, (name, "flat")) == name
+    kin = {other for names in KIN if name in names for other in names}
+    for other in NAMES:
+        assert name_among(name, (other,)) == (other if other == name or other in kin else None)
+
+
+def test_what_is_no_type_or_lacks_a_parameter_is_told_in_a_sentence():
+    with pytest.raises(FitError, match=r"expected a roof type .* got 'onion'"):
+        planes_of("onion", {"pitch_front": 30.0}, 0.0, np.zeros(3))
+    parameters, kappa, translation = member_of_shape(np.random.default_rng(0), "corner").describe()
+    del parameters["eave_front"]
+    with pytest.raises(FitError, match="expected the parameter eave_front of a corner roof"):
+        planes_of("corner", parameters, kappa, translation)

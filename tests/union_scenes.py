@@ -1,0 +1,128 @@
+"""Generated scenes and volumes for the laws of the union's search."""
+
+import math
+
+import numpy as np
+import shapely
+
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.scene import allowed_shapes, scene_of
+from hiproof.fit.union.volumes import (
+    COLUMNS,
+    DIRECTION,
+    LEVEL,
+    OFFSET,
+    PLANES,
+    REPLACES,
+    SIDES,
+    SLOPE,
+    TIE,
+    U0,
+    U1,
+    V0,
+    V1,
+    base_only,
+    equalise_slopes,
+)
+from hiproof.primitives.family import SHAPES, Member
+
+OUTLINES = (
+    shapely.box(-6.0, -4.0, 6.0, 4.0),
+    shapely.Polygon([(-7, -5), (7, -5), (7, 1), (0, 1), (0, 6), (-7, 6)]),
+    shapely.Polygon([(-6, -4), (5, -4), (7.5, 2), (3, 4), (-6, 4)]),
+)
+
+
+def random_volume(rng, replacing=0.2):
+    """A row (COLUMNS,) with a random rectangle, some of the five planes and a random tie; its ridge above its middle."""
+    row = np.zeros(COLUMNS)
+    row[DIRECTION] = rng.integers(2)
+    u, v = np.sort(rng.uniform(-7.0, 7.0, (2, 2)), axis=1) + [[-0.5, 0.5]]
+    row[U0], row[U1], row[V0], row[V1] = *u, *v
+    row[OFFSET : OFFSET + PLANES] = np.inf
+    some = rng.random(PLANES) < 0.5
+    some[rng.integers(PLANES)] = True
+    for k in np.nonzero(some)[0]:
+        row[OFFSET + k] = rng.uniform(-1.0, 2.0)
+        if k < LEVEL:
+            row[SLOPE + k] = rng.uniform(0.1, 1.2)
+            low = u[0] if k == 0 else -u[1] if k == 1 else v[0] if k == 2 else -v[1]
+            row[OFFSET + k] -= row[SLOPE + k] * low
+    row[TIE], row[REPLACES] = rng.integers(3), float(rng.random() < replacing)
+    equalise_slopes(row)
+    return row
+
+
+def random_volumes(rng, most=5, replacing=0.2):
+    """A level base and up to `most` random volumes: rows (k, COLUMNS)."""
+    return np.vstack([base_only(-1.0), *[random_volume(rng, replacing) for _ in range(rng.integers(1, most + 1))]])
+
+
+def heights(volumes, U, V):
+    """Height of the roof and the volume that shows at U, V (directions, n): the definition, in plain NumPy."""
+    z, top = np.full(U.shape[1], -np.inf), np.zeros(U.shape[1], int)
+    for k, row in enumerate(volumes):
+        u, v = U[int(row[DIRECTION])], V[int(row[DIRECTION])]
+        offset, slope = row[OFFSET : OFFSET + PLANES, None], row[SLOPE : SLOPE + SIDES, None]
+        h = np.min([*(offset[:LEVEL] + slope * [u, -u, v, -v]), np.broadcast_to(offset[LEVEL], u.shape)], axis=0)
+        shows = (row[U0] <= u) & (u <= row[U1]) & (row[V0] <= v) & (v <= row[V1]) & ((h > z) | (row[REPLACES] > 0))
+        z, top = np.where(shows, h, z), np.where(shows, k, top)
+    return z, top
+
+
+def random_scene(rng, volumes=None, count=250, types=()):
+    """A scene in two directions of points near the roof of `volumes` (level ground without), a tenth of them astray."""
+    outline = OUTLINES[rng.integers(len(OUTLINES))]
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (2 * count, 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)][:count]
+    plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
+    angles = [0.0, math.radians(rng.uniform(15.0, 75.0))]
+    scene = scene_of(plan, outline, np.arange(len(plan.cloud.u)), angles, 3.0, 0.25, allowed_shapes(types))
+    z = heights(volumes, scene.U, scene.V)[0] if volumes is not None else np.zeros(scene.U.shape[1])
+    z = z + rng.normal(0.0, 0.03, len(z)) + (rng.random(len(z)) < 0.1) * rng.normal(0.0, 1.0, len(z))
+    low, high = z.min() - 0.3, z.max() + 0.3
+    return scene._replace(z=z, low=low, high=high)
+
+
+def member_of_shape(rng, shape, regular=False, skewed=False):
+    """A random member of the family called `shape` (or a kin of it), its ridge along its own u.
+
+    `regular`: one eave and one slope, as most roofs have; `skewed`: planes that face a little off the axes.
+    """
+    top, sides = next((has_top, sides) for (has_top, _, _), (name, sides) in SHAPES.items() if name == shape)
+    sides, half = list(sides), np.array([rng.uniform(6.0, 8.0), rng.uniform(3.5, 5.0)])
+    eaves, slopes, leans = np.full(4, np.inf), np.zeros(4), np.zeros(4)
+    eaves[sides] = rng.uniform(3.0, 6.0) + (0.0 if regular else rng.uniform(0.0, 0.4, len(sides)))
+    slopes[sides] = rng.uniform(0.5, 0.9) * (np.ones(len(sides)) if regular else rng.uniform(0.9, 1.1, len(sides)))
+    if skewed:
+        leans[sides] = rng.uniform(-0.1, 0.1, len(sides))
+    reach = half[1] * slopes[sides].min() if sides else 0.0
+    height = (
+        (eaves[sides].max() + rng.uniform(0.4, 0.6) * reach if sides else rng.uniform(3.0, 6.0)) if top else math.inf
+    )
+    return Member(rng.uniform(-3.1, 3.1), rng.normal(0.0, 30.0, 2), half, eaves, slopes, height, leans)
+
+
+def rectangle_of(member):
+    """The plan (4, 2) of a member, counter-clockwise."""
+    c, s = math.cos(member.kappa), math.sin(member.kappa)
+    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * member.half
+    return corners @ np.array([[c, s], [-s, c]]) + member.centre
+
+
+def lowest_of(planes, xy):
+    """Height (n,) of the min of planes (k, 3) at `xy` (n, 2)."""
+    return (xy @ planes[:, :2].T + planes[:, 2]).min(axis=1)
+
+
+def brute_rectangle(gain):
+    """The largest sum of `gain` (nu, nv) over a rectangle of its cells, all of them tried."""
+    nu, nv = gain.shape
+    return max(
+        gain[a:b, c:d].sum()
+        for a in range(nu)
+        for b in range(a + 1, nu + 1)
+        for c in range(nv)
+        for d in range(c + 1, nv + 1)
+    )
