@@ -7,10 +7,12 @@ whole road from points to files. A mark beside the compiled code tells later run
 from __future__ import annotations
 
 import tempfile
+import warnings
 from pathlib import Path
 
 from ..compiled import kept
 from ..compiled.stamp import PACKAGE, stamp_of_all
+from ..errors import InputWarning
 from ..log import without_progress
 
 
@@ -38,10 +40,12 @@ def mark() -> str:
 
 
 def run_neighbourhood(scratch: Path | None) -> None:
-    """The whole road in this process; what comes out is thrown away."""
+    """The whole road in this process, with all inputs and with the points alone; what comes out is thrown away."""
     from ..simulate import demo_files
     from .run import Request, reconstruct_area
 
     files = {name: str(path) for name, path in demo_files().items()}
-    with tempfile.TemporaryDirectory(dir=scratch) as out, without_progress():
-        reconstruct_area(Request((files["cloud"],), Path(out), files["footprints"], files["terrain"]))
+    for footprints, terrain in ((files["footprints"], files["terrain"]), (None, None)):
+        with tempfile.TemporaryDirectory(dir=scratch) as out, without_progress(), warnings.catch_warnings():
+            warnings.simplefilter("ignore", InputWarning)
+            reconstruct_area(Request((files["cloud"],), Path(out), footprints, terrain))

@@ -18,10 +18,10 @@ def headline(done: int, total: int) -> str:
     """What is going on and how long it takes at most: a function takes a second or so.
 
     >>> headline(20, 220)
-    'compiling about 200 functions for this machine, once for each version; up to 4 min'
+    'compiling for this machine, once for each version: up to 200 functions, up to 4 min'
     """
     number = total - done
-    return f"compiling about {number} functions for this machine, once for each version; up to {-(-number // 60)} min"
+    return f"compiling for this machine, once for each version: up to {number} functions, up to {-(-number // 60)} min"
 
 
 class Lines:
