@@ -93,7 +93,7 @@ def right_types(part: Part, hidden: bool) -> set[str]:
 
 def errors_in_sigmas(truth: Part, fit: Part, hidden: bool) -> dict[str, float]:
     """Error over standard deviation of every parameter that both parts of one type have; none where they are turned
-    against each other, none along a part whose end is hidden."""
+    against each other, none along a part whose end is hidden, none of what the footprint gives (a sigma of 0)."""
     turn = math.remainder(fit.kappa - truth.kappa, math.pi)
     if fit.type != truth.type or abs(turn) > 0.3:
         return {}
