@@ -13,7 +13,7 @@ import hiproof.read.polygons
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.read.overlap import check_overlap, refuse_degrees
+from hiproof.read.overlap import check_overlap, doubtful_place, refuse_degrees
 from hiproof.read.polygons import simple_polygons
 from hiproof.settings import Settings
 
@@ -220,6 +220,22 @@ def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     with pytest.raises(InputError, match=expected) as caught:
         check_overlap(footprints, bounds, named, cloud)
     assert str(caught.value).startswith("expected footprints that overlap the cloud in x")
+
+
+@pytest.mark.parametrize(
+    ("code", "xy", "expected"),
+    [
+        (7415, HERE, None),
+        (25831, IN_UTM, None),
+        (25832, moved(IN_UTM, UTM31, UTM32), None),
+        (25831, HERE, "far from where EPSG:25831 (ETRS89 / UTM zone 31N) is used (0 to 6 E, 37 to"),
+        (2263, HERE, "far from where EPSG:2263"),
+        (25831, HERE * 1e7, "nowhere on Earth"),
+    ],
+)
+def test_coordinates_far_from_where_their_crs_is_used_are_told(code, xy, expected):
+    told = doubtful_place(CRS.from_epsg(code), xy)
+    assert told is None if expected is None else expected in told
 
 
 def test_what_names_no_crs_and_counts_in_degrees_is_refused():

@@ -12,7 +12,7 @@ from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..read.crs import described, parse_crs, units_of
 from ..read.footprints import footprint_crs
-from ..read.overlap import refuse_degrees
+from ..read.overlap import doubtful_place, refuse_degrees
 from ..read.pointcloud import PointFileHeader, common_crs
 
 
@@ -45,7 +45,17 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     frame = AreaFrame(cloud, footprints, units_of(cloud or footprints, named=read.unit))
     if cloud is None and (footprints is not None or read.unit == "auto"):
         say_what_is_assumed(headers[0].path, frame)
+    if frame.crs is not None:
+        say_where_it_lies(headers, frame)
     return frame
+
+
+def say_where_it_lies(headers: list[PointFileHeader], frame: AreaFrame) -> None:
+    """One line where the CRS puts the clouds far from the area it is made for: it is another, or of another unit."""
+    bounds = plan_bounds(headers)
+    doubt = doubtful_place(frame.crs, (bounds[:, :2] + bounds[:, 2:]) / 2) if len(bounds) else None
+    if doubt:
+        warnings.warn(f"{headers[0].path}: lies at {doubt}; check the CRS and its unit", InputWarning)
 
 
 def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:

@@ -15,6 +15,7 @@ from ..model import Footprint
 from .crs import described, epsg_code, horizontal_crs, parse_crs, same_horizontal
 
 DEGREES_WIDE = 0.2  # no building is narrower in metres, hardly a tile wider in degrees
+AREA_MARGIN = 2.0  # degrees that a CRS is commonly used beyond its area: a zone is kept at the border of the next
 NEIGHBOURS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
 FOOT_M = 0.3048
 
@@ -117,6 +118,21 @@ def refuse_degrees(boxes: np.ndarray, what: str, advice: str) -> None:
         raise InputError(
             f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like degrees; {advice}"
         )
+
+
+def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
+    """Where on Earth positions (n, 2) in `crs` lie, where that is far from the area it is made for; else None."""
+    area, degrees = horizontal_crs(crs).area_of_use, parse_crs("EPSG:4326")
+    lon, lat = np.median(reprojected(xy, horizontal_crs(crs), degrees), axis=0)
+    if area is None or area.west > area.east:
+        return None
+    if area.west - AREA_MARGIN <= lon <= area.east + AREA_MARGIN and (
+        area.south - AREA_MARGIN <= lat <= area.north + AREA_MARGIN
+    ):
+        return None
+    where = f"{lon:.1f} E {lat:.1f} N" if np.isfinite((lon, lat)).all() else "nowhere on Earth"
+    place = f"{area.west:.0f} to {area.east:.0f} E, {area.south:.0f} to {area.north:.0f} N"
+    return f"{where}, far from where {described(crs)} is used ({place})"
 
 
 def extent(low: np.ndarray, high: np.ndarray) -> str:
