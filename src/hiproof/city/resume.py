@@ -1,0 +1,112 @@
+"""A run's own folder: opened, held against what is asked for, and gone on from or begun anew."""
+
+from __future__ import annotations
+
+import json
+import secrets
+import shutil
+import sqlite3
+import time
+import warnings
+from pathlib import Path
+
+from .. import __version__
+from ..errors import OutputError, OutputWarning
+from ..log import LOGGER
+from ..masking import masked_values
+from ..write.files import atomic
+from .ledger import Ledger
+from .merge import remove_tiles
+from .outputs import broken_claims
+from .plan import PLAN_FILE, Plan
+from .prepare import make_plan
+from .request import Request, inputs_of, mark_of
+
+
+def open_state(out: Path) -> Path:
+    """The run's own folder inside the output folder, made if need be."""
+    state = Path(out) / ".hiproof"
+    try:
+        state.mkdir(parents=True, exist_ok=True)
+        (state / "tiles").mkdir(exist_ok=True)
+        (state / "points").mkdir(exist_ok=True)
+    except OSError as error:
+        raise OutputError(
+            f"expected a folder that can be written at {out}, got: {error}; choose another --out"
+        ) from error
+    return state
+
+
+def open_ledger(state: Path, restart: bool) -> Ledger:
+    """The ledger of a run; one that is damaged or of another version is dropped where the run begins anew."""
+    path = state / "ledger.sqlite"
+    try:
+        ledger = Ledger(path)
+        ledger.reopen()
+    except sqlite3.Error as error:
+        if restart:
+            for end in ("", "-wal", "-shm"):
+                path.with_name(path.name + end).unlink(missing_ok=True)
+            return open_ledger(state, False)
+        raise OutputError(
+            f"expected the ledger of a run of this version in {state}, got: {error}; begin anew with --restart, or "
+            "choose another --out"
+        ) from error
+    return ledger
+
+
+def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
+    """The plan of an earlier run of the same request whose files stand as it left them, else a new one."""
+    inputs = inputs_of(request)
+    if ledger.get("mark") is not None and not request.restart:
+        refuse_other_inputs(request.out, inputs, ledger)
+        if stands(request.out, ledger):
+            LOGGER.info("version %s goes on in %s", __version__, request.out)
+            return Plan.load(state / PLAN_FILE)
+    forget(state, ledger)
+    plan, salt = make_plan(request), secrets.token_hex(16)
+    with atomic(state / PLAN_FILE) as beside:
+        plan.save(Path(beside))
+    ledger.add_tasks([(f"sort:{i}", "sort", i, 0) for i in range(len(request.clouds))])
+    tiles = enumerate(plan.tiles.items())
+    ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
+    told = json.dumps(masked_values(inputs), default=str)
+    ledger.set(inputs=told, salt=salt, mark=mark_of(inputs, salt), started=str(time.time()))
+    LOGGER.info(
+        "version %s begins in %s: %d buildings in %d work tiles",
+        __version__,
+        request.out,
+        len(plan.jobs),
+        len(plan.tiles),
+    )
+    return plan
+
+
+def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
+    """Raise OutputError, naming what differs, where the folder holds a run of another request."""
+    if ledger.get("mark") == mark_of(inputs, ledger.get("salt")):
+        return
+    known, told = json.loads(ledger.get("inputs")), json.loads(json.dumps(masked_values(inputs), default=str))
+    other = [name for name in told | known if told.get(name) != known.get(name)]
+    raise OutputError(
+        f"expected {out} to be new or to hold a run of the same inputs, settings and version, got a run that differs in "
+        f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or begin anew with --restart"
+    )
+
+
+def stands(out: Path, ledger: Ledger) -> bool:
+    """Whether a run may go on from what is there: not where files of a finished run were removed or changed since."""
+    broken = broken_claims(ledger.claims(), Path(out)) if ledger.get("merged") == "yes" else []
+    if broken:
+        names = ", ".join(broken[:5]) + (" and others" if len(broken) > 5 else "")
+        warnings.warn(f"{out}: {names} is gone or not as the run left it; all is made again", OutputWarning)
+    return not broken
+
+
+def forget(state: Path, ledger: Ledger) -> None:
+    """Drop all that an earlier run in this folder has left of its state (its output files stay until replaced)."""
+    remove_tiles(state.parent)
+    ledger.forget()
+    for name in ("tiles", "points"):
+        shutil.rmtree(state / name, ignore_errors=True)
+        (state / name).mkdir()
