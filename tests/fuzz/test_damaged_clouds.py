@@ -11,7 +11,7 @@ from fuzz.damaged_clouds import damaged_clouds, field_of, sound_clouds
 from hiproof.errors import InputError
 from hiproof.read.pointcloud import iter_points, read_header
 
-QUICK = settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
 
 
 def read(path):

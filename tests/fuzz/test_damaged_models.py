@@ -86,7 +86,7 @@ def sound_text(tmp_path_factory):
     return folder, (folder / MODELS).read_text()
 
 
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+@settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
 @given(data=st.data())
 def test_any_change_of_the_text_is_read_or_answered(data, sound_text):
     folder, text = sound_text

@@ -3,6 +3,7 @@
 import os
 import signal
 import sys
+import time
 import warnings
 
 import pytest
@@ -65,6 +66,15 @@ def test_workers_leave_an_interrupt_to_their_parent():
     finally:
         processes.close()
     assert (result, error) == ("finished", None)
+
+
+def test_an_interrupt_does_not_wait_for_what_workers_are_at():
+    processes = Processes(1)
+    outcomes = processes.run(time.sleep, [(0,), (600,)])
+    next(outcomes)
+    with pytest.raises(KeyboardInterrupt):
+        outcomes.throw(KeyboardInterrupt)
+    processes.close()  # returns once the worker has ended
 
 
 def test_a_file_that_is_named_like_markup_is_named_as_it_is(hiproof, town, tmp_path, capsys):

@@ -17,6 +17,7 @@ from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessP
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -62,11 +63,20 @@ class Processes:
     def __init__(self, jobs: int):
         self.jobs = jobs
         self.pool: ProcessPoolExecutor | None = None
+        self.word: Connection | None = None
 
     def prepare(self, scratch: Path) -> None:
         make_ready(str(scratch))
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+        try:
+            yield from self.outcomes(function, tasks)
+        except BaseException:  # Ctrl-C, most of all: nobody waits any more for what the workers are at
+            if self.word is not None:
+                self.word.close()
+            raise
+
+    def outcomes(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
         waiting, running = iter(tasks), {}
         while True:
             # two tasks a worker in the queue: enough to keep it busy, few enough to lose little when one dies
@@ -84,12 +94,10 @@ class Processes:
 
     def submit(self, function: Callable, task: tuple) -> Future:
         if self.pool is None:
-            self.pool = ProcessPoolExecutor(
-                self.jobs,
-                mp_context=get_context("spawn"),
-                initializer=begin_worker,
-                initargs=(os.getpid(), log.started()),
-            )
+            context = get_context("spawn")
+            heard, self.word = context.Pipe(duplex=False)
+            given = (os.getpid(), heard, log.started())
+            self.pool = ProcessPoolExecutor(self.jobs, mp_context=context, initializer=begin_worker, initargs=given)
         try:
             return self.pool.submit(function, *task)
         except BrokenProcessPool as error:
@@ -116,27 +124,26 @@ class Processes:
             self.pool = None
 
 
-def begin_worker(parent: int, logging: tuple) -> None:
+def begin_worker(parent: int, heard: Connection, logging: tuple) -> None:
     """What a worker process starts with: it logs as the main process does, and ends with it.
 
     That compiled code cannot be kept, the main process has said.
     """
     log.start(*logging)
     warnings.simplefilter("ignore", NotKeptWarning)
-    leave_with_parent(parent)
+    leave_with_parent(parent, heard)
 
 
-def leave_with_parent(parent: int) -> None:
-    """Make a worker end when its parent is gone, so that kill -9 of the main process leaves nothing running.
+def leave_with_parent(parent: int, heard: Connection) -> None:
+    """Make a worker end when its parent closes the pipe, or is gone: kill -9 of the main process leaves nothing running.
 
-    Ctrl-C, which a terminal sends to all, is the parent's to answer: it lets the worker finish its task, and end.
+    Ctrl-C, which a terminal sends to all, is the parent's to answer.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
 
     def watch() -> None:
-        tick = threading.Event()
-        while os.getppid() == parent:
-            tick.wait(0.5)
+        while os.getppid() == parent and not heard.poll(0.5):
+            pass
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

@@ -1,0 +1,86 @@
+"""A footprint that is no building's gets a status of its own, in little time, and harms no other."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from fuzz.damaged_footprints import ODD, SOUND_IN_THE_WORLD, wavy, write_beside_a_sound_one
+from hiproof import stages
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.read.polygons import MOST_MEETINGS, WIDEST_M, meetings, simple_polygons
+from run_records import by_id
+from tiny_town import make_town, write_cloud, write_footprints
+
+QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+NUMBERS = st.one_of(
+    st.floats(-30, 30), st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.0, 1.0, 1e9])
+)
+
+
+@pytest.fixture(scope="module")
+def cloud(tmp_path_factory):
+    town = make_town(2, 3.0)
+    return str(write_cloud(tmp_path_factory.mktemp("town") / "cloud.laz", town.xyz, town.classification))
+
+
+@pytest.fixture(scope="module")
+def alone(cloud, tmp_path_factory):
+    """What the sound footprint comes to by itself."""
+    folder = tmp_path_factory.mktemp("alone")
+    footprints = write_footprints(folder / "footprints.geojson", {"sound": SOUND_IN_THE_WORLD})
+    reconstruct_area(Request((cloud,), folder / "out", str(footprints)))
+    return by_id(folder / "out")["sound"]
+
+
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
+@pytest.mark.parametrize("name", ODD)
+def test_an_odd_footprint_gets_a_status_and_harms_no_other(name, cloud, alone, tmp_path):
+    ring, status = ODD[name]
+    footprints = write_beside_a_sound_one(tmp_path / "footprints.geojson", ring)
+    summary = reconstruct_area(Request((cloud,), tmp_path / "out", str(footprints)))
+    rows = by_id(tmp_path / "out")
+    assert summary.exit_code == 0
+    assert rows["odd"]["status"] == status
+    assert rows["sound"] == alone
+    if status == "modelled":
+        assert "outline of 10001 vertices was simplified" in rows["odd"]["detail"]
+
+
+def test_an_outline_keeps_its_shape_and_says_how_far():
+    outline = shapely.Polygon(wavy(5000))
+    simple, remark = stages.without_needless_vertices(outline)
+    within = float(remark.rsplit("within ", 1)[1].removesuffix(" m"))
+    assert shapely.get_num_coordinates(simple) <= stages.MOST_OUTLINE_VERTICES
+    assert simple.is_valid and within <= 0.05
+    assert shapely.hausdorff_distance(simple.exterior, outline.exterior) <= within + 1e-9
+
+
+def test_an_outline_of_few_vertices_stays_as_it_is():
+    outline = shapely.Polygon(wavy(stages.MOST_OUTLINE_VERTICES - 1))
+    assert stages.without_needless_vertices(outline) == (outline, "")
+
+
+def test_courtyards_narrower_than_what_is_left_out_go_with_it():
+    yards = [shapely.box(x, y, x + 0.1, y + 0.1).exterior for x in range(20) for y in range(20)]
+    outline = shapely.Polygon(shapely.box(-1, -1, 21, 21).exterior, yards)
+    simple, remark = stages.without_needless_vertices(outline)
+    assert len(simple.interiors) == 0 and "of 2005 vertices" in remark
+
+
+def test_meetings_count_edges_that_do_not_follow_one_another():
+    assert (
+        meetings(shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])) == 1 + 1
+    )  # the crossing, and the two uprights' none
+    assert meetings(shapely.Polygon(ODD["80,000 crossings"][0])) > MOST_MEETINGS
+
+
+@QUICK
+@given(rest=st.lists(st.tuples(NUMBERS, NUMBERS), min_size=2, max_size=12))
+def test_any_ring_becomes_valid_polygons_of_a_buildings_size_or_none(rest):
+    polygons = simple_polygons(shapely.Polygon([(0.0, 0.0), *rest]))
+    assert polygons
+    for polygon in polygons:
+        assert polygon.is_valid
+        assert polygon.is_empty or np.ptp(shapely.get_coordinates(polygon), axis=0).max() <= WIDEST_M
