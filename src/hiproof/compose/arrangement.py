@@ -17,7 +17,7 @@ from ..compiled import compiled
 
 GRID_M = 1e-4
 OUTSIDE, UNCOVERED = -1, -2
-COLLINEAR_UNITS = 2.0
+COLLINEAR_UNITS = 5.0
 
 
 @compiled

@@ -19,6 +19,7 @@ from .arrangement import (
     plan_cells,
     trace_faces,
 )
+from .tidy import without_short_edges
 
 MAX_EXTENT_M = 50_000.0
 
@@ -129,7 +130,7 @@ def arrange(problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_
             min_width_m / GRID_M,
         )
         if not (side == UNCOVERED).any():
-            return PlanCells(xy, edges, side)
+            return PlanCells(*without_short_edges(xy, edges, side, problem.planes, reach_m / GRID_M))
         problem = extend_over_gaps(problem, PlanCells(xy, edges, side))
     raise CompositionError("expected the roof's pieces to reach all of its outline, got gaps that no piece borders")
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Solid
-from .check_kernel import check_shell
+from .bends import bent_faces
+from .check_kernel import SAME_POINT_M, check_faces, check_shell, weld
 
 CODES = {
     101: "has a ring with fewer than three points",
@@ -17,7 +18,7 @@ CODES = {
     201: "has rings that cross or share a stretch",
     202: "has the same ring twice",
     203: "is not planar: a vertex lies too far from its plane",
-    204: "is not planar: a corner turns out of its plane by more than 20 degrees",
+    204: "is not planar: two of its triangles differ by more than 20 degrees",
     205: "has an inside that its rings cut apart",
     206: "has an inner ring outside its outer ring",
     207: "has an inner ring inside another inner ring",
@@ -80,7 +81,13 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
         return (
             Finding(101, -1, "101: expected finite vertices and indices into them, got others; the file is damaged"),
         )
-    local = vertices - vertices[index].mean(axis=0)
     read = tuple(finding(code, face) for code, face in solid.defects)
-    rows = check_shell(local, index, ring_start, face_start, float(planarity_m))
+    local = vertices - vertices[index].mean(axis=0)
+    index = weld(local, SAME_POINT_M)[index]
+    rows, normals, offsets, flatness, risky = check_faces(local, index, ring_start, face_start, float(planarity_m))
+    risky[rows[:, 1]] = False  # what is unsound otherwise cannot be triangulated
+    bent = bent_faces(np.flatnonzero(risky), local, index, ring_start, face_start, normals)
+    rows = [*rows, *((204, face, -1) for face in bent)]
+    if len(rows) == 0:
+        rows = check_shell(local, index, ring_start, face_start, normals, offsets, flatness)
     return read + tuple(finding(int(code), int(face), int(other)) for code, face, other in rows)

@@ -10,15 +10,18 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from .bends import SURELY_FLAT_COSINE
 
 SAME_POINT_M = 1e-3
 TOUCH_M = 1e-9
-NORMAL_COSINE = np.cos(np.deg2rad(20.0))
+MOST_VERTICES_IN_THREES = 40
+SKEW = np.array([0.43, 0.61, 0.67])  # shorter than one: what is further apart along it is further apart in space
 
 
 @compiled
 def find_root(parent, i):
     while parent[i] != i:
+        parent[i] = parent[parent[i]]
         i = parent[i]
     return i
 
@@ -27,12 +30,13 @@ def find_root(parent, i):
 def weld(vertices, tolerance):
     """For each vertex (n,) the lowest index of a vertex closer than `tolerance`."""
     same = np.arange(len(vertices))
-    order = np.argsort(vertices[:, 0])
+    along = vertices @ SKEW  # buildings are square to the axes: along none of them do so few vertices share a place
+    order = np.argsort(along)
     for i in range(len(order)):
         v = order[i]
         for k in range(i - 1, -1, -1):
             w = order[k]
-            if vertices[v, 0] - vertices[w, 0] >= tolerance:
+            if along[v] - along[w] >= tolerance:
                 break
             d = vertices[v] - vertices[w]
             if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < tolerance * tolerance:
@@ -105,6 +109,16 @@ def depth_in_face(p, flat, index, ring_start, first, last):
 
 
 @compiled
+def segments_touch(a, b, c, d):
+    """Whether the plan segments ab and cd cross, or an end of one lies on the other."""
+    return (
+        crosses(a, b, c, d)
+        or min(distance_to_segment(c, a, b), distance_to_segment(d, a, b)) <= TOUCH_M
+        or min(distance_to_segment(a, c, d), distance_to_segment(b, c, d)) <= TOUCH_M
+    )
+
+
+@compiled
 def ring_is_simple(flat, index, low, high):
     """Whether a ring neither crosses nor touches nor folds back on itself (vertices already welded)."""
     size = high - low
@@ -115,21 +129,17 @@ def ring_is_simple(flat, index, low, high):
             return False
         if distance_to_segment(flat[a], flat[b], flat[c]) <= TOUCH_M:
             return False
+        west, east = min(flat[a, 0], flat[b, 0]) - TOUCH_M, max(flat[a, 0], flat[b, 0]) + TOUCH_M
+        south, north = min(flat[a, 1], flat[b, 1]) - TOUCH_M, max(flat[a, 1], flat[b, 1]) + TOUCH_M
         for j in range(i + 2, size):
             if i == 0 and j == size - 1:
                 continue
-            c, d = index[low + j], index[low + (j + 1) % size]
-            if a in (c, d) or b in (c, d) or crosses(flat[a], flat[b], flat[c], flat[d]):
-                return False
-            if (
-                min(distance_to_segment(flat[c], flat[a], flat[b]), distance_to_segment(flat[d], flat[a], flat[b]))
-                <= TOUCH_M
-            ):
-                return False
-            if (
-                min(distance_to_segment(flat[a], flat[c], flat[d]), distance_to_segment(flat[b], flat[c], flat[d]))
-                <= TOUCH_M
-            ):
+            c, d = index[low + j], index[low + j + 1 if j + 1 < size else low]
+            if (flat[c, 0] < west and flat[d, 0] < west) or (flat[c, 0] > east and flat[d, 0] > east):
+                continue
+            if (flat[c, 1] < south and flat[d, 1] < south) or (flat[c, 1] > north and flat[d, 1] > north):
+                continue
+            if a in (c, d) or b in (c, d) or segments_touch(flat[a], flat[b], flat[c], flat[d]):
                 return False
     return True
 
@@ -226,41 +236,53 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, found, count
 
 
 @compiled
-def bends(vertices, index, low, high, normal):
-    """Whether some corner of a ring turns out of the face's plane by more than 20 degrees (those under 2 mm pass)."""
-    for k in range(low, high):
-        p = vertices[index[k]]
-        q = vertices[index[k + 1 if k + 1 < high else low]]
-        r = vertices[index[k + 2 if k + 2 < high else k + 2 - (high - low)]]
-        a, b, chord = q - p, r - q, r - p
-        c = (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-        size = np.sqrt(c[0] * c[0] + c[1] * c[1] + c[2] * c[2])
-        longest = np.sqrt(max((a * a).sum(), (b * b).sum(), (chord * chord).sum()))
-        along = c[0] * normal[0] + c[1] * normal[1] + c[2] * normal[2]
-        if size > 2e-3 * longest and abs(along) < NORMAL_COSINE * size:
-            return True
+def may_bend(vertices, index, low, high, normal):
+    """Whether some three of a face's vertices span a triangle over 10 degrees off its `normal`.
+
+    Where none do, no two triangles of any triangulation are over 20 degrees apart. Large faces are not asked.
+    """
+    if high - low > MOST_VERTICES_IN_THREES:
+        return True
+    for i in range(low, high - 2):
+        p = vertices[index[i]]
+        for j in range(i + 1, high - 1):
+            q = vertices[index[j]]
+            ux, uy, uz = q[0] - p[0], q[1] - p[1], q[2] - p[2]
+            for k in range(j + 1, high):
+                r = vertices[index[k]]
+                wx, wy, wz = r[0] - p[0], r[1] - p[1], r[2] - p[2]
+                x, y, z = uy * wz - uz * wy, uz * wx - ux * wz, ux * wy - uy * wx
+                along = x * normal[0] + y * normal[1] + z * normal[2]
+                if abs(along) < SURELY_FLAT_COSINE * np.sqrt(x * x + y * y + z * z):
+                    return True
     return False
 
 
 @compiled
-def check_faces(vertices, index, ring_start, face_start, planarity, found):
-    """Ring and face codes. Returns (rows found, unit normals (f, 3), offsets (f,), flatness (f,))."""
+def ring_lengths_code(index, ring_start, first, last):
+    """Code 101 or 102 of the rings first to last, 0 where they have points enough and none twice in a row."""
+    code = 101 if first == last else 0
+    for r in range(first, last):
+        low, high = ring_start[r], ring_start[r + 1]
+        if high - low < 3:
+            return 101
+        for k in range(low, high):
+            if index[k] == index[k + 1 if k + 1 < high else low]:
+                code = 102
+    return code
+
+
+@compiled
+def check_faces(vertices, index, ring_start, face_start, planarity):
+    """Ring and face codes but 204: (rows found, unit normals (f, 3), offsets (f,), flatness (f,), may bend (f,))."""
     faces = len(face_start) - 1
     normals, offsets, flatness = np.zeros((faces, 3)), np.zeros(faces), np.zeros(faces)
-    count = 0
+    risky = np.zeros(faces, np.bool_)
+    found, count = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64), 0
+    flat = np.empty((len(vertices), 2))
     for f in range(faces):
         first, last = face_start[f], face_start[f + 1]
-        code = 0
-        for r in range(first, last):
-            low, high = ring_start[r], ring_start[r + 1]
-            if high - low < 3:
-                code = 101
-                break
-            for k in range(low, high):
-                if index[k] == index[k + 1 if k + 1 < high else low]:
-                    code = 102
-        if first == last:
-            code = 101
+        code = ring_lengths_code(index, ring_start, first, last)
         area = np.zeros(3) if code else newell(vertices, index, ring_start[first], ring_start[first + 1])
         size = np.sqrt(area @ area)
         if code == 0 and size < 1e-7:
@@ -269,48 +291,73 @@ def check_faces(vertices, index, ring_start, face_start, planarity, found):
             found[count, 0], found[count, 1], found[count, 2] = code, f, -1
             count += 1
             continue
-        normal = area / size
         low, high = ring_start[first], ring_start[last]
-        centre = np.zeros(3)
-        for k in range(low, high):
-            centre += vertices[index[k]]
-        centre /= high - low
-        for k in range(low, high):
-            flatness[f] = max(flatness[f], abs((vertices[index[k]] - centre) @ normal))
-        normals[f], offsets[f] = normal, centre @ normal
+        normals[f], offsets[f], flatness[f] = best_plane(vertices, index, low, high, area / size)
         if flatness[f] > planarity:
-            code = 203
-        else:
-            for r in range(first, last):
-                if bends(vertices, index, ring_start[r], ring_start[r + 1], normal):
-                    code = 204
-        if code:
-            found[count, 0], found[count, 1], found[count, 2] = code, f, -1
+            found[count, 0], found[count, 1], found[count, 2] = 203, f, -1
             count += 1
-        flat = projected(vertices, normal)
+        else:
+            risky[f] = high - low > 3 and may_bend(vertices, index, low, high, normals[f])
+        project(flat, vertices, index, low, high, np.argmax(np.abs(normals[f])))
         simple = True
         for r in range(first, last):
-            if not ring_is_simple(flat, index, ring_start[r], ring_start[r + 1]):
-                simple = False
+            simple = simple and ring_is_simple(flat, index, ring_start[r], ring_start[r + 1])
         if not simple:
             found[count, 0], found[count, 1], found[count, 2] = 104, f, -1
             count += 1
         elif last - first > 1:
             signed = np.empty(last - first)
             for r in range(first, last):
-                signed[r - first] = newell(vertices, index, ring_start[r], ring_start[r + 1]) @ normal
+                signed[r - first] = newell(vertices, index, ring_start[r], ring_start[r + 1]) @ normals[f]
             count = check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f)
-    return count, normals, offsets, flatness
+    return found[:count].copy(), normals, offsets, flatness, risky
 
 
 @compiled
-def projected(vertices, normal):
-    """Vertices (n, 2) without the coordinate along the normal's largest component."""
-    axis = np.argmax(np.abs(normal))
-    flat = np.empty((len(vertices), 2))
-    flat[:, 0] = vertices[:, 1 if axis == 0 else 0]
-    flat[:, 1] = vertices[:, 1 if axis == 2 else 2]
-    return flat
+def best_plane(vertices, index, low, high, normal):
+    """The plane by least squares through index[low:high]: (unit normal, offset, how far vertices lie off it).
+
+    `normal` is about right and is turned to the best; that of the area goes far astray where a face is long and thin.
+    """
+    centre = np.zeros(3)
+    for k in range(low, high):
+        centre += vertices[index[k]]
+    centre /= high - low
+    aside = np.zeros(3)
+    aside[np.argmin(np.abs(normal))] = 1.0
+    u = np.cross(normal, aside)
+    u /= np.sqrt(u @ u)
+    v = np.cross(normal, u)
+    uu = uv = vv = ud = vd = 0.0
+    for k in range(low, high):
+        p = vertices[index[k]] - centre
+        pu, pv, pd = p @ u, p @ v, p @ normal
+        uu, uv, vv, ud, vd = uu + pu * pu, uv + pu * pv, vv + pv * pv, ud + pu * pd, vd + pv * pd
+    determinant = uu * vv - uv * uv
+    if determinant > 1e-9 * uu * vv:
+        normal = normal - u * ((ud * vv - vd * uv) / determinant) - v * ((vd * uu - ud * uv) / determinant)
+        normal = normal / np.sqrt(normal @ normal)
+    farthest = 0.0
+    for k in range(low, high):
+        farthest = max(farthest, abs((vertices[index[k]] - centre) @ normal))
+    return normal, centre @ normal, farthest
+
+
+@compiled
+def largest_axes(normals):
+    """For each normal (f, 3) the axis of its largest component."""
+    axes = np.zeros(len(normals), np.int64)
+    for f in range(len(normals)):
+        axes[f] = np.argmax(np.abs(normals[f]))
+    return axes
+
+
+@compiled
+def project(flat, vertices, index, low, high, axis):
+    """Write into flat (n, 2) the vertices index[low:high] without their coordinate along `axis`."""
+    first, second = 1 if axis == 0 else 0, 1 if axis == 2 else 2
+    for k in range(low, high):
+        flat[index[k], 0], flat[index[k], 1] = vertices[index[k], first], vertices[index[k], second]
 
 
 @compiled
@@ -411,39 +458,56 @@ def holds_vertex(index, low, high, v):
 
 
 @compiled
-def edges_pierce(
-    vertices,
-    index,
-    low,
-    high,
-    low2,
-    high2,
-    ring_start,
-    first2,
-    last2,
-    ring_first,
-    ring_last,
-    normal,
-    offset,
-    flat,
-    slack,
-):
-    """Whether an edge of one face meets another face elsewhere than in shared vertices. `slack` is how far off plane counts."""
-    for r in range(ring_first, ring_last):
+def holds_edge(index, low, high, a, b):
+    """Whether the ring index[low:high] runs from a to b or from b to a."""
+    for k in range(low, high):
+        after = index[k + 1 if k + 1 < high else low]
+        if (index[k] == a and after == b) or (index[k] == b and after == a):
+            return True
+    return False
+
+
+@compiled
+def above(vertices, v, normal, offset):
+    """Height of vertex v over a plane."""
+    return vertices[v, 0] * normal[0] + vertices[v, 1] * normal[1] + vertices[v, 2] * normal[2] - offset
+
+
+@compiled
+def is_outside(vertices, a, b, low, high, slack):
+    """Whether the edge from a to b lies beyond one side of a box."""
+    for axis in range(3):
+        p, q = vertices[a, axis], vertices[b, axis]
+        if min(p, q) > high[axis] + slack or max(p, q) < low[axis] - slack:
+            return True
+    return False
+
+
+@compiled
+def edges_pierce(vertices, index, ring_start, face_start, f, g, normal, offset, low, high, flat, slack):
+    """Whether an edge of face g meets face f elsewhere than in shared vertices.
+
+    `normal` and `offset` are those of f, `low` and `high` its box; `slack` is how far off its plane counts.
+    """
+    first, last = face_start[f], face_start[f + 1]
+    begin, end = ring_start[first], ring_start[last]
+    for r in range(face_start[g], face_start[g + 1]):
         for k in range(ring_start[r], ring_start[r + 1]):
             a, b = index[k], index[k + 1 if k + 1 < ring_start[r + 1] else ring_start[r]]
-            da, db = vertices[a] @ normal - offset, vertices[b] @ normal - offset
+            if is_outside(vertices, a, b, low, high, slack):
+                continue
+            da, db = above(vertices, a, normal, offset), above(vertices, b, normal, offset)
             if min(da, db) > slack or max(da, db) < -slack:
                 continue
-            lands = abs(da) <= slack and not holds_vertex(index, low2, high2, a)
-            if lands and depth_in_face(flat[a], flat, index, ring_start, first2, last2) > -TOUCH_M:
+            lands = abs(da) <= slack and not holds_vertex(index, begin, end, a)
+            if lands and depth_in_face(flat[a], flat, index, ring_start, first, last) > -TOUCH_M:
                 return True
             if abs(da) <= slack and abs(db) <= slack:
-                if lies_across(flat, index, ring_start, first2, last2, a, b, slack):
+                if lies_across(flat, index, ring_start, first, last, a, b, slack):
                     return True
             elif (da > slack and db < -slack) or (da < -slack and db > slack):
                 t = da / (da - db)
-                if depth_in_face(flat[a] + t * (flat[b] - flat[a]), flat, index, ring_start, first2, last2) > slack:
+                if depth_in_face(flat[a] + t * (flat[b] - flat[a]), flat, index, ring_start, first, last) > slack:
                     return True
     return False
 
@@ -452,6 +516,9 @@ def edges_pierce(
 def lies_across(flat, index, ring_start, first, last, a, b, slack):
     """Whether edge ab, in the plane of a face, runs through its inside."""
     p, q = flat[a], flat[b]
+    for r in range(first, last):
+        if holds_edge(index, ring_start[r], ring_start[r + 1], a, b):
+            return False
     for r in range(first, last):
         low, high = ring_start[r], ring_start[r + 1]
         for k in range(low, high):
@@ -464,8 +531,8 @@ def lies_across(flat, index, ring_start, first, last, a, b, slack):
 
 
 @compiled
-def check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count):
-    """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; boxes are compared first."""
+def face_boxes(vertices, index, ring_start, face_start):
+    """Lowest and highest corner (f, 3) of the box around each face."""
     faces = len(face_start) - 1
     low_box, high_box = np.empty((faces, 3)), np.empty((faces, 3))
     for f in range(faces):
@@ -474,33 +541,58 @@ def check_intersections(vertices, index, ring_start, face_start, normals, offset
         for k in range(low, high):
             low_box[f] = np.minimum(low_box[f], vertices[index[k]])
             high_box[f] = np.maximum(high_box[f], vertices[index[k]])
-    for f in range(faces):
-        flat = projected(vertices, normals[f])
-        low, high = ring_start[face_start[f]], ring_start[face_start[f + 1]]
-        slack = flatness[f] + 2e-4
-        for g in range(faces):
-            if f == g or apart(low_box[f], high_box[f], low_box[g], high_box[g], slack):
-                continue
-            low2, high2 = ring_start[face_start[g]], ring_start[face_start[g + 1]]
-            if edges_pierce(
-                vertices,
-                index,
-                low2,
-                high2,
-                low,
-                high,
-                ring_start,
-                face_start[f],
-                face_start[f + 1],
-                face_start[g],
-                face_start[g + 1],
-                normals[f],
-                offsets[f],
-                flat,
-                slack,
-            ) and count < len(found):
-                found[count, 0], found[count, 1], found[count, 2] = 306, f, g
-                count += 1
+    return low_box, high_box
+
+
+@compiled
+def sweep_axis(low_box, high_box):
+    """The axis along which faces are shortest compared with the whole: sweeping along it meets the fewest pairs."""
+    best, fewest = 0, np.inf
+    for axis in range(3):
+        whole = high_box[:, axis].max() - low_box[:, axis].min()
+        overlaps = (high_box[:, axis] - low_box[:, axis]).sum() / whole if whole > 0 else np.inf
+        if overlaps < fewest:
+            best, fewest = axis, overlaps
+    return best
+
+
+@compiled
+def check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count):
+    """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; only those whose boxes meet are compared."""
+    low_box, high_box = face_boxes(vertices, index, ring_start, face_start)
+    slack = flatness + 2e-4
+    widest, axis = slack.max(), sweep_axis(low_box, high_box)
+    order = np.argsort(low_box[:, axis])
+    axis_of = largest_axes(normals)
+    flat = np.empty((len(vertices), 2))
+    for i in range(len(order)):
+        for j in range(i + 1, len(order)):
+            f, g = order[i], order[j]
+            if low_box[g, axis] > high_box[f, axis] + widest:
+                break
+            for one, other in ((f, g), (g, f)):
+                low, high = low_box[one], high_box[one]
+                if count == len(found) or apart(low, high, low_box[other], high_box[other], slack[one]):
+                    continue
+                for face in (one, other):
+                    begin, end = ring_start[face_start[face]], ring_start[face_start[face + 1]]
+                    project(flat, vertices, index, begin, end, axis_of[one])
+                if edges_pierce(
+                    vertices,
+                    index,
+                    ring_start,
+                    face_start,
+                    one,
+                    other,
+                    normals[one],
+                    offsets[one],
+                    low,
+                    high,
+                    flat,
+                    slack[one],
+                ):
+                    found[count, 0], found[count, 1], found[count, 2] = 306, one, other
+                    count += 1
     return count
 
 
@@ -524,19 +616,15 @@ def enclosed_volume(vertices, index, ring_start, face_start):
 
 
 @compiled
-def check_shell(vertices, index, ring_start, face_start, planarity):
-    """All findings (k, 3) of one shell; shell codes only where every ring and face is sound, as val3dity does."""
-    index = weld(vertices, SAME_POINT_M)[index]
+def check_shell(vertices, index, ring_start, face_start, normals, offsets, flatness):
+    """Findings (k, 3) of a shell of sound faces, whose lie is what `check_faces` returned."""
     faces = len(face_start) - 1
     found = np.empty((6 * len(index) + 6 * len(ring_start) + 64, 3), np.int64)
-    count, normals, offsets, flatness = check_faces(vertices, index, ring_start, face_start, planarity, found)
-    if count:
-        return found[:count]
     if faces < 4:
         found[0, 0], found[0, 1], found[0, 2] = 301, -1, -1
         return found[:1]
     edges = directed_edges(index, ring_start, face_start)
-    count, clean = check_edges(edges, faces, found, count)
+    count, clean = check_edges(edges, faces, found, 0)
     if clean:
         count = check_umbrellas(index, ring_start, face_start, found, count)
     count = check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count)

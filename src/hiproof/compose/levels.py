@@ -8,11 +8,53 @@ from ..compiled import compiled
 from .arrangement import OUTSIDE, half_edge_order, next_half_edges, trace_faces
 
 LEVEL_GAP_M = 1.1e-3  # levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
+NEAR_UNITS = 2000.0
+ASIDE_UNITS = (6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 
 
 @compiled
 def height(planes, label, x, y):
     return planes[label, 0] * x + planes[label, 1] * y + planes[label, 2]
+
+
+@compiled
+def has_room(xy, edges, e, x, y, reach):
+    """Whether (x, y) is at least `reach` from every edge but edge `e`."""
+    for other in range(len(edges)):
+        a, b = xy[edges[other, 0]], xy[edges[other, 1]]
+        if other == e or min(a[0], b[0]) - reach > x or max(a[0], b[0]) + reach < x:
+            continue
+        dx, dy, px, py = float(b[0] - a[0]), float(b[1] - a[1]), x - a[0], y - a[1]
+        t = min(1.0, max(0.0, (px * dx + py * dy) / (dx * dx + dy * dy)))
+        if np.hypot(px - t * dx, py - t * dy) < reach:
+            return False
+    return True
+
+
+@compiled
+def crossing_place(xy, edges, side, planes, e, x, y, reach):
+    """Grid point for the crossing at (x, y) of the planes on both sides of edge e, a millimetre aside where there is room.
+
+    On the edge itself rounding would leave it hundredths of a millimetre off the line between its neighbours, and so
+    make a triangle of any slope. It moves along the line on which the planes meet, to where both are nearest the grid.
+    """
+    left, right = side[e, 0], side[e, 1]
+    gx, gy = planes[left, 0] - planes[right, 0], planes[left, 1] - planes[right, 1]
+    dx, dy = xy[edges[e, 1], 0] - xy[edges[e, 0], 0], xy[edges[e, 1], 1] - xy[edges[e, 0], 1]
+    size = np.hypot(gx, gy)
+    across = (gx * dx + gy * dy) / (size * np.hypot(float(dx), float(dy)))  # sine of the angle between that line and e
+    best, best_x, best_y = np.inf, x, y
+    if abs(across) < 0.3:
+        return best_x, best_y
+    for aside in ASIDE_UNITS:
+        for way in (-1.0, 1.0):
+            step = way * aside / abs(across) / size
+            at_x, at_y = np.rint(x - step * gy), np.rint(y + step * gx)
+            z0, z1 = height(planes, left, at_x, at_y), height(planes, right, at_x, at_y)
+            off = max(abs(z0 - np.rint(0.5 * (z0 + z1))), abs(z1 - np.rint(0.5 * (z0 + z1)))) / aside
+            if off < best and has_room(xy, edges, e, at_x, at_y, reach):
+                best, best_x, best_y = off, at_x, at_y
+    return best_x, best_y
 
 
 @compiled
@@ -47,8 +89,10 @@ def split_at_crossings(xy, edges, side, planes, reach):
             ties[tied, 0], ties[tied, 1], ties[tied, 2] = v, min(z0, z1), max(z0, z1)
             tied += 1
             continue
-        out_xy[vertices, 0] = np.int64(np.rint(a[0] + t * (b[0] - a[0])))
-        out_xy[vertices, 1] = np.int64(np.rint(a[1] + t * (b[1] - a[1])))
+        x, y = a[0] + t * (b[0] - a[0]), a[1] + t * (b[1] - a[1])
+        if min(t, 1 - t) * length < NEAR_UNITS:
+            x, y = crossing_place(xy, edges, side, planes, e, x, y, reach)
+        out_xy[vertices, 0], out_xy[vertices, 1] = np.int64(np.rint(x)), np.int64(np.rint(y))
         out_edges[e, 1] = vertices
         out_edges[count, 0], out_edges[count, 1] = vertices, edges[e, 1]
         out_side[count] = side[e]

@@ -282,6 +282,8 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
             peaks.append((sectors.width((first, count)), (first, count), sectors.label[higher]))
     if len(peaks) < 2:
         peaks = pinches(sectors)
+    if not peaks:
+        raise CompositionError("expected levels that can be told apart around every corner, got a corner that has none")
     _, run, label = min(peaks)
     return sectors.tip(run, radius), label
 

@@ -1,0 +1,99 @@
+"""Which faces are bent: two triangles of their constrained Delaunay triangulation over 20 degrees apart (val3dity's 204)."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from ..compiled import compiled
+
+FLAT_COSINE, SURELY_FLAT_COSINE = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(10.0))
+
+
+def bent_faces(
+    faces: np.ndarray,
+    vertices: np.ndarray,
+    index: np.ndarray,
+    ring_start: np.ndarray,
+    face_start: np.ndarray,
+    normals: np.ndarray,
+) -> np.ndarray:
+    """Those of `faces` (k,) that are bent; the solid is flattened as for `check_faces`, `normals` (f, 3) its best planes'.
+
+    >>> saddle = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]]), np.arange(4), np.array([0, 4]), np.array([0, 1])
+    >>> bent_faces(np.array([0]), *saddle, np.array([[-0.4, -0.4, 0.8]])).tolist()
+    [0]
+    """
+    if len(faces) == 0:
+        return faces
+    corners, flat, start = in_their_planes(faces, vertices, index, ring_start, face_start, normals)
+    polygons = []
+    for face, low in zip(faces, start[:-1], strict=True):
+        bounds = ring_start[face_start[face] : face_start[face + 1] + 1]
+        outer, *holes = (flat[low + a : low + b] for a, b in pairwise(bounds - bounds[0]))
+        polygons.append(shapely.Polygon(outer, holes))
+    triangles, owner = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons), return_index=True)
+    places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
+    return faces[are_bent(places, owner, corners, flat, start, normals[faces])]
+
+
+@compiled
+def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
+    """Vertices (m, 3) of all rings of `faces`, the same in the planes of their faces (m, 2), and each face's start."""
+    start = np.zeros(len(faces) + 1, np.int64)
+    for k in range(len(faces)):
+        face = faces[k]
+        start[k + 1] = start[k] + ring_start[face_start[face + 1]] - ring_start[face_start[face]]
+    corners, flat = np.empty((start[-1], 3)), np.empty((start[-1], 2))
+    for k in range(len(faces)):
+        low, normal = ring_start[face_start[faces[k]]], normals[faces[k]]
+        aside = np.zeros(3)
+        aside[np.argmin(np.abs(normal))] = 1.0
+        u = np.cross(normal, aside)
+        u /= np.sqrt(u @ u)
+        v = np.cross(normal, u)
+        for i in range(start[k], start[k + 1]):
+            corners[i] = vertices[index[low + i - start[k]]]
+            flat[i, 0], flat[i, 1] = corners[i] @ u, corners[i] @ v
+    return corners, flat, start
+
+
+@compiled
+def corner_at(x, y, flat, low, high):
+    """The vertex of flat[low:high] that lies at (x, y)."""
+    for i in range(low, high):
+        if flat[i, 0] == x and flat[i, 1] == y:
+            return i
+    return low
+
+
+@compiled
+def triangle_normals(places, owner, corners, flat, start, normals):
+    """Unit normals (t, 3) of triangles given by their `places` (t, 4, 2) in their face's plane; zero without an area."""
+    found = np.zeros((len(places), 3))
+    for t in range(len(places)):
+        low, high = start[owner[t]], start[owner[t] + 1]
+        a = corners[corner_at(places[t, 0, 0], places[t, 0, 1], flat, low, high)]
+        b = corners[corner_at(places[t, 1, 0], places[t, 1, 1], flat, low, high)]
+        c = corners[corner_at(places[t, 2, 0], places[t, 2, 1], flat, low, high)]
+        normal = np.cross(b - a, c - a)
+        size = np.sqrt(normal @ normal)
+        if size > 0:
+            found[t] = normal / (size if normal @ normals[owner[t]] > 0 else -size)
+    return found
+
+
+@compiled
+def are_bent(places, owner, corners, flat, start, normals):
+    """Whether each face (k,) has two triangles over 20 degrees apart; `owner` (t,) is the face of each triangle."""
+    bent = np.zeros(len(normals), np.bool_)
+    found = triangle_normals(places, owner, corners, flat, start, normals)
+    for t in range(len(found)):
+        if found[t] @ normals[owner[t]] >= SURELY_FLAT_COSINE or not found[t].any() or bent[owner[t]]:
+            continue  # two triangles within 10 degrees of the face are within 20 of one another
+        for s in range(len(found)):
+            if owner[s] == owner[t] and found[s].any() and found[s] @ found[t] < FLAT_COSINE:
+                bent[owner[t]] = True
+    return bent

@@ -1,0 +1,71 @@
+"""Plan cells without steps a millimetre or two long, which no face can be flat beside. Compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiled import compiled
+from .arrangement import OUTSIDE, is_beside, renumbered, turn
+from .levels import height
+
+SHORT_UNITS = 30.0
+
+
+@compiled
+def edges_at(edges, v):
+    """The first two edges that end in vertex v (-1: none), and how many do."""
+    found, count = (-1, -1), 0
+    for e in range(len(edges)):
+        if edges[e, 0] == v or edges[e, 1] == v:
+            found = (e, found[1]) if count == 0 else (found[0], e) if count == 1 else found
+            count += 1
+    return found[0], found[1], count
+
+
+@compiled
+def gap_at(xy, side, planes, e, v):
+    """How far apart the planes left and right of edge e are over vertex v."""
+    return abs(height(planes, side[e, 0], xy[v, 0], xy[v, 1]) - height(planes, side[e, 1], xy[v, 0], xy[v, 1]))
+
+
+@compiled
+def is_clear(xy, edges, gone, stays, far, reach):
+    """Whether edge (gone, far) can become (stays, far): no vertex in the triangle between them or within reach of it."""
+    for e in range(len(edges)):
+        for v in edges[e]:
+            if v < 0 or v in (gone, stays, far):
+                continue
+            if is_beside(xy[v], xy[stays], xy[far], reach):
+                return False
+            a, b, c = turn(xy[gone], xy[stays], xy[v]), turn(xy[stays], xy[far], xy[v]), turn(xy[far], xy[gone], xy[v])
+            if (a >= 0) == (b >= 0) and (b >= 0) == (c >= 0):
+                return False
+    return True
+
+
+@compiled
+def without_short_edges(xy, edges, side, planes, reach):
+    """Drop an end of every edge between two cells that is shorter than 3 mm: (xy, edges, side) compacted.
+
+    Only an end where nothing else meets can go, of two the one over which the cells are further apart. Outlines stay.
+    """
+    edges = edges.copy()
+    for e in range(len(edges)):
+        u, v = edges[e]
+        if u < 0 or side[e, 0] == OUTSIDE or side[e, 1] == OUTSIDE:
+            continue
+        if np.hypot(float(xy[u, 0] - xy[v, 0]), float(xy[u, 1] - xy[v, 1])) >= SHORT_UNITS:
+            continue
+        if gap_at(xy, side, planes, e, u) < gap_at(xy, side, planes, e, v):
+            u, v = v, u
+        for gone, stays in ((u, v), (v, u)):
+            first, second, count = edges_at(edges, gone)
+            other = second if first == e else first
+            end = 0 if edges[other, 0] == gone else 1
+            far = edges[other, 1 - end]
+            if count != 2 or far == stays or not is_clear(xy, edges, gone, stays, far, reach):
+                continue
+            edges[other, end] = stays
+            edges[e, 0] = edges[e, 1] = -1
+            break
+    return renumbered(xy, edges, side)
