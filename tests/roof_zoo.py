@@ -153,7 +153,50 @@ def towers(rng):
     return roof(pieces, outline)
 
 
-KINDS = {kind.__name__: kind for kind in (partition, cross_gables, row_house, saw_tooth, steps, nearly, towers)}
+def off_by_little(rng, value):
+    """`value` or something a tenth of a millimetre to two centimetres beside it."""
+    return value + rng.choice([0, 0, 1e-4, 3e-4, 6e-4, 1e-3, 1.5e-3, 3e-3, 6e-3, 1e-2, 2e-2]) * rng.choice([-1, 1])
+
+
+def planes_over(rng, x, y, length, width, degrees, z):
+    """A flat, monopitch, gable, hip, mansard or cut gable with eaves at `z` over a rectangle."""
+    slope = rng.choice([0.2, 0.5, 0.84, 1.2, 2.75, rng.uniform(0.1, 2.5)])
+    sides = gable_planes(x, y, z + slope * width / 2, slope, degrees)
+    kind = rng.integers(6)
+    if kind == 0:
+        return np.array([[0.0, 0.0, z]])
+    if kind == 3:
+        end = slope if rng.random() < 0.5 else rng.uniform(0.2, 2.5)
+        return np.vstack((sides, gable_planes(x, y, z + end * length / 2, end, degrees + 90)))
+    if kind == 4:
+        low, high = (
+            gable_planes(x, y, z + rise, s, degrees) for rise, s in ((1.25 * width, 2.5), (1 + width / 10, 0.2))
+        )
+        return np.vstack((low, high))
+    if kind == 5:
+        return np.vstack((sides, [[0.0, 0.0, off_by_little(rng, z + slope * width / 4)]]))
+    return sides[:kind]
+
+
+def unions(rng):
+    """Roofs on overlapping rectangles of a few directions, whose edges and eaves miss one another by millimetres."""
+    directions = [0.0, 90.0, rng.choice([45.0, 0.01, 0.05, 0.3, rng.uniform(0, 90)])]
+    pieces, placed = [], [(np.zeros(2), 0.0, 0.0, 0.0)]
+    for _ in range(rng.integers(2, 7)):
+        length, width = rng.uniform(3, 14), rng.uniform(2, 8)
+        centre, other_length, other_width, degrees = placed[rng.integers(len(placed))]
+        along, across = rng.choice([-1, 0, 1], 2) * (other_length - length, other_width - width) / 2
+        shift = np.array([off_by_little(rng, along), off_by_little(rng, across)])
+        c, s = np.cos(np.deg2rad(degrees)), np.sin(np.deg2rad(degrees))
+        x, y = centre + np.array([[c, -s], [s, c]]) @ shift
+        degrees = float(degrees if rng.random() < 0.6 else rng.choice(directions))
+        z = off_by_little(rng, rng.choice([3.0, 3.0, 5.0, rng.uniform(3, 8)]))
+        pieces.append(Piece(rectangle(x, y, length, width, degrees), planes_over(rng, x, y, length, width, degrees, z)))
+        placed.append((np.array([x, y]), length, width, degrees))
+    return roof(pieces, shapely.union_all([piece.outline for piece in pieces]))
+
+
+KINDS = {kind.__name__: kind for kind in (partition, cross_gables, row_house, saw_tooth, steps, nearly, towers, unions)}
 
 
 def generated(kind, seed):

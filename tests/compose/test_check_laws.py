@@ -168,3 +168,31 @@ def test_every_single_fault_in_a_composed_solid_is_found(kind):
         assert check_solid(Solid(lifted, solid.faces))
         inward = tuple(Face(tuple(ring[::-1] for ring in f.rings), f.kind) for f in solid.faces)
         assert [f.code for f in check_solid(Solid(solid.vertices, inward))] == [405]
+
+
+def field(n):
+    """A block under a rough field of n by n squares, two triangles each."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij"))
+    top = np.column_stack((x, y, 5 + np.random.default_rng(0).uniform(0, 1, len(x))))
+    at = np.arange(len(x)).reshape(n + 1, n + 1)
+    rim = [*at[:-1, 0], *at[-1, :-1], *at[:0:-1, -1], *at[0, :0:-1]]
+    base = {int(v): len(top) + k for k, v in enumerate(rim)}
+    rings = [(at[i, j], at[i + 1, j], at[i + 1, j + 1]) for i in range(n) for j in range(n)]
+    rings += [(at[i, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(n) for j in range(n)]
+    rings += [(base[a], base[b], b, a) for a, b in zip(rim, rim[1:] + rim[:1], strict=True)]
+    rings.append(tuple(base[v] for v in reversed(rim)))
+    return solid_of(np.vstack((top, top[rim] * [1, 1, 0])), [tuple(map(int, ring)) for ring in rings])
+
+
+def test_shell_of_many_faces_is_checked_face_by_face():
+    sound = field(50)
+    assert check_solid(sound) == ()
+    spiked = sound.vertices.copy()
+    spiked[51 * 25 + 25] += (7.3, 4.2, 0)  # through the faces seven squares further
+    assert {finding.code for finding in check_solid(Solid(spiked, sound.faces))} == {306}
+
+
+def test_long_thin_face_is_as_planar_as_its_best_plane():
+    ring = [(0, 0, 0), (9, 0, 0), (9, 0.02, 1e-4), (0.02, 0.02, 0), (0.02, 9, 1e-4), (0, 9, 0)]
+    codes = {finding.code for finding in check_solid(solid_of(ring, [tuple(range(6))]))}
+    assert 203 not in codes

@@ -1,13 +1,22 @@
 """Quality figures on solids whose figures are known by hand."""
 
+import json
 import math
+import subprocess
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
+from hiproof.city.run import Request, reconstruct_area
 from hiproof.evaluate.metrics import iou, nodata_share, percentile, plan_outline, psd, quality, unexplained_area
+from hiproof.evaluate.run import evaluate_run
 from hiproof.model import GROUND, ROOF, WALL, Face, Solid
+
+SHARED = Path(__file__).parents[2] / "../shared"
+AMSTERDAM = SHARED / "data/amsterdam_west"
 
 
 def block(width=10.0, length=6.0, height=5.0):
@@ -40,14 +49,36 @@ def test_a_dormer_is_unexplained_by_its_area():
     points[dormer, 2] += 1
     figures = quality(block(), points, shapely.box(0, 0, 10, 6))
     assert figures.unexplained_area_m2 == 6
-    assert figures.share_within_20cm == pytest.approx(1 - 6 / 60)
+    assert figures.share_within_20cm == pytest.approx(1 - 15 / 180)  # of the points 0.3 m inside the outline
 
 
 def test_points_beyond_the_roof_are_misses():
-    points = np.concatenate([roof_points(), [[20.0, 3, 5]]])
-    figures = quality(block(), points, shapely.box(0, 0, 10, 6))
-    assert figures.share_within_20cm == pytest.approx(240 / 241)
-    assert psd(block(), points)[-1] == 10
+    annex = np.column_stack([np.full(20, 11.0), np.linspace(1, 5, 20), np.full(20, 5.0)])
+    points = np.concatenate([roof_points(), annex])
+    figures = quality(block(), points, shapely.box(0, 0, 12, 6))
+    assert figures.share_within_20cm == pytest.approx(190 / 210)
+    assert psd(block(), points)[-1] == 1
+
+
+def test_facade_points_do_not_count_for_the_share():
+    y = np.linspace(0.1, 5.9, 30)
+    facade = np.column_stack([np.full(30, 0.1), y, np.linspace(0, 4, 30)])
+    figures = quality(block(), np.concatenate([roof_points(), facade]), shapely.box(0, 0, 10, 6))
+    assert figures.share_within_20cm == 1 and figures.psd_mean > 0.1
+    few = quality(block(), facade, shapely.box(0, 0, 10, 6))
+    assert np.isnan(few.share_within_20cm)
+
+
+@pytest.mark.skipif(not AMSTERDAM.is_dir(), reason="needs the real data in ../shared")
+def test_the_share_is_that_of_the_judge(tmp_path):
+    """One definition: `share_within_20cm` of a run equals what ../shared/tools/roof_residuals.py says of its files."""
+    clouds, footprints = sorted(map(str, AMSTERDAM.glob("*.laz"))), str(AMSTERDAM / "footprints_bag.gpkg")
+    summary = reconstruct_area(Request(tuple(clouds), tmp_path, footprints))
+    tool = [sys.executable, SHARED / "tools/roof_residuals.py", tmp_path / "buildings.city.jsonl", footprints, *clouds]
+    judged = json.loads(subprocess.run([*map(str, tool), "--json"], capture_output=True, text=True, check=True).stdout)
+    assert summary.mean_share == pytest.approx(judged["share_within_20cm"], abs=0.005)
+    shares = [figures.quality.share_within_20cm for figures in evaluate_run(tmp_path, clouds, footprints).figures]
+    assert np.nanmean(shares) == pytest.approx(judged["share_within_20cm"], abs=0.005)
 
 
 def test_a_bare_corner_is_no_data():

@@ -113,7 +113,7 @@ def test_attributes_under_roofers_names(tmp_path):
         "rf_h_roof_ridge": 7,
         "rf_roof_type": "slanted",
         "rf_rmse_lod22": 0.06,
-        "rf_val3dity_lod22": "[]",
+        "hiproof_iso19107_lod22": "[]",
         "rf_volume_lod22": 480,
         "rf_pt_density": 4.5,
         "rf_nodata_frac": None,

@@ -112,7 +112,7 @@ def test_a_column_has_one_type(tmp_path, values, dtype, want):
 def test_unknown_figures_stay_numbers(tmp_path):
     _, _, meta = table(tmp_path, [unmodelled()])
     kinds = dict(zip(meta["fields"], meta["dtypes"], strict=True))
-    assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["rf_val3dity_lod22"]) == ("float64",) * 2 + (
+    assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["hiproof_iso19107_lod22"]) == ("float64",) * 2 + (
         "object",
     )
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import logging
+import math
 import shutil
 import sqlite3
 import time
@@ -46,7 +47,7 @@ class Summary:
     by_status: dict[str, int]
     by_type: dict[str, int]
     median_psd: float | None
-    median_share: float | None
+    mean_share: float | None
     broken_inputs: tuple[tuple[str, str], ...]
     failures: tuple[tuple[str, str], ...]
     seconds: dict[str, float]
@@ -229,7 +230,7 @@ def summarise(request: Request, plan: Plan, ledger: Ledger, clock: Clock) -> Sum
         by_status=ledger.counts("status"),
         by_type=ledger.counts("type"),
         median_psd=median(ledger.column("psd")),
-        median_share=median(ledger.column("share")),
+        mean_share=mean(ledger.column("share")),
         broken_inputs=broken,
         failures=tuple(ledger.failures()),
         seconds=clock.seconds,
@@ -245,6 +246,11 @@ def request_name(task: str, request: Request) -> str:
 def median(values: list) -> float | None:
     known = sorted(v for v in values if v is not None)
     return known[len(known) // 2] if known else None
+
+
+def mean(values: list) -> float | None:
+    known = [v for v in values if v is not None]
+    return math.fsum(known) / len(known) if known else None
 
 
 def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
@@ -265,7 +271,7 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
         "by_status": summary.by_status,
         "by_type": summary.by_type,
         "median_psd_m": summary.median_psd,
-        "median_share_within_20cm": summary.median_share,
+        "mean_share_within_20cm": summary.mean_share,
         "broken_inputs": [list(pair) for pair in summary.broken_inputs],
         "seconds": summary.seconds,
     }

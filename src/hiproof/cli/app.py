@@ -122,6 +122,14 @@ def settings(
 
 
 @app.command()
+def attributes() -> None:
+    """Print every attribute and table that a run writes, with kind, unit and meaning, as Markdown."""
+    from .attributes import run
+
+    raise typer.Exit(run())
+
+
+@app.command()
 def status(folder: Annotated[Path, typer.Argument(help="output folder of a run")]) -> None:
     """Show how far a run is: progress, failures by kind, throughput and time left, while it runs or after."""
     from .status import run

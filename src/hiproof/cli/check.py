@@ -21,7 +21,7 @@ def run(files: list[Path], planarity_m: float) -> int:
             if findings:
                 bad += 1
                 codes.update({finding.code for finding in findings})
-                print(f"{path}: {id}: " + "; ".join(str(finding) for finding in findings[:3]))
+                print(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
         by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
         print(f"{path}: {total} solids, {total - bad} valid, {bad} invalid{by_code}")
         invalid += bad

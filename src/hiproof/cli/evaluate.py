@@ -13,9 +13,9 @@ SHOWN = {
     "rmse": "RMSE",
     "p95": "p95",
     "share_within_20cm": "<0.2 m",
-    "share_within_20cm_inner": "inner",
     "outline_iou": "IoU",
 }
+CAPTION = "<0.2 m: share of the points 0.3 m or more inside the outline that lie within 0.2 m over or under the roof"
 COMPARED = {"ref_ridge_height_m": "ridge", "ref_slope_deg": "slope", "ref_volume_relative": "volume"}
 
 
@@ -48,6 +48,7 @@ def print_summary(summary: dict, has_reference: bool) -> None:
 
     columns = SHOWN | (COMPARED if has_reference else {})
     table = Table("type", "buildings", *columns.values(), title="mean over buildings")
+    table.caption = CAPTION
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]
         table.add_row(kind, str(figures["buildings"]), *("" if mean is None else f"{mean:.3f}" for mean in means))

@@ -94,10 +94,10 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
     if summary.by_type:
         show("roof types: " + ", ".join(f"{number} {name}" for name, number in summary.by_type.items()))
     if summary.median_psd is not None:
-        share = (
-            f", {100 * summary.median_share:.0f} % of points within 0.2 m" if summary.median_share is not None else ""
-        )
-        show(f"median over buildings: {summary.median_psd:.3f} m from points to roof{share}")
+        show(f"median over buildings of the mean distance of all points, facades included: {summary.median_psd:.3f} m")
+    if summary.mean_share is not None:
+        share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
+        show(f"mean over buildings: {share} lie within 0.2 m of the roof")
     if not summary.units.are_metres:
         show(f"coordinates are in {summary.units}, as in the input; attributes and parameters in metres")
     show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))

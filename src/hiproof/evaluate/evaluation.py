@@ -19,13 +19,7 @@ import shapely
 
 from ..frames import LocalFrame
 from ..model import ROOF, Quality, Solid
-from .distance import vertical_distances
-from .metrics import NEAR_M, iou, plan_outline, quality, roof_polygons
-
-FACADE_M = 0.3
-"""Points this close to the outline may be facade returns; the inner share leaves them out."""
-
-MIN_INNER_POINTS = 10
+from .metrics import iou, plan_outline, quality, share_near
 
 
 @dataclass(frozen=True)
@@ -43,20 +37,19 @@ class Comparison:
 
 @dataclass(frozen=True)
 class BuildingFigures:
-    """All figures of one building. `share_within_20cm_inner` counts only points 0.3 m inside the outline (no facades)."""
+    """All figures of one building."""
 
     id: str
     type: str
     status: str
     quality: Quality = field(default_factory=Quality)
-    share_within_20cm_inner: float = float("nan")
     volume_m3: float = float("nan")
     comparison: Comparison | None = None
 
     def row(self) -> dict[str, Any]:
         """One flat record, the comparison's columns prefixed with `ref_`."""
         row = {"id": self.id, "type": self.type, "status": self.status, **asdict(self.quality)}
-        row |= {"share_within_20cm_inner": self.share_within_20cm_inner, "volume_m3": self.volume_m3}
+        row["volume_m3"] = self.volume_m3
         if self.comparison is not None:
             row |= {f"ref_{name.removeprefix('reference_')}": v for name, v in asdict(self.comparison).items()}
         return row
@@ -67,8 +60,9 @@ def evaluate_building(
 ) -> BuildingFigures:
     """Figures of one `BuildingModel` against its `points` (n, 3) in world metres."""
     if model.solid is None:
-        share = 0.0 if len(points) else float("nan")
-        return BuildingFigures(model.id, model.roof_type, model.status, Quality(points=len(points)), share)
+        share = share_near(points, np.full(len(points), np.inf), footprint or shapely.Polygon())
+        missed = Quality(points=len(points), share_within_20cm=share)
+        return BuildingFigures(model.id, model.roof_type, model.status, missed)
     from ..write.roof_figures import roof_figures
 
     frame = LocalFrame.around(model.solid.vertices)
@@ -80,20 +74,9 @@ def evaluate_building(
         model.roof_type,
         model.status,
         quality(solid, local, outline),
-        inner_share(solid, local, outline if outline is not None else plan_outline(solid)),
         roof_figures(solid).volume_m3 if solid.of_kind(ROOF) else float("nan"),
         None if reference is None else compare(model.solid, reference.id, reference.solid),
     )
-
-
-def inner_share(solid: Solid, points: np.ndarray, outline: shapely.Geometry) -> float:
-    """Share of the points at least 0.3 m inside `outline` that lie within 0.2 m vertically; NaN for fewer than ten."""
-    inner = shapely.buffer(outline, -FACADE_M)
-    shapely.prepare(inner)
-    points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
-    if len(points) < MIN_INNER_POINTS:
-        return float("nan")
-    return float(np.mean(vertical_distances(points, roof_polygons(solid)) < NEAR_M))
 
 
 def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:

@@ -16,6 +16,12 @@ from .distance import point_surface_distances, surface_and_vertical_distances
 NEAR_M = 0.2
 """A point within this vertical distance of the roof counts as explained well (the field's share within 20 cm)."""
 
+FACADE_M = 0.3
+"""Points this close to the outline may be facade returns; the share leaves them out."""
+
+MIN_INNER_POINTS = 10
+"""A share of fewer points says nothing."""
+
 UNEXPLAINED_M = 0.5
 """A cell most of whose points lie farther than this above or below the roof holds something the model lacks."""
 
@@ -63,8 +69,8 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
     """Every residual figure of one model against the `points` (n, 3) it stands for, all in one frame.
 
     `outline` is the plan polygon asked for (a footprint); without one the alpha shape of the points takes its place, as
-    in the paper. `share_within_20cm` and `unexplained_area_m2` count vertical distances, and a point with no roof over
-    or under it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
+    in the paper. `share_within_20cm` (of the points 0.3 m or more inside the outline, NaN for fewer than ten) and
+    `unexplained_area_m2` count vertical distances, and a point with no roof over or under it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
     if not np.isfinite(points).all():
@@ -84,10 +90,18 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
             "psd_std": float(distances.std()),
             "rmse": float(np.sqrt(np.mean(distances**2))),
             "p95": percentile(distances, 0.95),
-            "share_within_20cm": float(np.mean(dz < NEAR_M)),
+            "share_within_20cm": share_near(points, dz, outline if has_outline else plan_outline(polygons)),
             "unexplained_area_m2": unexplained_area(points, dz),
         }
     return Quality(points=len(points), **figures)
+
+
+def share_near(points: np.ndarray, dz: np.ndarray, outline: shapely.Geometry) -> float:
+    """Share of the points (n, 3) at least 0.3 m inside `outline` with |dz| (n,) below 0.2 m; NaN for fewer than ten."""
+    inner = shapely.buffer(outline, -FACADE_M)
+    shapely.prepare(inner)
+    inside = shapely.intersects_xy(inner, points[:, 0], points[:, 1])
+    return float(np.mean(dz[inside] < NEAR_M)) if inside.sum() >= MIN_INNER_POINTS else float("nan")
 
 
 def percentile(values: np.ndarray, share: float) -> float:

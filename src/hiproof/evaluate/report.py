@@ -28,14 +28,14 @@ MOST_SHOWN = 10_000
 """Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow."""
 
 DISTRIBUTIONS = (
-    ("psd_mean", "mean distance of a building's points", "m"),
+    ("psd_mean", "mean distance of a building's points, facades included", "m"),
     ("p95", "95th percentile of the distances", "m"),
-    ("share_within_20cm", "share of points within 0.2 m", ""),
+    ("share_within_20cm", "share of points 0.3 m inside the outline within 0.2 m of the roof", ""),
     ("outline_iou", "outline IoU", ""),
     ("density", "points per square metre", ""),
     ("volume_m3", "volume", "m³"),
 )
-TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "share_within_20cm_inner", "outline_iou")
+TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
 
 
 def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> None:
@@ -122,7 +122,7 @@ def distributions(run: EvaluatedRun) -> str:
 def worst_indices(run: EvaluatedRun) -> list[int]:
     """The twenty models that explain the least of their points, facades aside (of equals the larger RMSE first)."""
     rmse = np.array([figures.quality.rmse for figures in run.figures], float)
-    share = np.array([figures.share_within_20cm_inner for figures in run.figures], float)
+    share = np.array([figures.quality.share_within_20cm for figures in run.figures], float)
     return [int(i) for i in np.lexsort((-rmse, share)) if np.isfinite(rmse[i])][:WORST]
 
 
@@ -148,6 +148,6 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
     pictures = building_pictures(model.solid.moved(-origin), points - origin, psd(model.solid, points), model.roof_type)
     text = (
         f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, RMSE {quality.rmse:.2f} m, "
-        f"{100 * quality.share_within_20cm:.0f} % of {quality.points} points within 0.2 m"
+        f"{100 * quality.share_within_20cm:.0f} % of the points inside the outline within 0.2 m of the roof"
     )
     return f'<figure class="worst" data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'

@@ -19,7 +19,8 @@ import shapely
 from ..errors import OutputError
 from ..frames import METRES, Units
 from ..model import GROUND, Building
-from .building_attributes import OWN, PREFIX, building_attributes, figures_of, plain_text
+from .attribute_list import HIPROOF, OWN, PREFIX, ROOFER
+from .building_attributes import building_attributes, figures_of, plain_text
 from .files import atomic, scratch
 from .naming import FileUnits, plan_wkt
 from .roof_figures import RoofFigures
@@ -29,7 +30,6 @@ LAYER = "buildings"
 ROWS_AT_ONCE = 1000
 RESERVED = ("fid", "geom")
 Row = tuple[bytes | None, dict[str, Any]]  # the outline as WKB, the values by column
-TEXT = (f"{OWN}roof_type", f"{OWN}ground_source")
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
@@ -160,7 +160,8 @@ def column_kind(name: str, found: set[type], prefix: str) -> type:
     """The one type that holds all values found; a computed figure that is always unknown stays a decimal."""
     known = found - {type(None)}
     if not known:
-        return float if name.startswith((prefix, OWN)) and name not in TEXT and "val3dity" not in name else str
+        computed = {prefix + a.name: a.kind for a in ROOFER} | {OWN + a.name: a.kind for a in HIPROOF}
+        return str if computed.get(name, "text") == "text" else float
     if len(known) == 1:
         return known.pop()
     return str if str in known else float if float in known else int

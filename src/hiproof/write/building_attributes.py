@@ -11,10 +11,9 @@ import numpy as np
 from ..frames import METRES, Units
 from ..model import Building
 from ..status import Status
+from .attribute_list import OWN, PREFIX
 from .roof_figures import RoofFigures, roof_figures
 
-PREFIX = "rf_"
-OWN = "hiproof_"
 FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
 
 
@@ -30,8 +29,7 @@ def building_attributes(
 
     Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what we computed wins.
     Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose coordinates are in other `units`, which
-    `hiproof_units` then says. `val3dity_lod22` "[]" because only valid solids are
-    written.
+    `hiproof_units` then says. What each is stands in attribute_list.py.
     """
     own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
@@ -66,7 +64,6 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
         "slope": None if figures is None else metres(figures.slope_deg),
         "azimuth": None if figures is None else metres(figures.azimuth_deg),
         "rmse_lod22": rounded(quality.rmse),
-        "val3dity_lod22": None if figures is None else "[]",
         "pt_density": rounded(quality.density),
         "nodata_frac": rounded(quality.nodata_share),
         "extrusion_mode": mode,
@@ -94,6 +91,7 @@ def hiproof_attributes(building: Building) -> dict[str, Any]:
         "outline_iou": rounded(quality.outline_iou),
         "unexplained_area_m2": rounded(quality.unexplained_area_m2),
         "ground_source": building.ground_source or None,
+        "iso19107_lod22": None if building.solid is None else "[]",  # only solids that pass the check get here
     }
 
 

@@ -1,0 +1,186 @@
+"""Every attribute and table that hiproof writes, with unit and meaning: what the formats name and the documents list."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+PREFIX = "rf_"
+OWN = "hiproof_"
+
+
+class Attribute(NamedTuple):
+    """A named value: `kind` is text, number or count; `unit` is empty where there is none."""
+
+    name: str
+    kind: str
+    unit: str
+    meaning: str
+
+
+class Table(NamedTuple):
+    """Attributes that stand together; `prefix` precedes their names in files."""
+
+    title: str
+    where: str
+    attributes: tuple[Attribute, ...]
+    prefix: str = ""
+
+
+ROOFER = (
+    Attribute("h_ground", "number", "m", "height of the ground: the lowest terrain along the outline"),
+    Attribute("h_roof_min", "number", "m", "lowest height of the roof"),
+    Attribute("h_roof_50p", "number", "m", "height that half of the roof's area lies below"),
+    Attribute("h_roof_70p", "number", "m", "height that seven tenths of the roof's area lie below"),
+    Attribute("h_roof_max", "number", "m", "highest height of the roof"),
+    Attribute("h_roof_ridge", "number", "m", "height of the highest ridge, of the roof where it has none"),
+    Attribute("volume_lod22", "number", "m3", "volume of the solid"),
+    Attribute("roof_type", "text", "", "roofer's type: horizontal, multiple horizontal, slanted, no points, unknown"),
+    Attribute("roof_n_surfaces", "count", "", "roof faces of the solid"),
+    Attribute("slope", "number", "deg", "slope of the roof, by area"),
+    Attribute("azimuth", "number", "deg", "compass direction in which the roof falls, by area"),
+    Attribute(
+        "rmse_lod22", "number", "m", "root mean square distance of the points from the roof, facade points included"
+    ),
+    Attribute("pt_density", "number", "1/m2", "points by area of the outline"),
+    Attribute("nodata_frac", "number", "", "share of the outline's 1 m cells that hold no point"),
+    Attribute("extrusion_mode", "text", "", "standard, lod11_fallback (a flat block) or skip (no model)"),
+)
+
+HIPROOF = (
+    Attribute("status", "text", "", "what came of the building: modelled, sparse, poor_fit, simplified, ..."),
+    Attribute("detail", "text", "", "the status as a sentence about this building"),
+    Attribute("roof_type", "text", "", "type of the largest part: a name of the catalogue, or free"),
+    Attribute("roof_type_probability", "number", "", "probability of that type after the fits"),
+    Attribute("network_type", "text", "", "type that the network names"),
+    Attribute("network_type_probability", "number", "", "probability that the network gives it"),
+    Attribute("parts", "count", "", "roof parts"),
+    Attribute("points", "count", "", "points that the building was judged by"),
+    Attribute("psd_mean", "number", "m", "mean distance of the points from the roof, facade points included"),
+    Attribute("psd_std", "number", "m", "standard deviation of those distances"),
+    Attribute("p95", "number", "m", "distance that 95 of 100 points stay below"),
+    Attribute(
+        "share_within_20cm",
+        "number",
+        "",
+        "share of the points 0.3 m or more inside the outline that lie within 0.2 m over or under the roof; null where"
+        " fewer than ten lie there",
+    ),
+    Attribute("outline_iou", "number", "", "intersection over union of the roof's outline with the footprint"),
+    Attribute("unexplained_area_m2", "number", "m2", "area most of whose points lie over 0.5 m off the roof"),
+    Attribute("ground_source", "text", "", "where the ground's height came from"),
+    Attribute(
+        "iso19107_lod22", "text", "", "ISO 19107 codes of our own check of the solid; [] is valid, none without a model"
+    ),
+    Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
+)
+
+ROOF_SURFACE = (
+    Attribute("rf_slope", "number", "deg", "slope of the face (in CityGML: slope)"),
+    Attribute(
+        "rf_azimuth", "number", "deg", "compass direction in which it falls, null where level (in CityGML: azimuth)"
+    ),
+    Attribute("hiproof_part", "count", "", "number of its roof part, from 0"),
+    Attribute("hiproof_part_type", "text", "", "type of its roof part"),
+)
+
+PARAMETERS = (
+    Attribute("id", "text", "", "the building's id"),
+    Attribute("status", "text", "", "as hiproof_status"),
+    Attribute("detail", "text", "", "as hiproof_detail"),
+    Attribute("type", "text", "", "type of the largest part, whose theta_p, kappa, T_L and sigma follow"),
+    Attribute("theta_p", "object", "m", "parameters of the primitive by name (teeth is a count)"),
+    Attribute("kappa", "number", "rad", "rotation about the vertical"),
+    Attribute("T_L", "list", "m", "translation relative to T_G"),
+    Attribute("sigma", "object", "m, rad", "standard deviations by name"),
+    Attribute("T_G", "list", "m", "origin of the building's frame in the world"),
+    Attribute("objective", "number", "", "value of what was minimised"),
+    Attribute("points", "count", "", "points that the building was judged by"),
+    Attribute("residuals", "object", "m", "psd_mean, psd_std, rmse, p95, share_within_20cm, outline_iou as above"),
+    Attribute("density", "number", "1/m2", "points by area of the outline"),
+    Attribute("nodata_share", "number", "", "as rf_nodata_frac"),
+    Attribute("unexplained_area_m2", "number", "m2", "as hiproof_unexplained_area_m2"),
+    Attribute("recognised", "object", "", "probability by roof type, from the network"),
+    Attribute("types", "object", "", "probability by roof type, after the fits"),
+    Attribute("z_ground", "number", "m", "height of the ground in the world"),
+    Attribute("ground_source", "text", "", "where it came from"),
+    Attribute(
+        "parts",
+        "list",
+        "",
+        "every part: type, theta_p, kappa, T_L, sigma, pieces (outline; planes a, b, c of z = a x + b y + c)",
+    ),
+)
+
+EVALUATION = (
+    Attribute("id", "text", "", "the building's id"),
+    Attribute("type", "text", "", "its roof type"),
+    Attribute("status", "text", "", "as hiproof_status"),
+    Attribute("points", "count", "", "points of the clouds given inside the outline"),
+    Attribute("density", "number", "1/m2", "points by area of the outline"),
+    Attribute("psd_mean", "number", "m", "mean distance of the points from the roof, facade points included"),
+    Attribute("psd_std", "number", "m", "standard deviation of those distances"),
+    Attribute("rmse", "number", "m", "root mean square of those distances"),
+    Attribute("p95", "number", "m", "distance that 95 of 100 points stay below"),
+    Attribute(
+        "share_within_20cm", "number", "", "as hiproof_share_within_20cm, of the points given; 0 without a model"
+    ),
+    Attribute("outline_iou", "number", "", "intersection over union of the roof's outline with the footprint"),
+    Attribute("nodata_share", "number", "", "as rf_nodata_frac"),
+    Attribute("unexplained_area_m2", "number", "m2", "as hiproof_unexplained_area_m2"),
+    Attribute("volume_m3", "number", "m3", "volume of the solid"),
+    Attribute("ref_id", "text", "", "with --reference: the building of the other model"),
+    Attribute("ref_ridge_height_m", "number", "m", "ridge height minus the other's"),
+    Attribute("ref_slope_deg", "number", "deg", "slope minus the other's"),
+    Attribute("ref_azimuth_deg", "number", "deg", "smaller angle between the azimuths"),
+    Attribute("ref_volume_m3", "number", "m3", "volume minus the other's"),
+    Attribute("ref_volume_relative", "number", "", "that difference by the other's volume"),
+    Attribute("ref_plan_iou", "number", "", "intersection over union of the outlines in plan"),
+)
+
+POSTGIS_BUILDINGS = (
+    Attribute("id", "text", "", "the building's id"),
+    Attribute("status", "text", "", "as hiproof_status"),
+    Attribute("roof_type", "text", "", "as hiproof_roof_type"),
+    Attribute("attributes", "object", "", "all attributes of the building (jsonb)"),
+    Attribute("geom", "geometry", "of the CRS", "the solid as a polyhedral surface of triangles"),
+)
+
+POSTGIS_ROOFS = (
+    Attribute("building_id", "text", "", "id of the building"),
+    Attribute("number", "count", "", "number of the face within its building, from 0"),
+    Attribute("roof_type", "text", "", "type of its roof part"),
+    Attribute("slope_deg", "number", "deg", "slope of the face"),
+    Attribute("azimuth_deg", "number", "deg", "compass direction in which it falls, null where level"),
+    Attribute("area_m2", "number", "m2", "true area of the face"),
+    Attribute("geom", "geometry", "of the CRS", "the face as a polygon"),
+)
+
+EVERY_FORMAT = "`buildings.gml`, `buildings.city.jsonl`, the layer `buildings` of `buildings.gpkg`, `buildings.parquet`"
+TABLES = (
+    Table("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
+    Table("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
+    Table("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
+    Table("Parameters", "`parameters.jsonl`, a line a building", PARAMETERS),
+    Table("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
+    Table("PostGIS: PREFIX_buildings", "`hiproof load`", POSTGIS_BUILDINGS),
+    Table("PostGIS: PREFIX_roofs", "`hiproof load`", POSTGIS_ROOFS),
+)
+
+HEAD = """# Attributes
+
+What stands in the files of a run, beside the attributes of the input, which are kept under their own names. Lengths are
+metres also where coordinates are not. Made by `hiproof attributes`.
+"""
+
+
+def attributes_text() -> str:
+    """All tables as Markdown: what `hiproof attributes` prints and docs/attributes.md holds."""
+    return "\n".join([HEAD, *map(table_text, TABLES)])
+
+
+def table_text(table: Table) -> str:
+    rows = [
+        f"| `{table.prefix}{name}` | {kind} | {unit} | {meaning} |" for name, kind, unit, meaning in table.attributes
+    ]
+    head = ["| name | kind | unit | meaning |", "| --- | --- | --- | --- |"]
+    return "\n".join([f"## {table.title}", "", f"In {table.where}.", "", *head, *rows, ""])

@@ -1,0 +1,116 @@
+"""Every path, command, option, setting and attribute that the documents name exists."""
+
+import re
+from functools import cache
+from pathlib import Path
+
+import pytest
+import typer
+
+from hiproof.cli.app import app
+from hiproof.settings import Settings
+from hiproof.write.attribute_list import TABLES
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = [*(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))]
+DOCUMENTS += sorted((ROOT / "docs").glob("*.md"))
+COMMANDS = typer.main.get_command(app).commands
+OPTIONS = {name for command in COMMANDS.values() for parameter in command.params for name in parameter.opts}
+OPTIONS |= {"--help", "--version"}
+PLACES = [ROOT, ROOT / "src/hiproof", ROOT / "src/hiproof/primitives", ROOT / "tests"]
+OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ")
+
+ATTRIBUTES = {table.prefix + attribute.name for table in TABLES for attribute in table.attributes}
+ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}  # tables of a database, by the prefix that is the default
+
+every_document = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
+
+
+def spans(path):
+    """What stands between backticks in the prose."""
+    return re.findall(r"(?<!`)`([^`\n]+)`(?!`)", path.read_text())
+
+
+def commands(path):
+    """Spans, and lines of indented or fenced code, without their comments."""
+    text = path.read_text()
+    fenced = [line for block in re.findall(r"```\w*\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+    indented = re.findall(r"^    (\S.*)$", text, re.MULTILINE)
+    return spans(path) + [line.split(" # ")[0].strip() for line in fenced + indented]
+
+
+@cache
+def source():
+    """All text of the package, its benchmarks and tests, where names of files and values come from."""
+    folders = ("src", "benchmarks", "experiments", "tests", "examples")
+    files = [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
+    return "\n".join(file.read_text() for file in files if file != Path(__file__))
+
+
+def module_file(name):
+    """The file of a module that `python -m` may be given, None where there is none."""
+    path = ROOT / name.replace(".", "/")
+    found = (path.with_suffix(".py"), path / "__main__.py", ROOT / "src" / name.replace(".", "/") / "__main__.py")
+    return next((file for file in found if file.is_file()), None)
+
+
+def is_path(span):
+    return bool(re.fullmatch(r"[\w.-]*(/[\w.-]+)*(/|\.(py|md|toml|json|jsonl|gml|gpkg|parquet|csv|html))", span))
+
+
+@every_document
+def test_links_lead_somewhere(path):
+    targets = re.findall(r"\]\(([^)#]+)\)", path.read_text())
+    assert [target for target in targets if "://" not in target and not (path.parent / target).exists()] == []
+
+
+@every_document
+def test_paths_exist(path):
+    """Of the repository, or of a run's output, whose names stand in the source."""
+    missing = [
+        span
+        for span in spans(path)
+        if is_path(span)
+        and not any((place / span).exists() for place in PLACES)
+        and not (re.search(rf"[\"'/]{re.escape(Path(span).name)}[\"'/]", source()) and not span.endswith(".py"))
+    ]
+    assert missing == []
+
+
+@every_document
+def test_commands_exist(path):
+    named = [found for text in commands(path) for found in re.findall(r"^hiproof ([a-z]\w*)", text)]
+    assert [name for name in named if name not in COMMANDS] == []
+    modules = [found for text in commands(path) for found in re.findall(r"^python -m ([\w.]+)", text)]
+    assert [name for name in modules if name not in ("pytest", "venv", "pip") and module_file(name) is None] == []
+    targets = re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    made = [found for text in commands(path) for found in re.findall(r"^make ([\w-]+)", text)]
+    assert [name for name in made if name not in targets] == []
+
+
+@every_document
+def test_options_exist(path):
+    missing = []
+    for text in commands(path):
+        if text.startswith(OTHER_PROGRAMS) or text.startswith("python -m pytest"):
+            continue
+        module = re.match(r"python -m ([\w.]+)", text)
+        known = OPTIONS if module is None else set(re.findall(r"--[\w-]+", module_file(module[1]).read_text()))
+        missing += [option for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text) if option not in known]
+    assert missing == []
+
+
+@every_document
+def test_attributes_and_settings_exist(path):
+    named = re.findall(r"`((?:rf|hiproof)_[a-z]\w*)`", path.read_text())
+    assert [name for name in named if name not in ATTRIBUTES] == []
+    settings = Settings().to_dict()
+    pairs = re.findall(r"`\[(\w+)\] (\w+)", path.read_text())
+    assert [pair for pair in pairs if pair[1] not in settings.get(pair[0], {})] == []
+
+
+@every_document
+def test_names_of_code_occur_in_it(path):
+    """A word between backticks that looks like a name of code, such as `fit_roof` or `model.Part`."""
+    named = {span.split(".")[-1] for span in spans(path) if re.fullmatch(r"@?[a-z]\w*(_|\.[A-Za-z])\w*", span)}
+    assert sorted(name for name in named - ATTRIBUTES if not re.search(rf"\b{re.escape(name)}\b", source())) == []

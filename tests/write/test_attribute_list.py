@@ -1,0 +1,81 @@
+"""Every attribute that is written is declared, with unit and meaning, and the documents list them."""
+
+import json
+import re
+from pathlib import Path
+
+from handmade import gable_house, modelled, unmodelled
+from hiproof.cli.attributes import run
+from hiproof.evaluate.evaluation import BuildingFigures, Comparison
+from hiproof.frames import METRES, Units
+from hiproof.write import write_all
+from hiproof.write.attribute_list import (
+    EVALUATION,
+    HIPROOF,
+    OWN,
+    PARAMETERS,
+    POSTGIS_BUILDINGS,
+    POSTGIS_ROOFS,
+    PREFIX,
+    ROOF_SURFACE,
+    ROOFER,
+    TABLES,
+)
+from hiproof.write.building_attributes import building_attributes, figures_of
+from hiproof.write.parameters import building_record
+from hiproof.write.postgis import SCHEMA
+
+DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
+KINDS = {"number": (int, float), "count": int, "text": str}
+
+
+def names(attributes, prefix=""):
+    return [prefix + attribute.name for attribute in attributes]
+
+
+def test_the_document_is_current(capsys):
+    run()
+    assert DOCUMENT.read_text() == capsys.readouterr().out
+
+
+def test_everything_is_explained():
+    for table in TABLES:
+        assert len(set(names(table.attributes))) == len(table.attributes)
+        assert all(attribute.meaning and attribute.kind for attribute in table.attributes)
+
+
+def test_buildings_have_the_attributes_declared():
+    feet = Units(0.3048, 0.3048, "foot", "foot")
+    for building in (modelled(gable_house()), unmodelled()):
+        found = building_attributes(building, figures_of(building), units=feet)
+        own = set(found) - set(building.attributes)
+        assert own == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
+        for attribute, prefix in ((a, p) for table, p in ((ROOFER, PREFIX), (HIPROOF, OWN)) for a in table):
+            value = found[prefix + attribute.name]
+            assert value is None or isinstance(value, KINDS[attribute.kind]), attribute.name
+    assert OWN + "units" not in building_attributes(unmodelled(), None, units=METRES)
+
+
+def test_validity_stands_under_our_own_name_only():
+    attributes = building_attributes(modelled(gable_house()), figures_of(modelled(gable_house())))
+    assert attributes["hiproof_iso19107_lod22"] == "[]"
+    assert building_attributes(unmodelled())["hiproof_iso19107_lod22"] is None
+    assert not any("val3dity" in name for name in attributes)
+
+
+def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
+    write_all(tmp_path, [modelled(gable_house())])
+    feature = json.loads((tmp_path / "buildings.city.jsonl").read_text().splitlines()[1])
+    (city_object,) = feature["CityObjects"].values()
+    surfaces = [s for g in city_object["geometry"] if g["type"] == "Solid" for s in g["semantics"]["surfaces"]]
+    assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
+    assert list(building_record(modelled(gable_house()))) == names(PARAMETERS)
+    row = BuildingFigures("a", "gable", "modelled", comparison=Comparison("b")).row()
+    assert sorted(row) == sorted(names(EVALUATION))
+
+
+def test_tables_of_the_database_are_as_declared():
+    tables = re.findall(r"create table if not exists \{(\w+)\} \((.*?)\);", SCHEMA, re.DOTALL)
+    for (name, body), attributes in zip(tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS), strict=True):
+        columns = re.findall(r"(?:^|,)\s*(\w+) (?=text|integer|double|jsonb|geometry)", body)
+        assert columns == names(attributes), name
