@@ -9,6 +9,7 @@ import hiproof
 from hiproof import Status
 from hiproof.compose import check_solid, volume
 from hiproof.settings import Settings
+from hiproof.stages import candidates
 from tiny_town import gable
 
 PLAIN = Settings.from_dict({"segment": {"enabled": False}})
@@ -191,3 +192,12 @@ def test_a_footprint_with_attributes_keeps_them():
     footprint = hiproof.Footprint("house", FOOTPRINT, {"street": "Main"})
     building = hiproof.reconstruct(gable_points(), footprint, settings=PLAIN)
     assert (building.id, building.attributes) == ("house", {"street": "Main"})
+
+
+def test_the_papers_objective_fits_only_what_is_asked_for_or_seen():
+    paper = Settings.from_dict({"fit": {"objective": "paper"}})
+    seen = {"gable": 0.6, "hip": 0.3, "mansard": 0.09, "shed": 0.01}
+    assert candidates(seen, paper) == ("gable", "hip", "mansard")
+    assert candidates(seen, paper.replace({"fit": {"types": ["hip", "flat"]}})) == ("hip",)
+    assert candidates(seen, paper.replace({"fit": {"types": ["flat"]}})) == ("flat",)
+    assert candidates({}, paper) == candidates(seen, Settings()) == ()

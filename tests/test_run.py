@@ -112,6 +112,14 @@ def test_how_the_area_is_cut_changes_no_byte(finished, tmp_path):
     assert records(tmp_path / "out") == records(finished[0])
 
 
+def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    paper, seen = Settings.from_dict({"fit": {"objective": "paper"}}), []
+    request = Request((town_files[0],), tmp_path, town_files[1], settings=paper)
+    reconstruct_area(request, lambda *progress: seen.append(progress))
+    assert [progress for progress in seen if progress[0] == "solve"][-4:] == [("solve", n, 4) for n in (1, 2, 3, 4)]
+
+
 def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
     make_ready(tmp_path)

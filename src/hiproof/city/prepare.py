@@ -5,6 +5,7 @@ from __future__ import annotations
 import shapely
 
 from ..errors import InputError
+from ..settings import Settings
 from ..write.naming import FileUnits
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 from .request import Request
@@ -26,12 +27,17 @@ def make_plan(request: Request) -> Plan:
     jobs = jobs_from_footprints(request, headers, frame) if request.footprints else jobs_from_cloud(request)
     return Plan(
         jobs=jobs,
-        tiles=cut_into_tiles(jobs, TILE_M, MOST_BUILDINGS_A_TILE),
+        tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
         crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
         settings=request.settings,
         names=unusual_names(jobs),
         translate=offset_of_jobs(jobs, FileUnits.of(frame.crs, frame.units).cityjson),
     )
+
+
+def most_buildings_a_tile(settings: Settings) -> int:
+    """Progress is told by tiles, and the paper's objective takes seconds a building: there each is a tile of its own."""
+    return 1 if settings.fit.objective == "paper" else MOST_BUILDINGS_A_TILE
 
 
 def read_headers(clouds: tuple[str, ...]) -> list:
