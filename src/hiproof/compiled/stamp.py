@@ -12,7 +12,6 @@ import hashlib
 import re
 import sys
 from collections.abc import Iterable, Iterator
-from importlib.metadata import version
 from pathlib import Path
 
 IMPORT = re.compile(
@@ -54,7 +53,11 @@ def digest(files: Iterable[Path]) -> str:
     return said.hexdigest()[:16]
 
 
-version_of = functools.cache(version)
+@functools.cache
+def version_of(library: str) -> str:
+    from importlib.metadata import version  # slow to import, and the command line's help needs no stamp
+
+    return version(library)
 
 
 @functools.cache
