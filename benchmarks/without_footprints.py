@@ -46,7 +46,7 @@ def report(name: str, outcomes: list[tuple[Building, float]]) -> str:
     ms, areas = 1e3 * np.array([seconds for _, seconds in outcomes]), area_by_type(buildings)
     return (
         f"{name}: {len(buildings)} of {len(outcomes)} buildings modelled"
-        f"  share {np.mean([b.quality.share_within_20cm for b in buildings]):.4f}"
+        f"  share {np.nanmean([b.quality.share_within_20cm for b in buildings]):.4f}"
         f"  distance median {np.median([b.quality.psd_mean for b in buildings]):.3f} m"
         f"  parts {np.mean([len(b.parts) for b in buildings]):.2f} ({sum(len(b.parts) for b in buildings)})"
         f"  faces {np.mean([len(b.solid.of_kind(ROOF)) for b in buildings]):.2f}"

@@ -14,6 +14,6 @@ summary = reconstruct_area(request)
 print(f"{summary.buildings} buildings: {summary.by_status}, roof types {summary.by_type}")
 
 buildings = [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
-worst = min(buildings, key=lambda building: building["residuals"]["share_within_20cm"])
-share = 100 * worst["residuals"]["share_within_20cm"]
-print(f"worst: {worst['id']}, {worst['type']}, {share:.0f} % of its points within 0.2 m")
+shares = {b["id"]: b["residuals"]["share_within_20cm"] for b in buildings}
+worst = min((id for id in shares if shares[id] is not None), key=shares.get)  # null: too few points to tell
+print(f"worst: {worst}, {100 * shares[worst]:.0f} % of its points inside the outline within 0.2 m of the roof")
