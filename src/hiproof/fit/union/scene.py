@@ -28,7 +28,7 @@ Scene = namedtuple(
     "U V z weight n low high turn depth corner_u corner_v pitch lines vertices evidence dead width edge_prices allowed",
 )
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose")
-EDGE_PRICES = EdgePrices(0.5, 0.08, 0.15, 0.5, 0.4)
+EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6)
 
 
 def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
@@ -110,10 +110,8 @@ def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
     return allowed
 
 
-DEAD_M, LEAST_WIDTH_M = (
-    0.06,
-    0.02,
-)  # residuals that cost nothing; over how much more they grow to a whole point at least
+DEAD_M = 0.03  # residuals that cost nothing
+LEAST_WIDTH_M = 0.02  # over how much more they grow to a whole point, at least
 
 
 def depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray, float]:

@@ -19,7 +19,7 @@ SETTLE_REACH_M = 0.7
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 COMMON_HOUSE_M2, LARGEST_FACTOR = 60.0, 16.0  # larger roofs ask more of each volume
 # What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
-LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.13, 0.04, 0.18, 0.15
+LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
 
 
 def evidence_per_unit(density: float, area_m2: float, settings) -> float:
