@@ -16,6 +16,7 @@ from ...primitives.shed import TEETH
 from .regions import GRID_M, polygons_of
 
 SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
+UNEVEN_M = 0.1  # heights of teeth, were they equally wide, that differ by more: they are not
 ON_TOP_M = 0.3  # a gable whose eave is so near another's top stands on it
 
 
@@ -41,7 +42,8 @@ def with_saw_teeth(parts: list[Part]) -> list[Part]:
             if grown:
                 teeth = [part for part in teeth if part is not neighbour]
                 row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
-        others += [saw_tooth(row)] if len(row) >= min(TEETH) else row
+        united = saw_tooth(row) if len(row) >= min(TEETH) else None
+        others += row if united is None else [united]
     return others
 
 
@@ -71,25 +73,33 @@ def follows(tooth: Part, next_tooth: Part) -> bool:
     )
 
 
-def saw_tooth(row: list[Part]) -> Part:
-    """One shed part of equal monopitches, in order from the lowest v to the highest."""
-    mean = {name: float(np.mean([part.parameters[name] for part in row])) for name in ("width", "length", "height")}
-    parameters = {**mean, "width": len(row) * mean["width"], "teeth": float(len(row))}
-    translation = np.mean([part.translation for part in row], axis=0)
-    shape = get("shed").variant(parameters)
-    whole = shape.part(shape.to_theta(parameters, row[0].kappa, translation))
+def saw_tooth(row: list[Part]) -> Part | None:
+    """One shed part of equal monopitches, in order from the lowest v to the highest; None where some are wider than others."""
+    count, kappa, origin = len(row), row[0].kappa, row[0].translation[:2]
+    axes = np.array([[math.cos(kappa), math.sin(kappa)], [-math.sin(kappa), math.cos(kappa)]])
     covered = shapely.union_all([piece.outline for part in row for piece in part.pieces])
-    c, s = math.cos(row[0].kappa), math.sin(row[0].kappa)
-    across = ((shapely.get_coordinates(covered) - translation[:2]) @ (-s, c)).tolist()
-    along = ((shapely.get_coordinates(covered) - translation[:2]) @ (c, s)).tolist()
-    breaks = np.linspace(-0.5, 0.5, len(row) + 1) * parameters["width"]
-    breaks[[0, -1]] = min(across) - 1.0, max(across) + 1.0
+    along, across = ((shapely.get_coordinates(covered) - origin) @ axes.T).T
+    low, width = across.min(), np.ptp(across)
+    centres = (np.array([part.translation[:2] for part in row]) - origin) @ axes.T
+    slopes = np.array([part.parameters["height"] / part.parameters["width"] for part in row])
+    middles = low + width / count * (np.arange(count) + 0.5)
+    heights = [p.translation[2] + 0.5 * p.parameters["height"] for p in row] + slopes * (middles - centres[:, 1])
+    if np.ptp(heights) > UNEVEN_M:
+        return None
+    rise, length = slopes.mean() * width / count, np.mean([part.parameters["length"] for part in row])
+    parameters = {"width": float(width), "length": float(length), "height": float(rise), "teeth": float(count)}
+    centre = np.array([centres[:, 0].mean(), low + 0.5 * width]) @ axes + origin
+    translation = np.array([*centre, heights.mean() - 0.5 * rise])
+    shape = get("shed").variant(parameters)
+    whole = shape.part(shape.to_theta(parameters, kappa, translation))
+    breaks = low + width * np.arange(count + 1) / count
+    breaks[[0, -1]] += -1.0, 1.0
     pieces = []
-    for low, high, piece in zip(breaks[:-1], breaks[1:], whole.pieces, strict=True):
-        strip = shapely.box(min(along) - 1.0, low, max(along) + 1.0, high)
-        strip = shapely.transform(strip, lambda uv: uv @ np.array([[c, s], [-s, c]]) + translation[:2])
+    for foot, top, piece in zip(breaks[:-1], breaks[1:], whole.pieces, strict=True):
+        strip = shapely.box(along.min() - 1.0, foot, along.max() + 1.0, top)
+        strip = shapely.transform(strip, lambda uv: uv @ axes + origin)
         pieces += [Piece(polygon, piece.planes) for polygon in polygons_of(shapely.intersection(covered, strip))]
-    return Part("shed", tuple(pieces), parameters, row[0].kappa, translation)
+    return Part("shed", tuple(pieces), parameters, kappa, translation)
 
 
 def with_gambrels(parts: list[Part]) -> list[Part]:
