@@ -30,6 +30,7 @@ from .volumes import (
     SLOPE,
     TIE,
     coefficients,
+    is_allowed,
     lowest,
     volume_cost,
 )
@@ -44,11 +45,12 @@ NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 
 
 def candidates_of(scene: Scene, members: np.ndarray, grids: list[Grid], most_planes: int) -> np.ndarray:
-    """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction."""
+    """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
     found = [
         volume
         for direction, grid in enumerate(grids)
         for volume in candidates_in(scene, members, direction, grid, most_planes)
+        if is_allowed(volume, scene.allowed)
     ]
     return np.array(found).reshape(-1, COLUMNS)
 
