@@ -9,7 +9,7 @@ from .candidates import best_rectangles, candidates_of
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
 from .moves import improve
 from .objective import costs, objective
-from .plan import Plan, cells_of
+from .plan import MIN_STRUCTURE_POINTS, Plan, cells_of
 from .planes import Grid
 from .refit import refit
 from .scene import Scene
@@ -27,7 +27,8 @@ CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back f
 
 def grow(scene: Scene, grids: list[Grid]) -> tuple[np.ndarray, float]:
     """Volumes (k, COLUMNS) and their objective, found greedily from the base alone."""
-    volumes = base_only(float(np.quantile(scene.z[: scene.n], BASE_QUANTILE, method="lower")))
+    quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
+    volumes = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
     value = objective(volumes, scene, np.inf)
     candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
     slopes = typical_slopes(candidates)
