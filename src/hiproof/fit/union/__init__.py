@@ -36,11 +36,10 @@ from .larger import put_together
 from .names import part_of
 from .objective import base_shows
 from .outline import outline_of_points
-from .plan import lay_out_plan
+from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
 from .search import find_volumes
 from .sides import sides_of
-from .volumes import roof_heights
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -81,9 +80,18 @@ def fit_building(
     ]
     parts = [as_allowed(part, types, points_local) for part in put_together(parts, types)]
     parts = clamped(parts, *(plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max())))
-    z, _ = roof_heights(volumes, scene.U, scene.V)
-    far = np.abs(scene.z - z)[: scene.n] > settings.compound.tolerance_m
-    return BuildingFit(tuple(parts), outline, value, scene.n, float(np.mean(far)))
+    far = unexplained_share(parts, plan, settings.compound.tolerance_m)
+    return BuildingFit(tuple(parts), outline, value, scene.n, far)
+
+
+def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
+    """The share of the plan's points further than `tolerance_m` from the max of the parts."""
+    xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
+    z = np.full(len(xy), -np.inf)
+    for piece in (piece for part in parts for piece in part.pieces):
+        inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
+        z[inside] = np.maximum(z[inside], piece.height_at(xy[inside]))
+    return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 
 def as_allowed(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
