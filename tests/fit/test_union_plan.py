@@ -1,0 +1,233 @@
+"""Laws of what becomes of volumes: sides on lines of the outline, regions without gaps, larger shapes put together."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.fit.union.finish import finished
+from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.regions import regions_of
+from hiproof.fit.union.scene import allowed_shapes, scene_of
+from hiproof.fit.union.sides import Side, corners_of, sides_of
+from hiproof.fit.union.volumes import LEVEL, OFFSET, U0, V1, base_only, roof_heights
+from hiproof.model import Part, Piece
+from hiproof.primitives import get
+from hiproof.primitives.family import Member
+from union_scenes import OUTLINES, random_volume, rectangle_of
+
+
+def laid_out(rng, outline, volumes=None):
+    """Plan and scene (one direction) of points at random over `outline`, on the roof of `volumes` where given."""
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (400, 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
+    scene = scene_of(plan, outline, np.arange(len(plan.cloud.u)), [0.0], 3.0, 0.25, allowed_shapes(()))
+    if volumes is not None:
+        scene = scene._replace(z=roof_heights(volumes, scene.U, scene.V)[0])
+    return plan, scene
+
+
+def level_volumes(rng, count):
+    """A base and `count` volumes of one direction with level tops among others, rectangles at random."""
+    rows = [random_volume(rng, replacing=0.3) for _ in range(count)]
+    for row in rows:
+        row[0] = 0.0
+        row[OFFSET + LEVEL] = min(row[OFFSET + LEVEL], 4.0)
+    return np.vstack([base_only(-1.0), *rows])
+
+
+# --- regions ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("base", [False, True])
+@pytest.mark.parametrize("seed", range(8))
+def test_regions_cover_the_outline_and_nothing_else(seed, base):
+    rng = np.random.default_rng(seed)
+    outline = OUTLINES[seed % len(OUTLINES)]
+    volumes = level_volumes(rng, 1 + seed % 4)
+    plan, scene = laid_out(rng, outline, volumes)
+    sides = sides_of(volumes, plan, outline, scene)
+    regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, base)
+    assert len(regions) == len(volumes)
+    polygons = [polygon for own in regions for polygon in own]
+    assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
+    united = shapely.union_all(polygons)
+    assert united.difference(outline.buffer(1e-5)).area < 1e-9
+    assert shapely.buffer(outline.difference(united), -1e-4).is_empty  # no gap wider than composing closes
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
+    rng = np.random.default_rng(seed)
+    outline, volumes = OUTLINES[0], level_volumes(rng, 3)
+    volumes[-1, U0 : V1 + 1] = -3.0, 1.0, -2.0, 2.0
+    volumes[-1, -1] = 1.0
+    plan, scene = laid_out(rng, outline, volumes)
+    sides = sides_of(volumes, plan, outline, scene)
+    regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, True)
+    recess = shapely.union_all(regions[-1])
+    assert recess.area > 1.0
+    assert all(polygon.intersection(recess).area < 1e-3 for own in regions[:-1] for polygon in own)
+
+
+# --- sides -----------------------------------------------------------------------------------------------------------
+
+
+def test_a_side_lies_on_the_line_of_the_outline_that_it_all_but_follows():
+    """A front out of square by three degrees: the volume's side takes its line, the other three their own."""
+    lean = math.tan(math.radians(3.0))
+    outline = shapely.Polygon([(-6, -4 - 6 * lean), (6, -4 + 6 * lean), (6, 4), (-6, 4)])
+    volumes = np.vstack([base_only(-5.0), base_only(2.0)])
+    volumes[1, U0 : V1 + 1] = -6.0, 6.0, -4.0, 4.0
+    plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
+    corners = (shapely.get_coordinates(outline)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    volumes[1, U0 : V1 + 1] = corners[:, 0].min(), corners[:, 0].max(), corners[:, 1].min() + 0.3, corners[:, 1].max()
+    sides = sides_of(volumes, plan, outline, scene)[1]
+    assert all(side.anchored for side in sides)
+    found = shapely.Polygon(plan.frame.xy_local(corners_of(sides)))
+    assert found.symmetric_difference(outline).area < 1e-6
+
+
+def test_sides_meet_in_the_corners_of_their_rectangle():
+    corners = corners_of([Side(-2.0), Side(3.0), Side(-1.0), Side(4.0)])
+    assert corners.tolist() == [[-2.0, -1.0], [3.0, -1.0], [3.0, 4.0], [-2.0, 4.0]]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_corners_lie_on_both_of_their_sides(seed):
+    rng = np.random.default_rng(seed)
+    sides = [Side(at, lean) for at, lean in zip((-3.0, 3.0, -2.0, 2.0), rng.uniform(-0.2, 0.2, 4), strict=True)]
+    for (u, v), (i, j) in zip(corners_of(sides), ((0, 2), (1, 2), (1, 3), (0, 3)), strict=True):
+        assert u == pytest.approx(sides[i].at + sides[i].lean * v)
+        assert v == pytest.approx(sides[j].at + sides[j].lean * u)
+
+
+def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
+    outline = OUTLINES[0]
+    volumes = np.vstack([base_only(-5.0), base_only(2.0)])
+    volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
+    plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
+    side = sides_of(volumes, plan, outline, scene)[1][1]
+    assert side == Side(1.3)
+
+
+# --- larger shapes ---------------------------------------------------------------------------------------------------
+
+KAPPAS = [0.0, 0.7, -2.5]
+
+
+def teeth(count, kappa, slope=0.5, width=5.0, length=12.0, uneven=0.0):
+    """Monopitches behind one another, in no order, a part each; every second one `uneven` (m) wider than the others."""
+    shape, parts, v = get("monopitch"), [], 0.0
+    for k in range(count):
+        own = width + (uneven if k % 2 else 0.0)
+        theta_p = {"width": own, "length": length, "height": slope * own}
+        across = v + 0.5 * own
+        place = np.array([-math.sin(kappa) * across + 40.0, math.cos(kappa) * across - 7.0, 4.0])
+        parts.append(shape.part(shape.to_theta(theta_p, kappa, place)))
+        v += own
+    return [parts[k] for k in np.random.default_rng(count).permutation(count)]
+
+
+def height_of(parts, xy):
+    z = np.full(len(xy), -np.inf)
+    for piece in (piece for part in parts for piece in part.pieces):
+        inside = shapely.contains_xy(piece.outline, *xy.T)
+        z[inside] = np.maximum(z[inside], piece.height_at(xy[inside]))
+    return z
+
+
+def strewn_over(parts, count=400):
+    outline = shapely.union_all([piece.outline for part in parts for piece in part.pieces]).buffer(-0.01)
+    x0, y0, x1, y1 = outline.bounds
+    xy = np.random.default_rng(0).uniform((x0, y0), (x1, y1), (count, 2))
+    return xy[shapely.contains_xy(outline, *xy.T)]
+
+
+@pytest.mark.parametrize("kappa", KAPPAS)
+@pytest.mark.parametrize("count", [2, 3, 6])
+def test_equal_monopitches_in_a_row_are_one_saw_tooth(count, kappa):
+    parts = teeth(count, kappa)
+    (shed,) = put_together(parts)
+    assert shed.type == "shed" and shed.parameters["teeth"] == count
+    assert shed.parameters["width"] == pytest.approx(5.0 * count)
+    xy = strewn_over(parts)
+    assert np.mean(np.abs(height_of([shed], xy) - height_of(parts, xy)) < 1e-6) > 0.99
+
+
+def test_monopitches_that_face_each_other_or_differ_stay_apart():
+    one, other = teeth(2, 0.0)
+    shape = get("monopitch")
+    turned = shape.part(shape.to_theta(other.parameters, other.kappa + math.pi, other.translation))
+    steeper = teeth(2, 0.0, slope=0.9)[1]
+    for second in (turned, steeper):
+        assert sorted(part.type for part in put_together([one, second])) == ["monopitch", "monopitch"]
+
+
+def test_larger_shapes_only_where_they_are_allowed():
+    assert {part.type for part in put_together(teeth(3, 0.0), ("monopitch", "flat"))} == {"monopitch"}
+    assert [part.type for part in put_together(teeth(3, 0.0), ("shed",))] == ["shed"]
+
+
+def gambrel_in_parts(rng, kappa):
+    """A gambrel as a gable on the top of a truncated gable, both over the plan of their own."""
+    width, length, slope, upper = (
+        rng.uniform(8.0, 11.0),
+        rng.uniform(10.0, 16.0),
+        rng.uniform(1.2, 2.0),
+        rng.uniform(0.3, 0.6),
+    )
+    half_break = 0.5 * width * rng.uniform(0.5, 0.75)
+    break_height = slope * (0.5 * width - half_break)
+    centre, none = rng.normal(0.0, 20.0, 2), np.inf
+    lower = Member(
+        kappa,
+        centre,
+        np.array([0.5 * length, 0.5 * width]),
+        np.array([none, none, 3.0, 3.0]),
+        np.array([0.0, 0.0, slope, slope]),
+        3.0 + break_height,
+    )
+    top = Member(
+        kappa,
+        centre,
+        np.array([0.5 * length, half_break]),
+        np.full(4, 3.0 + break_height) + [none, none, 0.0, 0.0],
+        np.array([0.0, 0.0, upper, upper]),
+    )
+    return [member.part([shapely.Polygon(rectangle_of(member))]) for member in (lower, top)], (
+        width,
+        length,
+        break_height,
+        2 * half_break,
+    )
+
+
+@pytest.mark.parametrize("kappa", KAPPAS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_gable_on_a_truncated_gable_is_a_gambrel(seed, kappa):
+    parts, (width, length, break_height, break_width) = gambrel_in_parts(np.random.default_rng(seed), kappa)
+    (found,) = put_together(parts)
+    assert found.type == "gambrel"
+    expected = {"width": width, "length": length, "break_height": break_height, "break_width": break_width}
+    assert {name: found.parameters[name] for name in expected} == pytest.approx(expected, abs=1e-6)
+    xy = strewn_over(parts)
+    assert height_of([found], xy) == pytest.approx(height_of(parts, xy), abs=1e-6)
+
+
+def test_a_gable_beside_a_truncated_gable_is_no_gambrel():
+    (lower, upper), _ = gambrel_in_parts(np.random.default_rng(0), 0.0)
+    aside = Part(
+        upper.type,
+        tuple(
+            Piece(shapely.transform(piece.outline, lambda xy: xy + [0.0, 12.0]), piece.planes) for piece in upper.pieces
+        ),
+        upper.parameters,
+        upper.kappa,
+        upper.translation + [0.0, 12.0, 0.0],
+    )
+    assert sorted(part.type for part in put_together([lower, aside])) == ["gable", "truncated_gable"]
