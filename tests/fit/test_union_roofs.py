@@ -221,6 +221,24 @@ def test_the_roof_of_the_solid_is_the_height_of_the_parts():
         assert np.mean(np.abs(found - roof.height_at(xy)) > 2e-3) < 5e-3
 
 
+@pytest.mark.parametrize("shape", ["gable", "hip", "side_hip"])
+def test_errors_are_about_as_large_as_the_deviations_say(shape):
+    ratios = []
+    for seed in range(8):
+        rng = np.random.default_rng([seed, 77])
+        member = member_of_shape(rng, shape, regular=True)
+        outline = shapely.Polygon(rectangle_of(member))
+        xy = strewn(outline, rng)
+        z = lowest_of(member.planes(), xy) + rng.normal(0.0, 0.05, len(xy))
+        (part,) = fit_building(np.column_stack([xy, z]), outline).roof_parts
+        truth = member.canonical().part([outline])
+        errors = {name: part.parameters[name] - value for name, value in truth.parameters.items()}
+        errors["t_z"] = part.translation[2] - truth.translation[2]
+        ratios += [errors[name] / sigma for name, sigma in part.sigma.items()]
+    assert len(ratios) >= 16
+    assert 0.6 < np.sqrt(np.mean(np.square(ratios))) < 1.5
+
+
 # --- types that are allowed ------------------------------------------------------------------------------------------
 
 LISTS = [("flat",), ("gable",), ("hip", "flat"), ("pyramid",), ("monopitch",), ("shed",), ("gambrel", "mansard")]
