@@ -14,7 +14,7 @@ from hiproof.simulate import demo_files
 from hiproof.write.parameters import building_record
 
 PLAIN = Settings.from_dict({"segment": {"enabled": False}})
-BUILDING_CLASS, SOME = 6, 25
+BUILDING_CLASS, SOME = 6, 12
 DELFT = Path(__file__).parents[3] / "shared" / "data" / "delft"
 
 
