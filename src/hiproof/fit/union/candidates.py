@@ -30,6 +30,7 @@ from .volumes import (
     SLOPE,
     TIE,
     coefficients,
+    equalise_slopes,
     is_allowed,
     lowest,
     volume_cost,
@@ -47,12 +48,21 @@ NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 def candidates_of(scene: Scene, members: np.ndarray, grids: list[Grid], most_planes: int) -> np.ndarray:
     """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
     found = [
-        volume
+        as_allowed(volume, scene.allowed)
         for direction, grid in enumerate(grids)
         for volume in candidates_in(scene, members, direction, grid, most_planes)
-        if is_allowed(volume, scene.allowed)
     ]
-    return np.array(found).reshape(-1, COLUMNS)
+    return np.array([volume for volume in found if volume is not None]).reshape(-1, COLUMNS)
+
+
+def as_allowed(volume: np.ndarray, allowed: np.ndarray) -> np.ndarray | None:
+    """The volume, with opposite slopes equal if it is only so among the `allowed` shapes; None where it is not."""
+    if is_allowed(volume, allowed):
+        return volume
+    volume = volume.copy()
+    volume[TIE] = OPPOSITE
+    equalise_slopes(volume)
+    return volume if is_allowed(volume, allowed) else None
 
 
 def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int) -> list[np.ndarray]:

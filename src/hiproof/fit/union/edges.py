@@ -25,6 +25,8 @@ from .volumes import (
 )
 
 MIN_SIDE_M = 0.8
+BETWEEN_M = 0.4  # how far an edge may go to a place midway between points,
+SMALL_REACH_M = 1.0  # once it is settled to within this: in the search it would rather stay on a line
 BEYOND_M = 0.6  # an edge outside the outline by so much does not show
 NEAR_VERTEX_M = 1.5
 SMALL_STEPS, SMALL_STEP_M = 4, 0.1
@@ -60,8 +62,9 @@ def move_edges(volumes, scene, k, value, reach):
         order = np.argsort(distance)
         distance = distance[order]
         gains, covered = np.cumsum(gain[members[order]]), np.cumsum(bare[members[order]])
+        places[m] = between_points(distance, gains, sign, start) if reach < SMALL_REACH_M else start
         best, chosen = value - LEAST_GAIN, start
-        for q in range(m):
+        for q in range(m + 1):
             t = places[q]
             if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
                 continue
@@ -84,11 +87,26 @@ def move_edges(volumes, scene, k, value, reach):
 
 
 @compiled
+def between_points(distance, gains, sign, start):
+    """The place near an edge's `start`, midway between two points, where the misfit is lowest.
+
+    `distance` (m,) of the points along the edge's way out, ascending, and `gains` (m,), the misfit up to each of them.
+    """
+    low = np.searchsorted(distance, sign * start - BETWEEN_M)
+    high = np.searchsorted(distance, sign * start + BETWEEN_M)
+    lowest, place = np.inf, start
+    for p in range(max(low, 1), min(high, len(distance) - 1) + 1):
+        if gains[p - 1] < lowest:
+            lowest, place = gains[p - 1], sign * 0.5 * (distance[p - 1] + distance[p])
+    return place
+
+
+@compiled
 def places_of(volumes, scene, k, edge):
     """Where an edge may go: grid lines, corners of the outline, small steps, other volumes' edges and ridges, outside."""
     direction, axis, start = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     lines, vertices = scene.lines[direction, axis], scene.vertices[direction, axis]
-    places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 1)
+    places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2)  # one is the caller's
     m, last = 0, lines[0]
     for x in lines:
         if x < np.inf:
