@@ -188,6 +188,15 @@ def test_the_network_adds_its_opinion():
     assert sum(alone.types.values()) == pytest.approx(1.0)
 
 
+def test_parts_that_became_flat_although_not_asked_for_are_told():
+    asked = Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["hip"]}})
+    points = np.column_stack([gable_points()[:, :2], np.full(len(gable_points()), 6.0)])
+    building = hiproof.reconstruct(points, FOOTPRINT, settings=asked)
+    assert {part.type for part in building.parts} <= {"flat", "hip"}
+    assert building.detail == "1 of 1 parts are flat: none of the types asked for (hip) explains their points"
+    assert hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).detail == ""
+
+
 def test_a_footprint_with_attributes_keeps_them():
     footprint = hiproof.Footprint("house", FOOTPRINT, {"street": "Main"})
     building = hiproof.reconstruct(gable_points(), footprint, settings=PLAIN)

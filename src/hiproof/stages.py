@@ -168,7 +168,18 @@ def fit_several(
     from .fit.union import fit_building
 
     found = fit_building(points, outline, settings)
-    return Fitted(found.roof_parts, found.outline, found.objective)
+    return Fitted(found.roof_parts, found.outline, found.objective, detail=last_resort(found.roof_parts, settings))
+
+
+def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
+    """A sentence where parts became flat although only other types were asked for; empty otherwise."""
+    types = settings.fit.types
+    flat = sum(part.type == "flat" for part in parts)
+    if not types or "flat" in types or not flat:
+        return ""
+    return (
+        f"{flat} of {len(parts)} parts are flat: none of the types asked for ({', '.join(types)}) explains their points"
+    )
 
 
 def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:

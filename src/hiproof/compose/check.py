@@ -31,6 +31,7 @@ CODES = {
     307: "is oriented against its neighbour",
     405: "the shell is oriented inwards",
 }
+FARTHEST_M = 1e9  # coordinates beyond it are of no system in use, and their products overflow
 
 
 @dataclass(frozen=True)
@@ -77,9 +78,9 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
     index, ring_start, face_start = flattened(solid)
     if len(index) == 0:
         return (finding(301),)
-    if not np.isfinite(vertices).all() or index.min() < 0 or index.max() >= len(vertices):
+    if not (np.abs(vertices) <= FARTHEST_M).all() or index.min() < 0 or index.max() >= len(vertices):
         return (
-            Finding(101, -1, "101: expected finite vertices and indices into them, got others; the file is damaged"),
+            Finding(101, -1, "101: expected vertices on Earth and indices into them, got others; the file is damaged"),
         )
     read = tuple(finding(code, face) for code, face in solid.defects)
     local = vertices - vertices[index].mean(axis=0)
