@@ -35,20 +35,6 @@ class PlanFrame:
         """(n, 2) plan coordinates back to local x, y."""
         return uv @ self.rotation + self.origin[:2]
 
-    def plane_local(self, planes: np.ndarray) -> np.ndarray:
-        """Planes (k, 3) over u, v as planes over local x, y."""
-        local = planes @ self.plane_map().T
-        local[:, 2] += self.origin[2]
-        return local
-
-    def plane_map(self) -> np.ndarray:
-        """The linear part (3, 3) of `plane_local` on (a, b, c)."""
-        slopes = self.rotation.T
-        full = np.eye(3)
-        full[:2, :2] = slopes
-        full[2, :2] = -self.origin[:2] @ slopes
-        return full
-
 
 @dataclass(frozen=True)
 class Plan:
