@@ -78,7 +78,7 @@ def random_scene(rng, volumes=None, count=250, types=()):
     xy = xy[shapely.contains_xy(outline, *xy.T)][:count]
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
     angles = [0.0, math.radians(rng.uniform(15.0, 75.0))]
-    scene = scene_of(plan, outline, np.arange(len(plan.cloud.u)), angles, 3.0, 0.25, allowed_shapes(types))
+    scene = scene_of(plan, outline, angles, 3.0, 0.25, allowed_shapes(types))
     z = heights(volumes, scene.U, scene.V)[0] if volumes is not None else np.zeros(scene.U.shape[1])
     z = z + rng.normal(0.0, 0.03, len(z)) + (rng.random(len(z)) < 0.1) * rng.normal(0.0, 1.0, len(z))
     low, high = z.min() - 0.3, z.max() + 0.3

@@ -25,7 +25,7 @@ def laid_out(rng, outline, volumes=None):
     xy = rng.uniform((x0, y0), (x1, y1), (400, 2))
     xy = xy[shapely.contains_xy(outline, *xy.T)]
     plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
-    scene = scene_of(plan, outline, np.arange(len(plan.cloud.u)), [0.0], 3.0, 0.25, allowed_shapes(()))
+    scene = scene_of(plan, outline, [0.0], 3.0, 0.25, allowed_shapes(()))
     if volumes is not None:
         scene = scene._replace(z=roof_heights(volumes, scene.U, scene.V)[0])
     return plan, scene

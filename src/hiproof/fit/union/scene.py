@@ -57,19 +57,14 @@ def quarter_gap(one, other):
 def scene_of(
     plan: Plan,
     outline: shapely.Polygon,
-    kept: np.ndarray,
     angles: list[float],
     evidence: float,
     tolerance_m: float,
     allowed: np.ndarray,
 ) -> Scene:
-    """The building as the search sees it through the `kept` (m,) of the plan's points.
-
-    A point further than `tolerance_m` from the roof counts as unexplained.
-    """
+    """The building as the search sees it; a point further than `tolerance_m` from the roof counts as unexplained."""
     cloud, ghosts = plan.cloud, plan.ghosts
-    share = len(kept) / max(len(cloud.u), 1)
-    u, v = np.r_[cloud.u[kept], ghosts.u], np.r_[cloud.v[kept], ghosts.v]
+    u, v = np.r_[cloud.u, ghosts.u], np.r_[cloud.v, ghosts.v]
     turn = np.array([[math.cos(a), math.sin(a)] for a in angles])
     depth, corner, pitch = depth_raster(plan, outline)
     ring = (shapely.get_coordinates(outline.exterior)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
@@ -77,9 +72,9 @@ def scene_of(
     return Scene(
         np.array([c * u + s * v for c, s in turn]),
         np.array([c * v - s * u for c, s in turn]),
-        np.r_[cloud.z[kept], np.zeros(len(ghosts.u))],
-        np.r_[np.ones(len(kept)), ghosts.weight * share],
-        len(kept),
+        np.r_[cloud.z, np.zeros(len(ghosts.u))],
+        np.r_[np.ones(len(cloud.u)), ghosts.weight],
+        len(cloud.u),
         float(ghosts.low),
         float(ghosts.high),
         turn,
@@ -95,6 +90,15 @@ def scene_of(
         EDGE_PRICES,
         allowed,
     )
+
+
+def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
+    """The scene with only the points `kept` (m,), ghosts weighing as many of them; what the outline gives is shared."""
+    columns = np.r_[kept, scene.n : len(scene.z)]
+    weight = scene.weight[columns]
+    weight[len(kept) :] *= len(kept) / scene.n
+    U, V = (np.ascontiguousarray(axis[:, columns]) for axis in (scene.U, scene.V))
+    return scene._replace(U=U, V=V, z=scene.z[columns], weight=weight, n=len(kept), evidence=evidence)
 
 
 def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:

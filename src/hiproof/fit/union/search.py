@@ -11,7 +11,7 @@ from .grow import grids_of, grow
 from .moves import move_all_edges, refit_each, simplify
 from .objective import objective
 from .plan import Plan
-from .scene import Scene, allowed_shapes, directions_of, scene_of
+from .scene import Scene, allowed_shapes, directions_of, scene_of, seen_through
 from .trim import trim
 
 SEARCH_POINTS = 600
@@ -38,11 +38,10 @@ def find_volumes(
     """
     count = len(plan.cloud.u)
     few = np.arange(min(count, SEARCH_POINTS)) * count // min(count, SEARCH_POINTS)
-    angles = directions_of(outline, plan)
-    allowed = allowed_shapes(types)
     evidence = [evidence_per_unit(plan.density * share, outline.area, settings) for share in (len(few) / count, 1.0)]
-    scene = scene_of(plan, outline, few, angles, evidence[0], settings.tolerance_m, allowed)
-    every = scene_of(plan, outline, np.arange(count), angles, evidence[1], settings.tolerance_m, allowed)
+    angles = directions_of(outline, plan)
+    every = scene_of(plan, outline, angles, evidence[1], settings.tolerance_m, allowed_shapes(types))
+    scene = seen_through(every, few, evidence[0])
     volumes, _ = grow(scene, grids_of(plan, scene))
     volumes, value = settled_on_all(volumes, every)
     lenient = lenient_scene(scene, outline.area)
