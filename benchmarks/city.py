@@ -12,7 +12,6 @@ with the small one's, `--kills` random kill -9 of the main process and its worke
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import random
 import resource
@@ -30,6 +29,7 @@ import numpy as np
 import pyogrio
 import shapely
 
+from hiproof import read_parameters
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.read import read_footprints, read_header
@@ -100,7 +100,7 @@ def used() -> tuple[float, float]:
 
 def outcomes(out: Path, asked: int) -> str:
     """How many solids are valid, and how many buildings have no outcome."""
-    rows = [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+    rows = read_parameters(out / "parameters.jsonl")
     solids = [solid for _, solid in read_solids(out / "buildings.city.jsonl")]
     valid = sum(not check_solid(solid, planarity_m=0.01) for solid in solids)
     statuses = ", ".join(f"{sum(r['status'] == s for r in rows)} {s}" for s in sorted({r["status"] for r in rows}))
@@ -177,7 +177,7 @@ def crossed(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def read_rows(out: Path) -> list[dict]:
-    return [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+    return read_parameters(out / "parameters.jsonl")
 
 
 def show(name: str, text: str) -> None:

@@ -28,12 +28,13 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 from matplotlib import patheffects
 
-from hiproof import Request, reconstruct_area
+from hiproof import Request, read_parameters, reconstruct_area
 from hiproof.errors import HiproofError, InputError
 from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run, run_inputs
-from hiproof.model import ROOF, Face, Piece, Solid
-from hiproof.write import read_parameters
+from hiproof.model import ROOF, Face, Part, Piece, Solid
+from hiproof.parametric.record import building_of
+from hiproof.stages import moved
 from hiproof.write.colours import TYPE_COLOURS
 
 SETS = Path(__file__).resolve().parents[1].parent / "shared" / "data"
@@ -109,28 +110,23 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
             f"expected the clouds of the run in {folder} where run.json says, got none; make the run again"
         )
     run = evaluate_run(folder, clouds, footprints, layer=layer)
-    records = {record["id"]: record for record in read_parameters(folder / "parameters.jsonl")}
+    roofs = {r["id"]: building_of(r).roof for r in read_parameters(folder / "parameters.jsonl")}
     true_solids = {model.id: model.solid for model in read_models(truth)} if truth else {}
     found = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):
         if model.solid is not None and len(points):
-            parts = tuple(drawn_part(part, records[model.id]["T_G"]) for part in records[model.id]["parts"])
+            roof = roofs[model.id]
+            parts = tuple(drawn_part(part, roof.frame.origin) for part in roof.parts)
             gap = gaps(model.solid, points)
             true_solid = true_solids.get(model.id)
             found.append(Drawn(model.id, model.status, model.solid, parts, points, footprint, gap, true_solid))
     return found
 
 
-def drawn_part(record: dict, shift: list[float]) -> DrawnPart:
-    """A part of parameters.jsonl in world coordinates."""
-    pieces = []
-    for piece in record["pieces"]:
-        planes = np.array(piece["planes"], float).reshape(-1, 3)
-        planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
-        outer, *holes = piece["outline"]
-        outline = shapely.transform(shapely.make_valid(shapely.Polygon(outer, holes)), lambda xy: xy + shift[:2])
-        pieces.append(Piece(outline, planes))
-    return DrawnPart(record["type"], tuple(pieces))
+def drawn_part(part: Part, shift: np.ndarray) -> DrawnPart:
+    """A part in world coordinates, its polygons made valid."""
+    pieces = (moved(piece, shift) for piece in part.pieces)
+    return DrawnPart(part.type, tuple(Piece(shapely.make_valid(piece.outline), piece.planes) for piece in pieces))
 
 
 def gaps(solid: Solid, points: np.ndarray) -> np.ndarray:

@@ -1,10 +1,9 @@
 """One tile: the bundled neighbourhood through the same road as `hiproof reconstruct`, then a look at the worst building."""
 
-import json
 import sys
 from pathlib import Path
 
-from hiproof import Request, reconstruct_area
+from hiproof import Request, read_parameters, reconstruct_area
 from hiproof.simulate import demo_files
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
@@ -13,7 +12,7 @@ request = Request((str(files["cloud"]),), out, str(files["footprints"]), str(fil
 summary = reconstruct_area(request)
 print(f"{summary.buildings} buildings: {summary.by_status}, roof types {summary.by_type}")
 
-buildings = [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+buildings = read_parameters(out / "parameters.jsonl")
 shares = {b["id"]: b["residuals"]["share_within_20cm"] for b in buildings}
 worst = min((id for id in shares if shares[id] is not None), key=shares.get)  # null: too few points to tell
 print(f"worst: {worst}, {100 * shares[worst]:.0f} % of its points inside the outline within 0.2 m of the roof")

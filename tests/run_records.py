@@ -1,6 +1,6 @@
 """What of a run's output is compared byte by byte."""
 
-import json
+from hiproof import read_parameters
 
 RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 
@@ -12,4 +12,4 @@ def records(out):
 
 def by_id(out):
     """The parameter rows by building."""
-    return {row["id"]: row for row in map(json.loads, (out / "parameters.jsonl").read_text().splitlines())}
+    return {row["id"]: row for row in read_parameters(out / "parameters.jsonl")}

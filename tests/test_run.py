@@ -15,6 +15,7 @@ import shapely
 from typer.testing import CliRunner
 
 import planted
+from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.warm import make_ready
@@ -47,7 +48,7 @@ def records(out):
 
 
 def parameters(out):
-    return [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+    return read_parameters(out / "parameters.jsonl")
 
 
 def test_every_building_is_modelled_validly(finished):

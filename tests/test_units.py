@@ -17,6 +17,7 @@ from rasterio.transform import from_origin
 import hiproof.frames
 import hiproof.write.naming
 import planted
+from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.ledger import Ledger
 from hiproof.city.run import Request, reconstruct_area
@@ -57,7 +58,7 @@ def run(folder, units, cloud_crs, plan_crs, **options):
 
 
 def parameters(out):
-    return [json.loads(line) for line in (out / "parameters.jsonl").read_text().splitlines()]
+    return read_parameters(out / "parameters.jsonl")
 
 
 def attributes(out):
@@ -66,8 +67,10 @@ def attributes(out):
 
 def lengths(building):
     """Every length of the parts and heights of a building, in metres."""
-    parts = [value for part in building["parts"] for value in part["theta_p"].values()]
-    return np.array([*parts, *building["T_L"], building["z_ground"], *building["residuals"].values()], float)
+    parts = [value for part in building["parts"] for value in part["parameters"].values()]
+    return np.array(
+        [*parts, *building["parts"][0]["position"], building["z_ground"], *building["residuals"].values()], float
+    )
 
 
 @pytest.fixture(scope="module")

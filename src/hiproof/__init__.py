@@ -16,6 +16,8 @@ from .reconstruct import reconstruct
 __version__ = "0.1.0"
 
 _HOME = {
+    "build": "parametric",
+    "read_parameters": "parametric",
     "reconstruct_area": "city.run",
     "Request": "city.request",
     "fit_roof": "fit",

@@ -49,5 +49,5 @@ def reconstruct(
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
     ground = stages.find_ground(fitted.outline, points, frame, terrain)
     roof = Roof(fitted.parts, fitted.outline, frame)
-    roof, solid, fitted = stages.solid_or_simpler(roof, points, ground.z_local, fitted, settings)
+    roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
     return stages.remarked(stages.judge(building, roof, solid, points, fitted, ground, settings), remark)

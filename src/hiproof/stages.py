@@ -52,9 +52,9 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Ground:
-    """Where the walls end: height in the local frame, the source of it, and the terrain's line along the outline."""
+    """Where the walls end: height in the world, the source of it, and the terrain's line along the outline."""
 
-    z_local: float
+    z: float
     source: str
     intersection: tuple[np.ndarray, ...] = ()
 
@@ -233,16 +233,20 @@ def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: s
 def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Any) -> Ground:
     """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them."""
     from .compose import terrain_intersection
+    from .parametric.settle import PLAN_DIGITS, settled
 
     lowest_roof = float(points[:, 2].min())
     if terrain is not None:
         corners = np.concatenate([np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)])
         heights, source = asked(terrain, frame.to_world(corners))
         if np.isfinite(heights).any():
-            z = float(np.nanmin(heights)) - float(frame.origin[2])
-            lines = terrain_intersection(outline, lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2], z)
-            return Ground(z, source, tuple(frame.to_world(line) for line in lines))
-    return Ground(lowest_roof - ASSUMED_WALL_M, f"assumed {ASSUMED_WALL_M:g} m below the lowest point")
+            z = settled(np.nanmin(heights), PLAN_DIGITS)
+            lines = terrain_intersection(
+                outline, lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2], z - frame.origin[2]
+            )
+            return Ground(z, source, tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines))
+    assumed = settled(lowest_roof - ASSUMED_WALL_M + frame.origin[2], PLAN_DIGITS)
+    return Ground(assumed, f"assumed {ASSUMED_WALL_M:g} m below the lowest point")
 
 
 def asked(terrain: Any, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
@@ -254,17 +258,19 @@ def asked(terrain: Any, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
 
 
 def solid_or_simpler(
-    roof: Roof, points: np.ndarray, z_ground: float, fitted: Fitted, settings: Settings
+    roof: Roof, points: np.ndarray, ground: Ground, fitted: Fitted, settings: Settings
 ) -> tuple[Roof, Solid | None, Fitted]:
-    """The roof as a checked solid in the local frame; a flat block where the fitted roof cannot become a valid one."""
+    """The roof as it is written and its checked solid, in the local frame; a flat block where it cannot become a valid one."""
     from .compose import compose
+    from .parametric.settle import settled_roof
 
+    roof, z_ground = settled_roof(roof), ground.z - roof.frame.origin[2]
     try:
         return roof, compose(roof, z_ground, settings), fitted
     except CompositionError as error:
         why = f"{Status.SIMPLIFIED.value} ({error})"
     fitted = flat(points, roof.outline, Status.SIMPLIFIED, why)
-    roof = dataclasses.replace(roof, parts=fitted.parts)
+    roof = settled_roof(dataclasses.replace(roof, parts=fitted.parts))
     try:
         return roof, compose(roof, z_ground, settings), fitted
     except CompositionError as error:
@@ -282,6 +288,7 @@ def judge(
 ) -> Building:
     """The finished building: quality measured on its solid, an honest status, everything back in the world's frame."""
     from .evaluate.metrics import quality
+    from .parametric.settle import settled_building
 
     if solid is None:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
@@ -293,17 +300,17 @@ def judge(
             Status.POOR_FIT,
             f"only {share:.0f} % of its points inside the outline lie within 0.2 m of the roof",
         )
-    origin = roof.frame.origin
-    return dataclasses.replace(
+    judged = dataclasses.replace(
         building,
         status=status,
         detail=detail,
         roof=roof,
-        solid=solid.moved(origin),
+        solid=solid.moved(roof.frame.origin),
         quality=measured,
-        z_ground=ground.z_local + float(origin[2]),
+        z_ground=ground.z,
         ground_source=ground.source,
         terrain_intersection=ground.intersection,
         objective=fitted.objective,
         types=fitted.types,
     )
+    return settled_building(judged)

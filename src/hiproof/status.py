@@ -13,6 +13,7 @@ class Status(Enum):
     FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
     BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"
+    NOT_BUILT = "no model: the parameters given make no valid solid; mend them"
     NO_ROOF = "no model: the points form no roof (all in one place or on one line)"
     INTERNAL_ERROR = "no model: hiproof failed on this building; please report it with its points"
 

@@ -11,9 +11,11 @@ from hiproof.frames import METRES, Units
 from hiproof.write import write_all
 from hiproof.write.attribute_list import (
     EVALUATION,
+    HEAD,
     HIPROOF,
     OWN,
     PARAMETERS,
+    PART,
     POSTGIS_BUILDINGS,
     POSTGIS_ROOFS,
     PREFIX,
@@ -22,7 +24,7 @@ from hiproof.write.attribute_list import (
     TABLES,
 )
 from hiproof.write.building_attributes import building_attributes, figures_of
-from hiproof.write.parameters import building_record
+from hiproof.write.parameters import FileHead, building_record, head_record
 from hiproof.write.postgis import SCHEMA
 
 DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
@@ -69,7 +71,10 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
     (city_object,) = feature["CityObjects"].values()
     surfaces = [s for g in city_object["geometry"] if g["type"] == "Solid" for s in g["semantics"]["surfaces"]]
     assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
-    assert list(building_record(modelled(gable_house()))) == names(PARAMETERS)
+    record = building_record(modelled(gable_house()))
+    assert list(record) == names(PARAMETERS)
+    assert list(record["parts"][0]) == names(PART)
+    assert list(head_record(FileHead())) == names(HEAD)
     row = BuildingFigures("a", "gable", "modelled", comparison=Comparison("b")).row()
     assert sorted(row) == sorted(names(EVALUATION))
 

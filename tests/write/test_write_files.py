@@ -11,6 +11,7 @@ import pytest
 
 import hiproof.write as write
 from handmade import gable_house, modelled, unmodelled
+from hiproof import read_parameters
 from hiproof.errors import InputError, OutputError
 from hiproof.model import ROOF
 from hiproof.write.files import atomic, atomic_file, scratch
@@ -145,7 +146,7 @@ def test_a_run_writes_its_files_together_or_not_at_all(tmp_path):
 def test_a_broken_solid_does_not_stop_the_others(tmp_path, break_it):
     buildings = [*street(), modelled(break_it(gable_house()), "broken"), *street()]
     assert write.write_all(tmp_path, buildings) == ["broken"]
-    records = write.read_parameters(tmp_path / "parameters.jsonl")
+    records = read_parameters(tmp_path / "parameters.jsonl")
     assert [r["status"] for r in records if r["id"] == "broken"] == ["internal_error"]
     assert len(records) == 9
 

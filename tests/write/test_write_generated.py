@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from hiproof import read_parameters
 from hiproof.compose import check_solid, compose, volume
 from hiproof.evaluate.models import read_models
 from hiproof.model import Building, Quality, Solid
 from hiproof.primitives import CATALOGUE
 from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, random_building, random_compound
 from hiproof.status import Status
-from hiproof.write import read_parameters, roof_figures, write_all
+from hiproof.write import roof_figures, write_all
 from hiproof.write.citygml import NAMESPACES
 
 
@@ -69,7 +70,7 @@ def test_roof_type_and_parameters(run):
         assert record["type"] == building.type
         assert [part["type"] for part in record["parts"]] == [part.type for part in building.parts]
         for part, stored in zip(building.parts, record["parts"], strict=True):
-            assert stored["theta_p"] == pytest.approx(part.parameters, abs=1e-6)
+            assert stored["parameters"] == pytest.approx(part.parameters, abs=1e-6)
         (code,) = root.xpath(f"//bldg:Building[gml:name='{building.id}']/bldg:roofType/text()", namespaces=NAMESPACES)
         codes = {CATALOGUE[part.type].citygml_code for part in building.parts}
         assert code == (codes.pop() if len(codes) == 1 else "1130")

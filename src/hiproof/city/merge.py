@@ -23,7 +23,7 @@ def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int]
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
-    join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.translate, plan.crs())
+    join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.head())
 
 
 def parts_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
@@ -58,7 +58,7 @@ def tile_files(out: Path, tile: str) -> dict[str, Path]:
 def write_tile(plan: Plan, out: Path, tile: str, parts: list[Fragments]) -> None:
     """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
     if plan.settings.city.models != "merged":
-        join_fragments(tile_files(out, tile), parts, plan.translate, plan.crs())
+        join_fragments(tile_files(out, tile), parts, plan.head())
 
 
 def remove_tiles(out: Path, pattern: str = "*") -> None:

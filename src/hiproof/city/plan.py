@@ -15,10 +15,12 @@ import shapely
 from ..errors import InputError, OutputError
 from ..frames import Units
 from ..model import Footprint
+from ..read.crs import parse_crs
 from ..settings import Settings
 from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
 from ..write.naming import FileUnits, UniqueNames, gml_name
+from ..write.parameters import FileHead, crs_text
 
 PLAN_FILE = "plan.jsonl"
 
@@ -65,10 +67,13 @@ class Plan:
         return FileUnits.of(self.crs(), self.units)
 
     def crs(self) -> Any:
-        """The output's reference system, None where no input names one."""
-        from pyproj import CRS
+        """The output's reference system, None where no input names one; by its code where that says all of it, so that
+        also its plan alone has one."""
+        return parse_crs(crs_text(self.crs_wkt))
 
-        return CRS.from_wkt(self.crs_wkt) if self.crs_wkt else None
+    def head(self) -> FileHead:
+        """What the files written have in common."""
+        return FileHead(self.crs(), self.settings.read.unit, self.translate, self.settings.compose)
 
     def save(self, path: Path) -> None:
         whole = {

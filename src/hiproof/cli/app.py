@@ -9,6 +9,7 @@ import typer
 
 from .. import __version__
 from ..log import Level, start
+from .build import build
 from .classify import classify
 from .convert import convert
 from .evaluate import evaluate
@@ -149,5 +150,5 @@ def load(
     raise typer.Exit(run(folder, database, prefix))
 
 
-for command in (evaluate, report, convert, classify, train):
+for command in (build, evaluate, report, convert, classify, train):
     app.command()(command)

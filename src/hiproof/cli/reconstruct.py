@@ -54,6 +54,7 @@ class Bar:
         "sort": "reading points",
         "solve": "fitting roofs",
         "merge": "writing models",
+        "build": "building models",
     }
 
     def __enter__(self) -> Bar:

@@ -10,7 +10,7 @@ from .citygml import CityGMLWriter, write_citygml
 from .cityjson import CityJSONWriter, write_cityjson
 from .files import atomic, atomic_file
 from .fragments import Fragments, load_fragments, save_fragments
-from .parameters import ParametersWriter, read_parameters, write_parameters
+from .parameters import FileHead, ParametersWriter, write_parameters
 from .roof_figures import RoofFigures, roof_figures
 from .run_files import fragments, join_fragments, write_all
 from .writer import BuildingWriter
@@ -20,6 +20,7 @@ __all__ = [
     "BuildingWriter",
     "CityGMLWriter",
     "CityJSONWriter",
+    "FileHead",
     "Fragments",
     "ParametersWriter",
     "RoofFigures",
@@ -29,7 +30,6 @@ __all__ = [
     "fragments",
     "join_fragments",
     "load_fragments",
-    "read_parameters",
     "roof_figures",
     "save_fragments",
     "write_all",

@@ -87,28 +87,46 @@ PARAMETERS = (
     Attribute("id", "text", "", "the building's id"),
     Attribute("status", "text", "", "as hiproof_status"),
     Attribute("detail", "text", "", "as hiproof_detail"),
-    Attribute("type", "text", "", "type of the largest part, whose theta_p, kappa, T_L and sigma follow"),
-    Attribute("theta_p", "object", "m", "parameters of the primitive by name (teeth is a count)"),
-    Attribute("kappa", "number", "rad", "rotation about the vertical"),
-    Attribute("T_L", "list", "m", "translation relative to T_G"),
-    Attribute("sigma", "object", "m, rad", "standard deviations by name"),
-    Attribute("T_G", "list", "m", "origin of the building's frame in the world"),
-    Attribute("objective", "number", "", "value of what was minimised"),
+    Attribute("type", "text", "", "type of the largest part; `hiproof build` reads those of the parts"),
+    Attribute("origin", "list", "m", "origin x, y, z of the building's frame in the world; null without a model"),
+    Attribute("parts", "list", "", "every part of the roof, as below"),
+    Attribute(
+        "outline",
+        "list",
+        "m",
+        "rings of the outline, the outer first, about the origin; the footprint's without a model",
+    ),
+    Attribute("z_ground", "number", "m", "height of the ground in the world"),
+    Attribute("ground_source", "text", "", "where it came from"),
+    Attribute("terrain_line", "list", "m", "closed lines of x, y, z in the world where the walls meet the terrain"),
+    Attribute("attributes", "object", "", "the input's own"),
     Attribute("points", "count", "", "points that the building was judged by"),
     Attribute("residuals", "object", "m", "psd_mean, psd_std, rmse, p95, share_within_20cm, outline_iou as above"),
     Attribute("density", "number", "1/m2", "points by area of the outline"),
     Attribute("nodata_share", "number", "", "as rf_nodata_frac"),
     Attribute("unexplained_area_m2", "number", "m2", "as hiproof_unexplained_area_m2"),
+    Attribute("objective", "number", "", "value of what was minimised"),
     Attribute("recognised", "object", "", "probability by roof type, from the network"),
     Attribute("types", "object", "", "probability by roof type, after the fits"),
-    Attribute("z_ground", "number", "m", "height of the ground in the world"),
-    Attribute("ground_source", "text", "", "where it came from"),
+)
+
+PART = (
+    Attribute("type", "text", "", "a name of the catalogue or of the family"),
+    Attribute("parameters", "object", "m, deg", "by name; `hiproof build --shapes` lists those of every type"),
+    Attribute("position", "list", "m", "x, y of the rectangle's centre and z of the lowest eave, about the origin"),
+    Attribute("rotation", "number", "deg", "from the x axis to the rectangle's length, counter-clockwise"),
+    Attribute("sigma", "object", "m, deg", "standard deviations by name; t_x, t_y, t_z are those of the position"),
     Attribute(
-        "parts",
-        "list",
-        "",
-        "every part: type, theta_p, kappa, T_L, sigma, pieces (outline; planes a, b, c of z = a x + b y + c)",
+        "outlines", "list", "m", "polygons that the part roofs, about the origin; left out: its rectangle's share"
     ),
+)
+
+HEAD = (
+    Attribute("hiproof_parameters", "count", "", "version of the file"),
+    Attribute("crs", "text", "", "CRS of the files built, as EPSG code or WKT"),
+    Attribute("unit", "text", "", "unit of their coordinates where there is no CRS, as read.unit"),
+    Attribute("cityjson_offset", "list", "of the CRS", "offset of the CityJSON file"),
+    Attribute("compose", "object", "", "the settings [compose]"),
 )
 
 EVALUATION = (
@@ -160,13 +178,15 @@ TABLES = (
     Table("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
     Table("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
     Table("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
-    Table("Parameters", "`parameters.jsonl`, a line a building", PARAMETERS),
+    Table("Parameters: the first line", "`parameters.jsonl`; its schema: `hiproof build --schema`", HEAD),
+    Table("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
+    Table("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
     Table("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
     Table("PostGIS: PREFIX_buildings", "`hiproof load`", POSTGIS_BUILDINGS),
     Table("PostGIS: PREFIX_roofs", "`hiproof load`", POSTGIS_ROOFS),
 )
 
-HEAD = """# Attributes
+PREFACE = """# Attributes
 
 What stands in the files of a run, beside the attributes of the input, which are kept under their own names. Lengths are
 metres also where coordinates are not. Made by `hiproof attributes`.
@@ -175,7 +195,7 @@ metres also where coordinates are not. Made by `hiproof attributes`.
 
 def attributes_text() -> str:
     """All tables as Markdown: what `hiproof attributes` prints and docs/attributes.md holds."""
-    return "\n".join([HEAD, *map(table_text, TABLES)])
+    return "\n".join([PREFACE, *map(table_text, TABLES)])
 
 
 def table_text(table: Table) -> str:

@@ -1,72 +1,66 @@
-"""parameters.jsonl: the parametric models themselves, one JSON object a line for each building asked for."""
+"""parameters.jsonl: the parametric models themselves. A head, then one JSON object a line for each building asked for.
+
+`hiproof build` makes all files of a run of it again; docs/parameters.md says how to edit it by hand.
+"""
 
 from __future__ import annotations
 
-import json
+import dataclasses
 import math
 import os
 from collections.abc import Iterable
-from pathlib import Path
+from contextlib import ExitStack
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import shapely
 
-from ..errors import InputError
-from ..model import Building, Part, Piece
-from .building_attributes import plain_text
+from ..model import Building, Part
+from ..settings import ComposeSettings
+from .building_attributes import plain, plain_text
 from .json_text import dump
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
-LENGTH_DIGITS = 6  # micrometres and microradians
-PLANE_DIGITS = 9  # a slope's last digit stays below a micrometre a kilometre away
+VERSION = 1
+LENGTH_DIGITS = 6  # micrometres and millionths of a degree
 
 
-def write_parameters(path: str | os.PathLike, buildings: Iterable[Building]) -> None:
-    """Write one JSON object a building to `path`; raises OutputError when it cannot be written.
+@dataclass(frozen=True)
+class FileHead:
+    """What the files of a run have in common: the CRS (anything pyproj understands, or None), the unit of coordinates
+    without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
+    settles it, and how solids are composed."""
 
-    Keys: id, status, detail, type, theta_p (metres, by name), kappa (rad), T_L, T_G (metres), sigma (standard
-    deviations by name), objective, points, residuals, recognised and types (probability by roof type from the network,
-    and after the fits), z_ground, ground_source, parts. theta_p, kappa, T_L and sigma on top are those of the largest part. A part has type, theta_p, kappa, T_L,
-    sigma and pieces, a piece `outline` (rings, outer first) and `planes` (a, b, c of z = a x + b y + c), both
-    relative to T_G. All lengths are metres, T_G too, also where the files' CRS counts in feet. What cannot be told is null.
+    crs: Any = None
+    unit: str = "auto"
+    offset: np.ndarray | None = None
+    compose: ComposeSettings = field(default_factory=ComposeSettings)
+
+
+def write_parameters(
+    path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, head: FileHead | None = None
+) -> None:
+    """Write a head and one JSON object a building to `path`; raises OutputError when it cannot be written.
+
+    What stands in them is listed in docs/attributes.md. All lengths are metres, `origin` too, also where the files' CRS
+    counts in feet; angles are degrees. What cannot be told is null.
     """
-    with ParametersWriter(path) as writer:
+    with ParametersWriter(path, head or FileHead(crs)) as writer:
         for building in buildings:
             writer.add(building)
 
 
-def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
-    """The objects of a parameters.jsonl, in its order. Raises InputError when it cannot be read or is no such file."""
-    records = []
-    try:
-        with Path(path).open(encoding="utf-8") as file:
-            for number, line in enumerate(file, 1):
-                if line.strip():
-                    records.append(parsed(line, path, number))
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(
-            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got: {error}; check the path"
-        ) from error
-    return records
-
-
-def parsed(line: str, path: str | os.PathLike, number: int) -> dict[str, Any]:
-    try:
-        record = json.loads(line)
-    except json.JSONDecodeError as error:
-        record = error
-    if not isinstance(record, dict) or "id" not in record or "status" not in record:
-        raise InputError(
-            f"expected a JSON object with an id and a status in line {number} of {os.fspath(path)}, "
-            f"got {line.strip()[:40]!r}; is it a parameters.jsonl that hiproof wrote?"
-        )
-    return record
-
-
 class ParametersWriter(BuildingWriter):
     """Incremental form of `write_parameters`."""
+
+    def __init__(self, path: str | os.PathLike, head: FileHead | None = None) -> None:
+        super().__init__(path)
+        self.head = head or FileHead()
+
+    def begin(self, stack: ExitStack) -> None:
+        self.file.write(dump(head_record(self.head)) + b"\n")
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         self.put(parameters_line(building))
@@ -76,22 +70,54 @@ class ParametersWriter(BuildingWriter):
         self.file.write(line)
 
 
+def head_record(head: FileHead) -> dict[str, Any]:
+    """The JSON object of the first line."""
+    return {
+        "hiproof_parameters": VERSION,
+        "crs": crs_text(head.crs),
+        "unit": head.unit,
+        "cityjson_offset": None if head.offset is None else [float(value) for value in head.offset],
+        "compose": dataclasses.asdict(head.compose),
+    }
+
+
+def crs_text(crs: Any) -> str | None:
+    """The shortest text that is the same CRS to the letter: "EPSG:7415" or WKT.
+
+    >>> crs_text(7415)
+    'EPSG:7415'
+    """
+    from pyproj import CRS
+
+    from ..read.crs import epsg_code, parse_crs
+
+    crs = parse_crs(crs)
+    if crs is None:
+        return None
+    code = epsg_code(crs)
+    is_same = code is not None and CRS.from_epsg(code).to_wkt() == crs.to_wkt()
+    return f"EPSG:{code}" if is_same else crs.to_wkt()
+
+
 def parameters_line(building: Building) -> bytes:
     return dump(building_record(building)) + b"\n"
 
 
 def building_record(building: Building) -> dict[str, Any]:
     """The JSON object of one building; see `write_parameters`."""
-    quality = building.quality
-    largest = max(building.parts, key=lambda part: part.area, default=None)
-    primitive = primitive_record(largest) if largest else dict.fromkeys(("type", "theta_p", "kappa", "T_L", "sigma"))
+    quality, roof = building.quality, building.roof
     return {
         "id": plain_text(building.id),
         "status": building.status.code,
         "detail": building.detail or building.status.value,
-        **primitive,
-        "T_G": numbers(building.roof.frame.origin) if building.roof is not None else None,
-        "objective": number(building.objective),
+        "type": building.type,
+        "origin": None if roof is None else numbers(roof.frame.origin),
+        "parts": [part_record(part) for part in building.parts],
+        "outline": outline_record(building.footprint if roof is None else roof.outline),
+        "z_ground": number(building.z_ground),
+        "ground_source": building.ground_source or None,
+        "terrain_line": [[numbers(xyz) for xyz in line] for line in building.terrain_intersection],
+        "attributes": {plain_text(name): plain(value) for name, value in building.attributes.items()},
         "points": int(quality.points),
         "residuals": {
             name: number(getattr(quality, name))
@@ -100,33 +126,32 @@ def building_record(building: Building) -> dict[str, Any]:
         "density": number(quality.density),
         "nodata_share": number(quality.nodata_share),
         "unexplained_area_m2": number(quality.unexplained_area_m2),
+        "objective": number(building.objective),
         "recognised": by_name(building.recognised),
         "types": by_name(building.types),
-        "z_ground": number(building.z_ground),
-        "ground_source": building.ground_source or None,
-        "parts": [
-            {**primitive_record(part), "pieces": [piece_record(piece) for piece in part.pieces]}
-            for part in building.parts
-        ],
     }
 
 
-def primitive_record(part: Part) -> dict[str, Any]:
+def part_record(part: Part) -> dict[str, Any]:
+    """A part of a building's object: what `hiproof build` makes it of."""
+    sigma = {
+        ("rotation" if n == "kappa" else n): (math.degrees(s) if n == "kappa" else s) for n, s in part.sigma.items()
+    }
     return {
         "type": part.type,
-        "theta_p": by_name(part.parameters),
-        "kappa": number(part.kappa),
-        "T_L": numbers(part.translation),
-        "sigma": by_name(part.sigma),
+        "parameters": by_name(part.parameters),
+        "position": numbers(part.translation),
+        "rotation": number(math.degrees(part.kappa)),
+        "sigma": by_name(sigma),
+        "outlines": [outline_record(piece.outline) for piece in part.pieces],
     }
 
 
-def piece_record(piece: Piece) -> dict[str, Any]:
-    rings = (piece.outline.exterior, *piece.outline.interiors)
-    return {
-        "outline": [[numbers(xy) for xy in shapely.get_coordinates(ring)] for ring in rings],
-        "planes": [numbers(plane, PLANE_DIGITS) for plane in piece.planes],
-    }
+def outline_record(outline: shapely.Polygon | None) -> list[list[list[float]]] | None:
+    """The rings of a polygon, the outer first; None where there is none."""
+    if outline is None or outline.is_empty:
+        return None
+    return [shapely.get_coordinates(ring).tolist() for ring in (outline.exterior, *outline.interiors)]
 
 
 def by_name(values: dict[str, float]) -> dict[str, float | None]:

@@ -25,7 +25,7 @@ from .cityjson_geometry import Vertices
 from .fragments import Fragments
 from .geoparquet import GeoParquetWriter
 from .naming import FileUnits
-from .parameters import ParametersWriter, parameters_line
+from .parameters import FileHead, ParametersWriter, parameters_line
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
@@ -43,7 +43,7 @@ def write_all(folder: str | os.PathLike, buildings: Iterable[Building], crs: Any
         writers: list[BuildingWriter] = [
             CityGMLWriter(folder / "buildings.gml", crs),
             CityJSONWriter(folder / "buildings.city.jsonl", crs),
-            ParametersWriter(folder / "parameters.jsonl"),
+            ParametersWriter(folder / "parameters.jsonl", FileHead(crs)),
             AttributesWriter(folder / "buildings.gpkg", crs),
         ]
         # The table does most of its work at the end: entered last it is closed first, and its failure stops the others.
@@ -73,18 +73,18 @@ def fragments(
     return building, Fragments(member, feature, parameters_line(building), table_row(building, attributes, units.gml))
 
 
-def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], translate: np.ndarray, crs: Any = None) -> None:
+def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
     """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
 
     `files` are paths by what they hold: gml, cityjson, parameters, gpkg (the attribute table) or parquet (the same as
     GeoParquet). Raises OutputError when one cannot be written.
     """
     writers = {
-        "gml": lambda path: (CityGMLWriter(path, crs), "gml"),
-        "cityjson": lambda path: (CityJSONWriter(path, crs, translate=translate), "cityjson"),
-        "parameters": lambda path: (ParametersWriter(path), "parameters"),
-        "gpkg": lambda path: (AttributesWriter(path, crs), "row"),
-        "parquet": lambda path: (GeoParquetWriter(path, crs), "row"),
+        "gml": lambda path: (CityGMLWriter(path, head.crs), "gml"),
+        "cityjson": lambda path: (CityJSONWriter(path, head.crs, translate=head.offset), "cityjson"),
+        "parameters": lambda path: (ParametersWriter(path, head), "parameters"),
+        "gpkg": lambda path: (AttributesWriter(path, head.crs), "row"),
+        "parquet": lambda path: (GeoParquetWriter(path, head.crs), "row"),
     }
     with ExitStack() as stack:
         opened = []

@@ -1,0 +1,54 @@
+"""`hiproof build`: models of parameters, as a run wrote them or as a person changed them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def print_shapes(wanted: bool) -> None:
+    if wanted:
+        from ..parametric.shape import NAMES, names_of
+
+        for name in NAMES:
+            typer.echo(f"{name}: {', '.join(names_of(name))}")
+        raise typer.Exit
+
+
+def print_schema(wanted: bool) -> None:
+    if wanted:
+        from ..parametric.schema import schema_text
+
+        typer.echo(schema_text(), nl=False)
+        raise typer.Exit
+
+
+def build(
+    parameters: Annotated[Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")],
+    out: Annotated[Path, typer.Option(help="folder for the results")],
+    parquet: Annotated[
+        bool, typer.Option("--parquet", help="write the tables as GeoParquet too (extra `city`)")
+    ] = False,
+    shapes: Annotated[
+        bool, typer.Option("--shapes", callback=print_shapes, is_eager=True, help="print every roof type's parameters")
+    ] = False,
+    schema: Annotated[
+        bool, typer.Option("--schema", callback=print_schema, is_eager=True, help="print the JSON schema of the file")
+    ] = False,
+) -> None:
+    """Build the models of a parameters.jsonl again, or of what a person made of it.
+
+    Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid solid, or unusable input.
+    """
+    from ..parametric.run import build_file
+    from .reconstruct import Bar
+
+    with Bar() as bar:
+        built = build_file(parameters, out, parquet, lambda done: bar.update("build", done, None))
+    for id, why in built.not_built:
+        typer.echo(f"not built: building {id}: {why}", err=True)
+    typer.echo(f"{built.buildings} buildings: " + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common()))
+    typer.echo(f"models: {out / 'buildings.gml'}, {out / 'buildings.city.jsonl'}")
+    raise typer.Exit(built.exit_code)

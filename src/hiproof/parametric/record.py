@@ -1,0 +1,234 @@
+"""The JSON object of one building checked, and its parts made. Whatever is wrong becomes one sentence that says where."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..frames import LocalFrame
+from ..model import Building, Part, Quality, Roof
+from ..status import Status
+from ..write.attribute_list import PARAMETERS, PART
+from .settle import pieces_of
+from .shape import refuse_no_shape
+
+MOST_PARTS = 1000
+WIDEST_M = 1e5  # of any number of a part
+MOST = 1e15  # of any number
+PART_KEYS = tuple(attribute.name for attribute in PART)
+FIGURES = ("density", "nodata_share", "unexplained_area_m2")
+RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
+
+
+def building_of(record: Mapping[str, Any]) -> Building:
+    """The building that a JSON object tells of, its roof made of its parts, without its solid.
+
+    Raises InputError, one sentence, for an object that makes none.
+    """
+    refuse_other_keys(record, [attribute.name for attribute in PARAMETERS], "the building")
+    parts = list_at(record, "parts")
+    origin = None if record.get("origin") is None else place(record["origin"], "origin")
+    outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
+    status = status_of(record, bool(parts))
+    roof = roof_of(parts, outline, origin) if parts else None
+    world = outline if roof is None or outline is None else shapely.transform(outline, roof.frame.to_world)
+    return Building(
+        id=str(record["id"]),
+        status=status,
+        detail=text_at(record, "detail") if status.code == record.get("status") else "",
+        roof=roof,
+        quality=quality_of(record),
+        z_ground=figure(record, "z_ground") if roof is None else number(record.get("z_ground"), "z_ground"),
+        ground_source=text_at(record, "ground_source"),
+        terrain_intersection=tuple(lines_of(record)),
+        objective=figure(record, "objective"),
+        recognised=numbers_by_name(record.get("recognised") or {}, "recognised"),
+        types=numbers_by_name(record.get("types") or {}, "types"),
+        footprint=world,
+        attributes=dict(mapping(record.get("attributes") or {}, "attributes")),
+    )
+
+
+def status_of(record: Mapping[str, Any], has_parts: bool) -> Status:
+    """The status told; that of a building which has parts by hand is a model's."""
+    code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
+    known = {status.code: status for status in Status}
+    if code not in known:
+        raise InputError(f"expected a status ({', '.join(known)}), got {code!r}; leave it as the run wrote it")
+    if has_parts and not known[code].is_model:
+        return Status.MODELLED
+    if not has_parts and known[code].is_model:
+        raise InputError(f"expected parts of a building whose status is {code}, got none; give one part at least")
+    return known[code]
+
+
+def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
+    """The roof of a building's parts over its outline, about its origin."""
+    if outline is None or origin is None:
+        raise InputError("expected an outline and an origin of a building with parts, got null; give both")
+    if len(parts) > MOST_PARTS:
+        raise InputError(f"expected at most {MOST_PARTS} parts, got {len(parts)}; split the building")
+    made = [part_of(part, outline, f"part {index}") for index, part in enumerate(parts)]
+    refuse_alike(parts)
+    return Roof(tuple(made), outline, LocalFrame(origin))
+
+
+def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
+    """A part with its planes; without outlines of its own it roofs what its rectangle covers of the building's."""
+    refuse_other_keys(mapping(record, where), PART_KEYS, where)
+    kind = record.get("type")
+    parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
+    refuse_no_shape(kind, parameters, where)
+    position = place(record.get("position"), f"position of {where}")
+    kappa = math.radians(number(record.get("rotation", 0.0), f"rotation of {where}"))
+    outlines = outlines_of(record, parameters, position, kappa, outline, where)
+    pieces = pieces_of(kind, parameters, kappa, position, outlines)
+    if not all(np.isfinite(piece.planes).all() for piece in pieces):
+        raise InputError(f"expected parameters that make finite planes, got others in {where}; check their sizes")
+    sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {where}")
+    sigma = {("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s) for n, s in sigma.items()}
+    return Part(kind, pieces, parameters, kappa, position, sigma)
+
+
+def outlines_of(
+    record: Mapping[str, Any],
+    parameters: Mapping[str, float],
+    position: np.ndarray,
+    kappa: float,
+    outline: shapely.Polygon,
+    where: str,
+) -> list[shapely.Polygon]:
+    """Where a part roofs the building: the outlines given, else its rectangle's share of the building's outline."""
+    if record.get("outlines") is None:
+        found = rectangle_within(parameters, position, kappa, outline, where)
+    else:
+        found = [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
+    if not any(shapely.intersects(piece, outline) for piece in found):
+        raise InputError(f"expected {where} to roof some of the building's outline, got one outside it; move it there")
+    return found
+
+
+def rectangle_within(
+    parameters: Mapping[str, float], position: np.ndarray, kappa: float, outline: shapely.Polygon, where: str
+) -> list[shapely.Polygon]:
+    """The polygons that the rectangle of a part covers of the outline."""
+    if "width" not in parameters or "length" not in parameters:
+        raise InputError(f"expected width and length, or outlines, of {where}, got neither; give the rectangle")
+    u, v = 0.5 * parameters["length"], 0.5 * parameters["width"]
+    c, s = math.cos(kappa), math.sin(kappa)
+    corners = np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
+    covered = shapely.intersection(shapely.Polygon(corners), valid(outline), grid_size=1e-4)
+    return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
+
+
+def valid(polygon: shapely.Polygon) -> shapely.Geometry:
+    return polygon if polygon.is_valid else shapely.make_valid(polygon)
+
+
+def refuse_alike(parts: list) -> None:
+    """Raise InputError where one part stands there twice."""
+    seen: dict[str, int] = {}
+    for index, part in enumerate(parts):
+        told = repr([part.get(key) for key in PART_KEYS if key != "sigma"])
+        if seen.setdefault(told, index) != index:
+            raise InputError(f"expected parts that differ, got part {index} the same as part {seen[told]}; remove one")
+
+
+def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:
+    """The terrain's lines (m, 3) along the outline."""
+    lines = [
+        np.array([place(xyz, "a point of terrain_line") for xyz in as_list(line, "a line of terrain_line")])
+        for line in as_list(record.get("terrain_line") or [], "terrain_line")
+    ]
+    return [line for line in lines if len(line)]
+
+
+def quality_of(record: Mapping[str, Any]) -> Quality:
+    """The figures that were measured when the building was reconstructed."""
+    residuals = mapping(record.get("residuals") or {}, "residuals")
+    figures = {name: figure(residuals, name) for name in RESIDUALS} | {name: figure(record, name) for name in FIGURES}
+    points = number(record.get("points", 0), "points")
+    return Quality(points=int(points), **figures)
+
+
+def refuse_other_keys(record: Mapping[str, Any], known: Any, where: str) -> None:
+    other = [str(key)[:40] for key in record if key not in known]
+    if other:
+        raise InputError(
+            f"expected the keys {', '.join(known)} of {where}, got also {', '.join(other[:8])}; remove them"
+        )
+
+
+def mapping(value: Any, where: str) -> Mapping[str, Any]:
+    if not isinstance(value, dict):
+        raise InputError(f"expected an object as {where}, got {shown(value)}; write {{...}}")
+    return value
+
+
+def as_list(value: Any, where: str) -> list:
+    if not isinstance(value, list):
+        raise InputError(f"expected a list as {where}, got {shown(value)}; write [...]")
+    return value
+
+
+def list_at(record: Mapping[str, Any], name: str) -> list:
+    return as_list(record.get(name) if record.get(name) is not None else [], name)
+
+
+def text_at(record: Mapping[str, Any], name: str) -> str:
+    value = record.get(name)
+    if not (value is None or isinstance(value, str)):
+        raise InputError(f"expected text as {name}, got {shown(value)}; put it in quotes")
+    return value or ""
+
+
+def number(value: Any, where: str) -> float:
+    """A finite number that a building can have."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if not is_number or not abs(value) < MOST:
+        raise InputError(f"expected a number as {where}, got {shown(value)}; give metres, or degrees for angles")
+    return float(value)
+
+
+def figure(record: Mapping[str, Any], name: str) -> float:
+    """A number, NaN where it is null or left out."""
+    return math.nan if record.get(name) is None else number(record[name], name)
+
+
+def numbers_by_name(values: Any, where: str) -> dict[str, float]:
+    found = {str(name): number(value, f"{name} in {where}") for name, value in mapping(values, where).items()}
+    far = [name for name, value in found.items() if abs(value) > WIDEST_M]
+    if far:
+        raise InputError(f"expected {far[0]} in {where} within {WIDEST_M:g}, got {found[far[0]]:g}; check its unit")
+    return found
+
+
+def place(value: Any, where: str) -> np.ndarray:
+    """Three numbers (3,)."""
+    if not isinstance(value, list) or len(value) != 3:
+        raise InputError(f"expected three numbers [x, y, z] as {where}, got {shown(value)}; give metres")
+    return np.array([number(v, where) for v in value])
+
+
+def polygon(rings: Any, where: str) -> shapely.Polygon:
+    """A polygon of rings, the outer first."""
+    found = []
+    for ring in as_list(rings, where):
+        corners = as_list(ring, where)
+        if len(corners) < 3 or not all(isinstance(xy, list) and len(xy) == 2 for xy in corners):
+            raise InputError(f"expected rings of three or more [x, y] as {where}, got {shown(ring)}; close the ring")
+        found.append([(number(x, where), number(y, where)) for x, y in corners])
+    if not found:
+        raise InputError(f"expected rings, the outer first, as {where}, got none; write null for no outline")
+    return shapely.Polygon(found[0], found[1:])
+
+
+def shown(value: Any) -> str:
+    """A value as a sentence can hold it."""
+    text = "null" if value is None else repr(value)
+    return text if len(text) <= 40 else text[:37] + "..."

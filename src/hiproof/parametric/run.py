@@ -1,0 +1,196 @@
+"""`hiproof build`: a file of parameters into the files of a run, one building in memory at a time."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import os
+import traceback
+from collections import Counter
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .. import __version__
+from ..errors import HiproofError, OutputError
+from ..masking import masked, masked_values
+from ..model import Building
+from ..read.crs import units_of
+from ..status import Status
+from ..write.building_attributes import plain_text
+from ..write.cityjson import offset_of
+from ..write.files import atomic
+from ..write.fragments import Fragments
+from ..write.json_text import dump
+from ..write.naming import FileUnits, UniqueNames, gml_name
+from ..write.parameters import FileHead
+from ..write.run_files import fragments, join_fragments
+from .building import build
+from .file import opened_parameters
+
+FILES = {
+    "gml": "buildings.gml",
+    "cityjson": "buildings.city.jsonl",
+    "parameters": "parameters.jsonl",
+    "gpkg": "buildings.gpkg",
+    "parquet": "buildings.parquet",
+}
+MOST_TOLD = 1000
+
+
+@dataclass
+class Built:
+    """What came of a file: buildings by status, and (id, sentence) of those that could not be built, the first MOST_TOLD."""
+
+    by_status: Counter = field(default_factory=Counter)
+    by_type: Counter = field(default_factory=Counter)
+    not_built: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def buildings(self) -> int:
+        return sum(self.by_status.values())
+
+    @property
+    def exit_code(self) -> int:
+        """0 all built, 1 an internal error, 2 some parameters make no valid solid."""
+        if self.by_status[Status.INTERNAL_ERROR.code]:
+            return 1
+        return 2 if self.by_status[Status.NOT_BUILT.code] else 0
+
+    def count(self, building: Building) -> None:
+        self.by_status[building.status.code] += 1
+        if building.type:
+            self.by_type[building.type] += 1
+        if building.status in (Status.NOT_BUILT, Status.INTERNAL_ERROR) and len(self.not_built) < MOST_TOLD:
+            self.not_built.append((building.id, building.detail))
+
+
+def build_file(
+    path: str | os.PathLike,
+    out: str | os.PathLike,
+    parquet: bool = False,
+    progress: Callable[[int], None] = lambda done: None,
+) -> Built:
+    """Write the files of a run into the folder `out` from the parameters.jsonl at `path`; `parquet` adds GeoParquet.
+
+    A building that cannot be built is written without a model, with a sentence, and keeps its parameters. Raises InputError
+    for a file that cannot be read and OutputError for a folder that cannot be written; then nothing is written.
+    """
+    path, out, built = Path(path), Path(out), Built()
+    refuse_folder_of_a_run(out)
+    with opened_parameters(path) as (head, records):
+        maker = Maker(head)
+        files = {kind: out / name for kind, name in FILES.items() if kind != "parquet" or parquet}
+        first = next(records, None)
+        records = iter(()) if first is None else chained(first, records)
+        maker.settle_offset(first)
+        join_fragments(files, made(maker, records, built, progress), maker.head)
+    write_record(path, out, head, built)
+    return built
+
+
+def refuse_folder_of_a_run(out: Path) -> None:
+    """Raise OutputError for the folder of `hiproof reconstruct`, which would make all its files again."""
+    if (out / ".hiproof").exists():
+        raise OutputError(
+            f"expected a folder for what is built, got {out}, which holds a run of `hiproof reconstruct`; "
+            "choose another --out"
+        )
+
+
+def chained(first: dict, rest: Iterator[dict]) -> Iterator[dict]:
+    yield first
+    yield from rest
+
+
+def made(maker: Maker, records: Iterator[dict], built: Built, progress: Callable[[int], None]) -> Iterator[Fragments]:
+    """The texts of every building, counted."""
+    for number, record in enumerate(records, 1):
+        building, texts = maker.make(record)
+        built.count(building)
+        progress(number)
+        yield texts
+
+
+class Maker:
+    """Makes the texts of building after building, as the files of one run hold them."""
+
+    def __init__(self, head: FileHead) -> None:
+        self.head = head
+        self.units = FileUnits.of(head.crs, units_of(head.crs, named=head.unit))
+        self.names = UniqueNames(), UniqueNames()
+
+    def settle_offset(self, first: Mapping[str, Any] | None) -> None:
+        """The offset of the CityJSON file where the head tells none: by the first building."""
+        if self.head.offset is None:
+            self.head = dataclasses.replace(self.head, offset=offset_by(first, self.units))
+
+    def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
+        """The building of an object and its texts; where it cannot be built, without a model and with its parameters kept."""
+        id = record["id"]
+        names = self.names[0].take(plain_text(id)), self.names[1].take(gml_name(id))
+        try:
+            return fragments(build(record, self.head.compose), names, self.head.offset, self.units)
+        except HiproofError as error:
+            why, status = str(error), Status.NOT_BUILT
+        except MemoryError:
+            raise
+        except Exception as error:
+            place = traceback.extract_tb(error.__traceback__)[-1]
+            why = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+            status = Status.INTERNAL_ERROR
+        building = Building(id, status, masked(why))
+        building, texts = fragments(building, names, self.head.offset, self.units)
+        kept = finite({**record, "status": status.code, "detail": building.detail})
+        return building, dataclasses.replace(texts, parameters=dump(kept) + b"\n")
+
+
+def finite(value: Any) -> Any:
+    """A JSON value without NaN and infinities, which JSON does not know: they become null."""
+    if isinstance(value, dict):
+        return {key: finite(inner) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [finite(inner) for inner in value]
+    return None if isinstance(value, float) and not np.isfinite(value) else value
+
+
+def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
+    """The offset (3,) of a CityJSON file whose first building is `record`."""
+    from .record import building_of
+
+    try:
+        outline = building_of(record).footprint if record is not None else None
+    except HiproofError:
+        outline = None
+    if outline is None:
+        return np.zeros(3)
+    return offset_of(units.cityjson.from_metres(np.array(shapely.bounds(outline)[:2])))
+
+
+def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
+    """run.json: what was built of which file, and the clouds and footprints of the run that the file came from."""
+    record = {
+        "hiproof": __version__,
+        **earlier_record(path.parent / "run.json"),
+        "parameters": str(path),
+        "crs": None if head.crs is None else head.crs.to_wkt(),
+        "buildings": built.buildings,
+        "by_status": dict(built.by_status),
+        "by_type": dict(built.by_type),
+        "not_built": [list(pair) for pair in built.not_built],
+    }
+    with atomic(out / "run.json") as beside:
+        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n")
+
+
+def earlier_record(path: Path) -> dict[str, Any]:
+    """Settings, inputs and units of the run whose record lies at `path`; nothing where there is none."""
+    try:
+        record = json.loads(path.read_text())
+        return {name: record[name] for name in ("settings", "inputs", "units") if name in record}
+    except (OSError, ValueError, TypeError):
+        return {}

@@ -1,0 +1,105 @@
+"""The JSON schema (draft 2020-12) of parameters.jsonl: its first line is a `head`, every other a `building`."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from ..primitives.family import NAMES
+from ..read.crs import NAMED_UNITS
+from ..status import Status
+from ..write.attribute_list import HEAD, PARAMETERS, PART, Attribute
+from ..write.parameters import VERSION
+from .shape import names_of
+
+NUMBER, TEXT = {"type": "number"}, {"type": "string"}
+NUMBER_OR_NULL, TEXT_OR_NULL = {"type": ["number", "null"]}, {"type": ["string", "null"]}
+NUMBERS = {"type": "object", "additionalProperties": NUMBER}
+SHARES = {"type": "object", "additionalProperties": NUMBER_OR_NULL}
+PLACE = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
+RING = {"type": "array", "minItems": 3, "items": {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}}
+POLYGON = {"type": "array", "items": RING, "minItems": 1}
+LENGTH = {"type": "number", "exclusiveMinimum": 0}
+
+HEAD_KINDS = {
+    "hiproof_parameters": {"const": VERSION},
+    "crs": TEXT_OR_NULL,
+    "unit": {"enum": list(NAMED_UNITS)},
+    "cityjson_offset": {"anyOf": [PLACE, {"type": "null"}]},
+    "compose": NUMBERS,
+}
+BUILDING_KINDS = {
+    "id": TEXT,
+    "status": {"enum": [status.code for status in Status]},
+    "detail": TEXT,
+    "type": TEXT_OR_NULL,
+    "origin": {"anyOf": [PLACE, {"type": "null"}]},
+    "parts": {"type": "array", "items": {"$ref": "#/$defs/part"}},
+    "outline": {"anyOf": [POLYGON, {"type": "null"}]},
+    "z_ground": NUMBER_OR_NULL,
+    "ground_source": TEXT_OR_NULL,
+    "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},
+    "attributes": {"type": "object"},
+    "points": {"type": "integer", "minimum": 0},
+    "residuals": SHARES,
+    "recognised": SHARES,
+    "types": SHARES,
+}
+PART_KINDS = {
+    "type": {"enum": list(NAMES)},
+    "parameters": {**NUMBERS, "properties": {"width": LENGTH, "length": LENGTH}},
+    "position": PLACE,
+    "rotation": NUMBER,
+    "sigma": NUMBERS,
+    "outlines": {"type": "array", "items": POLYGON},
+}
+
+
+def schema() -> dict[str, Any]:
+    """The schema of a line.
+
+    >>> schema()["$defs"]["head"]["properties"]["hiproof_parameters"]["const"]
+    1
+    """
+    defs = {
+        "head": described(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
+        "building": described(PARAMETERS, BUILDING_KINDS, required=("id",)),
+        "part": described(PART, PART_KINDS, required=("type", "parameters", "position"))
+        | {"allOf": parameters_by_type()},
+    }
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "a line of parameters.jsonl",
+        "if": {"required": ["hiproof_parameters"]},
+        "then": {"$ref": "#/$defs/head"},
+        "else": {"$ref": "#/$defs/building"},
+        "$defs": defs,
+    }
+
+
+def described(attributes: tuple[Attribute, ...], kinds: dict[str, Any], required: tuple[str, ...]) -> dict[str, Any]:
+    """An object with `attributes`, each with its meaning and unit; those of no other kind are numbers or null."""
+    properties = {
+        a.name: {"description": f"{a.meaning} [{a.unit}]" if a.unit else a.meaning, **kinds.get(a.name, NUMBER_OR_NULL)}
+        for a in attributes
+    }
+    closed = {"additionalProperties": False} if attributes is not HEAD else {}
+    return {"type": "object", "properties": properties, "required": list(required), **closed}
+
+
+def parameters_by_type() -> list[dict[str, Any]]:
+    """What the parameters of a part of each type must hold, unless they are given side by side."""
+    side_by_side = {"propertyNames": {"pattern": "^(width|length|height|(pitch|eave|skew)_(left|right|front|back))$"}}
+    rules = []
+    for kind in NAMES:
+        names = names_of(kind)
+        needed = [] if kind == "flat" else list(names)
+        own = {"required": needed, "propertyNames": {"enum": list(names)}}
+        is_kind = {"properties": {"type": {"const": kind}}}
+        rules.append({"if": is_kind, "then": {"properties": {"parameters": {"anyOf": [own, side_by_side]}}}})
+    return rules
+
+
+def schema_text() -> str:
+    """The schema as the published file holds it."""
+    return json.dumps(schema(), indent=1) + "\n"

@@ -1,0 +1,102 @@
+"""Whether parameters make a shape: those of its type, lengths that are lengths, planes that rise from their eaves."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from ..errors import FitError, InputError
+from ..primitives.catalogue import CATALOGUE
+from ..primitives.family import NAMES, SHAPES, SIDES, member_of
+
+STEEPEST_DEG = 89.0
+SHOWN = 8
+
+
+def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> None:
+    """Raise InputError where `parameters` (finite numbers by name) make no shape of the type `kind`.
+
+    >>> refuse_no_shape("gable", {"width": -8.0, "length": 12.0, "height": 3.0}, "part 0")
+    Traceback (most recent call last):
+    hiproof.errors.InputError: expected a positive width of part 0, got -8; give metres
+    """
+    if kind not in NAMES:
+        raise InputError(f"expected a roof type ({', '.join(NAMES)}) in {where}, got {kind!r}; choose one")
+    for name in ("width", "length"):
+        if name in parameters and not parameters[name] > 0.0:
+            raise InputError(f"expected a positive {name} of {where}, got {parameters[name]:g}; give metres")
+    if kind == "flat":
+        refuse_other_names(kind, parameters, [], ["width", "length"], where)
+    elif kind in CATALOGUE and not any(name.startswith("pitch_") for name in parameters):
+        refuse_other_names(kind, parameters, CATALOGUE[kind].parameters, [], where)
+        refuse_falling(kind, parameters, where)
+    else:
+        refuse_no_member(kind, parameters, where)
+
+
+def refuse_other_names(
+    kind: str, parameters: Mapping[str, float], needed: list[str], allowed: list[str], where: str
+) -> None:
+    """Raise InputError where a parameter is missing or is none of the type's."""
+    missing = [name for name in needed if name not in parameters]
+    other = [name for name in parameters if name not in (*needed, *allowed)]
+    if missing or other:
+        got = f"none for {', '.join(missing)}" if missing else f"also {', '.join(other[:SHOWN])}"
+        raise InputError(
+            f"expected the parameters {', '.join(needed) or 'width, length'} of a {kind} roof in {where}, got {got}; "
+            "`hiproof build --shapes` lists those of every type"
+        )
+
+
+def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> None:
+    """Raise InputError where a shape of the catalogue has a plane that falls from its eave or stands upright."""
+    shape = CATALOGUE[kind]
+    try:
+        q = np.array(shape.to_theta(parameters)[6:])
+    except FitError as error:
+        raise InputError(f"{where}: {error}") from error
+    except ZeroDivisionError:
+        q = np.full(3, np.inf)
+    slopes = [value for value, (low, _) in zip(q, shape.bounds, strict=False) if low >= 0.0]
+    steepest = math.tan(math.radians(STEEPEST_DEG))
+    if not all(0.0 <= slope <= steepest for slope in slopes):
+        told = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
+        raise InputError(
+            f"expected planes that rise from the eaves by less than {STEEPEST_DEG:g} degrees, got a {kind} roof of {told} "
+            f"in {where}; is one of its lengths too long?"
+        )
+
+
+def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> None:
+    """Raise InputError where parameters given side by side make no member of the family."""
+    allowed = ["height", "width", "length", *(f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew"))]
+    refuse_other_names(kind, parameters, [], allowed, where)
+    for name, value in parameters.items():
+        low = 0.0 if name.startswith("pitch_") else -STEEPEST_DEG
+        if name.startswith(("pitch_", "skew_")) and not low <= value <= STEEPEST_DEG:
+            raise InputError(
+                f"expected {name} between {low:g} and {STEEPEST_DEG:g} degrees in {where}, got {value:g}; give degrees"
+            )
+    try:
+        member_of(kind, parameters, 0.0, np.zeros(3))
+    except FitError as error:
+        raise InputError(f"{where}: {error}") from error
+
+
+def names_of(kind: str) -> tuple[str, ...]:
+    """The parameters of a type: those of the catalogue's shape, else side by side.
+
+    >>> names_of("hip"), names_of("corner")[:4]
+    (('width', 'length', 'height', 'ridge_length'), ('width', 'length', 'pitch_right', 'eave_right'))
+    """
+    return CATALOGUE[kind].parameters if kind in CATALOGUE else side_by_side_names(kind)
+
+
+def side_by_side_names(kind: str) -> tuple[str, ...]:
+    """The parameters of a member of the family, each side's own; skews, which are seldom there, left out."""
+    base = kind.replace("half_hip", "hip").replace("asymmetric_", "").replace("pyramid", "hip")
+    top, sides = next((top, sides) for (top, _, _), (name, sides) in SHAPES.items() if name == base)
+    of_sides = [f"{what}_{SIDES[side]}" for side in sorted(sides) for what in ("pitch", "eave")]
+    return ("width", "length", *(["height"] if top else []), *of_sides)

@@ -1,0 +1,228 @@
+"""`hiproof build`: a run's own parameters give the run's own files; what a hand got wrong is one sentence about one building."""
+
+import copy
+import json
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import pytest
+from jsonschema import Draft202012Validator
+from typer.testing import CliRunner
+
+import hiproof
+from hiproof.cli import main
+from hiproof.cli.app import app
+from hiproof.compose import check_solid
+from hiproof.errors import CompositionError, HiproofError, InputError
+from hiproof.parametric.file import opened_parameters
+from hiproof.parametric.run import build_file
+from hiproof.parametric.schema import schema, schema_text
+from hiproof.parametric.shape import names_of
+from hiproof.primitives import CATALOGUE
+from hiproof.primitives.family import NAMES
+from hiproof.simulate import demo_files
+
+FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg", "buildings.parquet")
+PUBLISHED = Path(__file__).parents[2] / "docs/parameters.schema.json"
+RING = [[-6.0, -4.0], [6.0, -4.0], [6.0, 4.0], [-6.0, 4.0], [-6.0, -4.0]]
+HEAD = {"hiproof_parameters": 1, "crs": "EPSG:28992"}
+
+
+def house(**changes):
+    """A gable of 12 by 8 m."""
+    part = {
+        "type": "gable",
+        "parameters": {"width": 8.0, "length": 12.0, "height": 3.0},
+        "position": [0.0, 0.0, 5.0],
+        "rotation": 0.0,
+    }
+    part |= changes
+    return {"id": "a", "origin": [85000.0, 446000.0, 2.0], "outline": [RING], "z_ground": 2.0, "parts": [part]}
+
+
+def write_lines(path, *records, head=HEAD):
+    path.write_text("".join(json.dumps(record) + "\n" for record in (head, *records)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def demo_run(tmp_path_factory):
+    """The bundled neighbourhood, without the network: its types are all in it, and a footprint without points."""
+    files, out = demo_files(), tmp_path_factory.mktemp("demo")
+    pytest.importorskip("pyarrow", reason="GeoParquet needs pyarrow (extra `city`)")
+    settings = hiproof.Settings.from_dict({"segment": {"enabled": False}, "city": {"parquet": True}})
+    request = hiproof.Request(
+        (str(files["cloud"]),), out, str(files["footprints"]), str(files["terrain"]), settings=settings
+    )
+    hiproof.reconstruct_area(request)
+    return out
+
+
+def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
+    built = build_file(demo_run / "parameters.jsonl", tmp_path, parquet=True)
+    assert built.exit_code == 0 and built.buildings == len(hiproof.read_parameters(demo_run / "parameters.jsonl"))
+    for name in FILES:
+        assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name
+
+
+def test_all_lines_are_as_the_published_schema_says(demo_run):
+    assert PUBLISHED.read_text() == schema_text()
+    validator = Draft202012Validator(schema())
+    lines = (demo_run / "parameters.jsonl").read_text().splitlines()
+    assert len(lines) > 20
+    for line in lines:
+        validator.validate(json.loads(line))
+
+
+def test_every_type_can_be_built_by_its_own_parameters():
+    for name in NAMES:
+        if name in CATALOGUE:
+            parameters = CATALOGUE[name].typical(8.0, 12.0, 3.0)
+        else:
+            parameters = {key: 30.0 if key.startswith("pitch") else 0.0 for key in names_of(name)}
+            parameters |= {"width": 8.0, "length": 12.0} | ({"height": 1.5} if "height" in parameters else {})
+        building = hiproof.build(house(type=name, parameters=parameters))
+        assert building.type == name and not check_solid(building.solid), name
+        assert list(parameters) == [key for key in names_of(name) if key in parameters]
+
+
+def test_numbers_are_what_they_say():
+    solid = hiproof.build(house()).solid
+    assert solid.vertices[:, 2].max() == pytest.approx(2.0 + 5.0 + 3.0)
+    assert solid.vertices[:, :2].min(axis=0).tolist() == [84994.0, 445996.0]
+
+
+def spoilt(change):
+    record = house()
+    change(record)
+    return record
+
+
+BAD = {
+    "negative width": (lambda r: r["parts"][0]["parameters"].update(width=-8.0), "positive width of part 0, got -8"),
+    "NaN": (
+        lambda r: r["parts"][0]["parameters"].update(height=float("nan")),
+        "number as height in .* part 0, got nan",
+    ),
+    "infinite": (lambda r: r.update(z_ground=float("inf")), "number as z_ground, got inf"),
+    "text": (lambda r: r["parts"][0].update(position=["a", 0, 0]), "position of part 0, got 'a'"),
+    "huge": (lambda r: r["parts"][0]["parameters"].update(height=10**400), "number as height"),
+    "no such type": (lambda r: r["parts"][0].update(type="onion"), "roof type .* got 'onion'"),
+    "missing": (lambda r: r["parts"][0]["parameters"].pop("height"), "got none for height"),
+    "misspelt": (lambda r: r["parts"][0]["parameters"].update(ridge=3.0), "got also ridge"),
+    "misspelt key": (lambda r: r["parts"][0].update(rotatoin=3.0), "got also rotatoin"),
+    "outside": (lambda r: r["parts"][0].update(position=[50.0, 0, 5]), "outside it"),
+    "alike": (lambda r: r["parts"].append(copy.deepcopy(r["parts"][0])), "part 1 the same as part 0"),
+    "ridge too long": (
+        lambda r: r["parts"][0].update(
+            type="hip", parameters={"width": 8.0, "length": 12.0, "height": 3.0, "ridge_length": 13.0}
+        ),
+        "planes that rise",
+    ),
+    "too steep": (
+        lambda r: r["parts"][0].update(
+            type="monopitch", parameters={"width": 8.0, "length": 12.0, "pitch_front": 95.0, "eave_front": 0.0}
+        ),
+        "pitch_front between 0 and 89 degrees",
+    ),
+    "no outline": (lambda r: r.update(outline=None), "an outline and an origin"),
+    "no parts": (lambda r: r.update(parts=[], status="modelled"), "give one part at least"),
+    "no ground": (lambda r: r.update(z_ground=None), "number as z_ground, got null"),
+    "parts no list": (lambda r: r.update(parts={}), "expected a list as parts"),
+    "ring of two": (lambda r: r.update(outline=[[[0, 0], [1, 1]]]), "rings of three"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_wrong_is_one_sentence(name):
+    change, message = BAD[name]
+    with pytest.raises(InputError, match=message) as caught:
+        hiproof.build(spoilt(change))
+    assert str(caught.value).startswith(("expected", "part 0")) and "\n" not in str(caught.value)
+
+
+def test_a_roof_that_does_not_close_is_one_sentence():
+    outline = [[[0.0, 0.0], [1e-5, 0.0], [0.0, 1e-5], [0.0, 0.0]]]
+    with pytest.raises(CompositionError, match="expected"):
+        hiproof.build(house(outlines=[outline]) | {"outline": outline})
+
+
+def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
+    wrong = spoilt(lambda r: r["parts"][0]["parameters"].update(width=-8.0)) | {"id": "wrong"}
+    path = write_lines(tmp_path / "p.jsonl", house() | {"id": "one"}, wrong, house() | {"id": "two"})
+    done = CliRunner().invoke(app, ["build", str(path), "--out", str(tmp_path / "out")])
+    assert done.exit_code == 2
+    assert "building wrong: expected a positive width" in done.output
+    rows = {row["id"]: row for row in hiproof.read_parameters(tmp_path / "out/parameters.jsonl")}
+    assert [rows[id]["status"] for id in ("one", "wrong", "two")] == ["modelled", "not_built", "modelled"]
+    assert rows["wrong"]["parts"] == wrong["parts"]
+    _, _, _, columns = pyogrio.raw.read(tmp_path / "out/buildings.gpkg", columns=["hiproof_status"])
+    assert columns[0].tolist() == ["modelled", "not_built", "modelled"]
+    mended = {**rows["wrong"], "parts": house()["parts"]}
+    assert hiproof.build(mended).status.is_model
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"hiproof_parameters": 1}\n\n{"id": "a", "parts": [}\n', r"line 3 of .* column 23 .*beside"),
+        ('{"hiproof_parameters": 2}\n', "version 1 .* got version 2"),
+        ('{"id": "a"}\n', "first line"),
+        ("", "first line"),
+        ('{"hiproof_parameters": 1, "unit": "ell"}\n', "expected a unit"),
+        ('{"hiproof_parameters": 1, "crs": "EPSG:x"}\n', "coordinate reference system"),
+        ('{"hiproof_parameters": 1, "compose": {"snap_m": -1}}\n', "compose.snap_m"),
+        ('{"hiproof_parameters": 1, "cityjson_offset": [0, 0]}\n', "three numbers"),
+        ('{"hiproof_parameters": 1}\n{"parts": []}\n', "an id in line 2"),
+        ('{"hiproof_parameters": 1}\n' + "[" * 100_000 + "\n", "line 2"),
+    ],
+)
+def test_a_file_that_cannot_be_read_is_refused_whole(text, message, tmp_path, capsys, monkeypatch):
+    (tmp_path / "p.jsonl").write_text(text)
+    with pytest.raises(HiproofError, match=message):
+        build_file(tmp_path / "p.jsonl", tmp_path / "out")
+    assert not list((tmp_path / "out").glob("*"))
+    monkeypatch.setattr("sys.argv", ["hiproof", "build", str(tmp_path / "p.jsonl"), "--out", str(tmp_path / "out")])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2
+    assert "Traceback" not in capsys.readouterr().err
+
+
+def test_a_file_is_read_as_it_is_needed(tmp_path):
+    path = write_lines(tmp_path / "p.jsonl", house(), house())
+    with path.open("a") as file:
+        file.write("{broken")
+    with opened_parameters(path) as (_, records):
+        assert [next(records)["id"], next(records)["id"]] == ["a", "a"]
+        with pytest.raises(InputError, match="line 4"):
+            next(records)
+
+
+def test_a_runs_own_folder_is_not_built_into(undisturbed):
+    with pytest.raises(HiproofError, match="choose another --out"):
+        build_file(undisturbed / "parameters.jsonl", undisturbed)
+
+
+def test_buildings_may_be_fewer_and_in_another_order(demo_run, tmp_path):
+    head, *lines = (demo_run / "parameters.jsonl").read_text().splitlines()
+    (tmp_path / "p.jsonl").write_text("\n".join([head, *lines[10:4:-1]]) + "\n")
+    build_file(tmp_path / "p.jsonl", tmp_path / "out")
+    whole = set((demo_run / "buildings.city.jsonl").read_text().splitlines()[1:])
+    some = (tmp_path / "out/buildings.city.jsonl").read_text().splitlines()[1:]
+    assert len(some) == 6 and set(some) <= whole
+
+
+def test_shapes_and_schema_are_printed():
+    shapes = CliRunner().invoke(app, ["build", "--shapes"]).output
+    assert [line.split(":")[0] for line in shapes.splitlines()] == list(NAMES)
+    assert json.loads(CliRunner().invoke(app, ["build", "--schema"]).output) == json.loads(PUBLISHED.read_text())
+
+
+def test_the_head_keeps_feet(tmp_path):
+    feet = {"hiproof_parameters": 1, "crs": None, "unit": "foot"}
+    build_file(write_lines(tmp_path / "p.jsonl", house(), head=feet), tmp_path / "feet")
+    build_file(write_lines(tmp_path / "q.jsonl", house()), tmp_path / "metres")
+    low = [pyogrio.read_bounds(tmp_path / name / "buildings.gpkg")[1][:2, 0] for name in ("feet", "metres")]
+    assert low[0] == pytest.approx(np.array(low[1]) / 0.3048)
