@@ -256,11 +256,11 @@ def test_texts_of_buildings_come_back_as_they_were(tmp_path):
     with open(tmp_path / "tile.npz", "wb") as file:
         save_fragments(file, parts)
     for was, got in zip(parts, load_fragments(tmp_path / "tile.npz"), strict=True):
-        assert (got.gml.text, got.cityjson, got.parameters, got.row) == (
+        assert (got.gml.text, got.cityjson, got.parameters, got.rows) == (
             was.gml.text,
             was.cityjson,
             was.parameters,
-            was.row,
+            was.rows,
         )
         assert np.array_equal([got.gml.low, got.gml.high], [was.gml.low, was.gml.high])
     with open(tmp_path / "none.npz", "wb") as file:

@@ -1,20 +1,24 @@
 """Footprints out of, and models into, a real PostGIS."""
 
 import json
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 import shapely
 
+import hiproof
 from handmade import courtyard, gable_house, modelled, unmodelled
 from hiproof.errors import InputError, OutputError
 from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.write import write_cityjson
+from hiproof.write import write_all, write_attributes, write_cityjson
 from hiproof.write.postgis import lie_of, load_postgis
 from hiproof.write.roof_figures import roof_figures
 from postgis_server import running, why_not
 from sample_models import write_sample_run
 
+DOCS = Path(__file__).parents[1] / "docs"
 psycopg = pytest.importorskip("psycopg", reason="the extra `postgis` is not installed")
 
 
@@ -132,12 +136,21 @@ def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
         assert all(abs(slope - 36.87) < 0.01 for slope, _ in slopes)
 
 
+def reconstructed_gable():
+    """A gable of 12 by 8 m whose ridge runs east, built of its parameters."""
+    ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
+    part = {"type": "gable", "parameters": {"width": 8, "length": 12, "height": 3}, "position": [0, 0, 5]}
+    place = {"origin": [85000, 446000, 0], "outline": [ring], "z_ground": 0}
+    return hiproof.build({"id": "south", **place, "parts": [part]})
+
+
 @pytest.fixture
 def run_of_two(tmp_path):
     """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without model."""
     buildings = [modelled(gable_house(), "house"), modelled(courtyard(), "yard", ("flat",)), unmodelled()]
     (tmp_path / "run").mkdir()
     write_cityjson(tmp_path / "run" / "buildings.city.jsonl", buildings, "EPSG:7415")
+    write_attributes(tmp_path / "run" / "buildings.gpkg", buildings, "EPSG:7415")
     return tmp_path / "run", buildings
 
 
@@ -147,8 +160,24 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
     with psycopg.connect(database) as connection:
         told = connection.execute("select id, status, roof_type from told_buildings order by id").fetchall()
         assert told == sorted((b.id, b.status.code, b.type) for b in buildings)
-        types = connection.execute("select distinct building_id, roof_type from told_roofs order by 1").fetchall()
+        types = connection.execute("select distinct building_id, type from told_roofs order by 1").fetchall()
         assert types == [("house", "gable"), ("yard", "flat")]
+        told = connection.execute("select building_id, part, type, width, ridge_length from told_parts order by 1")
+        assert told.fetchall() == [("house", 0, "gable", 8.0, None), ("yard", 0, "flat", 8.0, None)]
+        (area,) = connection.execute("select ST_Area(geom) from told_parts where building_id = 'house'").fetchone()
+        assert area > 96.0  # of the turned box around its outline, for its length is not known
+
+
+def test_the_documented_question_of_a_solar_map(database, tmp_path):
+    """Roof surfaces of 20 m2 or more that look between south-east and south-west, as docs/tables.md asks for them."""
+    house = reconstructed_gable()
+    (tmp_path / "run").mkdir()
+    write_all(tmp_path / "run", [house], "EPSG:7415")
+    load_postgis(tmp_path / "run", database, "solar")
+    (sql,) = re.findall(r"```sql\n(.*?)```", (DOCS / "tables.md").read_text(), re.DOTALL)
+    with psycopg.connect(database) as connection:
+        rows = connection.execute(sql.replace("hiproof_", "solar_")).fetchall()
+    assert [(id, kind, round(azimuth)) for id, kind, azimuth, *_ in rows] == [("south", "gable", 180)]
 
 
 def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_two):
@@ -167,6 +196,7 @@ def test_loading_again_replaces_the_run_whatever_its_reference_system(database, 
     folder, buildings = run_of_two
     load_postgis(folder, database, "again")
     write_cityjson(folder / "buildings.city.jsonl", buildings[1:], "EPSG:25832")
+    write_attributes(folder / "buildings.gpkg", buildings[1:], "EPSG:25832")
     load_postgis(folder, database, "again")
     with psycopg.connect(database) as connection:
         left = connection.execute("select distinct id, ST_SRID(geom) from again_buildings order by 1").fetchall()

@@ -123,7 +123,7 @@ def extents(out):
     corners = [
         node.text.split() for node in etree.parse(out / "buildings.gml").iter("{*}lowerCorner", "{*}upperCorner")
     ]
-    _, _, outlines, _ = pyogrio.raw.read(out / "buildings.gpkg")
+    _, _, outlines, _ = pyogrio.raw.read(out / "buildings.gpkg", layer="buildings")
     plan = shapely.total_bounds(shapely.from_wkb(outlines))
     return (
         np.reshape(header["metadata"]["geographicalExtent"], (2, 3)),

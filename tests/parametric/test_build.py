@@ -23,7 +23,8 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.family import NAMES
 from hiproof.simulate import demo_files
 
-FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg", "buildings.parquet")
+FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
+PARQUET = ("buildings.parquet", "parts.parquet", "roof_surfaces.parquet")
 PUBLISHED = Path(__file__).parents[2] / "docs/parameters.schema.json"
 RING = [[-6.0, -4.0], [6.0, -4.0], [6.0, 4.0], [-6.0, 4.0], [-6.0, -4.0]]
 HEAD = {"hiproof_parameters": 1, "crs": "EPSG:28992"}
@@ -62,7 +63,7 @@ def demo_run(tmp_path_factory):
 def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
     built = build_file(demo_run / "parameters.jsonl", tmp_path, parquet=True)
     assert built.exit_code == 0 and built.buildings == len(hiproof.read_parameters(demo_run / "parameters.jsonl"))
-    for name in FILES:
+    for name in (*FILES, *PARQUET):
         assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name
 
 
@@ -157,7 +158,7 @@ def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
     rows = {row["id"]: row for row in hiproof.read_parameters(tmp_path / "out/parameters.jsonl")}
     assert [rows[id]["status"] for id in ("one", "wrong", "two")] == ["modelled", "not_built", "modelled"]
     assert rows["wrong"]["parts"] == wrong["parts"]
-    _, _, _, columns = pyogrio.raw.read(tmp_path / "out/buildings.gpkg", columns=["hiproof_status"])
+    _, _, _, columns = pyogrio.raw.read(tmp_path / "out/buildings.gpkg", layer="buildings", columns=["hiproof_status"])
     assert columns[0].tolist() == ["modelled", "not_built", "modelled"]
     mended = {**rows["wrong"], "parts": house()["parts"]}
     assert hiproof.build(mended).status.is_model
@@ -224,5 +225,8 @@ def test_the_head_keeps_feet(tmp_path):
     feet = {"hiproof_parameters": 1, "crs": None, "unit": "foot"}
     build_file(write_lines(tmp_path / "p.jsonl", house(), head=feet), tmp_path / "feet")
     build_file(write_lines(tmp_path / "q.jsonl", house()), tmp_path / "metres")
-    low = [pyogrio.read_bounds(tmp_path / name / "buildings.gpkg")[1][:2, 0] for name in ("feet", "metres")]
+    low = [
+        pyogrio.read_bounds(tmp_path / name / "buildings.gpkg", layer="buildings")[1][:2, 0]
+        for name in ("feet", "metres")
+    ]
     assert low[0] == pytest.approx(np.array(low[1]) / 0.3048)

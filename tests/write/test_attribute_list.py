@@ -8,6 +8,8 @@ from handmade import gable_house, modelled, unmodelled
 from hiproof.cli.attributes import run
 from hiproof.evaluate.evaluation import BuildingFigures, Comparison
 from hiproof.frames import METRES, Units
+from hiproof.parametric.shape import names_of, side_by_side_names
+from hiproof.primitives.family import COMPONENTS, NAMES
 from hiproof.write import write_all
 from hiproof.write.attribute_list import (
     EVALUATION,
@@ -16,7 +18,9 @@ from hiproof.write.attribute_list import (
     OWN,
     PARAMETERS,
     PART,
+    PARTS_LAYER,
     POSTGIS_BUILDINGS,
+    POSTGIS_PARTS,
     POSTGIS_ROOFS,
     PREFIX,
     ROOF_SURFACE,
@@ -25,7 +29,7 @@ from hiproof.write.attribute_list import (
 )
 from hiproof.write.building_attributes import building_attributes, figures_of
 from hiproof.write.parameters import FileHead, building_record, head_record
-from hiproof.write.postgis import SCHEMA
+from hiproof.write.postgis import MEASURES, SCHEMA
 
 DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
 KINDS = {"number": (int, float), "count": int, "text": str}
@@ -81,6 +85,16 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
 
 def test_tables_of_the_database_are_as_declared():
     tables = re.findall(r"create table if not exists \{(\w+)\} \((.*?)\);", SCHEMA, re.DOTALL)
-    for (name, body), attributes in zip(tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS), strict=True):
+    for (name, body), attributes in zip(tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS, POSTGIS_PARTS), strict=True):
+        body = body.replace("{measures}", MEASURES)
         columns = re.findall(r"(?:^|,)\s*(\w+) (?=text|integer|double|jsonb|geometry)", body)
         assert columns == names(attributes), name
+
+
+def test_the_table_of_parts_has_a_column_for_every_parameter():
+    parameters = {parameter for kind in NAMES for parameter in (*names_of(kind), *side_by_side_or_none(kind))}
+    assert parameters <= set(names(PARTS_LAYER))
+
+
+def side_by_side_or_none(kind):
+    return () if kind in COMPONENTS else side_by_side_names(kind)

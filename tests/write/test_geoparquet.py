@@ -9,7 +9,7 @@ import shapely
 
 from handmade import courtyard, gable_house, modelled, unmodelled
 from hiproof.errors import InputError
-from hiproof.write.attributes import write_attributes
+from hiproof.write.attributes import LAYERS, write_attributes
 from hiproof.write.geoparquet import GeoParquetWriter
 
 
@@ -20,14 +20,15 @@ def street():
     yield unmodelled()
 
 
-def test_the_same_rows_as_the_geopackage(tmp_path):
+@pytest.mark.parametrize("layer", LAYERS)
+def test_the_same_rows_as_the_geopackage(tmp_path, layer):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
     write_attributes(tmp_path / "b.gpkg", street(), "EPSG:7415")
-    with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415") as writer:
+    with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415", layer=layer) as writer:
         for building in street():
             writer.add(building)
     table = pq.read_table(tmp_path / "b.parquet")
-    meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "b.gpkg")
+    meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "b.gpkg", layer=layer)
     assert table.column_names == [*meta["fields"], "geometry"]
     for name, expected in zip(meta["fields"], columns, strict=True):
         for got, value in zip(table[name].to_pylist(), expected.tolist(), strict=True):

@@ -18,7 +18,7 @@ from hiproof.write import attributes, write_attributes, write_parameters
 def table(tmp_path, buildings, crs="EPSG:7415"):
     """Columns by name, and geometries, of the GeoPackage written."""
     write_attributes(tmp_path / "a.gpkg", buildings, crs)
-    meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "a.gpkg")
+    meta, _, wkb, columns = pyogrio.raw.read(tmp_path / "a.gpkg", layer="buildings")
     return dict(zip(meta["fields"], columns, strict=True)), shapely.from_wkb(wkb), meta
 
 

@@ -12,7 +12,11 @@ from .plan import Plan
 
 MODELS = {"gml": "buildings.gml", "cityjson": "buildings.city.jsonl"}
 TABLES = {"parameters": "parameters.jsonl", "gpkg": "buildings.gpkg"}
-PARQUET = {"parquet": "buildings.parquet"}
+PARQUET = {
+    "parquet": "buildings.parquet",
+    "parquet_parts": "parts.parquet",
+    "parquet_surfaces": "roof_surfaces.parquet",
+}
 TILE_FOLDER, TILE_ENDINGS = "models", {"gml": ".gml", "cityjson": ".city.jsonl"}
 TILE_FILE = re.compile(r"\.?-?\d+_-?\d+_\d+\.(gml|city\.jsonl).*")  # a dot before it: unfinished
 

@@ -8,5 +8,7 @@ from pathlib import Path
 def run(folder: Path, dsn: str, prefix: str) -> int:
     from ..write.postgis import load_postgis
 
-    print(f"{load_postgis(folder, dsn, prefix)} buildings loaded into {prefix}_buildings and {prefix}_roofs")
+    print(
+        f"{load_postgis(folder, dsn, prefix)} buildings loaded into {prefix}_buildings, {prefix}_roofs and {prefix}_parts"
+    )
     return 0

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from .. import __version__
-from ..errors import HiproofError, OutputError
+from ..errors import HiproofError, InputError, OutputError
 from ..masking import masked, masked_values
 from ..model import Building
 from ..read.crs import units_of
@@ -37,7 +37,11 @@ FILES = {
     "cityjson": "buildings.city.jsonl",
     "parameters": "parameters.jsonl",
     "gpkg": "buildings.gpkg",
+}
+PARQUET = {
     "parquet": "buildings.parquet",
+    "parquet_parts": "parts.parquet",
+    "parquet_surfaces": "roof_surfaces.parquet",
 }
 MOST_TOLD = 1000
 
@@ -84,7 +88,7 @@ def build_file(
     refuse_folder_of_a_run(out)
     with opened_parameters(path) as (head, records):
         maker = Maker(head)
-        files = {kind: out / name for kind, name in FILES.items() if kind != "parquet" or parquet}
+        files = {kind: out / name for kind, name in (FILES | (PARQUET if parquet else {})).items()}
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
         maker.settle_offset(first)
@@ -134,6 +138,8 @@ class Maker:
         id = record["id"]
         names = self.names[0].take(plain_text(id)), self.names[1].take(gml_name(id))
         try:
+            if names[0] != plain_text(id):
+                raise InputError(f"expected buildings of different ids, got {id!r} again; give this one another")
             return fragments(build(record, self.head.compose), names, self.head.offset, self.units)
         except HiproofError as error:
             why, status = str(error), Status.NOT_BUILT

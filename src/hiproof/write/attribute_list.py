@@ -121,6 +121,60 @@ PART = (
     ),
 )
 
+SIZES = {
+    "width": ("m", "of the rectangle, across the ridge"),
+    "length": ("m", "of the rectangle, along the ridge"),
+    "height": ("m", "of the ridge or the level top over the lowest eave; of a saw-tooth's tooth"),
+    "ridge_length": ("m", "of a hip or half-hip"),
+    "hip_height": ("m", "of a half-hip's end, from its eave to the ridge"),
+    "top_width": ("m", "of a mansard's level top"),
+    "top_length": ("m", "of a mansard's level top"),
+    "teeth": ("", "of a saw-tooth"),
+    "ridge_offset": ("m", "of an asymmetric gable's ridge from the middle, to the back"),
+    "eave_step": ("m", "of an asymmetric gable: the back eave over the front eave"),
+    "break_width": ("m", "of a gambrel, between the lines where its slopes break"),
+    "break_height": ("m", "of these lines over the eave"),
+}
+OF_SIDES = {
+    "pitch": ("deg", "slope of the plane from this side"),
+    "eave": ("m", "height of this side's eave over the lowest"),
+    "skew": ("deg", "how far this side's plane faces off its axis"),
+}
+SHAPE = {
+    **SIZES,
+    **{f"{what}_{side}": told for side in ("front", "back", "left", "right") for what, told in OF_SIDES.items()},
+}
+"""Every parameter of a part by name: unit and meaning."""
+
+PARTS_LAYER = (
+    Attribute("building_id", "text", "", "id of the building"),
+    Attribute("part", "count", "", "number of the part within its building, from 0"),
+    Attribute("type", "text", "", "roof type of the part"),
+    Attribute("area_m2", "number", "m2", "of the outline that it may roof"),
+    Attribute("z_eave", "number", "m", "height of its lowest eave in the world; of its ridge or top: z_eave + height"),
+    Attribute("rotation", "number", "deg", "from the x axis to its length, counter-clockwise"),
+    *(Attribute(name, "number", unit, meaning) for name, (unit, meaning) in SHAPE.items()),
+    *(
+        Attribute(f"{name}_sigma", "number", unit, f"standard deviation of {name}")
+        for name, unit in {
+            "z_eave": "m",
+            "rotation": "deg",
+            **{name: unit for name, (unit, _) in SHAPE.items()},
+        }.items()
+        if name != "teeth"
+    ),
+)
+
+SURFACES_LAYER = (
+    Attribute("building_id", "text", "", "id of the building"),
+    Attribute("number", "count", "", "number of the surface within its building, from 0"),
+    Attribute("part", "count", "", "number of its roof part, as in the layer parts"),
+    Attribute("type", "text", "", "roof type of that part"),
+    Attribute("slope_deg", "number", "deg", "slope of the surface"),
+    Attribute("azimuth_deg", "number", "deg", "compass direction in which it falls, null where level"),
+    Attribute("area_m2", "number", "m2", "true area of the surface"),
+)
+
 HEAD = (
     Attribute("hiproof_parameters", "count", "", "version of the file"),
     Attribute("crs", "text", "", "CRS of the files built, as EPSG code or WKT"),
@@ -163,13 +217,13 @@ POSTGIS_BUILDINGS = (
     Attribute("geom", "geometry", "of the CRS", "the solid as a polyhedral surface of triangles"),
 )
 
+POSTGIS_PARTS = (
+    *PARTS_LAYER,
+    Attribute("geom", "geometry", "of the CRS", "the rectangle as a polygon"),
+)
+
 POSTGIS_ROOFS = (
-    Attribute("building_id", "text", "", "id of the building"),
-    Attribute("number", "count", "", "number of the face within its building, from 0"),
-    Attribute("roof_type", "text", "", "type of its roof part"),
-    Attribute("slope_deg", "number", "deg", "slope of the face"),
-    Attribute("azimuth_deg", "number", "deg", "compass direction in which it falls, null where level"),
-    Attribute("area_m2", "number", "m2", "true area of the face"),
+    *SURFACES_LAYER,
     Attribute("geom", "geometry", "of the CRS", "the face as a polygon"),
 )
 
@@ -181,9 +235,18 @@ TABLES = (
     Table("Parameters: the first line", "`parameters.jsonl`; its schema: `hiproof build --schema`", HEAD),
     Table("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
     Table("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
+    Table(
+        "Parts",
+        "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; rectangles",
+        PARTS_LAYER,
+    ),
+    Table(
+        "Roof surfaces as polygons",
+        "the layer `roof_surfaces` of `buildings.gpkg`, `roof_surfaces.parquet`, PostGIS: PREFIX_roofs",
+        SURFACES_LAYER,
+    ),
     Table("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
     Table("PostGIS: PREFIX_buildings", "`hiproof load`", POSTGIS_BUILDINGS),
-    Table("PostGIS: PREFIX_roofs", "`hiproof load`", POSTGIS_ROOFS),
 )
 
 PREFACE = """# Attributes

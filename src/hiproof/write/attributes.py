@@ -1,4 +1,4 @@
-"""buildings.gpkg: the outlines with every attribute as a table, for QGIS and its like.
+"""buildings.gpkg: outlines with every attribute, parts and roof surfaces as tables, for QGIS and its like.
 
 A table's columns need one type each, known before the first row, while the input's attributes may differ from building
 to building: rows wait in a temporary file until the last building has settled the types.
@@ -11,25 +11,28 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
-from typing import Any
+from typing import Any, BinaryIO
 
 import numpy as np
-import shapely
 
 from ..errors import OutputError
-from ..frames import METRES, Units
-from ..model import GROUND, Building
-from .attribute_list import HIPROOF, OWN, PREFIX, ROOFER
-from .building_attributes import building_attributes, figures_of, plain_text
+from ..frames import Units
+from ..model import Building
+from .attribute_list import HIPROOF, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
+from .building_attributes import building_attributes, figures_of
 from .files import atomic, scratch
 from .naming import FileUnits, plan_wkt
 from .roof_figures import RoofFigures
+from .table_rows import Row, Rows, table_rows
 from .writer import BuildingWriter
 
-LAYER = "buildings"
+BUILDINGS = "buildings"
+LAYERS = {BUILDINGS: "MultiPolygon", "parts": "Polygon", "roof_surfaces": "Polygon Z"}
+"""Tables and the geometry of their rows."""
+
+DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
 ROWS_AT_ONCE = 1000
 RESERVED = ("fid", "geom")
-Row = tuple[bytes | None, dict[str, Any]]  # the outline as WKB, the values by column
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
@@ -37,61 +40,83 @@ FIXED_DATE = "2000-01-01T00:00:00.000Z"
 def write_attributes(
     path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, prefix: str = PREFIX
 ) -> None:
-    """Write the outline of each of `buildings` (world coordinates) with its attributes to the GeoPackage `path`.
+    """Write the GeoPackage `path`: layers of the outlines of `buildings` (world coordinates), their parts and roof surfaces.
 
     A building whose outline is unknown gets a row without geometry. Values of one column are brought to one type: whole
-    numbers and decimals to decimals, anything beside text to text. Outlines are in the unit of `crs`. Raises OutputError when the file cannot be written.
+    numbers and decimals to decimals, anything beside text to text. Geometries are in the unit of `crs`. Raises OutputError when the file cannot be written.
     """
     with AttributesWriter(path, crs, prefix) as writer:
         for building in buildings:
             writer.add(building)
 
 
+class WaitingRows:
+    """Rows of one table in a temporary file, and the types found in each column."""
+
+    def __init__(self, layer: str, file: BinaryIO) -> None:
+        self.layer, self.file, self.count = layer, file, 0
+        self.found: dict[str, set[type]] = {a.name: set() for a in DECLARED.get(layer, ())}
+
+    def put(self, row: Row) -> None:
+        geometry, values = row
+        for name, value in values.items():
+            self.found.setdefault(name, set()).add(kind_of(value))
+        self.file.write(json.dumps([geometry and geometry.hex(), values]).encode() + b"\n")
+        self.count += 1
+
+    def kinds(self, prefix: str) -> dict[str, type]:
+        """The one type of every column."""
+        declared = {prefix + a.name: a.kind for a in ROOFER} | {OWN + a.name: a.kind for a in HIPROOF}
+        declared = {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
+        kinds = {name: column_kind(found, declared.get(name, "text")) for name, found in self.found.items()}
+        return kinds or {"id": str}
+
+    def batches(self) -> Iterator[list[Row]]:
+        """The rows, some thousands at a time; one empty batch if there are none."""
+        self.file.seek(0)
+        left = self.count
+        while True:
+            size = min(left, ROWS_AT_ONCE)
+            waiting = (json.loads(self.file.readline()) for _ in range(size))
+            yield [(geometry and bytes.fromhex(geometry), values) for geometry, values in waiting]
+            left -= size
+            if not left:
+                return
+
+
 class AttributesWriter(BuildingWriter):
-    """Incremental form of `write_attributes`."""
+    """Incremental form of `write_attributes`; `layers` are those written."""
+
+    layers: tuple[str, ...] = tuple(LAYERS)
 
     def __init__(
         self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, units: Units | None = None
     ) -> None:
         super().__init__(path)
         self.plan_wkt, self.prefix, self.units = plan_wkt(crs), prefix, FileUnits.of(crs, units).gml
-        self.kinds: dict[str, set[type]] = {}
-        self.count = 0
 
     def open(self, stack: ExitStack) -> None:
         self.hidden = stack.enter_context(atomic(self.path))
-        self.waiting = stack.enter_context(scratch(self.path))
+        self.waiting = {layer: WaitingRows(layer, stack.enter_context(scratch(self.path))) for layer in self.layers}
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        attributes = building_attributes(building, figures or figures_of(building), self.prefix, self.units)
-        self.put(table_row(building, attributes, self.units))
+        figures = figures or figures_of(building)
+        attributes = building_attributes(building, figures, self.prefix, self.units)
+        self.put(table_rows(building, figures, attributes, self.units))
 
-    def put(self, row: Row) -> None:
-        """Write a building that `table_row` made, here or in another process."""
-        for name, value in row[1].items():
-            self.kinds.setdefault(name, set()).add(kind_of(value))
-        outline, values = row
-        self.waiting.write(json.dumps([outline and outline.hex(), values]).encode() + b"\n")
-        self.count += 1
+    def put(self, rows: Rows) -> None:
+        """Write a building that `table_rows` made, here or in another process."""
+        for layer, waiting in self.waiting.items():
+            for row in getattr(rows, layer):
+                waiting.put(row)
 
     def finish(self) -> None:
-        kinds = {name: column_kind(name, found, self.prefix) for name, found in self.kinds.items()} or {"id": str}
-        self.waiting.seek(0)
-        for number, rows in enumerate(self.batches()):
-            self.write_rows(rows, kinds, append=number > 0)
+        for waiting in self.waiting.values():
+            kinds = waiting.kinds(self.prefix)
+            for number, rows in enumerate(waiting.batches()):
+                self.write_rows(waiting.layer, rows, kinds, append=number > 0)
 
-    def batches(self) -> Iterator[list[Row]]:
-        """The waiting rows, some thousands at a time; one empty batch if there are none."""
-        left = self.count
-        while True:
-            size = min(left, ROWS_AT_ONCE)
-            waiting = (json.loads(self.waiting.readline()) for _ in range(size))
-            yield [(outline and bytes.fromhex(outline), values) for outline, values in waiting]
-            left -= size
-            if not left:
-                return
-
-    def write_rows(self, rows: list, kinds: dict[str, type], append: bool) -> None:
+    def write_rows(self, layer: str, rows: list[Row], kinds: dict[str, type], append: bool) -> None:
         import pyogrio
         from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
@@ -104,10 +129,10 @@ class AttributesWriter(BuildingWriter):
                     [values for values, _ in columns],
                     column_names(kinds),
                     [mask for _, mask in columns],
-                    layer=LAYER,
+                    layer=layer,
                     driver="GPKG",
-                    geometry_type="MultiPolygon",
-                    promote_to_multi=True,
+                    geometry_type=LAYERS[layer],
+                    promote_to_multi=LAYERS[layer] == "MultiPolygon",
                     crs=self.plan_wkt,
                     append=append,
                 )
@@ -115,15 +140,6 @@ class AttributesWriter(BuildingWriter):
             raise OutputError(
                 f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions and the space left"
             ) from error
-
-
-def table_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
-    """The outline of `building` in `units` as WKB (None where it is unknown) and its attributes by column."""
-    named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in attributes.items()}
-    outline = plan_outline(building)
-    if outline is not None and not units.are_metres:
-        outline = shapely.transform(outline, units.from_metres)
-    return None if outline is None else shapely.to_wkb(outline), {"id": plain_text(building.id), **named}
 
 
 @contextmanager
@@ -141,27 +157,16 @@ def fixed_date() -> Iterator[None]:
         pyogrio.set_gdal_config_options({"OGR_CURRENT_DATE": before})
 
 
-def plan_outline(building: Building) -> shapely.Geometry | None:
-    """The building's outline in world coordinates: the modelled one, else the one asked for, else None."""
-    if building.roof is not None:
-        return shapely.transform(building.roof.outline, building.roof.frame.to_world)
-    if building.solid is not None:
-        rings = [[building.solid.vertices[list(r), :2] for r in f.rings] for f in building.solid.of_kind(GROUND)]
-        return shapely.union_all([shapely.Polygon(outer, inner) for outer, *inner in rings])
-    return building.footprint
-
-
 def kind_of(value: Any) -> type:
     """bool, int, float, str or NoneType; whole numbers beyond 64 bits count as text."""
     return str if type(value) is int and abs(value) >= 2**63 else type(value)
 
 
-def column_kind(name: str, found: set[type], prefix: str) -> type:
-    """The one type that holds all values found; a computed figure that is always unknown stays a decimal."""
+def column_kind(found: set[type], declared: str) -> type:
+    """The one type that holds all values found; a figure that is always unknown stays a decimal if it is `declared` one."""
     known = found - {type(None)}
     if not known:
-        computed = {prefix + a.name: a.kind for a in ROOFER} | {OWN + a.name: a.kind for a in HIPROOF}
-        return str if computed.get(name, "text") == "text" else float
+        return str if declared == "text" else float
     if len(known) == 1:
         return known.pop()
     return str if str in known else float if float in known else int

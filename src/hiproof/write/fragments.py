@@ -17,9 +17,9 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import OutputError
-from .attributes import Row
 from .citygml import Member
 from .cityjson import Feature
+from .table_rows import Rows
 
 NOTHING = [np.nan] * 6
 
@@ -31,7 +31,7 @@ class Fragments:
     gml: Member
     cityjson: Feature
     parameters: bytes
-    row: Row
+    rows: Rows
 
 
 def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
@@ -40,8 +40,7 @@ def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
         "gml": [part.gml.text for part in parts],
         "cityjson": [part.cityjson.line for part in parts],
         "parameters": [part.parameters for part in parts],
-        "outline": [part.row[0] or b"" for part in parts],
-        "values": [json.dumps(part.row[1]).encode() for part in parts],
+        "rows": [rows_text(part.rows) for part in parts],
     }
     arrays = {
         "gml_extent": np.array([[*part.gml.low, *part.gml.high] for part in parts], float).reshape(-1, 6),
@@ -57,18 +56,26 @@ def load_fragments(path: Path) -> Iterator[Fragments]:
     """The buildings that `save_fragments` wrote to `path`. Raises OutputError for a file that is not whole."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            names = ("gml", "cityjson", "parameters", "outline", "values")
+            names = ("gml", "cityjson", "parameters", "rows")
             texts = zip(*(cut(arrays[name], arrays[f"{name}_ends"]) for name in names), strict=True)
             extents = zip(arrays["gml_extent"], arrays["cityjson_extent"].tolist(), strict=True)
-            for (gml, line, parameters, outline, values), (box, extent) in zip(texts, extents, strict=True):
+            for (gml, line, parameters, rows), (box, extent) in zip(texts, extents, strict=True):
                 feature = Feature(line, None if np.isnan(extent[0]) else extent)
-                yield Fragments(
-                    Member(gml, box[:3], box[3:]), feature, parameters, (outline or None, json.loads(values))
-                )
+                yield Fragments(Member(gml, box[:3], box[3:]), feature, parameters, rows_of(rows))
     except (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile) as error:
         raise OutputError(
             f"expected a work tile's buildings in {path}, got: {error}; begin anew with --restart"
         ) from error
+
+
+def rows_text(rows: Rows) -> bytes:
+    """Rows as JSON, geometries in hexadecimal digits."""
+    return json.dumps([[[wkb and wkb.hex(), values] for wkb, values in table] for table in rows]).encode()
+
+
+def rows_of(text: bytes) -> Rows:
+    """The rows that `rows_text` wrote."""
+    return Rows(*(tuple((wkb and bytes.fromhex(wkb), values) for wkb, values in table) for table in json.loads(text)))
 
 
 def cut(joined: np.ndarray, ends: np.ndarray) -> list[bytes]:

@@ -1,4 +1,5 @@
-"""buildings.parquet: the attribute table as GeoParquet 1.0, for data frames and columnar databases (needs pyarrow)."""
+"""buildings.parquet, parts.parquet, roof_surfaces.parquet: the tables as GeoParquet 1.0, for data frames and columnar
+databases (needs pyarrow)."""
 
 from __future__ import annotations
 
@@ -8,29 +9,37 @@ from typing import Any
 
 from ..errors import InputError
 from ..frames import Units
-from .attributes import AttributesWriter, Row, column_kind, column_names
+from .attributes import BUILDINGS, AttributesWriter, column_names
 from .building_attributes import PREFIX
+from .table_rows import Row
 
 GEOMETRY = "geometry"
+GEOMETRY_TYPES = {BUILDINGS: ["Polygon", "MultiPolygon"], "parts": ["Polygon"], "roof_surfaces": ["Polygon Z"]}
 
 
 class GeoParquetWriter(AttributesWriter):
-    """Incremental writer of the same rows as the GeoPackage's; raises InputError where pyarrow is missing."""
+    """Incremental writer of the same rows as the GeoPackage's `layer`; raises InputError where pyarrow is missing."""
 
     def __init__(
-        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, units: Units | None = None
+        self,
+        path: str | os.PathLike,
+        crs: Any = None,
+        prefix: str = PREFIX,
+        units: Units | None = None,
+        layer: str = BUILDINGS,
     ) -> None:
         import_pyarrow()
         super().__init__(path, crs, prefix, units)
+        self.layers = (layer,)
 
     def finish(self) -> None:
         import pyarrow.parquet
 
-        kinds = {name: column_kind(name, found, self.prefix) for name, found in self.kinds.items()} or {"id": str}
+        (waiting,) = self.waiting.values()
+        kinds = waiting.kinds(self.prefix)
         schema = self.schema(kinds)
-        self.waiting.seek(0)
         with pyarrow.parquet.ParquetWriter(self.hidden, schema, compression="zstd") as file:
-            for rows in self.batches():
+            for rows in waiting.batches():
                 file.write_table(pyarrow.Table.from_arrays(arrays(rows, kinds, schema), schema=schema))
 
     def schema(self, kinds: dict[str, type]) -> Any:
@@ -43,7 +52,7 @@ class GeoParquetWriter(AttributesWriter):
             pyarrow.field(name, types[kind]) for name, kind in zip(column_names(kinds), kinds.values(), strict=True)
         ]
         crs = None if self.plan_wkt is None else CRS.from_wkt(self.plan_wkt).to_json_dict()
-        geometry = {"encoding": "WKB", "geometry_types": ["Polygon", "MultiPolygon"], "crs": crs}
+        geometry = {"encoding": "WKB", "geometry_types": GEOMETRY_TYPES[self.layers[0]], "crs": crs}
         geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
         return pyarrow.schema([*fields, pyarrow.field(GEOMETRY, pyarrow.binary())], {"geo": json.dumps(geo)})
 

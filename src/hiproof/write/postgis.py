@@ -1,4 +1,4 @@
-"""Models into PostGIS: a polyhedral surface a building, a polygon a roof surface, with all attributes.
+"""Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof surface, a rectangle a part.
 
 The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners of a face that are
 stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a table of their own.
@@ -8,6 +8,7 @@ A prefix's tables hold one run: loading replaces what they held, in one transact
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import islice
@@ -20,21 +21,27 @@ from ..errors import InputError, OutputError
 from ..frames import METRES, Units
 from ..model import ROOF, Face
 from ..read.database import import_psycopg, refuse_half_a_password
-from .building_attributes import OWN
+from .attribute_list import OWN, PARTS_LAYER
 from .naming import units_named
 from .triangles import face_triangles
 
+PARTS_AT_ONCE = 5000
+MEASURES = ", ".join(f"{a.name} double precision" for a in PARTS_LAYER if a.kind == "number")
 SCHEMA = """
 create extension if not exists postgis;
 create table if not exists {buildings} (
     id text primary key, status text, roof_type text, attributes jsonb, geom geometry(PolyhedralSurfaceZ, {srid}));
 create table if not exists {roofs} (
-    building_id text references {buildings} (id) on delete cascade, number integer, roof_type text,
+    building_id text references {buildings} (id) on delete cascade, number integer, part integer, type text,
     slope_deg double precision, azimuth_deg double precision, area_m2 double precision,
     geom geometry(PolygonZ, {srid}), primary key (building_id, number));
+create table if not exists {parts} (
+    building_id text references {buildings} (id) on delete cascade, part integer, type text,
+    {measures}, geom geometry(Polygon, {srid}), primary key (building_id, part));
 create index if not exists {prefix}_buildings_geom on {buildings} using gist (geom);
 create index if not exists {prefix}_roofs_geom on {roofs} using gist (geom);
-create index if not exists {prefix}_roofs_type on {roofs} (roof_type);
+create index if not exists {prefix}_roofs_type on {roofs} (type);
+create index if not exists {prefix}_parts_geom on {parts} using gist (geom);
 """
 
 
@@ -51,7 +58,7 @@ class Row:
 
 
 def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 500) -> int:
-    """Replace the tables PREFIX_buildings and PREFIX_roofs of the database at `dsn` by `folder`/buildings.city.jsonl.
+    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn` by the models of `folder`.
 
     Returns the number of buildings loaded. Raises InputError for a folder without models, OutputError for a database
     that cannot be written.
@@ -64,7 +71,7 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
     if not prefix.isidentifier():
         raise InputError(f"expected a table prefix of letters, digits and underscores, got {prefix!r}")
     psycopg = import_psycopg()
-    names = {"buildings": f"{prefix}_buildings", "roofs": f"{prefix}_roofs", "prefix": prefix}
+    names = {"prefix": prefix} | {table: f"{prefix}_{table}" for table in ("buildings", "roofs", "parts")}
     try:
         with psycopg.connect(refuse_half_a_password(dsn)) as connection, connection.cursor() as cursor:
             header, features = open_sequence(path)
@@ -72,7 +79,9 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
             empty_tables(cursor, names, srid)
             units = units_named(header.get("metadata", {}).get("referenceSystem"), units_of_run(path.parent))
             rows = (building_row(header["transform"], feature, units) for feature in features)
-            return sum(insert(cursor, some, names, srid) for some in batched(rows, batch))
+            count = sum(insert(cursor, some, names, srid) for some in batched(rows, batch))
+            insert_parts(cursor, path.with_name("buildings.gpkg"), names["parts"], srid)
+            return count
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
         raise OutputError(
@@ -82,9 +91,10 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
 
 def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
     """Make the tables, or empty those that are there and give them the run's reference system."""
-    cursor.execute(SCHEMA.format(srid=srid, **names))
+    cursor.execute(SCHEMA.format(srid=srid, measures=MEASURES, **names))
     cursor.execute("delete from {buildings}".format(**names))
-    for table, kind in ((names["buildings"], "PolyhedralSurfaceZ"), (names["roofs"], "PolygonZ")):
+    for key, kind in (("buildings", "PolyhedralSurfaceZ"), ("roofs", "PolygonZ"), ("parts", "Polygon")):
+        table = names[key]
         cursor.execute("select srid from geometry_columns where f_table_name = %s", (table,))
         if {known for (known,) in cursor.fetchall()} != {srid}:
             cursor.execute(f"alter table {table} alter column geom type geometry({kind}, {srid})")
@@ -141,20 +151,47 @@ def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> in
         ],
     )  # fmt: skip
     cursor.executemany(
-        f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, {geometry})",
+        f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, %s, {geometry})",
         [roof for row in rows for roof in roof_rows(row)],
     )
     return len(rows)
 
 
+def insert_parts(cursor: Any, path: Path, table: str, srid: int) -> None:
+    """Insert the layer `parts` of the GeoPackage at `path`; nothing where there is none."""
+    import pyogrio
+
+    if not path.is_file() or "parts" not in pyogrio.list_layers(path)[:, 0]:
+        return
+    columns = [attribute.name for attribute in PARTS_LAYER]
+    values = ", ".join(["%s"] * len(columns))
+    sql = f"insert into {table} ({', '.join(columns)}, geom) values ({values}, ST_SetSRID(%s::geometry, {srid}))"
+    start = 0
+    while True:
+        _, _, wkb, found = pyogrio.raw.read(
+            path, layer="parts", columns=columns, skip_features=start, max_features=PARTS_AT_ONCE
+        )
+        cursor.executemany(sql, [(*map(known, row), geometry) for *row, geometry in zip(*found, wkb, strict=True)])
+        start += len(wkb)
+        if len(wkb) < PARTS_AT_ONCE:
+            return
+
+
+def known(value: Any) -> Any:
+    """A value of a table as the database takes it; NaN, which stands for what is not known, as null."""
+    value = value.item() if isinstance(value, np.generic) else value
+    return None if isinstance(value, float) and math.isnan(value) else value
+
+
 def roof_rows(row: Row) -> Iterator[tuple]:
-    """A row a roof surface: (building, number, type, slope, azimuth, area, WKT)."""
+    """A row a roof surface: (building, number, part, type, slope, azimuth, area, WKT)."""
     roofs = [(face, said) for face, said in zip(row.faces, row.semantics, strict=True) if face.kind == ROOF]
     for number, (face, said) in enumerate(roofs):
         rings = [row.vertices[list(ring)] for ring in face.rings]
         yield (
             row.id,
             number,
+            said.get(f"{OWN}part"),
             said.get(f"{OWN}part_type"),
             *lie_of([row.units.to_metres(ring) for ring in rings]),
             f"POLYGON Z {rings_wkt(rings)}",

@@ -24,7 +24,7 @@ class RoofFigures:
     `h_50p` and `h_70p` are the levels that 50 and 70 % of the roof's plan area lie below; `h_ridge` the height of the
     longest level edge from which two faces fall away. `slope_deg` and `azimuth_deg` (clockwise from north, the way
     water runs) are those of the largest roof face, `face_slope_deg` and `face_azimuth_deg` (faces,) those of every
-    face.
+    face, `face_area_m2` (faces,) the true area of roof faces, 0 of others.
     """
 
     h_min: float
@@ -41,6 +41,7 @@ class RoofFigures:
     roof_faces: int
     face_slope_deg: np.ndarray
     face_azimuth_deg: np.ndarray
+    face_area_m2: np.ndarray
 
     @property
     def roofer_type(self) -> str:
@@ -98,6 +99,7 @@ def roof_figures(solid: Solid) -> RoofFigures:
         roof_faces=int(is_roof.sum()),
         face_slope_deg=slope,
         face_azimuth_deg=azimuth,
+        face_area_m2=size,
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from ..model import Building
 from ..status import Status
-from .attributes import AttributesWriter, table_row
+from .attributes import AttributesWriter
 from .building_attributes import building_attributes, figures_of
 from .citygml import CityGMLWriter, gml_member
 from .cityjson import SCALE, CityJSONWriter, feature_line
@@ -27,6 +27,7 @@ from .geoparquet import GeoParquetWriter
 from .naming import FileUnits
 from .parameters import FileHead, ParametersWriter, parameters_line
 from .roof_figures import RoofFigures
+from .table_rows import table_rows
 from .writer import BuildingWriter
 
 
@@ -70,21 +71,25 @@ def fragments(
     attributes = building_attributes(building, figures, units=units.gml)
     feature = feature_line(building, figures, attributes, names[0], Vertices(translate, SCALE, units.cityjson))
     member = gml_member(building, figures, attributes, names[1], units.gml)
-    return building, Fragments(member, feature, parameters_line(building), table_row(building, attributes, units.gml))
+    return building, Fragments(
+        member, feature, parameters_line(building), table_rows(building, figures, attributes, units.gml)
+    )
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
     """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
 
-    `files` are paths by what they hold: gml, cityjson, parameters, gpkg (the attribute table) or parquet (the same as
-    GeoParquet). Raises OutputError when one cannot be written.
+    `files` are paths by what they hold: gml, cityjson, parameters, gpkg (the tables) or parquet, parquet_parts,
+    parquet_surfaces (the same as GeoParquet). Raises OutputError when one cannot be written.
     """
     writers = {
         "gml": lambda path: (CityGMLWriter(path, head.crs), "gml"),
         "cityjson": lambda path: (CityJSONWriter(path, head.crs, translate=head.offset), "cityjson"),
         "parameters": lambda path: (ParametersWriter(path, head), "parameters"),
-        "gpkg": lambda path: (AttributesWriter(path, head.crs), "row"),
-        "parquet": lambda path: (GeoParquetWriter(path, head.crs), "row"),
+        "gpkg": lambda path: (AttributesWriter(path, head.crs), "rows"),
+        "parquet": lambda path: (GeoParquetWriter(path, head.crs), "rows"),
+        "parquet_parts": lambda path: (GeoParquetWriter(path, head.crs, layer="parts"), "rows"),
+        "parquet_surfaces": lambda path: (GeoParquetWriter(path, head.crs, layer="roof_surfaces"), "rows"),
     }
     with ExitStack() as stack:
         opened = []

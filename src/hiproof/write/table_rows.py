@@ -1,0 +1,125 @@
+"""The rows of one building in the tables of a run: its outline, its parts as rectangles, its roof surfaces."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import shapely
+
+from ..frames import METRES, Units
+from ..model import GROUND, ROOF, Building, Part
+from .attribute_list import PARTS_LAYER, SHAPE
+from .building_attributes import metres, plain_text, rounded
+from .roof_figures import RoofFigures
+
+Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
+
+
+class Rows(NamedTuple):
+    """The rows of one building by table."""
+
+    buildings: tuple[Row, ...]
+    parts: tuple[Row, ...] = ()
+    roof_surfaces: tuple[Row, ...] = ()
+
+
+def table_rows(
+    building: Building, figures: RoofFigures | None, attributes: dict[str, Any], units: Units = METRES
+) -> Rows:
+    """The rows of `building`, their geometry in `units`; `attributes` are its own and `figures` those of its solid."""
+    parts = part_rows(building, units)
+    return Rows((building_row(building, attributes, units),), parts, surface_rows(building, figures, units))
+
+
+def building_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
+    """The outline of `building` in `units` (None where it is unknown) and its attributes by column."""
+    named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in attributes.items()}
+    return wkb_of(plan_outline(building), units), {"id": plain_text(building.id), **named}
+
+
+def plan_outline(building: Building) -> shapely.Geometry | None:
+    """The building's outline in world coordinates: the modelled one, else the one asked for, else None."""
+    if building.roof is not None:
+        return shapely.transform(building.roof.outline, building.roof.frame.to_world)
+    if building.solid is not None:
+        rings = [[building.solid.vertices[list(r), :2] for r in f.rings] for f in building.solid.of_kind(GROUND)]
+        return shapely.union_all([shapely.Polygon(outer, inner) for outer, *inner in rings])
+    return building.footprint
+
+
+def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
+    """A row a part: its rectangle, its type, every parameter and its standard deviation."""
+    if building.roof is None:
+        return ()
+    origin = building.roof.frame.origin
+    rows = []
+    for number, part in enumerate(building.parts):
+        corners = rectangle_of(part)
+        known = {
+            "building_id": plain_text(building.id),
+            "part": number,
+            "type": part.type,
+            "area_m2": metres(part.area),
+            "z_eave": metres(part.translation[2] + origin[2]),
+            "rotation": rounded(math.degrees(part.kappa)),
+            **{name: rounded(value) for name, value in part.parameters.items()},
+            **sigmas_of(part),
+        }
+        values = {a.name: known.pop(a.name, None) for a in PARTS_LAYER} | known
+        rows.append((wkb_of(shapely.Polygon(corners + origin[:2]), units), values))
+    return tuple(rows)
+
+
+def sigmas_of(part: Part) -> dict[str, float]:
+    """Standard deviations by column, those of the angles in degrees."""
+    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {name: f"{name}_sigma" for name in SHAPE}
+    return {
+        columns[name]: rounded(math.degrees(value) if name == "kappa" else value)
+        for name, value in part.sigma.items()
+        if name in columns
+    }
+
+
+def rectangle_of(part: Part) -> np.ndarray:
+    """Corners (4, 2) of the part's rectangle in the roof's frame; of one without sizes those around its outlines."""
+    c, s = math.cos(part.kappa), math.sin(part.kappa)
+    axes = np.array([[c, s], [-s, c]])
+    if "width" in part.parameters and "length" in part.parameters:
+        u, v = 0.5 * part.parameters["length"], 0.5 * part.parameters["width"]
+        return np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ axes + part.translation[:2]
+    uv = np.concatenate([shapely.get_coordinates(piece.outline) for piece in part.pieces]) @ axes.T
+    (u0, v0), (u1, v1) = uv.min(axis=0), uv.max(axis=0)
+    return np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)]) @ axes
+
+
+def surface_rows(building: Building, figures: RoofFigures | None, units: Units = METRES) -> tuple[Row, ...]:
+    """A row a roof surface of the solid: its polygon, slope, azimuth, area and part."""
+    if figures is None or building.solid is None:
+        return ()
+    vertices, rows = units.from_metres(building.solid.vertices), []
+    for index, face in enumerate(building.solid.faces):
+        if face.kind != ROOF:
+            continue
+        azimuth = float(figures.face_azimuth_deg[index])
+        known = 0 <= face.part < len(building.parts)
+        values = {
+            "building_id": plain_text(building.id),
+            "number": len(rows),
+            "part": face.part if known else None,
+            "type": building.parts[face.part].type if known else None,
+            "slope_deg": rounded(figures.face_slope_deg[index], 3),
+            "azimuth_deg": rounded(azimuth, 3) if math.isfinite(azimuth) else None,
+            "area_m2": metres(figures.face_area_m2[index]),
+        }
+        outer, *holes = (np.round(vertices[list(ring)], 4) for ring in face.rings)
+        rows.append((shapely.to_wkb(shapely.Polygon(outer, holes)), values))
+    return tuple(rows)
+
+
+def wkb_of(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
+    """A plan geometry (world metres) in `units` as WKB."""
+    if geometry is None:
+        return None
+    return shapely.to_wkb(geometry if units.are_metres else shapely.transform(geometry, units.from_metres))
