@@ -2,6 +2,7 @@
 
 import doctest
 import importlib
+import json
 import pkgutil
 import subprocess
 import sys
@@ -68,6 +69,18 @@ def test_examples_run(example, tmp_path):
     done = subprocess.run(command, capture_output=True, text=True, env=ENVIRONMENT, cwd=tmp_path, check=False)
     assert done.returncode == 0, done.stderr
     assert done.stdout.strip()
+
+
+def test_the_notebook_runs():
+    """Its cells one after the other, as a notebook's kernel would: the last value of each shows itself."""
+    pytest.importorskip("matplotlib", reason="the notebook plots (extra `report`)").use("Agg")
+    cells = json.loads((ROOT / "examples/edit_a_building.ipynb").read_text())["cells"]
+    names = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            exec(compile("".join(cell["source"]), cell["id"], "exec"), names)
+    assert max(names["shares"].values()) > 0.9 and names["building"].status.is_model
+    assert len(set(names["volumes"])) == 100 and names["axes"].collections
 
 
 def test_importing_brings_neither_torch_nor_dask_nor_the_compiler():

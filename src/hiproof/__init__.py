@@ -17,6 +17,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "build": "parametric",
+    "plot": "draw.plot",
     "read_parameters": "parametric",
     "reconstruct_area": "city.run",
     "Request": "city.request",

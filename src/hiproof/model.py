@@ -218,3 +218,46 @@ class Building:
     @property
     def parts(self) -> tuple[Part, ...]:
         return self.roof.parts if self.roof is not None else ()
+
+    def with_part(self, index: int, **change: Any) -> Building:
+        """The building with part `index` changed, or with one more part where `index` is the number of parts.
+
+        A change names any of `type`, `ridge_height` and `eave_height` (world metres), `position` (x, y of the rectangle's
+        centre and z of the lowest eave, about `roof.frame.origin`), `rotation` (degrees, of the length from the x axis),
+        `outlines` (rings of the polygons that it roofs) and parameters of the type by name (metres, degrees). Another type
+        keeps rectangle, eave and rise; a part that is moved or resized roofs what its rectangle covers. Figures of the
+        earlier model do not stay. Raises InputError for what makes no roof, CompositionError for what makes no solid.
+
+        >>> import hiproof
+        >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
+        >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)]))
+        >>> house.with_part(0, type="hip", ridge_height=6.0).type
+        'hip'
+        """
+        from .parametric.edit import with_part
+
+        return with_part(self, index, **change)
+
+    def without_part(self, index: int) -> Building:
+        """The building without part `index`; what it roofed alone is roofed by the part beside it. Raises as `with_part`."""
+        from .parametric.edit import without_part
+
+        return without_part(self, index)
+
+    def refit(
+        self, points: np.ndarray, fixed: dict[int, tuple[str, ...]] | None = None, settings: Any = None
+    ) -> Building:
+        """The building with all heights, pitches and inner lengths of its parts fitted to `points` (n, 3) world metres.
+
+        Types, rectangles and what `fixed` names (parameters by part, "z" the position's height) stay as they are. The
+        quality is measured on the points. Raises FitError for fewer than three points inside the outline.
+        """
+        from .parametric.refit import refit
+
+        return refit(self, points, fixed, settings)
+
+    def _repr_html_(self) -> str:
+        """A small view in a notebook, turned by dragging; it asks nothing of the network."""
+        from .draw.html import html_of
+
+        return html_of(self)

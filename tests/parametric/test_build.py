@@ -144,7 +144,7 @@ def test_what_is_wrong_is_one_sentence(name):
 
 
 def test_a_roof_that_does_not_close_is_one_sentence():
-    outline = [[[0.0, 0.0], [1e-5, 0.0], [0.0, 1e-5], [0.0, 0.0]]]
+    outline = [[[0.0, 0.0], [5e-4, 0.0], [0.0, 5e-4], [0.0, 0.0]]]
     with pytest.raises(CompositionError, match="expected"):
         hiproof.build(house(outlines=[outline]) | {"outline": outline})
 

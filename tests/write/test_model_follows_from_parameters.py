@@ -10,7 +10,6 @@ import hiproof
 from hiproof.read import read_footprints, read_points
 from hiproof.read.assign import points_of_footprints
 from hiproof.settings import Settings
-from hiproof.simulate import demo_files
 from hiproof.write.parameters import building_record, parameters_line
 
 PLAIN = Settings.from_dict({"segment": {"enabled": False}})
@@ -18,13 +17,12 @@ BUILDING_CLASS, SOME = 6, 12
 DELFT = Path(__file__).parents[3] / "shared" / "data" / "delft"
 
 
-def buildings(clouds, footprints, most=None):
-    """The models of all of the footprints, or of `most` of them drawn by chance."""
+def buildings(clouds, footprints, most):
+    """The models of `most` of the footprints, drawn by chance."""
     points = [read_points(path) for path in clouds]
     xyz = np.concatenate([cloud.xyz[cloud.classification == BUILDING_CLASS] for cloud in points])
     asked = list(read_footprints(footprints))
-    if most is not None:
-        asked = [asked[k] for k in np.random.default_rng(0).permutation(len(asked))[:most]]
+    asked = [asked[k] for k in np.random.default_rng(0).permutation(len(asked))[:most]]
     own = points_of_footprints(xyz, asked)
     return [hiproof.reconstruct(xyz[i], f, settings=PLAIN) for i, f in zip(own, asked, strict=True)]
 
@@ -36,12 +34,6 @@ def assert_follows(building):
     assert again.solid.faces == building.solid.faces
     for piece, told in zip(building.roof.pieces, again.roof.pieces, strict=True):
         assert np.array_equal(piece.planes, told.planes)
-
-
-def test_the_demos_buildings_follow_from_what_is_written():
-    files = demo_files()
-    for building in buildings([files["cloud"]], files["footprints"]):
-        assert_follows(building)
 
 
 @pytest.mark.skipif(not DELFT.is_dir(), reason="needs ../shared/data/delft")

@@ -14,7 +14,7 @@ from ..frames import LocalFrame
 from ..model import Building, Part, Quality, Roof
 from ..status import Status
 from ..write.attribute_list import PARAMETERS, PART
-from .settle import pieces_of
+from .settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, settled, settled_outline, settled_sigma
 from .shape import refuse_no_shape
 
 MOST_PARTS = 1000
@@ -36,14 +36,15 @@ def building_of(record: Mapping[str, Any]) -> Building:
     outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
     status = status_of(record, bool(parts))
     roof = roof_of(parts, outline, origin) if parts else None
-    world = outline if roof is None or outline is None else shapely.transform(outline, roof.frame.to_world)
+    world = outline if roof is None else shapely.transform(roof.outline, roof.frame.to_world)
+    ground = figure(record, "z_ground") if roof is None else number(record.get("z_ground"), "z_ground")
     return Building(
         id=str(record["id"]),
         status=status,
         detail=text_at(record, "detail") if status.code == record.get("status") else "",
         roof=roof,
         quality=quality_of(record),
-        z_ground=figure(record, "z_ground") if roof is None else number(record.get("z_ground"), "z_ground"),
+        z_ground=settled(ground, PLAN_DIGITS),
         ground_source=text_at(record, "ground_source"),
         terrain_intersection=tuple(lines_of(record)),
         objective=figure(record, "objective"),
@@ -73,9 +74,10 @@ def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | N
         raise InputError("expected an outline and an origin of a building with parts, got null; give both")
     if len(parts) > MOST_PARTS:
         raise InputError(f"expected at most {MOST_PARTS} parts, got {len(parts)}; split the building")
+    outline = settled_outline(outline)
     made = [part_of(part, outline, f"part {index}") for index, part in enumerate(parts)]
     refuse_alike(parts)
-    return Roof(tuple(made), outline, LocalFrame(origin))
+    return Roof(tuple(made), outline, LocalFrame(rounded(origin, DIGITS)))
 
 
 def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
@@ -84,15 +86,16 @@ def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
     kind = record.get("type")
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
     refuse_no_shape(kind, parameters, where)
-    position = place(record.get("position"), f"position of {where}")
-    kappa = math.radians(number(record.get("rotation", 0.0), f"rotation of {where}"))
-    outlines = outlines_of(record, parameters, position, kappa, outline, where)
+    parameters = {name: settled(value) for name, value in parameters.items()}
+    position = rounded(place(record.get("position"), f"position of {where}"), DIGITS)
+    kappa = math.radians(settled(number(record.get("rotation", 0.0), f"rotation of {where}")))
+    outlines = [rounded_outline(o) for o in outlines_of(record, parameters, position, kappa, outline, where)]
     pieces = pieces_of(kind, parameters, kappa, position, outlines)
     if not all(np.isfinite(piece.planes).all() for piece in pieces):
         raise InputError(f"expected parameters that make finite planes, got others in {where}; check their sizes")
     sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {where}")
     sigma = {("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s) for n, s in sigma.items()}
-    return Part(kind, pieces, parameters, kappa, position, sigma)
+    return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
 
 
 def outlines_of(
@@ -145,7 +148,7 @@ def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:
         np.array([place(xyz, "a point of terrain_line") for xyz in as_list(line, "a line of terrain_line")])
         for line in as_list(record.get("terrain_line") or [], "terrain_line")
     ]
-    return [line for line in lines if len(line)]
+    return [rounded(line, PLAN_DIGITS) for line in lines if len(line)]
 
 
 def quality_of(record: Mapping[str, Any]) -> Quality:
@@ -193,6 +196,10 @@ def number(value: Any, where: str) -> float:
     if not is_number or not abs(value) < MOST:
         raise InputError(f"expected a number as {where}, got {shown(value)}; give metres, or degrees for angles")
     return float(value)
+
+
+def rounded(values: np.ndarray, digits: int) -> np.ndarray:
+    return np.array([settled(v, digits) for v in values.ravel()]).reshape(values.shape)
 
 
 def figure(record: Mapping[str, Any], name: str) -> float:

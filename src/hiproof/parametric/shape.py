@@ -9,7 +9,10 @@ import numpy as np
 
 from ..errors import FitError, InputError
 from ..primitives.catalogue import CATALOGUE
-from ..primitives.family import NAMES, SHAPES, SIDES, member_of
+from ..primitives.family import COMPONENTS, NAMES, SHAPES, SIDES
+
+SIDED = frozenset(f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew"))
+"""Parameters of a member's sides; a part that has one gives all of its shape side by side."""
 
 STEEPEST_DEG = 89.0
 SHOWN = 8
@@ -29,7 +32,7 @@ def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> N
             raise InputError(f"expected a positive {name} of {where}, got {parameters[name]:g}; give metres")
     if kind == "flat":
         refuse_other_names(kind, parameters, [], ["width", "length"], where)
-    elif kind in CATALOGUE and not any(name.startswith("pitch_") for name in parameters):
+    elif kind in CATALOGUE and not SIDED & parameters.keys():
         refuse_other_names(kind, parameters, CATALOGUE[kind].parameters, [], where)
         refuse_falling(kind, parameters, where)
     else:
@@ -45,7 +48,7 @@ def refuse_other_names(
     if missing or other:
         got = f"none for {', '.join(missing)}" if missing else f"also {', '.join(other[:SHOWN])}"
         raise InputError(
-            f"expected the parameters {', '.join(needed) or 'width, length'} of a {kind} roof in {where}, got {got}; "
+            f"expected the parameters {', '.join(needed) or 'width, length'} of the type {kind} in {where}, got {got}; "
             "`hiproof build --shapes` lists those of every type"
         )
 
@@ -54,7 +57,9 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
     """Raise InputError where a shape of the catalogue has a plane that falls from its eave or stands upright."""
     shape = CATALOGUE[kind]
     try:
-        q = np.array(shape.to_theta(parameters)[6:])
+        theta = shape.variant(parameters).to_theta(parameters)
+        shape.from_theta(theta)
+        q = theta[6:]
     except FitError as error:
         raise InputError(f"{where}: {error}") from error
     except ZeroDivisionError:
@@ -71,18 +76,17 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
 
 def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> None:
     """Raise InputError where parameters given side by side make no member of the family."""
-    allowed = ["height", "width", "length", *(f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew"))]
-    refuse_other_names(kind, parameters, [], allowed, where)
+    if kind in COMPONENTS:
+        refuse_other_names(kind, parameters, list(CATALOGUE[kind].parameters), [], where)
+    needed = side_by_side_names(kind)
+    skews = [name.replace("pitch", "skew") for name in needed if name.startswith("pitch_")]
+    refuse_other_names(kind, parameters, list(needed), skews, where)
     for name, value in parameters.items():
         low = 0.0 if name.startswith("pitch_") else -STEEPEST_DEG
         if name.startswith(("pitch_", "skew_")) and not low <= value <= STEEPEST_DEG:
             raise InputError(
                 f"expected {name} between {low:g} and {STEEPEST_DEG:g} degrees in {where}, got {value:g}; give degrees"
             )
-    try:
-        member_of(kind, parameters, 0.0, np.zeros(3))
-    except FitError as error:
-        raise InputError(f"{where}: {error}") from error
 
 
 def names_of(kind: str) -> tuple[str, ...]:

@@ -1,0 +1,65 @@
+"""Random edits of generated buildings: each becomes a valid solid or one sentence. And: how long an edit takes.
+
+python -m benchmarks edits [EDITS] [BUILDINGS]
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import Counter
+
+import numpy as np
+
+from hiproof.compose import check_solid
+from hiproof.errors import HiproofError
+from hiproof.model import Building
+from hiproof.parametric.building import solid_of
+from hiproof.parametric.settle import settled_roof
+from hiproof.simulate import random_building, random_compound
+from hiproof.simulate.edits import KINDS, random_edit
+from hiproof.status import Status
+
+
+def generated(count: int, seed: int = 0) -> list[Building]:
+    """Buildings of one primitive and compounds in turn, their solids composed."""
+    rng = np.random.default_rng(seed)
+    roofs = [(random_building if k % 2 else random_compound)(rng).roof for k in range(count)]
+    return [
+        solid_of(Building(f"house-{k}", Status.MODELLED, roof=settled_roof(roof), z_ground=0.0))
+        for k, roof in enumerate(roofs)
+    ]
+
+
+def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, Counter]:
+    """Each building is edited again and again, an edit standing on those before it that made a building."""
+    rng, houses = np.random.default_rng(seed), generated(buildings)
+    outcomes = {kind: Counter() for kind in KINDS}
+    sentences: Counter = Counter()
+    seconds = []
+    for number in range(edits):
+        place = number % buildings
+        kind, index, change = random_edit(rng, houses[place])
+        start = time.perf_counter()
+        try:
+            house = houses[place]
+            found = house.without_part(index) if kind == "remove" else house.with_part(index, **change)
+            valid = not check_solid(found.solid, planarity_m=0.01)
+            outcomes[kind]["valid" if valid else "INVALID"] += 1
+            houses[place] = found if len(found.parts) < 12 else houses[place]
+        except HiproofError as error:
+            sentences[str(error)[:60]] += 1
+            outcomes[kind]["one sentence" if "\n" not in str(error) else "SENTENCES"] += 1
+        except Exception as error:
+            outcomes[kind][f"CRASH {type(error).__name__}: {error}"[:120]] += 1
+        seconds.append(time.perf_counter() - start)
+    for kind, counts in outcomes.items():
+        print(f"{kind}: " + ", ".join(f"{number} {what}" for what, number in counts.most_common()))
+    print(f"{edits} edits of {buildings} buildings, {1e3 * np.median(seconds):.1f} ms in the median")
+    for sentence, number in sentences.most_common(8):
+        print(f"  {number} {sentence} ...")
+    return outcomes
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:3]))

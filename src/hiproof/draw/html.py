@@ -1,0 +1,75 @@
+"""A building in a notebook: a small view that turns when dragged, its parts in a table; no request leaves the page."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from html import escape
+from importlib.resources import files
+
+import numpy as np
+
+from ..model import Building
+from .view import TILT_DEG, TURN_DEG, colours_of, lightness, seen_faces, shaded
+
+SIZE = (360, 260)
+MARGIN = 12
+SHOWN_PARTS = 12
+MM = 3
+
+
+def html_of(building: Building) -> str:
+    """The building as HTML: its view where it has a solid, status, and the parameters of its parts."""
+    head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
+    view = view_of(building) if building.solid is not None else ""
+    return f'<div style="font-family:sans-serif;font-size:12px">{view}<div>{head}</div>{parts_table(building)}</div>'
+
+
+def view_of(building: Building) -> str:
+    """The solid as SVG, and the script that turns it."""
+    solid, colours = building.solid, colours_of(building)
+    corners = np.round(solid.vertices - solid.vertices.mean(axis=0), MM)
+    scale = (min(SIZE) - 2 * MARGIN) / max(float(np.ptp(corners, axis=0).max()), 1e-6)
+    faces = [
+        {"r": [list(ring) for ring in face.rings], "c": shaded(colour, lightness(solid, face))}
+        for face, colour in zip(solid.faces, colours, strict=True)
+    ]
+    data = json.dumps({"v": corners.tolist(), "f": faces, "s": scale, "t": [TURN_DEG, TILT_DEG]}, separators=(",", ":"))
+    name = "hiproof-" + hashlib.sha256((building.id + data).encode()).hexdigest()[:12]
+    polygons = "".join(
+        path_of(face.rings, shaded(face.colour, face.light), scale) for face in seen_faces(solid, colours)
+    )
+    box = f"{-SIZE[0] / 2} {-SIZE[1] / 2} {SIZE[0]} {SIZE[1]}"
+    script = (files("hiproof.draw") / "turn.js").read_text(encoding="utf-8")
+    return (
+        f'<svg id="{name}" width="{SIZE[0]}" height="{SIZE[1]}" viewBox="{box}" style="cursor:grab;touch-action:none" '
+        f'role="img" aria-label="model of {escape(building.id, quote=True)}">{polygons}</svg>'
+        f'<script>({script.strip()})("{name}",{data.replace("<", chr(92) + "u003c")})</script>'
+    )
+
+
+def path_of(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
+    """A face as an SVG path."""
+    d = "".join("M" + "L".join(f"{x * scale:.1f} {y * scale:.1f}" for x, y in ring) + "Z" for ring in rings)
+    return f'<path d="{d}" fill="{colour}" fill-rule="evenodd" stroke="#333" stroke-width="0.7"/>'
+
+
+def parts_table(building: Building) -> str:
+    """A row a part: number, type, parameters with their standard deviations."""
+    rows = "".join(
+        f"<tr><td>{number}</td><td>{escape(part.type)}</td><td>{parameters_text(part)}</td></tr>"
+        for number, part in enumerate(building.parts[:SHOWN_PARTS])
+    )
+    more = len(building.parts) - SHOWN_PARTS
+    rest = f"<tr><td></td><td>and {more} more</td><td></td></tr>" if more > 0 else ""
+    return f'<table style="font-size:12px">{rows}{rest}</table>' if rows else ""
+
+
+def parameters_text(part) -> str:
+    """Parameters as a person reads them: degrees for angles, else metres."""
+    told = []
+    for name, value in part.parameters.items():
+        unit = "°" if name.startswith(("pitch_", "skew_")) else "" if name == "teeth" else " m"
+        sigma = f" ± {part.sigma[name]:.2f}" if name in part.sigma else ""
+        told.append(f"{escape(name)} {value:.2f}{sigma}{unit}")
+    return ", ".join(told)

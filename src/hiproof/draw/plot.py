@@ -1,0 +1,57 @@
+"""A building over its points, by matplotlib."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..model import Building
+from .view import colours_of, lightness, shaded
+
+NEAR_M = 0.2
+MOST_POINTS = 5000
+
+
+def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -> Any:
+    """Draw the building's solid, and `points` (n, 3) world metres coloured by their height over its roof, into matplotlib axes.
+
+    ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the roof are blue, others red.
+    Raises InputError for a building without a model, or where matplotlib (extra `report`) is missing.
+    """
+    if building.solid is None:
+        raise InputError(f"expected a building with a model, got {building.id} without one; its status says why")
+    ax = ax if ax is not None else new_axes()
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+    origin = building.roof.frame.origin if building.roof is not None else building.solid.vertices.mean(axis=0)
+    vertices = building.solid.vertices - origin
+    faces = building.solid.faces
+    colours = [shaded(c, lightness(building.solid, f)) for c, f in zip(colours_of(building), faces, strict=True)]
+    polygons = [vertices[list(face.rings[0])] for face in faces]
+    ax.add_collection3d(
+        Poly3DCollection(polygons, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.75)
+    )
+    shown = vertices
+    if points is not None and len(points):
+        local = np.asarray(points, float).reshape(-1, 3)[:: max(1, len(points) // MOST_POINTS)] - origin
+        gap = local[:, 2] - building.roof.height_at(local[:, :2])
+        near = np.abs(gap) <= NEAR_M
+        for chosen, colour, label in ((near, "#1f5fbf", "within 0.2 m"), (~near, "#c8321e", "further")):
+            ax.scatter(*local[chosen].T, s=2, color=colour, label=f"{label}: {chosen.sum()} points", depthshade=False)
+        ax.legend(loc="upper left", fontsize="small")
+        shown = np.concatenate([vertices, local])
+    low, high = shown.min(axis=0), shown.max(axis=0)
+    ax.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), zlim=(low[2], high[2]))
+    ax.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title=f"{building.id}: {building.type}")
+    ax.set_box_aspect(np.maximum(high - low, 0.1))
+    return ax
+
+
+def new_axes() -> Any:
+    try:
+        import matplotlib.pyplot as plt
+    except ImportError as error:
+        raise InputError("expected matplotlib for plots, got none; try: pip install 'hiproof[report]'") from error
+    return plt.figure(figsize=(7, 6)).add_subplot(projection="3d")

@@ -1,0 +1,76 @@
+"""How a solid is seen: faces turned, projected and ordered from far to near (painter's algorithm)."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import ROOF, Building, Solid
+from ..write.colours import TYPE_COLOURS
+
+WALL_COLOUR = "#d9d4cb"
+TURN_DEG, TILT_DEG = -35.0, 35.0
+
+
+@dataclass(frozen=True)
+class SeenFace:
+    """A face on the page: its rings (m, 2), y downwards, its colour, how light it is (0 to 1)."""
+
+    rings: tuple[np.ndarray, ...]
+    colour: str
+    light: float
+    is_roof: bool
+
+
+def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
+    """Page coordinates and nearness (n, 3) of points seen from a `tilt_deg` above the horizon, turned by `turn_deg`."""
+    a, t = math.radians(turn_deg), math.radians(tilt_deg)
+    x = xyz[:, 0] * math.cos(a) - xyz[:, 1] * math.sin(a)
+    y = xyz[:, 0] * math.sin(a) + xyz[:, 1] * math.cos(a)
+    return np.column_stack([x, -(y * math.sin(t) + xyz[:, 2] * math.cos(t)), xyz[:, 2] * math.sin(t) - y * math.cos(t)])
+
+
+def colours_of(building: Building) -> list[str]:
+    """A colour a face: that of its part's type for roofs."""
+    return [
+        TYPE_COLOURS.get(building.parts[face.part].type, TYPE_COLOURS["unknown"])
+        if face.kind == ROOF and 0 <= face.part < len(building.parts)
+        else WALL_COLOUR
+        for face in building.solid.faces
+    ]
+
+
+def seen_faces(
+    solid: Solid, colours: list[str], turn_deg: float = TURN_DEG, tilt_deg: float = TILT_DEG
+) -> list[SeenFace]:
+    """The faces that look towards the eye, the farthest first."""
+    page = projected(solid.vertices - solid.vertices.mean(axis=0), turn_deg, tilt_deg)
+    seen = []
+    for face, colour in zip(solid.faces, colours, strict=True):
+        outer = page[list(face.rings[0])]
+        ahead = np.roll(outer, -1, axis=0)
+        area = float((outer[:, 0] * ahead[:, 1] - ahead[:, 0] * outer[:, 1]).sum())
+        if area < -1e-9:  # y points down, so what is counter-clockwise in space turns the other way
+            rings = tuple(page[list(ring), :2] for ring in face.rings)
+            seen.append((float(outer[:, 2].mean()), SeenFace(rings, colour, lightness(solid, face), face.kind == ROOF)))
+    return [face for _, face in sorted(seen, key=lambda pair: pair[0])]
+
+
+def lightness(solid: Solid, face) -> float:
+    """How light a face is under a lamp high in the south-west."""
+    corners = solid.vertices[list(face.rings[0])]
+    corners = corners - corners[0]
+    normal = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    normal /= max(float(np.linalg.norm(normal)), 1e-12)
+    return float(0.72 + 0.28 * normal @ np.array([-0.4, -0.5, 0.77]))
+
+
+def shaded(colour: str, light: float) -> str:
+    """A colour (#rrggbb) made darker.
+
+    >>> shaded("#ff8000", 0.5)
+    '#804000'
+    """
+    return "#" + "".join(f"{round(int(colour[k : k + 2], 16) * max(min(light, 1.0), 0.0)):02x}" for k in (1, 3, 5))

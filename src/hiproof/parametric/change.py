@@ -1,0 +1,195 @@
+"""One part changed: another type of the same size, a ridge or an eave at a height, sides moved. Parts are JSON objects here.
+
+An edit is an edit of what is written (`write.parameters.part_record`), so whatever a hand may do to the file a program may do, and
+the same checks hold.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..primitives.catalogue import CATALOGUE
+from ..primitives.family import COMPONENTS, NAMES, Member, member_of
+from .shape import SIDED, side_by_side_names
+
+PLAN = ("width", "length")
+USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one
+HALF_HIP = 0.5  # share of the rise at which the eave of a half-hipped end lies
+TOP = 0.6  # share of the rise at which a level top cuts
+STEEPEST = math.tan(math.radians(85.0))
+
+
+def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) -> dict[str, Any]:
+    """The part after a change: `type`, `position` (x, y, z about the origin), `rotation` (degrees), `ridge_height` and
+    `eave_height` (world metres, the origin at `z_origin`), `outlines`, and any parameter by name.
+
+    Another type keeps the rectangle, the lowest eave and the ridge's height. A part that moves or whose sides do roofs what
+    its rectangle covers, its own outlines left out. Raises InputError for what contradicts itself.
+    """
+    change = {name: value for name, value in change.items() if value is not None}
+    part = {key: value for key, value in part.items() if key != "sigma"}
+    kind = change.pop("type", part["type"])
+    if kind != part["type"]:
+        part = of_type(with_sizes(part), kind)
+    ridge, eave = change.pop("ridge_height", None), change.pop("eave_height", None)
+    placed = {name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change}
+    if SIDED & change.keys():
+        part = side_by_side(part)
+    moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN)
+    if moves and "outlines" not in placed:
+        part = {key: value for key, value in with_sizes(part).items() if key != "outlines"}
+    part = {**part, **placed, "parameters": {**part["parameters"], **change}}
+    if eave is not None:
+        part["position"] = [*part["position"][:2], eave - z_origin]
+    return part if ridge is None else with_ridge(part, ridge - z_origin)
+
+
+def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
+    """The part with a width and a length; one that has none gets those of the smallest rectangle around its outlines."""
+    if all(name in part["parameters"] for name in PLAN):
+        return part
+    outlines = shapely.union_all([shapely.make_valid(shapely.Polygon(o[0], o[1:])) for o in part["outlines"]])
+    corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(outlines))[:4]
+    sides = corners[1:3] - corners[:2]
+    lengths = np.hypot(*sides.T)
+    along = int(lengths.argmax())
+    x, y = corners.mean(axis=0).tolist()
+    sizes = {"width": float(lengths[1 - along]), "length": float(lengths[along])}
+    rotation = math.degrees(math.atan2(*sides[along][::-1]))
+    return {
+        **part,
+        "parameters": {**part["parameters"], **sizes},
+        "position": [x, y, part["position"][2]],
+        "rotation": rotation,
+    }
+
+
+def of_type(part: dict[str, Any], kind: str) -> dict[str, Any]:
+    """The part as another roof type over the same rectangle, with the same lowest eave and the same rise."""
+    if kind not in NAMES:
+        raise InputError(f"expected a roof type ({', '.join(NAMES)}), got {kind!r}; choose one")
+    width, length = (part["parameters"][name] for name in PLAN)
+    rise = rise_of(part) or 0.5 * USUAL_PITCH * width
+    if kind in CATALOGUE:
+        parameters = CATALOGUE[kind].typical(width, length, rise)
+    else:
+        parameters = typical_member(kind, width, length, rise)
+    return {**part, "type": kind, "parameters": parameters}
+
+
+def typical_member(kind: str, width: float, length: float, rise: float) -> dict[str, float]:
+    """An ordinary member of the family that the catalogue does not have: equal pitches, a level top where it has one."""
+    names = side_by_side_names(kind)
+    two_across = "pitch_front" in names and "pitch_back" in names
+    pitch = math.degrees(math.atan(rise / (0.5 * width if two_across else width)))
+    parameters = {"width": width, "length": length}
+    for name in names[2:]:
+        if name == "height":
+            parameters[name] = TOP * rise
+        elif name.startswith("pitch_"):
+            parameters[name] = pitch
+        else:
+            is_end = name.endswith(("left", "right"))
+            parameters[name] = HALF_HIP * rise if "half_hip" in kind and is_end else 0.0
+    return parameters
+
+
+def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
+    """The part with each side's own pitch and eave in place of the catalogue's parameters. Raises InputError where it has none."""
+    parameters = part["parameters"]
+    if SIDED & parameters.keys():
+        return part
+    if part["type"] in COMPONENTS or part["type"] == "flat":
+        raise InputError(
+            f"expected a roof with pitches of its own sides, got a {part['type']} roof; change its type first"
+        )
+    return {**part, "parameters": member_like(part).side_by_side()[0]}
+
+
+def member_like(part: dict[str, Any]) -> Member:
+    """The member of the family that is the same surface as the catalogue's shape, in its own axes."""
+    kind, parameters = part["type"], part["parameters"]
+    if SIDED & parameters.keys():
+        return member_of(kind, parameters, 0.0, np.zeros(3))
+    shape = CATALOGUE[kind]
+    planes = shape.plane_values(shape.to_theta(parameters))
+    half = 0.5 * np.array([parameters["length"], parameters["width"]])
+    eaves, slopes, top = np.full(4, np.inf), np.zeros(4), math.inf
+    for a, b, c in planes:
+        if a == 0.0 and b == 0.0:
+            top = float(c)
+            continue
+        axis = 0 if abs(a) > abs(b) else 1
+        slope = (a, b)[axis]
+        side = 2 * axis + (0 if slope > 0.0 else 1)
+        slopes[side] = abs(slope)
+        eaves[side] = c - abs(slope) * half[axis]
+    return Member(0.0, np.zeros(2), half, eaves, slopes, top)
+
+
+def rise_of(part: dict[str, Any]) -> float:
+    """Height of the part's ridge or top over its lowest eave [m]."""
+    if part["type"] == "flat":
+        return 0.0
+    return part["parameters"]["height"] if part["type"] in COMPONENTS else rise_of_member(member_like(part))
+
+
+def rise_of_member(member: Member) -> float:
+    """Height of a member's highest place over its base, within its rectangle, skews left aside."""
+    reach = []
+    for axis in (0, 1):
+        sides = [side for side in (2 * axis, 2 * axis + 1) if member.has[side]]
+        if len(sides) == 2:
+            reach.append(member.apex(axis) if member.slopes[sides].any() else member.eaves[sides].min())
+        reach += [member.eaves[s] + 2.0 * member.slopes[s] * member.half[axis] for s in sides if len(sides) == 1]
+    return float(min(*reach, member.top, math.inf) - member.base)
+
+
+def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
+    """The part with its ridge or top at `z_ridge` about the origin, its eaves where they are."""
+    if part["type"] == "flat":
+        return {**part, "position": [*part["position"][:2], z_ridge]}
+    if not rise_of(part) > 0.0:  # a roof without any slope has none that could be made steeper
+        part = of_type(with_sizes(part), part["type"])
+    parameters, rise = part["parameters"], z_ridge - part["position"][2]
+    if not rise > 0.0:
+        raise InputError(
+            f"expected a ridge above the eave, got one {-rise:.2f} m below it; lower the eave too (eave_height)"
+        )
+    if not SIDED & parameters.keys():
+        heights = {name: parameters[name] for name in ("hip_height", "break_height", "eave_step") if name in parameters}
+        scale = rise / parameters["height"]
+        return {
+            **part,
+            "parameters": {**parameters, "height": rise, **{name: h * scale for name, h in heights.items()}},
+        }
+    if "height" not in parameters:
+        return {**part, "parameters": parameters | pitches_for(parameters, part["type"], rise)}
+    steeper = rise / parameters["height"]  # a level top keeps its size
+    pitches = {n: steeper_by(steeper, v) for n, v in parameters.items() if n.startswith("pitch_")}
+    return {**part, "parameters": {**parameters, **pitches, "height": rise}}
+
+
+def steeper_by(factor: float, pitch_deg: float) -> float:
+    """A pitch whose slope is `factor` times as much [degrees]."""
+    return math.degrees(math.atan(factor * math.tan(math.radians(pitch_deg))))
+
+
+def pitches_for(parameters: dict[str, float], kind: str, rise: float) -> dict[str, float]:
+    """Pitches, all slopes changed by one factor, with which the ridge comes to `rise` over the lowest eave."""
+    given = {name: value for name, value in parameters.items() if name.startswith("pitch_")}
+
+    def pitches(factor: float) -> dict[str, float]:
+        return {name: steeper_by(factor, pitch) for name, pitch in given.items()}
+
+    low, high = 0.0, STEEPEST / max(math.tan(math.radians(max(given.values()))), 1e-9)
+    for _ in range(60):  # the rise grows with the factor
+        middle = 0.5 * (low + high)
+        found = rise_of_member(member_of(kind, parameters | pitches(middle), 0.0, np.zeros(3)))
+        low, high = (middle, high) if found < rise else (low, middle)
+    return pitches(0.5 * (low + high))

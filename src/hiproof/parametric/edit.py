@@ -1,0 +1,67 @@
+"""A building with another part, or without one: what `Building.with_part` and `without_part` do."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+from ..errors import InputError
+from ..model import Building, Quality
+from ..status import Status
+from ..write.parameters import building_record
+from .building import build
+from .change import changed_part
+
+BY_HAND = "changed by hand"
+
+
+def with_part(building: Building, index: int, **change: Any) -> Building:
+    """The building with part `index` changed, or with one more where `index` is their number; see `Building.with_part`."""
+    record = record_of(building)
+    parts, z_origin = record["parts"], record["origin"][2]
+    if not 0 <= index <= len(parts):
+        raise InputError(f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one")
+    if index == len(parts):
+        parts = [*parts, new_part(change, z_origin)]
+    else:
+        parts = [*parts[:index], changed_part(parts[index], change, z_origin), *parts[index + 1 :]]
+    return built(building, {**record, "parts": parts})
+
+
+def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
+    """A part of its own: its type, position, width and length at least are given."""
+    missing = [name for name in ("type", "position", "width", "length") if change.get(name) is None]
+    if missing:
+        raise InputError(f"expected type, position, width and length of a new part, got none for {', '.join(missing)}")
+    sizes = {name: change[name] for name in ("width", "length")}
+    flat = {"type": "flat", "parameters": sizes, "position": list(change["position"]), "rotation": 0.0}
+    return changed_part(flat, change, z_origin)
+
+
+def without_part(building: Building, index: int) -> Building:
+    """The building without part `index`; what it roofed alone is roofed by the part beside it."""
+    record = record_of(building)
+    parts = record["parts"]
+    if len(parts) < 2 or not 0 <= index < len(parts):
+        raise InputError(
+            f"expected one of two or more parts to leave out, got {index} of {len(parts)}; keep one at least"
+        )
+    return built(building, {**record, "parts": [*parts[:index], *parts[index + 1 :]]})
+
+
+def record_of(building: Building) -> dict[str, Any]:
+    """What is written of a building that has a model. Raises InputError for one that has none."""
+    if building.roof is None:
+        raise InputError(f"expected a building with a model, got {building.id} without one; its status says why")
+    return building_record(building)
+
+
+def built(building: Building, record: dict[str, Any]) -> Building:
+    """The building of a changed record: no figure of the earlier model stays."""
+    found = build({**record, "status": Status.MODELLED.code, "detail": BY_HAND})
+    return dataclasses.replace(
+        found,
+        quality=Quality(points=building.quality.points, density=building.quality.density),
+        footprint=building.footprint,
+        attributes=building.attributes,
+    )

@@ -1,0 +1,256 @@
+"""The parameters of given parts fitted to points: types, rectangles and what is held stay, the points determine the rest.
+
+One robust least squares over all parts at once (Levenberg and Marquardt, re-weighted by Tukey's biweight from coarse to fine): the
+residual of a point is its height over the roof, which is the highest part there. Each part's planes follow from its own
+parameters, so a column of the Jacobian asks one part again. The result is never further from the points than the start.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Collection, Mapping
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import FitError, InputError
+from ..model import Building, Part, Roof
+from ..settings import Settings
+from ..status import Status
+from .edit import built, record_of
+from .settle import pieces_of
+from .shape import SIDED
+
+HELD = ("width", "length", "teeth")
+STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian
+SCALES_M = (3.0, 0.8, 0.25)  # residuals beyond are outliers, from coarse to fine
+ROUNDS = 6  # at each scale
+MOST_POINTS = 2000  # an even selection of more
+WELL = 0.3  # of a point's whole cost: a start that comes so near is no further searched for from afar
+FACADE_M, ENOUGH = 0.3, 30  # points so near the outline may be returns of walls; left out where enough others are
+FEWEST_POINTS = 3
+LEAST_HEIGHT_M, PITCHES_DEG = 0.01, (0.5, 85.0)
+Z = "z"
+FAR_M = 100.0
+
+
+@dataclasses.dataclass(frozen=True)
+class Unknowns:
+    """Which numbers are fitted: `names` (part, parameter or "z"), their start values and bounds (p,)."""
+
+    names: tuple[tuple[int, str], ...]
+    start: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+
+def refit(
+    building: Building,
+    points: np.ndarray,
+    fixed: Mapping[int, Collection[str]] | None = None,
+    settings: Settings | None = None,
+) -> Building:
+    """The building with its parts fitted to `points` again; see `Building.refit`."""
+    record = record_of(building)
+    roof = building.roof
+    local = roof.frame.to_local(np.asarray(points, float).reshape(-1, 3))
+    local = local[np.isfinite(local).all(axis=1)]
+    local = local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
+    unknowns = unknowns_of(roof.parts, fixed or {})
+    if len(local) < max(FEWEST_POINTS, 1):
+        raise FitError(f"expected {FEWEST_POINTS} points or more inside the outline, got {len(local)}; add a cloud")
+    parts = record["parts"]
+    if unknowns.names:
+        values, sigma = fitted(roof.parts, off_the_walls(local, roof.outline), unknowns)
+        parts = [
+            with_values(
+                part, {n: v for (i, n), v in zip(unknowns.names, values, strict=True) if i == index}, sigma[index]
+            )
+            for index, part in enumerate(parts)
+        ]
+    return measured(built(building, {**record, "parts": parts}), local, settings or Settings())
+
+
+def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
+    """The points (n, 3) that are no returns of walls, where they are enough; else all."""
+    inner = shapely.buffer(outline, -FACADE_M)
+    kept = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    return kept if len(kept) >= ENOUGH else points
+
+
+def unknowns_of(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:
+    """All parameters of all parts but their rectangles, skews and those `fixed` by part; the position's z is "z"."""
+    rows = []
+    for index, part in enumerate(parts):
+        held = set(fixed.get(index, ()))
+        known = {*part.parameters, Z}
+        if held - known:
+            raise InputError(
+                f"expected parameters of part {index} ({', '.join(sorted(known))}) to hold, got "
+                f"{', '.join(sorted(held - known))}; choose among these"
+            )
+        if Z not in held and not SIDED & part.parameters.keys():  # a member's eaves are free one by one
+            rows.append((index, Z, float(part.translation[2]), -np.inf, np.inf))
+        for name, value in part.parameters.items():
+            if name not in held and name not in HELD and not name.startswith("skew_"):
+                rows.append((index, name, value, *bounds_of(name, part.parameters)))
+    start, low, high = (np.array([row[k] for row in rows], float) for k in (2, 3, 4))
+    low, high = np.minimum(low, start), np.maximum(high, start)
+    return Unknowns(tuple((row[0], row[1]) for row in rows), start, low - 1e-9, high + 1e-9)
+
+
+def bounds_of(name: str, parameters: Mapping[str, float]) -> tuple[float, float]:
+    """Within which a parameter makes a roof over its rectangle."""
+    width, length = parameters.get("width", FAR_M), parameters.get("length", FAR_M)
+    return {
+        "ridge_length": (0.0, 0.98 * length),
+        "top_length": (0.0, 0.98 * length),
+        "top_width": (0.0, 0.98 * width),
+        "break_width": (0.02 * width, 0.98 * width),
+        "ridge_offset": (-0.45 * width, 0.45 * width),
+        "eave_step": (-FAR_M, FAR_M),
+    }.get(
+        name,
+        PITCHES_DEG
+        if name.startswith("pitch_")
+        else (-FAR_M, FAR_M)
+        if name.startswith("eave_")
+        else (LEAST_HEIGHT_M, FAR_M),
+    )
+
+
+class Heights:
+    """Heights of the roof at points (n, 3), as a function of the unknowns x (p,)."""
+
+    def __init__(self, parts: tuple[Part, ...], points: np.ndarray, unknowns: Unknowns) -> None:
+        self.parts, self.xy, self.z, self.unknowns = parts, points[:, :2], points[:, 2], unknowns
+        self.inside = [
+            [shapely.intersects_xy(piece.outline, points[:, 0], points[:, 1]) for piece in part.pieces]
+            for part in parts
+        ]
+        self.outlines = [[piece.outline for piece in part.pieces] for part in parts]
+
+    def values_of(self, index: int, x: np.ndarray) -> dict[str, float]:
+        """The unknowns of one part by name."""
+        return {n: float(v) for (i, n), v in zip(self.unknowns.names, x, strict=True) if i == index}
+
+    def of_part(self, index: int, values: Mapping[str, float], chosen: np.ndarray) -> np.ndarray:
+        """Heights (m,) of a part with `values` at the `chosen` (m,) points, minus infinity where it covers nothing; NaN
+        where its parameters make no planes."""
+        part = self.parts[index]
+        parameters = {name: values.get(name, value) for name, value in part.parameters.items()}
+        translation = np.array([*part.translation[:2], values.get(Z, part.translation[2])])
+        try:
+            pieces = pieces_of(part.type, parameters, part.kappa, translation, self.outlines[index])
+        except (FitError, ZeroDivisionError):
+            return np.full(len(chosen), np.nan)
+        xy, z = self.xy[chosen], np.full(len(chosen), -np.inf)
+        for piece, inside in zip(pieces, self.inside[index], strict=True):
+            z = np.where(inside[chosen], np.maximum(z, piece.height_at(xy)), z)
+        return z
+
+    def gaps(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Heights (n,) of the points over the roof, and the part (n,) that is the roof there."""
+        everywhere = np.arange(len(self.xy))
+        layers = np.stack([self.of_part(i, self.values_of(i, x), everywhere) for i in range(len(self.parts))])
+        layers = np.where(np.isnan(layers), FAR_M, layers)
+        top = layers.argmax(axis=0)
+        return np.clip(self.z - layers[top, everywhere], -FAR_M, FAR_M), top
+
+    def jacobian(self, x: np.ndarray, gaps: np.ndarray, top: np.ndarray) -> np.ndarray:
+        """By how much the roof's height (n, p) at each point grows with each unknown."""
+        found = np.zeros((len(self.xy), len(x)))
+        for column, (index, name) in enumerate(self.unknowns.names):
+            own = np.flatnonzero((top == index) & (np.abs(gaps) < FAR_M))
+            step = STEP if x[column] + STEP < self.unknowns.high[column] else -STEP
+            moved = self.of_part(index, {**self.values_of(index, x), name: x[column] + step}, own)
+            found[own, column] = np.nan_to_num((moved - (self.z[own] - gaps[own])) / step, posinf=0.0, neginf=0.0)
+        return found
+
+
+def fitted(
+    parts: tuple[Part, ...], points: np.ndarray, unknowns: Unknowns
+) -> tuple[np.ndarray, list[dict[str, float]]]:
+    """Values (p,) of the unknowns, and standard deviations by name of every part."""
+    heights = Heights(parts, points[:: max(1, -(-len(points) // MOST_POINTS))], unknowns)
+    found = [unknowns.start, descended(heights, unknowns.start, SCALES_M[-1])]
+    if misfit(heights.gaps(found[1])[0], SCALES_M[-1]) > WELL * len(heights.z):
+        coarse = unknowns.start
+        for scale in SCALES_M:
+            coarse = descended(heights, coarse, scale)
+        found.append(coarse)
+    x = min(found, key=lambda x: misfit(heights.gaps(x)[0], SCALES_M[-1]))
+    gaps, top = heights.gaps(x)
+    near = np.abs(gaps) < SCALES_M[-1]
+    deviations = np.sqrt(np.diag(covariance(heights.jacobian(x, gaps, top)[near], gaps[near])))
+    sigma: list[dict[str, float]] = [{} for _ in parts]
+    for (index, name), deviation in zip(unknowns.names, deviations, strict=True):
+        if 0.0 < deviation < FAR_M:
+            sigma[index]["t_z" if name == Z else name] = float(deviation)
+    return x, sigma
+
+
+def descended(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
+    """The unknowns at the foot of the hill: damped steps that each lessen the misfit at this scale."""
+    unknowns, damping = heights.unknowns, 1e-3
+    gaps, top = heights.gaps(x)
+    cost = misfit(gaps, scale)
+    for _ in range(ROUNDS):
+        jacobian = heights.jacobian(x, gaps, top)
+        weight = np.clip(1.0 - (gaps / scale) ** 2, 0.0, None) ** 2
+        normal, right = (jacobian * weight[:, None]).T @ jacobian, jacobian.T @ (weight * gaps)
+        scales = np.diag(normal) + 1e-9 * max(normal.max(initial=0.0), 1e-9)
+        step = np.linalg.solve(normal + damping * np.diag(scales), right)
+        tried = np.clip(x + step, unknowns.low, unknowns.high)
+        new_gaps, new_top = heights.gaps(tried)
+        new_cost = misfit(new_gaps, scale)
+        if new_cost >= cost:
+            damping *= 30.0
+            continue
+        gained = (cost - new_cost) / cost
+        x, gaps, top, cost, damping = tried, new_gaps, new_top, new_cost, 0.1 * damping
+        if gained < 1e-4:
+            break
+    return x
+
+
+def misfit(gaps: np.ndarray, scale: float) -> float:
+    """What the points (n,) cost at this scale: Tukey's biweight, at most 1 a point."""
+    return float((1.0 - np.clip(1.0 - (gaps / scale) ** 2, 0.0, None) ** 3).sum()) + 1e-9
+
+
+def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
+    """Covariance (p, p) of the unknowns from the points near the roof; zero where they say nothing."""
+    if not len(gaps):
+        return np.zeros((jacobian.shape[1],) * 2)
+    return np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10) * float(np.mean(gaps**2))
+
+
+def with_values(part: dict[str, Any], values: Mapping[str, float], sigma: dict[str, float]) -> dict[str, Any]:
+    """The part's object with fitted values; its position's z is that of its lowest eave again."""
+    parameters = {name: values.get(name, value) for name, value in part["parameters"].items()}
+    x, y, z = part["position"]
+    z = values.get(Z, z)
+    eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
+    if eaves:
+        low = min(parameters[name] for name in eaves)
+        parameters |= {name: parameters[name] - low for name in (*eaves, "height") if name in parameters}
+        z += low
+    return {**part, "parameters": parameters, "position": [x, y, z], "sigma": sigma}
+
+
+def measured(building: Building, points_local: np.ndarray, settings: Settings) -> Building:
+    """The building with its quality on `points_local` (n, 3), and what that says of it."""
+    from ..evaluate.metrics import quality
+    from .settle import settled_building
+
+    roof: Roof = building.roof
+    found = quality(building.solid.moved(-roof.frame.origin), points_local, roof.outline)
+    share = found.share_within_20cm
+    if math.isfinite(share) and share < settings.reconstruct.poor_share:
+        status, detail = Status.POOR_FIT, f"only {100 * share:.0f} % of its points lie within 0.2 m of the roof given"
+    else:
+        status, detail = Status.MODELLED, f"{building.detail}, fitted to its points"
+    return settled_building(dataclasses.replace(building, quality=found, status=status, detail=detail))

@@ -1,0 +1,149 @@
+"""Editing a building: other types, ridges at a height, parts more or less, refits; every edit is a valid solid or one sentence."""
+
+import numpy as np
+import pytest
+from benchmarks.edits import generated
+from benchmarks.edits import main as random_edits
+
+import hiproof
+from hiproof.compose import check_solid
+from hiproof.errors import FitError, InputError
+from hiproof.parametric.building import solid_of
+from hiproof.parametric.settle import settled_roof
+from hiproof.primitives.family import NAMES
+from hiproof.simulate import random_building
+from hiproof.status import Status
+from hiproof.write.parameters import building_record
+from parametric_house import gable_house
+
+EDITS, BUILDINGS = 150, 30
+RIDGED = [name for name in NAMES if name not in ("flat", "shed")]
+RECOVERED = ("gable", "hip", "monopitch", "pyramid", "half_hip", "mansard", "asymmetric_gable", "gambrel", "shed")
+
+
+def built(roof, id="house"):
+    return solid_of(hiproof.Building(id, Status.MODELLED, roof=settled_roof(roof), z_ground=0.0))
+
+
+@pytest.fixture(scope="module")
+def gable():
+    return gable_house()
+
+
+@pytest.mark.parametrize("kind", NAMES)
+def test_another_type_keeps_the_eave(gable, kind):
+    other = gable.with_part(0, type=kind)
+    assert other.type == kind and not check_solid(other.solid)
+    assert other.parts[0].translation[2] == pytest.approx(5.0)
+    assert (other.parts[0].parameters["width"], other.parts[0].parameters["length"]) == (8.0, 12.0)
+    assert not np.isfinite(other.quality.rmse) and other.attributes == gable.attributes
+
+
+@pytest.mark.parametrize("kind", RIDGED)
+def test_a_ridge_comes_to_its_height(gable, kind):
+    other = gable.with_part(0, type=kind, ridge_height=12.4)
+    assert other.solid.vertices[:, 2].max() == pytest.approx(12.4, abs=2e-3)
+
+
+def test_a_flat_roof_becomes_a_gable_and_its_volume_grows(gable):
+    flat = gable.with_part(0, type="flat", ridge_height=7.0)
+    ridged = flat.with_part(0, type="gable", ridge_height=10.0)
+    volumes = [hiproof.compose.volume(b.solid) for b in (flat, ridged)]
+    assert volumes == pytest.approx([96 * 5.0, 96 * 6.5], rel=1e-6)
+
+
+def test_a_level_gable_gets_a_ridge(gable):
+    for level in (gable.with_part(0, height=0.0), gable.with_part(0, pitch_front=0.0, pitch_back=0.0)):
+        assert level.with_part(0, ridge_height=9.0).solid.vertices[:, 2].max() == pytest.approx(9.0, abs=1e-3)
+
+
+def test_sides_move_one_by_one(gable):
+    other = gable.with_part(0, pitch_front=30.0)
+    assert other.parts[0].parameters["pitch_back"] == pytest.approx(np.degrees(np.arctan(0.75)), abs=1e-5)
+    slopes = sorted(round(s, 3) for s in hiproof.write.roof_figures(other.solid).face_slope_deg if s == s)
+    assert slopes == [30.0, 36.87]
+
+
+def test_a_moved_part_roofs_what_its_rectangle_covers(gable):
+    two = gable.with_part(1, type="flat", position=[0, 0, 9.0], width=2.0, length=2.0)
+    assert two.parts[1].area == pytest.approx(4.0) and two.solid.vertices[:, 2].max() == pytest.approx(11.0)
+    aside = two.with_part(1, position=[6.0, 0.0, 9.0])
+    assert aside.parts[1].area == pytest.approx(2.0)
+    assert len(two.without_part(1).parts) == 1
+
+
+def test_what_cannot_be_is_one_sentence(gable):
+    for change, message in [
+        ({"width": -1.0}, "positive width"),
+        ({"type": "onion"}, "roof type"),
+        ({"ridge_height": 3.0}, "ridge above the eave"),
+        ({"position": [99.0, 0.0, 5.0]}, "outside"),
+        ({"colour": 3.0}, "got also colour"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            gable.with_part(0, **change)
+    for call, message in [
+        (lambda: gable.with_part(7, type="hip"), "part from 0 to 1"),
+        (lambda: gable.with_part(1, type="hip"), "of a new part"),
+        (lambda: gable.without_part(0), "two or more parts"),
+        (lambda: hiproof.Building("b", Status.NO_POINTS).with_part(0, type="hip"), "with a model"),
+        (lambda: gable.refit(np.zeros((9, 3)), fixed={0: ("ridge",)}), "parameters of part 0"),
+    ]:
+        with pytest.raises(InputError, match=message):
+            call()
+    with pytest.raises(FitError, match="3 points or more"):
+        gable.refit(np.zeros((9, 3)))
+
+
+@pytest.mark.parametrize("kind", RECOVERED)
+def test_a_refit_finds_what_was_changed(kind):
+    roof = random_building(np.random.default_rng(5), kind).roof
+    house = built(roof)
+    points = sampled(house, np.random.default_rng(6))
+    name = "height"
+    true = house.parts[0].parameters[name]
+    changed = house.with_part(
+        0, height=1.3 * true, eave_height=house.parts[0].translation[2] - 0.5 + roof.frame.origin[2]
+    )
+    found = changed.refit(points)
+    assert found.parts[0].parameters[name] == pytest.approx(true, abs=0.05)
+    assert found.quality.share_within_20cm > 0.95 and found.parts[0].sigma[name] < 0.05
+    assert found.status is Status.MODELLED and "fitted" in found.detail
+
+
+def sampled(house, rng, noise=0.03):
+    """Points (n, 3) on the roof of a building, world metres."""
+    x0, y0, x1, y1 = house.roof.outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (1500, 2))
+    z = house.roof.height_at(xy)
+    xyz = np.column_stack([xy, z + rng.normal(0.0, noise, len(z))])[np.isfinite(z)]
+    return house.roof.frame.to_world(xyz)
+
+
+def test_a_refit_keeps_what_is_held(gable):
+    points = sampled(gable, np.random.default_rng(1))
+    changed = gable.with_part(0, height=2.0)
+    assert changed.refit(points, fixed={0: ("height",)}).parts[0].parameters["height"] == 2.0
+    assert changed.refit(points).parts[0].parameters["height"] == pytest.approx(3.0, abs=0.02)
+
+
+def test_a_wrong_type_fits_poorly_and_says_so(gable):
+    points = sampled(gable.with_part(0, ridge_height=14.0), np.random.default_rng(2))
+    flat = gable.with_part(0, type="flat").refit(points)
+    assert flat.status is Status.POOR_FIT and "%" in flat.detail
+
+
+def test_an_edit_is_what_is_written_of_it(gable):
+    edited = gable.with_part(0, type="hip", rotation=1.0 / 3.0, ridge_height=9.87654321)
+    assert building_record(hiproof.build(building_record(edited))) == building_record(edited)
+
+
+def test_random_edits_are_valid_or_one_sentence():
+    outcomes = random_edits(EDITS, BUILDINGS, seed=3)
+    found = {what for counts in outcomes.values() for what in counts}
+    assert found == {"valid", "one sentence"}
+    assert sum(counts["valid"] for counts in outcomes.values()) > EDITS / 2
+
+
+def test_the_benchmarks_buildings_are_valid():
+    assert all(not check_solid(house.solid) for house in generated(6))

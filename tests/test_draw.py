@@ -1,0 +1,53 @@
+"""Pictures of models: a notebook's view asks nothing of the network and turns, a plot shows points where they are."""
+
+import re
+
+import numpy as np
+import pytest
+
+import hiproof
+from hiproof.draw.view import colours_of, projected, seen_faces
+from hiproof.errors import InputError
+from hiproof.status import Status
+from parametric_house import gable_house
+
+
+@pytest.fixture(scope="module")
+def house():
+    return gable_house()
+
+
+def test_the_view_is_whole_and_asks_nothing_of_the_network(house):
+    html = house._repr_html_()
+    assert html.count("<path") >= 3 and "height 3.00 m" in html and "<b>a</b>" in html
+    assert not re.search(r"https?://|src=|@import|url\(", html)
+    assert len(html) < 8000
+    assert house._repr_html_() == html
+
+
+def test_a_building_without_a_model_says_why():
+    html = hiproof.Building("<script>", Status.NO_POINTS)._repr_html_()
+    assert "no usable points" in html and "<svg" not in html and "<script>" not in html
+
+
+def test_faces_seen_are_those_that_look_here(house):
+    from_above = seen_faces(house.solid, colours_of(house), tilt_deg=90.0)
+    assert [face.is_roof for face in from_above] == [True, True]
+    assert len(seen_faces(house.solid, colours_of(house))) == 4  # two slopes, one wall each way
+
+
+def test_north_is_up_from_above():
+    page = projected(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]), 0.0, 90.0)
+    assert np.allclose(page[:, :2], [[0.0, -1.0], [1.0, 0.0]])
+
+
+def test_a_plot_tells_near_points_from_far_ones(house):
+    pytest.importorskip("matplotlib", reason="plots need matplotlib (extra `report`)").use("Agg")
+    xy = np.random.default_rng(0).uniform((-5.0, -3.0), (5.0, 3.0), (40, 2))
+    local = np.column_stack([xy, house.roof.height_at(xy)])
+    local[:10, 2] += 1.0
+    axes = hiproof.plot(house, house.roof.frame.to_world(local))
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ["within 0.2 m: 30 points", "further: 10 points"]
+    with pytest.raises(InputError, match="with a model"):
+        hiproof.plot(hiproof.Building("b", Status.NO_POINTS))
