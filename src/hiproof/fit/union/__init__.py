@@ -63,7 +63,7 @@ def fit_building(
     points_local = np.asarray(points_local, float).reshape(-1, 3)
     points_local = points_local[np.isfinite(points_local).all(axis=1)]
     if outline is None:
-        outline = outline_of_points(points_local, settings)
+        outline = outline_of_points(points_local)
     outline = max(polygons_of(shapely.make_valid(outline)), key=lambda polygon: polygon.area, default=outline)
     plan = lay_out_plan(points_local, outline)
     if len(plan.cloud.u) == 0:

@@ -2,37 +2,21 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 import shapely
 
-from ...errors import FitError
-from ...model import Fit
-from ...settings import Settings
-from ..outline import estimate_outline, is_rectangular
-from ..single import fit_roof
+from ..direction import slope_direction
+from ..outline import estimate_outline
+
+SLOPES, NEIGHBOURS = 150, 9
+SURE = 0.5
 
 
-def outline_of_points(points_local: np.ndarray, settings: Settings) -> shapely.Polygon:
-    """Outline around `points_local` (n, 3): the rectangle of one primitive where that is it, else drawn around the points.
+def outline_of_points(points_local: np.ndarray) -> shapely.Polygon:
+    """Outline around `points_local` (n, 3), mostly along the roof's slopes and across them, where it has any.
 
     Raises FitError for points that span no area.
     """
-    try:
-        fit = fit_roof(points_local, settings=settings)
-    except FitError:
-        return estimate_outline(points_local[:, :2])
-    rectangle = plan_rectangle(fit)
-    if is_rectangular(rectangle, points_local[:, :2]):
-        return rectangle
-    return estimate_outline(points_local[:, :2], fit.kappa)
-
-
-def plan_rectangle(fit: Fit) -> shapely.Polygon:
-    """The rectangle that a fitted primitive covers, all its teeth together."""
-    half = 0.5 * np.array([fit.parameters["length"], fit.parameters["width"]])
-    c, s = math.cos(fit.kappa), math.sin(fit.kappa)
-    corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * half
-    centre = fit.translation[:2] + fit.global_translation[:2]
-    return shapely.Polygon(corners @ np.array([[c, s], [-s, c]]) + centre)
+    ascending = points_local[np.argsort(points_local[:, 0], kind="stable")]
+    kappa, confidence = slope_direction(ascending, SLOPES, NEIGHBOURS)
+    return estimate_outline(points_local[:, :2], kappa if confidence > SURE else None)

@@ -1,0 +1,100 @@
+"""What an outline costs: how badly it explains where points lie, and how many lines it is drawn with. Compiled.
+
+Points are spread evenly over a roof, so an outline of area A around points of `density` has the likelihood
+
+    exp(-density A)  times the product over points of  density (stray + (1 - stray) Phi(depth / blur))
+
+and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece. To this come the prices of
+lines (two for a notch), of directions besides the main one, and of lines that run in them. All are in nats.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from ...compiled import compiled
+from .lines import SAME_RAD, area_of, find_corners, quarter_gap
+
+SURE = 4.0  # blurs from the border beyond which a point is inside or outside for sure
+
+# x, y (m): points that may decide where the border runs; density: of such points a square metre.
+# blur (m), stray (share): see above. line, direction, skew: prices of a line, a further direction, a line in that.
+Border = namedtuple("Border", "x y density blur stray line direction skew")
+
+# lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, cost: all of it.
+Drawing = namedtuple("Drawing", "lines kappa corners own cost")
+
+
+@compiled
+def drawing_of(lines, kappa, border):
+    """The drawing of `lines`; its cost is infinite where they are no polygon."""
+    corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
+    if len(lines) < 3 or not find_corners(lines, corners) or area_of(corners) <= 0.0:
+        return Drawing(lines, kappa, corners, own, np.inf)
+    for k in range(len(own)):
+        own[k] = point_cost(border.x[k], border.y[k], corners, border.blur, border.stray)
+    misfit = border.density * area_of(corners) + own.sum()
+    return Drawing(lines, kappa, corners, own, misfit + structure_cost(lines, kappa, border))
+
+
+@compiled
+def structure_cost(lines, kappa, border):
+    """Price of the lines, of directions other than the main one, and of lines in these."""
+    cost = border.line * len(lines)
+    for i in range(len(lines)):
+        if abs(quarter_gap(lines[i, 0] - kappa)) < SAME_RAD:
+            continue
+        cost += border.skew + border.direction
+        for j in range(i):
+            if abs(quarter_gap(lines[i, 0] - lines[j, 0])) < SAME_RAD:
+                cost -= border.direction
+                break
+    return cost
+
+
+@compiled
+def point_cost(x, y, corners, blur, stray):
+    """Minus the logarithm of how likely a point at x, y is, against one deep inside."""
+    n, inside, nearest = len(corners), False, np.inf
+    for i in range(n):
+        k = i + 1 if i + 1 < n else 0
+        x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[k, 0], corners[k, 1]
+        dx, dy = x1 - x0, y1 - y0
+        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / dy * dx:
+            inside = not inside
+        t = min(max(((x - x0) * dx + (y - y0) * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
+        squared = (x0 + t * dx - x) ** 2 + (y0 + t * dy - y) ** 2
+        nearest = min(nearest, squared)
+    depth = math.sqrt(nearest) / blur
+    if depth >= SURE:
+        return 0.0 if inside else -math.log(stray)
+    return -math.log(stray + (1.0 - stray) * 0.5 * math.erfc((-depth if inside else depth) / math.sqrt(2.0)))
+
+
+@compiled
+def cost_of_change(lines, drawing, i, count, fresh, border):
+    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on.
+
+    Points away from these corners cost what they did.
+    """
+    corners, old = np.empty((len(lines), 2)), drawing.corners
+    if len(lines) < 3 or not find_corners(lines, corners, 2):
+        return np.inf
+    area = area_of(corners)
+    if area <= 0.0:
+        return np.inf
+    x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
+    for k in range(count + 1 + fresh):
+        x, y = old[(i + k) % len(old)] if k <= count else corners[k - count - 1]
+        x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
+    reach = SURE * border.blur
+    misfit = border.density * (area - area_of(old))
+    for k in range(len(border.x)):
+        x, y = border.x[k], border.y[k]
+        if x_low - reach < x < x_high + reach and y_low - reach < y < y_high + reach:
+            misfit += point_cost(x, y, corners, border.blur, border.stray) - drawing.own[k]
+    structure = structure_cost(lines, drawing.kappa, border) - structure_cost(drawing.lines, drawing.kappa, border)
+    return drawing.cost + misfit + structure

@@ -1,0 +1,100 @@
+"""A polygon as the lines of its sides, counter-clockwise. Compiled.
+
+`lines` (n, 2) hold a row a side: the azimuth of the normal that looks outwards (rad) and the line's distance from the
+origin along it (m). Corner i is where sides i - 1 and i meet, so side i runs from corner i to corner i + 1.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiled import compiled
+
+SHARPEST = 0.15  # sine of the angle between neighbours: lines closer to parallel have no corner to speak of
+SAME_RAD = 1e-6
+
+
+def lines_through(corners: np.ndarray) -> np.ndarray:
+    """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise."""
+    ends = np.roll(corners, -1, axis=0)
+    step, middle = ends - corners, 0.5 * (corners + ends)
+    azimuth = np.arctan2(step[:, 1], step[:, 0]) - 0.5 * math.pi
+    return np.column_stack([azimuth, middle[:, 0] * np.cos(azimuth) + middle[:, 1] * np.sin(azimuth)])
+
+
+@compiled
+def find_corners(lines, corners, fresh=-1):
+    """Write the corners (n, 2) of `lines`; False where they are no simple polygon run through in order.
+
+    With `fresh`, only the last side and the first `fresh` are asked whether they cross others: the rest did not before.
+    """
+    n = len(lines)
+    for i in range(n):
+        before, r_before, after, r_after = lines[i - 1, 0], lines[i - 1, 1], lines[i, 0], lines[i, 1]
+        sine = math.sin(after - before)
+        if abs(sine) < SHARPEST:
+            return False
+        corners[i, 0] = (r_before * math.sin(after) - r_after * math.sin(before)) / sine
+        corners[i, 1] = (r_after * math.cos(before) - r_before * math.cos(after)) / sine
+    for i in range(n):
+        k = (i + 1) % n
+        along = math.cos(lines[i, 0]) * (corners[k, 1] - corners[i, 1])
+        if along - math.sin(lines[i, 0]) * (corners[k, 0] - corners[i, 0]) < -1e-9:
+            return False
+    asked = n if fresh < 0 else min(fresh + 1, n)
+    for k in range(asked):
+        i = (k - 1) % n
+        for j in range(n):
+            apart = (j - i) % n
+            if 1 < apart < n - 1 and cross(corners[i], corners[(i + 1) % n], corners[j], corners[(j + 1) % n]):
+                return False
+    return True
+
+
+@compiled
+def cross(a, b, c, d):
+    """Whether the segments a-b and c-d cross."""
+    return left_of(a, b, c) * left_of(a, b, d) < 0.0 and left_of(c, d, a) * left_of(c, d, b) < 0.0
+
+
+@compiled
+def left_of(a, b, c):
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+@compiled
+def area_of(corners):
+    """Area (m2) of the polygon, positive where it runs counter-clockwise."""
+    doubled = 0.0
+    for i in range(len(corners)):
+        doubled += corners[i - 1, 0] * corners[i, 1] - corners[i, 0] * corners[i - 1, 1]
+    return 0.5 * doubled
+
+
+@compiled
+def quarter_gap(angle):
+    """The angle (rad) from the nearest quarter turn."""
+    return angle - math.floor(angle / (0.5 * math.pi) + 0.5) * (0.5 * math.pi)
+
+
+@compiled
+def replaced(lines, i, count, azimuth, distance):
+    """The lines with one in place of `count` from `i` on; it comes first."""
+    n = len(lines)
+    result = np.empty((n - count + 1, 2))
+    result[0, 0], result[0, 1] = azimuth, distance
+    for k in range(n - count):
+        result[k + 1] = lines[(i + count + k) % n]
+    return result
+
+
+@compiled
+def dropped(lines, i):
+    """The lines without line `i`; the one after it comes first."""
+    n = len(lines)
+    result = np.empty((n - 1, 2))
+    for k in range(n - 1):
+        result[k] = lines[(i + 1 + k) % n]
+    return result

@@ -1,0 +1,185 @@
+"""An outline redrawn until no change of a few lines explains the points more cheaply. Compiled.
+
+Changes: a line goes; one, two or three in a row become one (three are a step); one turns into a direction that others have;
+lines move; all lines of a direction turn together.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiled import compiled
+from .cost import cost_of_change, drawing_of
+from .lines import SAME_RAD, dropped, quarter_gap, replaced
+
+LONGEST_RUN = 3  # lines that become one
+TURN_RAD = math.radians(35.0)  # of a line, at most
+APART = (0.0, 1.0, 1.5, 0.7)  # turns by which the first and last of so many lines may differ to become one
+STEPS_M, TURNS_RAD = (0.3, 0.1, 0.05), (0.03, 0.01, 0.003)
+ROUNDS, SHIFT_ROUNDS, MOST_CHANGES = 3, 3, 400
+REACHED = LONGEST_RUN  # lines on either side of a change whose own changes it concerns
+GAIN = 1e-6
+
+
+@compiled
+def redrawn(drawing, border, step_m):
+    """The drawing with no change left that pays; lines that replace others are moved by `step_m` at first."""
+    drawing = simplified(drawing, border, step_m)
+    for _ in range(ROUNDS):
+        before = drawing.cost
+        for step in STEPS_M:
+            drawing = shifted(drawing, border, step, len(drawing.lines), SHIFT_ROUNDS)
+        for turn in TURNS_RAD:
+            drawing = turned(drawing, border, turn)
+        drawing = simplified(drawing, border, step_m)
+        if drawing.cost > before - 0.1:
+            break
+    return drawing
+
+
+@compiled
+def simplified(drawing, border, step_m):
+    """The change that gains most is made, again and again; after each only the gains of lines beside it are asked anew."""
+    gains = np.full(len(drawing.lines), np.inf)
+    for _ in range(MOST_CHANGES):
+        for i in range(len(gains)):
+            if gains[i] == np.inf:
+                gains[i] = max(drawing.cost - best_change(drawing, i, border)[0], -1e9)
+        i = int(np.argmax(gains))
+        if gains[i] <= GAIN:
+            break
+        cost, lines, following = best_change(drawing, i, border)
+        gains[i] = max(drawing.cost - cost, -1e9)  # those of lines far off may be of an earlier drawing
+        if gains[i] <= GAIN:
+            continue
+        known, gains = gains, np.full(len(lines), np.inf)
+        for k in range(REACHED + 1, len(lines) - REACHED):
+            gains[k] = known[(following + k - 1) % len(known)]
+        drawing = shifted(drawing_of(lines, drawing.kappa, border), border, step_m, 1, 1)
+    return drawing
+
+
+@compiled
+def best_change(drawing, i, border):
+    """The cheapest change that begins at line `i`: its cost, the lines, and which of the old ones is their second."""
+    n = len(drawing.lines)
+    best, lines, following = np.inf, drawing.lines, 0
+    if n > 3:
+        lines, following = dropped(drawing.lines, i), (i + 2) % n
+        best = cost_of_change(lines, drawing, i, 1, 1, border)
+    for count in range(1, min(LONGEST_RUN, n - 2) + 1):
+        for azimuth, distance in joint_lines(drawing, i, count):
+            new = replaced(drawing.lines, i, count, azimuth, distance)
+            cost = cost_of_change(new, drawing, i, count, 2, border)
+            if cost < best:
+                best, lines, following = cost, new, (i + count) % n
+    return best, lines, following
+
+
+@compiled
+def joint_lines(drawing, i, count):
+    """Lines (m, 2) that may stand for `count` lines from `i` on.
+
+    They run through the middle of these, or of the first and last of three, which are a step and may also go on as one of
+    them; along the main direction, the chord, the first or the last; a single line also along that of any longer one.
+    """
+    lines, corners, n = drawing.lines, drawing.corners, len(drawing.lines)
+    found, m = np.empty((n + 8, 2)), 0
+    first, last = lines[i], lines[(i + count - 1) % n]
+    if count > 1 and math.cos(first[0] - last[0]) < math.cos(TURN_RAD * APART[count]):
+        return found[:0]
+    start, end = corners[i], corners[(i + count) % n]
+    chord = math.atan2(start[0] - end[0], end[1] - start[1])
+    middle = middle_of(corners, i, count)
+    ways = ways_of(drawing, i, count, chord)
+    for way in ways:
+        unchanged = count == 1 and abs(math.sin(way - first[0])) < SAME_RAD
+        if not unchanged and math.cos(way - chord) > math.cos(TURN_RAD):
+            found[m] = way, middle[0] * math.cos(way) + middle[1] * math.sin(way)
+            m += 1
+    if count == LONGEST_RUN:
+        found[m], found[m + 1] = first, last
+        m += 2
+    return found[:m]
+
+
+@compiled
+def ways_of(drawing, i, count, chord):
+    """Azimuths (m,) that the one line for `count` from `i` on may have: nearest to the `chord` of all that are common."""
+    lines, n = drawing.lines, len(drawing.lines)
+    main = chord - quarter_gap(chord - drawing.kappa)
+    if count > 1:
+        return np.array([main, chord, lines[i, 0], lines[(i + count - 1) % n, 0]])
+    ways, m = np.empty(n + 1), 1
+    ways[0], length = main, side_length(drawing.corners, i)
+    for j in range(n):
+        if side_length(drawing.corners, j) > length and abs(quarter_gap(lines[j, 0] - drawing.kappa)) > SAME_RAD:
+            ways[m] = chord - quarter_gap(chord - lines[j, 0])
+            m += 1
+    return ways[:m]
+
+
+@compiled
+def side_length(corners, i):
+    a, b = corners[i], corners[(i + 1) % len(corners)]
+    return math.hypot(b[0] - a[0], b[1] - a[1])
+
+
+@compiled
+def middle_of(corners, i, count):
+    """The middle (2,) of `count` sides from `i` on, weighted by their lengths; of a run of three without the second."""
+    n, total, x, y = len(corners), 1e-9, 0.0, 0.0
+    for k in range(0, count, 2 if count == LONGEST_RUN else 1):
+        a, b = corners[(i + k) % n], corners[(i + k + 1) % n]
+        length = side_length(corners, (i + k) % n) + 1e-9
+        total += length
+        x += 0.5 * length * (a[0] + b[0])
+        y += 0.5 * length * (a[1] + b[1])
+    return x / total, y / total
+
+
+@compiled
+def shifted(drawing, border, step, upto, rounds):
+    """Each of the first `upto` lines moved by multiples of `step` (m) for as long as that is cheaper."""
+    for _ in range(rounds):
+        before = drawing.cost
+        for i in range(upto):
+            for sign in (1.0, -1.0):
+                moved = False
+                while True:
+                    azimuth, distance = drawing.lines[i, 0], drawing.lines[i, 1] + sign * step
+                    new = replaced(drawing.lines, i, 1, azimuth, distance)
+                    if not cost_of_change(new, drawing, i, 1, 2, border) < drawing.cost - GAIN:
+                        break
+                    lines = drawing.lines.copy()
+                    lines[i, 1] = distance
+                    drawing, moved = drawing_of(lines, drawing.kappa, border), True
+                if moved:
+                    break
+        if drawing.cost >= before - GAIN:
+            break
+    return drawing
+
+
+@compiled
+def turned(drawing, border, step):
+    """All lines of each direction turned about their middles by multiples of `step` (rad) for as long as that is cheaper."""
+    for i in range(len(drawing.lines)):
+        for sign in (1.0, -1.0):
+            moved = False
+            while True:
+                lines, main = drawing.lines.copy(), abs(quarter_gap(drawing.lines[i, 0] - drawing.kappa)) < SAME_RAD
+                for j in range(len(lines)):
+                    if abs(quarter_gap(lines[j, 0] - drawing.lines[i, 0])) < SAME_RAD:
+                        x, y = middle_of(drawing.corners, j, 1)
+                        lines[j, 0] += sign * step
+                        lines[j, 1] = x * math.cos(lines[j, 0]) + y * math.sin(lines[j, 0])
+                new = drawing_of(lines, drawing.kappa + (sign * step if main else 0.0), border)
+                if not new.cost < drawing.cost - GAIN:
+                    break
+                drawing, moved = new, True
+            if moved:
+                break
+    return drawing

@@ -1,0 +1,79 @@
+"""Each side of an outline where the points across it put it: undoing the bias of outermost points.
+
+Across a side of length L the density of points is  density L (Phi(d / blur) + walls N(d; blur)):  even inside, with what a
+scanner sees of the wall below the eave piled up on the line. The side's place is the mean of its posterior, over a few values of
+blur and walls. Where points come in rows along the side the gap between rows is wider than chance would have it: the side
+then lies half a gap beyond the last row.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .lines import find_corners
+
+BLURS_M, WALLS_M = (
+    (0.02, 0.06, 0.12),
+    (0.0, 0.3, 1.0),
+)  # points on the wall a metre, as the depth of roof that holds as many
+OFFSETS_M = np.arange(-0.5, 0.7, 0.02)
+DEEP_M, SHALLOW_M, OUTSIDE_M = (
+    2.0,
+    0.4,
+    0.8,
+)  # the density is that between shallow and deep; points further out are stray
+LEAST_DENSITY, STRAY = 0.3, 0.02  # shares of the outline's density
+END_M, LONG_M = 0.3, 1.0  # of a side longer than that, its ends do not count: points there may be another side's
+FEWEST, FARTHEST_M = 4, 0.4
+ROW_M, MOSTLY = 0.1, 0.6  # points closer across the side are of one row where most of the depth is between rows
+
+
+def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
+    """The `lines` (n, 2) of an outline, each moved to where the points `xy` (m, 2) across it put it."""
+    corners, moved = np.empty_like(lines), lines.copy()
+    find_corners(lines, corners)
+    for i, (azimuth, distance) in enumerate(lines):
+        normal = np.array([math.cos(azimuth), math.sin(azimuth)])
+        along = xy @ [-normal[1], normal[0]]
+        low, high = sorted(corners[k % len(lines)] @ [-normal[1], normal[0]] for k in (i, i + 1))
+        if high - low > LONG_M:
+            low, high = low + END_M, high - END_M
+        depth = (distance - xy @ normal)[(along >= low) & (along <= high)]
+        moved[i, 1] += offset(depth[(depth < DEEP_M) & (depth > -OUTSIDE_M)], high - low, density)
+    return moved if find_corners(moved, corners) else lines
+
+
+def offset(depth: np.ndarray, length: float, density: float) -> float:
+    """How far (m) outwards a side of `length` lies of where points `depth` (n,) were measured from."""
+    if len(depth) < FEWEST:
+        return 0.0
+    from scipy.special import ndtr
+
+    inside = (depth > SHALLOW_M).sum() / ((DEEP_M - SHALLOW_M) * length)
+    a_metre = max(inside, LEAST_DENSITY * density) * length
+    logs = []
+    for blur in BLURS_M:
+        away = (depth[:, None] + OFFSETS_M) / blur
+        wall = np.exp(-0.5 * away**2) / (blur * math.sqrt(2.0 * math.pi))
+        logs += [
+            np.log(a_metre * (ndtr(away) + walls * wall + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
+            for walls in WALLS_M
+        ]
+    likely = np.exp(np.array(logs) - np.max(logs)).sum(axis=0)
+    mean = float((likely * OFFSETS_M).sum() / likely.sum())
+    return mean + min(max(half_gap(depth[depth + mean > -ROW_M]) - 1.0 / a_metre, 0.0), FARTHEST_M)
+
+
+def half_gap(depth: np.ndarray) -> float:
+    """Distance (m) from a line placed by chance to the next point behind it, or the next row where points lie in rows.
+
+    That is half the mean gap, wide gaps being hit more often.
+    """
+    depth = np.sort(depth)
+    gaps = np.diff(depth)
+    if gaps[gaps > ROW_M].sum() > MOSTLY * gaps.sum():
+        rows = np.split(depth, np.flatnonzero(gaps > ROW_M) + 1)
+        gaps = np.diff([row.mean() for row in rows])
+    return float((gaps**2).sum() / (2.0 * gaps.sum())) if len(gaps) > 1 else 0.0
