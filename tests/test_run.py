@@ -123,7 +123,7 @@ def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, m
 
 def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
-    make_ready()
+    make_ready(tmp_path)
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), jobs=2))
     assert records(tmp_path) == records(finished[0])
@@ -222,26 +222,19 @@ def test_without_footprints_the_cloud_is_split(files, tmp_path):
     assert summary.by_status == {"modelled": 4}
 
 
-def test_without_the_building_class_the_sentence_names_the_classes(tmp_path):
-    town = make_town()
-    cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, np.where(town.classification == 6, 1, 2))
-    path = write_footprints(tmp_path / "footprints.geojson", town.footprints)
-    for footprints in (str(path), None):
-        with pytest.raises(InputError, match="--building-class"):
-            reconstruct_area(Request((str(cloud),), tmp_path / "out", footprints, restart=True))
-    settings = Settings.from_dict({"read": {"building_classes": [1]}})
-    assert (
-        reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path), settings=settings, restart=True)).buildings
-        == 4
-    )
+def test_a_building_class_that_was_asked_for_and_is_not_there_is_refused(files, tmp_path):
+    settings = Settings.from_dict({"read": {"building_classes": [67]}})
+    for footprints in (str(files[1]), None):
+        with pytest.raises(InputError, match=r"class 67.*--building-class"):
+            reconstruct_area(Request((str(files[0]),), tmp_path, footprints, settings=settings, restart=True))
 
 
-def test_without_a_ground_class_the_lowest_points_are_named(tmp_path):
+def test_without_a_ground_class_the_ground_is_found(tmp_path):
     town = make_town()
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, np.where(town.classification == 2, 1, 6))
     path = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
-    assert b"lowest points around the building" in (tmp_path / "out" / "buildings.city.jsonl").read_bytes()
+    assert b"ground found by its shape" in (tmp_path / "out" / "buildings.city.jsonl").read_bytes()
 
 
 @pytest.mark.parametrize(("of_cloud", "of_footprints"), [("EPSG:7415", None), (None, "EPSG:28992"), (None, None)])

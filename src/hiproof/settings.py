@@ -39,6 +39,12 @@ class ReadSettings:
         (6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)", "", 0, 255, fewest=1
     )
     ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points", "", 0, 255)
+    roofs: str = setting(
+        "auto",
+        "class: roofs are the points of the building classes; shape: they are looked for among all others that may be roofs; "
+        "auto: by shape where no point has the building class",
+        choices=("auto", "class", "shape"),
+    )
     crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say')
     unit: str = setting(
         "auto",
@@ -82,8 +88,7 @@ class CompoundSettings:
 class SegmentSettings:
     """[segment] recognising the roof before fitting it."""
 
-    enabled: bool = setting(True, "let the network weigh points and types where one primitive is fitted to a building")
-    always: bool = setting(False, "ask it of every building and write its answer, though a fit of several does without")
+    enabled: bool = setting(True, "let the network label the points and inform the choice of type")
     weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")
     device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
 

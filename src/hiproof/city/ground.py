@@ -6,13 +6,15 @@ answer is the same whatever tile the cells were gathered for, and costs a few ta
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
+from ..classify.ground import bare_points
 from ..compiled import compiled
 from ..read.terrain import LowestPointsTerrain, TinTerrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
 
-GROUND_REACH_M = 10.0
 RINGS = (2, 5, 9)  # cells looked at around a position, the next where fewer than three are known; within the reach
 SOFT_M2 = 0.25  # cells nearer than half a metre weigh about the same
 LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
@@ -30,6 +32,12 @@ class Cells:
         tables[:, cell[:, 1], cell[:, 0]] = xyz.T
         self.x, self.y, self.z = tables
 
+    def inside(self, box: np.ndarray) -> np.ndarray:
+        """Points (m, 3) of the known cells inside the whole-metre `box` (xmin, ymin, xmax, ymax)."""
+        left, low, right, high = (np.asarray(box) - np.tile(self.low, 2)).astype(int).clip(0)
+        tables = np.stack([table[low:high, left:right] for table in (self.x, self.y, self.z)], axis=-1)
+        return tables[np.isfinite(tables[..., 2])]
+
 
 class GroundAround:
     """Terrain for one building: a plane through the known cells around each position, the near ones weighing most.
@@ -46,6 +54,25 @@ class GroundAround:
         """Height (n,) at `xy_world` (n, 2); NaN where no cell within the last ring is known."""
         xy, cells = np.ascontiguousarray(xy_world, float), self.cells
         return plane_heights(xy, cells.x, cells.y, cells.z, cells.low, self.box.astype(np.int64))
+
+
+class BareAround:
+    """Terrain for one building where no class says which points are the ground: the lowest cells, without what stands on it."""
+
+    source = "ground found by its shape"
+
+    def __init__(self, cells: Cells, box: np.ndarray):
+        self.cells, self.box = cells, box
+
+    @functools.cached_property
+    def bare(self) -> GroundAround:
+        """Found when first asked for, from the cells inside the box alone."""
+        lowest = self.cells.inside(self.box)
+        return GroundAround(Cells(bare_points(lowest) if len(lowest) else lowest), self.box)
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_world` (n, 2), NaN where no ground is found within the last ring."""
+        return self.bare.height_at(xy_world)
 
 
 class LowestAround:

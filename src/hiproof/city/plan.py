@@ -23,6 +23,7 @@ from ..write.naming import FileUnits, UniqueNames, gml_name
 from ..write.parameters import FileHead, crs_text
 
 PLAN_FILE = "plan.jsonl"
+GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 
 
 @dataclass(frozen=True)
@@ -53,6 +54,11 @@ class Plan:
 
     def names_of(self, job: Job) -> tuple[str, str]:
         return self.names.get(job.index) or (job.id, gml_name(job.id))
+
+    @property
+    def terrain_reach_m(self) -> float:
+        """How far around a building terrain matters: farther where the ground must be found first."""
+        return FOUND_GROUND_REACH_M if self.settings.read.roofs == "shape" else GROUND_REACH_M
 
     @functools.cached_property
     def units(self) -> Units:

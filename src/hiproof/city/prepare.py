@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import shapely
-
-from ..errors import InputError
 from ..settings import Settings
 from ..write.naming import FileUnits
+from .classes import settle_classes
+from .from_cloud import jobs_from_cloud
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 from .request import Request
 
@@ -24,12 +23,16 @@ def make_plan(request: Request) -> Plan:
     if request.terrain:
         # only to be told now if it cannot be read, and not after all points are sorted
         read_terrain(request.terrain, frame.crs, frame.units)
-    jobs = jobs_from_footprints(request, headers, frame) if request.footprints else jobs_from_cloud(request)
+    settings = settle_classes(request.clouds, request.settings)
+    if request.footprints:
+        jobs = jobs_from_footprints(request, headers, frame)
+    else:
+        jobs, settings = jobs_from_cloud(request.clouds, settings)
     return Plan(
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
         crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
-        settings=request.settings,
+        settings=settings,
         names=unusual_names(jobs),
         translate=offset_of_jobs(jobs, FileUnits.of(frame.crs, frame.units).cityjson),
     )
@@ -69,32 +72,3 @@ def jobs_from_footprints(request, headers: list, frame) -> tuple[Job, ...]:
     if len(bounds):
         check_overlap(footprints, bounds, frame.footprints, frame.cloud, frame.units)
     return jobs_of_footprints(footprints)
-
-
-def jobs_from_cloud(request) -> tuple[Job, ...]:
-    """Without footprints, the connected groups of roof points are the buildings."""
-    from ..read.pointcloud import read_points
-    from ..read.split import split_buildings
-
-    try:
-        cloud = read_points(*request.clouds, settings=request.settings)
-    except InputError:
-        readable = [name for name in request.clouds if is_readable(name)]
-        if len(readable) in (0, len(request.clouds)):
-            raise
-        cloud = read_points(*readable, settings=request.settings)
-    groups = split_buildings(cloud, request.settings)
-    areas = [(group.id, shapely.make_valid(group.area)) for group in groups]
-    return tuple(Job(i, id, area, None) for i, (id, area) in enumerate(areas))
-
-
-def is_readable(name: str) -> bool:
-    """Whether a point file can be read from end to end; the step that sorts points names those that cannot."""
-    from ..read.pointcloud import iter_points
-
-    try:
-        for _ in iter_points(name):
-            pass
-    except InputError:
-        return False
-    return True

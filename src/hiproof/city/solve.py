@@ -9,6 +9,7 @@ import traceback
 from pathlib import Path
 
 import numpy as np
+import shapely
 
 from ..frames import Units
 from ..masking import masked
@@ -22,7 +23,8 @@ from ..status import Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, save_fragments
 from ..write.run_files import fragments
-from .ground import GROUND_REACH_M, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
+from .ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
 from .merge import tile_parts, write_tile
 from .plan import Job, Plan, load_plan, neighbourhood
 from .sort import load_points
@@ -31,22 +33,40 @@ from .sort import load_points
 class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
 
-    def __init__(self, points: dict[str, np.ndarray], model: Terrain | None):
-        self.roof, self.model = points["roof"], model
+    def __init__(self, points: dict[str, np.ndarray], model: Terrain | None, plan: Plan):
+        self.roof, self.model, self.plan = points["roof"], model, plan
         self.grid = PointGrid(self.roof)
         self.ground = ground_cells(points["ground"])
         self.low = Cells(lowest_in_cells(points["low"]))
 
-    def roof_of(self, job: Job) -> np.ndarray:
+    def roof_of(self, job: Job) -> FoundRoof:
         """Roof points (n, 3) inside the job's area; a point that stands in two files comes twice."""
-        return self.roof[self.grid.inside(job.area)]
+        if self.plan.settings.read.roofs != "shape" or job.area.is_empty:
+            return FoundRoof(self.roof[self.grid.inside(job.area)])
+        low, high = neighbourhood(job, 0.0).reshape(2, 2)
+        near = self.roof[self.grid.candidates((*low, *high))]
+        near = without_repeats(near[((near[:, :2] >= low) & (near[:, :2] <= high)).all(axis=1)])
+        return found_roof(near, job.area, near[:, 2] - TerrainChain(self.grounds_of(job)).height_at(near))
+
+    def grounds_of(self, job: Job) -> list[Terrain | None]:
+        """The terrain model, the ground points in the whole-metre box around the building, and the ground found there."""
+        box = neighbourhood(job, self.plan.terrain_reach_m)
+        found = BareAround(self.low, box) if self.is_seen_around(job, box) else None
+        return [self.model, GroundAround(self.ground, box), found]
+
+    def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
+        """Whether anything beside the building is known: else the lowest points are the roof's own."""
+        beside = self.low.inside(box)
+        outline = shapely.buffer(job.area, BESIDE_M)
+        return int((~shapely.intersects_xy(outline, beside[:, 0], beside[:, 1])).sum()) >= FEWEST_BESIDE
 
     def terrain_of(self, job: Job) -> TerrainChain | None:
-        """The terrain model, else the ground points in the whole-metre box around the building, else the lowest points."""
+        """What answers for the ground around the building: that of `grounds_of`, else the lowest points."""
         if job.area.is_empty:
             return None
-        box = neighbourhood(job, GROUND_REACH_M)
-        return TerrainChain([self.model, GroundAround(self.ground, box), LowestAround(self.low, box)])
+        grounds = self.grounds_of(job)
+        lowest = LowestAround(self.low, neighbourhood(job, self.plan.terrain_reach_m))
+        return TerrainChain([*grounds, None if grounds[-1] is None else lowest])
 
 
 def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[tuple]:
@@ -58,7 +78,7 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
     root = Path(folder)
     plan = load_plan(root)
     surroundings = Surroundings(
-        load_points(root, tile), terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident())
+        load_points(root, tile), terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()), plan
     )
     parts, rows = [], []
     for index in plan.tiles[tile]:
@@ -89,17 +109,27 @@ def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Buildin
     Only MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone.
     """
     try:
-        points, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
+        found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
+        if not found.is_seen:
+            return fragments(not_seen(job, found.remark), plan.names_of(job), plan.translate, plan.file_units)
+        points = found.points
         used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
         building = reconstruct(used, job.footprint, surroundings.terrain_of(job), plan.settings, id=job.id)
         if len(used) < len(points) and building.status is Status.MODELLED:
             building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
+        building = remarked(building, found.remark)
         return fragments(building, plan.names_of(job), plan.translate, plan.file_units)
     except MemoryError:
         raise
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+
+
+def not_seen(job: Job, detail: str) -> Building:
+    """A building whose outline holds no roof, as far as its points tell."""
+    attributes = job.footprint.attributes if job.footprint else {}
+    return Building(job.id, Status.NO_ROOF, detail, footprint=job.area, attributes=attributes)
 
 
 def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:

@@ -27,7 +27,7 @@ from ..read.lax import read_lax
 from ..read.pointcloud import as_input_error, file_kind, iter_points, read_header
 from ..settings import ReadSettings
 from ..write.files import atomic_file
-from .ground import GROUND_REACH_M, lowest_in_cells
+from .ground import lowest_in_cells
 from .plan import PLAN_FILE, Plan, load_plan
 
 NOISE_CLASSES = (7, 18)
@@ -74,7 +74,8 @@ class Reaches:
         low, high = bounds[:, :2], bounds[:, 2:]
         # a border on a whole metre belongs to the area: one metre more on the upper sides
         self.roof_boxes = np.hstack([np.floor(low), np.ceil(high) + 1.0])
-        self.terrain_boxes = np.hstack([np.floor(low - GROUND_REACH_M), np.ceil(high + GROUND_REACH_M)])
+        reach_m = plan.terrain_reach_m
+        self.terrain_boxes = np.hstack([np.floor(low - reach_m), np.ceil(high + reach_m)])
         has_area = np.isfinite(bounds[:, 0])
         members = {tile: [i for i in own if has_area[i]] for tile, own in plan.tiles.items()}
         self.members = {tile: own for tile, own in members.items() if own}
@@ -109,6 +110,7 @@ class Gatherer:
     def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
         self.folder, self.number, self.read = folder, number, read
         self.reach_of, self.near = functools.lru_cache(maxsize=MASKS_KEPT)(reaches.of), reaches.near
+        self.low_kinds = (OTHER, ROOF) if read.roofs == "shape" else (OTHER,)
         self.found: dict[str, dict[str, list[np.ndarray]]] = {}
         self.classes: Counter[int] = Counter()
         self.points = self.held = self.flushes = 0
@@ -129,7 +131,9 @@ class Gatherer:
             kind = kinds[candidates]
             self.keep(tile, "roof", cloud.xyz[candidates[(kind == ROOF) & (bits & 1 > 0)]])
             self.keep(tile, "ground", cloud.xyz[candidates[(kind == GROUND) & (bits & 2 > 0)]])
-            self.keep(tile, "low", lowest_in_cells(cloud.xyz[candidates[(kind == OTHER) & (bits & 2 > 0)]]))
+            self.keep(
+                tile, "low", lowest_in_cells(cloud.xyz[candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]])
+            )
         if self.held > HELD_POINTS:
             self.flush()
 

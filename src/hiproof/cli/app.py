@@ -14,6 +14,7 @@ from .classify import classify
 from .convert import convert
 from .evaluate import evaluate
 from .report import report
+from .segment import segment
 from .train import train
 
 app = typer.Typer(
@@ -54,13 +55,12 @@ def reconstruct(
     id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
     building_class: Annotated[list[int] | None, typer.Option(help="LAS class of roof points [default: 6]")] = None,
     ground_class: Annotated[list[int] | None, typer.Option(help="LAS class of terrain points [default: 2]")] = None,
+    roofs: Annotated[str | None, typer.Option(help="found by class, by shape, or auto [default: auto]")] = None,
     types: Annotated[str | None, typer.Option(help="roof types to choose among, such as gable,hip")] = None,
     objective: Annotated[str | None, typer.Option(help="likelihood or paper [default: likelihood]")] = None,
     detail: Annotated[str | None, typer.Option(help="full, or main: without dormers and small parts")] = None,
     parts: Annotated[str | None, typer.Option(help="compound, or one: one primitive a building")] = None,
-    network: Annotated[
-        bool | None, typer.Option(help="ask the network of every building, or of none [default: with --parts one]")
-    ] = None,
+    network: Annotated[bool | None, typer.Option(help="recognise roof types with the network first")] = None,
     config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
     parquet: Annotated[bool | None, typer.Option(help="write the attributes as GeoParquet too (extra `city`)")] = None,
     models: Annotated[str | None, typer.Option(help="models merged, by work tiles, or both [default: merged]")] = None,
@@ -78,14 +78,20 @@ def reconstruct(
 
     start(log_level, log_file)
     options = {
-        "read": {"building_classes": building_class, "ground_classes": ground_class, "crs": crs, "unit": unit},
+        "read": {
+            "building_classes": building_class,
+            "ground_classes": ground_class,
+            "roofs": roofs,
+            "crs": crs,
+            "unit": unit,
+        },
         "fit": {
             "types": [name.strip() for name in types.split(",")] if types else None,
             "objective": objective,
             "parts": parts,
         },
         "compound": {"detail": detail},
-        "segment": {"enabled": network, "always": network},
+        "segment": {"enabled": network},
         "city": {"parquet": parquet, "models": models},
     }
     inputs = {"footprints": footprints, "layer": layer, "terrain": terrain, "id_attribute": id_attribute}
@@ -98,18 +104,6 @@ def demo(folder: Annotated[Path, typer.Argument(help="folder for the results")] 
     from .demo import run
 
     raise typer.Exit(run(folder))
-
-
-@app.command()
-def warm(
-    everything: Annotated[
-        bool, typer.Option("--all", help="also what only runs without footprints or with --parts one call")
-    ] = False,
-) -> None:
-    """Compile what runs call, once for each version and machine, so that the first run starts at once."""
-    from .warm import run
-
-    raise typer.Exit(run(everything))
 
 
 @app.command()
@@ -164,5 +158,5 @@ def load(
     raise typer.Exit(run(folder, database, prefix))
 
 
-for command in (build, evaluate, report, convert, classify, train):
+for command in (build, evaluate, report, convert, classify, segment, train):
     app.command()(command)

@@ -1,4 +1,4 @@
-"""`hiproof classify`: label the points of buildings with roof types and write them with a table of types."""
+"""`hiproof classify`: a copy of a LAS or LAZ file in which ground and buildings have a class."""
 
 from __future__ import annotations
 
@@ -9,28 +9,19 @@ import typer
 
 
 def classify(
-    clouds: Annotated[
-        list[Path], typer.Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)")
-    ],
-    out: Annotated[Path, typer.Option(help="LAZ file for the labelled points; the table lies beside it as CSV")],
-    crs: Annotated[str | None, typer.Option(help="CRS of the clouds [default: as they say]")] = None,
+    cloud: Annotated[Path, typer.Argument(help="LAS, LAZ or COPC file")],
+    out: Annotated[Path, typer.Argument(help="LAZ or LAS file to write")],
+    crs: Annotated[str | None, typer.Option(help="CRS of the cloud [default: as it says]")] = None,
     unit: Annotated[str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")] = None,
-    weights: Annotated[str, typer.Option(help="ONNX file with other weights than the shipped ones")] = "",
-    device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
-    """Label every point with a roof type or not-roof, and name each building's type.
+    """Find ground (class 2) and buildings (6) by the shape of the cloud, and write a copy with these classes.
 
-    The LAZ has the extra dimensions roof_type (number of the type in the table's columns, from 1; 0 is no roof),
-    not_roof (probability) and building (the file's number on the command line, from 1). Exit code 1 if a building
-    could not be labelled; the others are written all the same.
+    Points that were of these classes and are found to be neither become unclassified (1); all other classes, and everything
+    else of the file, stay as they are. Noise, water and bridges are left alone.
     """
-    from ..segment.files import classify_files
+    from ..classify.files import classify_file
     from ..settings import Settings
 
     read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
-    settings = Settings().replace({"read": read, "segment": {"weights": weights, "device": device}})
-    failures = classify_files(clouds, out, settings)
-    for path, why in failures.items():
-        typer.echo(f"{path}: {why}", err=True)
-    if failures:
-        raise typer.Exit(1)
+    counts = classify_file(cloud, out, Settings().replace({"read": read}))
+    typer.echo(f"{out}: {counts['ground']:,} ground and {counts['building']:,} building points of {counts['points']:,}")

@@ -1,4 +1,4 @@
-"""Files of `hiproof classify`: clouds in, one LAZ with labels and a table of types out."""
+"""Files of `hiproof segment`: clouds in, one LAZ with labels and a table of types out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .inference import SHIPPED_WEIGHTS, Segmentation, load, segment
 EXTRA_DIMENSIONS = (("roof_type", "uint8"), ("not_roof", "float32"), ("building", "uint32"))
 
 
-def classify_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Path, str]:
+def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Path, str]:
     """Label each cloud of `clouds` as one building; write the points to `out` (LAZ or LAS) and the types to a CSV
     of the same name. Returns why, by file, where a building could not be labelled.
 

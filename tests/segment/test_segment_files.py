@@ -1,4 +1,4 @@
-"""`hiproof classify`: labelled points and the table, and files that cannot be labelled."""
+"""`hiproof segment`: labelled points and the table, and files that cannot be labelled."""
 
 import csv
 
@@ -8,10 +8,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from hiproof.cli.classify import classify
+from hiproof.cli.segment import segment as command
 from hiproof.errors import InputError, OutputError
 from hiproof.segment import segment
-from hiproof.segment.files import classify_files
+from hiproof.segment.files import segment_files
 from hiproof.settings import Settings
 from hiproof.simulate import training_sample
 
@@ -26,7 +26,7 @@ def test_points_and_table_say_what_segment_says(tmp_path):
     clouds = [tmp_path / "a.xyz", tmp_path / "b.xyz"]
     points = [written_cloud(path, seed) for seed, path in enumerate(clouds)]
     out = tmp_path / "labelled.laz"
-    assert classify_files(clouds, out, Settings()) == {}
+    assert segment_files(clouds, out, Settings()) == {}
     las = laspy.read(out)
     np.testing.assert_allclose(las.xyz, np.concatenate(points), atol=1e-3)
     found = [segment(cloud) for cloud in points]
@@ -41,7 +41,7 @@ def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path)
     written_cloud(tmp_path / "good.xyz", 1)
     np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
     app = typer.Typer()
-    app.command()(classify)
+    app.command()(command)
     arguments = [str(tmp_path / "few.xyz"), str(tmp_path / "good.xyz"), "--out", str(tmp_path / "out.laz")]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 1
@@ -52,6 +52,6 @@ def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path)
 def test_nothing_to_label_and_wrong_names_are_refused(tmp_path):
     np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
     with pytest.raises(InputError, match="at least one building"):
-        classify_files([tmp_path / "few.xyz"], tmp_path / "out.laz", Settings())
+        segment_files([tmp_path / "few.xyz"], tmp_path / "out.laz", Settings())
     with pytest.raises(OutputError, match="laz"):
-        classify_files([tmp_path / "few.xyz"], tmp_path / "out.txt", Settings())
+        segment_files([tmp_path / "few.xyz"], tmp_path / "out.txt", Settings())

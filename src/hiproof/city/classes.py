@@ -1,0 +1,63 @@
+"""Which of the clouds' classes may hold roofs, settled once for a run: those named, or all where none is a building's."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from collections import Counter
+
+from ..errors import InputError, InputWarning
+from ..read.pointcloud import as_input_error, iter_points
+from ..settings import ReadSettings, Settings
+
+NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noise"}
+PEEK_POINTS = 100_000
+
+
+def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
+    """`settings`, or where roofs are to be found by shape those with that said, and the classes that may hold roofs.
+
+    Classes other than the default that were asked for are taken as they are. Otherwise all classes but ground, water, noise,
+    low vegetation and bridges may hold roofs where no point has the building class, and one line says so. Raises InputError
+    where no class of the clouds may.
+    """
+    read = settings.read
+    if read.roofs == "class" or (read.roofs == "auto" and read.building_classes != ReadSettings().building_classes):
+        return settings
+    counts = count_classes(clouds, read.building_classes if read.roofs == "auto" else ())
+    if read.roofs == "auto" and (not counts or any(counts[c] for c in read.building_classes)):
+        return settings
+    others = tuple(sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes))
+    present = ", ".join(f"{c} ({n:,} points)" for c, n in sorted(counts.items()))
+    if not others:
+        raise InputError(
+            f"expected points that may be roofs, got classes {present}, all of them ground, water, noise, low vegetation "
+            "or bridges; say which class holds roofs with --building-class"
+        )
+    if read.roofs == "auto":
+        warnings.warn(
+            f"the clouds have no building class ({', '.join(map(str, read.building_classes))}) but {present}: roofs are looked "
+            f"for among the points of class {', '.join(map(str, others))}; say otherwise with --building-class",
+            InputWarning,
+        )
+    return with_read(settings, roofs="shape", building_classes=others)
+
+
+def with_read(settings: Settings, **changes: object) -> Settings:
+    return dataclasses.replace(settings, read=dataclasses.replace(settings.read, **changes))
+
+
+def count_classes(clouds: tuple[str, ...], enough: tuple[int, ...]) -> Counter[int]:
+    """Points by class, 0 where a file has none, of all readable files; counted no further than a point of class `enough`."""
+    counts: Counter[int] = Counter()
+    for name in clouds:
+        try:
+            for chunk in iter_points(name, PEEK_POINTS):
+                counts.update([0] * len(chunk) if chunk.classification is None else chunk.classification.tolist())
+                if any(counts[c] for c in enough):
+                    return counts
+        except MemoryError:
+            raise
+        except Exception as error:
+            as_input_error(error, name)  # the step that sorts points tells of it
+    return counts

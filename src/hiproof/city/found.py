@@ -1,0 +1,48 @@
+"""The roof of one building among points that nobody has classified: what lies on no surface, or on the ground, is left out."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..classify import roof_points
+from ..classify.surfaces import one_a_voxel
+
+CLEAR_M = 0.5  # of a roof above the ground
+BESIDE_M = 1.0
+FEWEST_BESIDE = 10  # cells beside a building, without which nothing is known of the ground
+MOSTLY, HARDLY = 0.5, 0.15  # shares of the outline's points
+
+
+@dataclass(frozen=True)
+class FoundRoof:
+    """`points` (n, 3) of the roof; `remark` says what hides it, `is_seen` whether enough of it is there to be modelled."""
+
+    points: np.ndarray
+    remark: str = ""
+    is_seen: bool = True
+
+
+def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray) -> FoundRoof:
+    """The roof within `area`, from the points `near` (n, 3) it and their `height` (n,) above ground, NaN where unknown.
+
+    Shares are of points thinned to one a voxel, so that a wall or a crown hit often does not count as more.
+    """
+    inside = shapely.intersects_xy(area, near[:, 0], near[:, 1])
+    if not inside.any():
+        return FoundRoof(near[inside])
+    shapely.prepare(area)
+    is_high = ~(height < CLEAR_M)
+    is_roof = np.zeros(len(near), bool)
+    is_roof[is_high] = roof_points(near[is_high])
+    chosen, _ = one_a_voxel(near[inside])
+    roof, high = is_roof[inside][chosen].mean(), is_high[inside][chosen].mean()
+    what = "leaves" if high > 0.5 * (1 + roof) else "ground"
+    if roof < HARDLY:
+        return FoundRoof(near[inside], f"no roof seen: its points are {what}", False)
+    if roof < MOSTLY:
+        remark = f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, the rest {what}"
+        return FoundRoof(near[inside & is_roof], remark)
+    return FoundRoof(near[inside & is_roof])

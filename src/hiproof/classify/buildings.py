@@ -1,0 +1,130 @@
+"""Which points are a building's: those on smooth and large surfaces that stand above the ground."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from ..read.assign import PointGrid
+from ..read.split import plan_density
+from .cells import PlanCells
+from .ground import ground_grid
+from .surfaces import Surfaces, surfaces_of
+
+UNKNOWN, GROUND, BUILDING = 1, 2, 6
+
+WORK_M, BORDER_M = 250.0, 40.0  # a cloud is worked through in squares, with what lies so far around each
+GROUND_M = 0.25  # of a point above or below the ground; on slopes more, by what half a cell rises
+HIGH_M = 1.5  # what is lower is no roof
+OPEN_M = 0.5  # what is lower is taken for ground when it is counted around a point
+FOOT_M = 0.3  # walls are a building's from here on
+CELLS_M = (0.5, 1.0, 2.0)  # sides of the cells in which buildings are put together, by density
+AROUND_M = 4.5  # side of the window in which ground is looked for around a point
+
+# Log odds of roof or wall against leaves, chosen on simulated towns and on one half of a real one.
+LOG_ROUGHNESS, LOG_LARGEST, LOG_EXTENT, GROUND_SHARE, CONSTANT = -0.93, 0.82, 0.46, -7.0, -1.65
+ROUNDS = 4  # of taking the mean over neighbours
+
+CORE_M2 = 5.0  # a building has cells with a surface of that size ...
+FEWEST_M2 = 16.0  # ... on that much of its plan,
+NARROWEST_M = 2.0  # nowhere narrower than this,
+UNLIKELY = -3.0  # log odds of what is no building even below a roof
+SQUARE = np.ones((3, 3))
+REACH_M = 1.5  # and nothing farther from them is part of it
+
+
+def classify(xyz: np.ndarray) -> np.ndarray:
+    """Class (n,) uint8 of each point (n, 3) in world metres: BUILDING, GROUND or UNKNOWN.
+
+    Points within 40 m decide, and so the answer for a place is much the same whatever else the cloud holds.
+    """
+    classes = np.full(len(xyz), UNKNOWN, np.uint8)
+    if not len(xyz):
+        return classes
+    grid, cell_m = PointGrid(xyz, 10.0), cell_for(xyz)
+    for column, row in np.unique(np.floor(xyz[:, :2] / WORK_M).astype(np.int64), axis=0).tolist():
+        low = WORK_M * np.array([column, row])
+        near = grid.candidates((*(low - BORDER_M), *(low + WORK_M + BORDER_M)))
+        own = (np.floor(xyz[near, :2] / WORK_M) == (column, row)).all(axis=1)
+        classes[near[own]] = classes_of_square(xyz[near], cell_m)[own]
+    return classes
+
+
+def cell_for(xyz: np.ndarray) -> float:
+    """Side of the cells that buildings are put together of: the smallest that most often holds a point where any are."""
+    density = plan_density(xyz)
+    return next((cell for cell in CELLS_M if density * cell**2 >= 1.0), CELLS_M[-1])
+
+
+def classes_of_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
+    """Class (n,) of all points of a small cloud (n, 3), n > 0."""
+    ground = ground_grid(xyz)
+    rise = 0.5 * ground.cell_m * ground.slope_at(xyz)
+    height = xyz[:, 2] - ground.height_at(xyz) - rise  # the ground's cells lie as low as their lowest point
+    classes = np.where(np.abs(height) <= GROUND_M + rise, GROUND, UNKNOWN).astype(np.uint8)
+    classes[building_points(xyz, height, cell_m)] = BUILDING
+    return classes
+
+
+def roof_points(xyz: np.ndarray) -> np.ndarray:
+    """Which (n,) of points (n, 3) within one building's outline lie on a surface, and not among leaves."""
+    if len(xyz) < 4:
+        return np.ones(len(xyz), bool)
+    surfaces = surfaces_of(xyz)
+    return smoothed(surfaces, log_odds(surfaces))[surfaces.voxel] > 0
+
+
+def log_odds(surfaces: Surfaces) -> np.ndarray:
+    """Log odds (v,) of each voxel of being a roof's or a wall's, as far as its surface tells."""
+    extent = np.log(surfaces.extent_m2)
+    return (
+        LOG_ROUGHNESS * np.log(surfaces.roughness_m + 0.02)
+        + LOG_LARGEST * extent[surfaces.neighbours].max(axis=1)
+        + LOG_EXTENT * surfaces.around(extent)
+        + CONSTANT
+    )
+
+
+def smoothed(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
+    """Log odds (v,), those of neighbours taken together; none is surer than 6."""
+    odds = np.clip(odds, -6.0, 6.0)
+    for _ in range(ROUNDS):
+        odds = surfaces.around(odds)
+    return odds
+
+
+def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.ndarray:
+    """Which (n,) of the points (n, 3), `height` (n,) above ground, are a building's."""
+    cells, high = PlanCells(xyz, cell_m), height > HIGH_M
+    odds, is_large = np.zeros(len(xyz)), np.zeros(len(xyz), bool)
+    if high.sum() < 4:
+        return is_large
+    surfaces = surfaces_of(xyz[high])
+    in_the_open = cells.share_around(height < OPEN_M, AROUND_M)[cells.of(surfaces.xyz)]
+    odds[high] = smoothed(surfaces, log_odds(surfaces) + GROUND_SHARE * in_the_open)[surfaces.voxel]
+    is_large[high] = surfaces.extent_m2[surfaces.voxel] >= CORE_M2
+    plan = building_cells(cells.count(odds > 0), cells.count(high), cells.count(is_large & (odds > 0)) > 0, cell_m)
+    inside = ndimage.binary_dilation(plan, SQUARE).ravel()[cells.index]
+    below_roof = (height < cells.highest(height, odds > 0).ravel()[cells.index]) & (odds > UNLIKELY)
+    return inside & (height > FOOT_M) & (~high | (odds > 0) | below_roof)
+
+
+def building_cells(solid: np.ndarray, high: np.ndarray, core: np.ndarray, cell_m: float) -> np.ndarray:
+    """Which cells (c, r) are buildings', from the points in each that are high, those of them that are solid, and
+    whether it holds a large surface."""
+    likely = closed((solid > 0) & (2 * solid >= high))
+    core = closed(core & likely)
+    narrowest = max(1, round(NARROWEST_M / cell_m))
+    core = ndimage.binary_opening(core, np.ones((narrowest, narrowest)))
+    label, count = ndimage.label(core, SQUARE)
+    area = ndimage.sum_labels(core, label, np.arange(count + 1)) * cell_m**2
+    core = core & (area >= FEWEST_M2)[label]
+    reach = round(REACH_M / cell_m)
+    plan = core | (likely & ndimage.binary_dilation(core, SQUARE, iterations=reach) if reach else likely & core)
+    gaps = ndimage.binary_fill_holes(plan) & (high > 0) & (ndimage.uniform_filter(plan.astype(float), 7) > 0.6)
+    return plan | gaps
+
+
+def closed(cells: np.ndarray) -> np.ndarray:
+    """`cells` (c, r) and those narrow gaps between them that are wholly surrounded."""
+    return cells | ndimage.binary_closing(np.pad(cells, 2), SQUARE)[2:-2, 2:-2]

@@ -1,0 +1,38 @@
+"""Points counted by square cells of the world's own grid."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from ..read.thin import cell_range
+
+
+class PlanCells:
+    """The cells of side `cell_m` (m) that points (n, 3) lie in; tables are (columns, rows), `index` (n,) is flat."""
+
+    def __init__(self, xyz: np.ndarray, cell_m: float):
+        self.cell_m = cell_m
+        self.first, self.shape = cell_range(xyz, cell_m)
+        self.index = self.of(xyz)
+
+    def of(self, xyz: np.ndarray) -> np.ndarray:
+        """Flat index (k,) of the cells that hold the points `xyz` (k, 3), which lie among those given before."""
+        column, row = (np.floor(xyz[:, :2] / self.cell_m).astype(np.int64) - self.first).T
+        return column * self.shape[1] + row
+
+    def count(self, chosen: np.ndarray) -> np.ndarray:
+        """Table of how many of the points `chosen` (n,) each cell holds."""
+        return np.bincount(self.index[chosen], minlength=self.shape[0] * self.shape[1]).reshape(self.shape)
+
+    def highest(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+        """Table of the largest of the `values` (n,) of points `chosen` (n,) in each cell and those around it."""
+        table = np.full(self.shape[0] * self.shape[1], -np.inf)
+        np.maximum.at(table, self.index[chosen], values[chosen])
+        return ndimage.maximum_filter(table.reshape(self.shape), 3)
+
+    def share_around(self, chosen: np.ndarray, width_m: float) -> np.ndarray:
+        """Share, flat by cells, of the points in a window of `width_m` about each cell that are `chosen` (n,)."""
+        size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
+        mean = [ndimage.uniform_filter(self.count(c).astype(float), size) for c in (chosen, np.ones(len(chosen), bool))]
+        return (mean[0] / np.maximum(mean[1], 1e-9)).ravel()

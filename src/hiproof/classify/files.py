@@ -1,0 +1,76 @@
+"""`hiproof classify`: a LAS or LAZ file's points get classes, and everything else in it stays as it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from ..errors import InputError, OutputError
+from ..read.crs import parse_crs, units_of
+from ..read.las import explained, las_crs, read_las_header
+from ..read.pointcloud import file_kind, refuse_implausible
+from ..settings import Settings
+from ..write.files import atomic
+from .buildings import BUILDING, GROUND, UNKNOWN, classify
+
+LEFT_ALONE = (7, 9, 17, 18)  # noise, water, bridges
+
+
+def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
+    """Write `path` to `out` with its ground and buildings as classes 2 and 6; how many "points", "ground", "building".
+
+    Raises InputError for a file that cannot be read or holds nothing but noise, water and bridges, OutputError for one
+    that cannot be written.
+    """
+    path, out = Path(path), Path(out)
+    if out.suffix.lower() not in (".laz", ".las"):
+        raise OutputError(f"expected a .laz or .las file to write, got {out}; name one")
+    if out.exists() and out.samefile(path):
+        raise OutputError(
+            f"expected another file to write than the one that is read, got {out} for both; name a new one"
+        )
+    las = read_whole(path)
+    units = units_of(parse_crs(settings.read.crs) or las_crs(las.header, path), str(path), settings.read.unit)
+    before = np.asarray(las.classification, np.uint8)
+    asked = ~np.isin(before, LEFT_ALONE) & ~np.asarray(las.withheld, bool)
+    if not asked.any():
+        raise InputError(
+            f"expected points that may be ground or buildings in {path}, got {len(before):,} of noise, water or bridges alone; "
+            "check the file's classes"
+        )
+    found = classify(units.to_metres(np.asarray(las.xyz)[asked]))
+    las.classification[asked] = classes_after(before[asked], found)
+    write_whole(las, out)
+    counts = {"points": len(before), "ground": (found == GROUND).sum(), "building": (found == BUILDING).sum()}
+    return {name: int(count) for name, count in counts.items()}
+
+
+def classes_after(before: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Classes (n,) from those `before` and those `found`: neither ground nor building keeps its own, unless it was one."""
+    own = np.where(np.isin(before, (GROUND, BUILDING)), UNKNOWN, before)
+    return np.where(found == UNKNOWN, own, found).astype(np.uint8)
+
+
+def read_whole(path: Path) -> laspy.LasData:
+    """Everything in the file. Raises InputError where it cannot be read, is empty, or is no LAS."""
+    if file_kind(path) != "las":
+        raise InputError(
+            f"expected a LAS, LAZ or COPC file at {path}, got another kind of point cloud; convert it first"
+        )
+    if not read_las_header(path).point_count:
+        raise InputError(f"expected points in {path}, got none; copy or download it again")
+    with explained(path):
+        las = laspy.read(path)
+        refuse_implausible(np.asarray(las.xyz), path)
+        return las
+
+
+def write_whole(las: laspy.LasData, out: Path) -> None:
+    """The file under its name, whole or not at all; an octree of COPC is left out, as the copy has none."""
+    header = las.header
+    header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
+    header.evlrs = [record for record in header.evlrs or [] if record.user_id != "copc"]
+    with atomic(out) as beside, open(beside, "wb") as file:
+        las.write(file, do_compress=out.suffix.lower() == ".laz")

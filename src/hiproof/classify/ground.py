@@ -1,0 +1,118 @@
+"""The ground under a cloud: what stands on it is taken away by openings of growing windows, the gaps are filled.
+
+A simple morphological filter after Pingel, Clarke and McBride (An improved simple morphological filter for the terrain
+classification of airborne LIDAR data, ISPRS Journal 77, 2013), with two changes: a plane through all cells is taken away
+first, so that the upper border of a steep slope is no step, and cells without points take no part instead of being
+filled before. The cloth filter's packages were weighed and left: their answer for a place depends on the whole cloud.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import ndimage
+
+from ..read.thin import cell_range
+
+CELL_M = 1.0
+WINDOWS_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0)  # half sides of the openings' windows
+SLOPE = 0.15  # a rise above the opened surface of more than this much of the half side is no ground
+PIT_M = 2.0  # a cell that lies so far below all around it is noise
+PLANES = 3
+SMOOTHINGS = 30
+
+
+@dataclass(frozen=True)
+class GroundGrid:
+    """Heights `z` (columns, rows) of the ground at the centres of square cells; the first cell's corner is `corner` (2,)."""
+
+    corner: np.ndarray
+    z: np.ndarray
+    cell_m: float
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy` (n, 2 or more), bilinear between cells' centres; the border's beyond them."""
+        place = (np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m - 0.5
+        return ndimage.map_coordinates(self.z, place.T, order=1, mode="nearest")
+
+    def slope_at(self, xy: np.ndarray) -> np.ndarray:
+        """Steepness (n,), a ratio, of the cell that holds each of `xy`."""
+        place = ((np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m).astype(int)
+        column, row = np.clip(place, 0, np.array(self.z.shape) - 1).T
+        padded = np.pad(self.z, 1, mode="edge")
+        along = (padded[2:, 1:-1] - padded[:-2, 1:-1]) / (2 * self.cell_m)
+        across = (padded[1:-1, 2:] - padded[1:-1, :-2]) / (2 * self.cell_m)
+        return np.hypot(along, across)[column, row]
+
+
+def ground_grid(xyz: np.ndarray, cell_m: float = CELL_M) -> GroundGrid:
+    """The ground under points (n, 3), n > 0, in world metres, on cells of the world's own grid.
+
+    >>> x, y = np.mgrid[0:40, 0:40] + 0.5
+    >>> house = (abs(x - 20) < 5) & (abs(y - 20) < 4)
+    >>> points = np.column_stack([x.ravel(), y.ravel(), np.where(house, 6.0, 0.0).ravel()])
+    >>> float(ground_grid(points).height_at(np.array([[20.0, 20.0]]))[0])
+    0.0
+    """
+    first, lowest = lowest_in_cells(xyz, cell_m)
+    return GroundGrid(np.array(first) * cell_m, filled(bare_ground(lowest, cell_m)), cell_m)
+
+
+def bare_points(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
+    """Those of the points (m, 3), at most one a cell, that are the ground's."""
+    first, table = lowest_in_cells(lowest, cell_m)
+    column, row = (np.floor(lowest[:, :2] / cell_m).astype(np.int64) - first).T
+    return lowest[np.isfinite(bare_ground(table, cell_m))[column, row]]
+
+
+def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
+    """The first cell of the world's grid, and the lowest height of points (n, 3) a cell (c, r), NaN where there is none."""
+    first, size = cell_range(xyz, cell_m)
+    column, row = (np.floor(xyz[:, :2] / cell_m).astype(np.int64) - first).T
+    lowest = np.full(size, np.inf)
+    np.minimum.at(lowest, (column, row), xyz[:, 2])
+    return first, np.where(np.isfinite(lowest), lowest, np.nan)
+
+
+def bare_ground(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
+    """The lowest heights of cells (c, r), NaN where no point is, with NaN also where they are not the ground's."""
+    level = lowest - plane_through(lowest, cell_m)
+    pit = -opened(-level, 1) - level > PIT_M
+    level = np.where(pit, np.nan, level)
+    known, raised, before = np.isfinite(level), np.zeros(level.shape, bool), level
+    for half in WINDOWS_M:
+        cells = max(1, round(half / cell_m))
+        after = opened(before, cells)
+        raised |= before - after > SLOPE * half
+        before = np.where(known, after, np.nan)
+    return np.where(known & ~raised, lowest, np.nan)
+
+
+def plane_through(z: np.ndarray, cell_m: float) -> np.ndarray:
+    """Heights at every cell of the plane through the known cells of `z`: of all, then twice of the half farthest below."""
+    column, row = (index * cell_m for index in np.indices(z.shape))
+    terms, known = np.stack([column, row, np.ones(z.shape)], axis=-1), np.isfinite(z)
+    for _ in range(PLANES):
+        plane = terms @ np.linalg.lstsq(terms[known], z[known], rcond=None)[0]
+        known = known & (z - plane <= np.median((z - plane)[known]))
+    return plane
+
+
+def opened(z: np.ndarray, half: int) -> np.ndarray:
+    """The opening of `z` by squares of 2 half + 1 cells whose middles are known cells; unknown ones (NaN) take no part."""
+    known, size = np.isfinite(z), 2 * half + 1
+    eroded = ndimage.grey_erosion(np.where(known, z, np.inf), size=size, mode="constant", cval=np.inf)
+    return ndimage.grey_dilation(np.where(known, eroded, -np.inf), size=size, mode="constant", cval=-np.inf)
+
+
+def filled(z: np.ndarray) -> np.ndarray:
+    """`z` with the nearest known height in unknown cells (NaN), smoothed there; zeros where nothing is known."""
+    known = np.isfinite(z)
+    if not known.any():
+        return np.zeros(z.shape)
+    nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
+    heights = z[tuple(nearest)]
+    for _ in range(SMOOTHINGS):
+        heights = np.where(known, z, ndimage.uniform_filter(heights, 3, mode="nearest"))
+    return heights

@@ -1,0 +1,96 @@
+"""How smooth and how large the surface is that a point lies on: what tells roofs and walls from leaves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..read.thin import hashes
+
+VOXEL_M = 0.5
+NEIGHBOURS = 12
+SMOOTH_M = 0.1  # a plane with larger residuals is no surface, and a point farther off is not on it
+TURN_DEG = 10.0  # neighbours of one surface have planes that differ by less
+LARGEST_M2 = 50.0  # surfaces of that size and larger are all alike
+
+
+@dataclass(frozen=True)
+class Surfaces:
+    """Points thinned to one a voxel, (v, ...), and what each lies on; `voxel` (n,) is the one of each point given.
+
+    `neighbours` (v, k) are the nearest voxels, itself first; `roughness_m` (v,) is the residual of the smoothest plane
+    among those through a neighbour's neighbours, `extent_m2` (v,) the size of the surface that this plane belongs to.
+    """
+
+    voxel: np.ndarray
+    xyz: np.ndarray
+    neighbours: np.ndarray
+    roughness_m: np.ndarray
+    extent_m2: np.ndarray
+
+    def around(self, values: np.ndarray) -> np.ndarray:
+        """Mean (v,) of each voxel's neighbours' `values` (v,)."""
+        return values[self.neighbours].mean(axis=1)
+
+
+def surfaces_of(xyz: np.ndarray) -> Surfaces:
+    """The surfaces that points (n, 3), in world metres, lie on; the same whatever order they come in.
+
+    >>> x, y = np.meshgrid(np.arange(0, 8, 0.5), np.arange(0, 8, 0.5))
+    >>> found = surfaces_of(np.column_stack([x.ravel(), y.ravel(), 0.5 * x.ravel()]))
+    >>> bool(found.roughness_m.max() < 1e-6), bool(found.extent_m2.min() > 40)
+    (True, True)
+    """
+    from scipy.spatial import cKDTree
+
+    chosen, voxel = one_a_voxel(xyz)
+    middles = xyz[chosen] - np.floor(xyz.mean(axis=0))
+    k = min(NEIGHBOURS, len(middles))
+    distance, neighbours = cKDTree(middles).query(middles, k=[*range(1, k + 1)])
+    centre, normal, residual = planes_through(middles[neighbours])
+    best = neighbours[np.arange(len(middles)), residual[neighbours].argmin(axis=1)]
+    centre, normal, residual = centre[best], normal[best], residual[best]
+    beside = np.abs(((middles - centre) * normal).sum(axis=1))
+    own_m2 = np.clip(np.pi * distance[:, -1] ** 2 / k, VOXEL_M**2, 4.0)
+    smooth = (residual < SMOOTH_M) & (beside < SMOOTH_M)
+    surface = connected(middles, normal, smooth, neighbours)
+    extent = np.minimum(np.bincount(surface, own_m2)[surface], LARGEST_M2)
+    return Surfaces(voxel, xyz[chosen], neighbours, residual, extent)
+
+
+def one_a_voxel(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the voxel (n,) of each point."""
+    cell = np.floor(xyz / VOXEL_M).astype(np.int64)
+    cell -= cell.min(axis=0)
+    size = cell.max(axis=0) + 1
+    key = (cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2]
+    order = np.lexsort((hashes(xyz), key))
+    _, first, voxel = np.unique(key[order], return_index=True, return_inverse=True)
+    of_point = np.empty(len(xyz), np.int64)
+    of_point[order] = voxel
+    return order[first], of_point
+
+
+def planes_through(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centre (v, 3), unit normal (v, 3) and residual (v,), one sigma, of the plane through each group of points (v, k, 3)."""
+    centre = groups.mean(axis=1)
+    offset = groups - centre[:, None]
+    values, vectors = np.linalg.eigh(np.einsum("vki,vkj->vij", offset, offset) / groups.shape[1])
+    return centre, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
+
+
+def connected(xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
+    """Number (v,) of the surface of each voxel: neighbours are of one where both are smooth and lie in each other's plane."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    one, other = np.repeat(np.arange(len(xyz)), neighbours.shape[1]), neighbours.ravel()
+    both = smooth[one] & smooth[other]
+    one, other = one[both], other[both]
+    between = xyz[other] - xyz[one]
+    same = np.abs((normal[one] * normal[other]).sum(axis=1)) > np.cos(np.radians(TURN_DEG))
+    for end in (one, other):
+        same &= np.abs((between * normal[end]).sum(axis=1)) < SMOOTH_M
+    links = coo_array((np.ones(same.sum(), np.int8), (one[same], other[same])), shape=(len(xyz),) * 2)
+    return connected_components(links, directed=False)[1]

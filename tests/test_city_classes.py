@@ -1,0 +1,131 @@
+"""Runs of clouds without a building class: roofs and ground are found, and what hides a roof is said."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof import build, read_parameters
+from hiproof.city.found import found_roof
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.errors import InputError, InputWarning
+from hiproof.settings import Settings
+from leafy_scenes import drone, forest, house_under_a_tree
+from tiny_town import make_town, write_cloud, write_footprints
+
+
+def run(folder, xyz, classes, footprints=None, settings=None):
+    """The run's record and its rows by id."""
+    cloud = write_cloud(folder / "cloud.laz", xyz, classes, origin=xyz.min(axis=0))
+    outlines = footprints and str(write_footprints(folder / "footprints.geojson", footprints))
+    request = Request((str(cloud),), folder / "out", outlines, settings=settings or Settings())
+    reconstruct_area(request)
+    return {row["id"]: row for row in read_parameters(folder / "out" / "parameters.jsonl")}
+
+
+def height_of(row, xy_world):
+    """Height (n,) in the world of the roof that a row of the parameters makes."""
+    roof = build(row).roof
+    return roof.height_at(xy_world - roof.frame.origin[:2]) + roof.frame.origin[2]
+
+
+@pytest.mark.parametrize("ground", [1, 2], ids=["one class only", "a ground class"])
+def test_footprints_are_enough(tmp_path, ground):
+    town = make_town()
+    classes = np.where(town.classification == 2, ground, 1)
+    with pytest.warns(InputWarning, match="no building class"):
+        rows = run(tmp_path, town.xyz, classes, town.footprints)
+    assert [row["status"] for row in rows.values()] == ["modelled"] * 4
+    assert all(abs(row["z_ground"] - 2.0) < 1.5 for row in rows.values())
+    record = json.loads((tmp_path / "out" / "run.json").read_text())
+    assert record["settings"]["read"]["roofs"] == "shape"
+
+
+def test_nothing_but_points_is_enough(tmp_path):
+    town = make_town()
+    with pytest.warns(InputWarning, match="no building class"):
+        rows = run(tmp_path, town.xyz, np.ones(len(town.xyz)))
+    assert [row["status"] for row in rows.values()] == ["modelled"] * 4
+
+
+def test_shape_can_be_asked_for_although_there_is_a_class(tmp_path):
+    town = make_town()
+    wrong = np.where(np.arange(len(town.xyz)) % 2, town.classification, 1)
+    rows = run(tmp_path, town.xyz, wrong, settings=Settings.from_dict({"read": {"roofs": "shape"}}))
+    assert [row["status"] for row in rows.values()] == ["modelled"] * 4
+
+
+@pytest.mark.parametrize("kind", [2, 3, 7, 9, 17])
+def test_a_cloud_of_one_class_that_holds_no_roof_is_refused(tmp_path, kind):
+    town = make_town(1)
+    with pytest.raises(InputError, match=f"got classes {kind} "):
+        run(tmp_path, town.xyz, np.full(len(town.xyz), kind), town.footprints)
+
+
+def test_a_cloud_of_trees_without_footprints_is_refused(tmp_path):
+    cloud = forest(np.random.default_rng(0), 40.0, 5.0)
+    with pytest.warns(InputWarning), pytest.raises(InputError, match="none of which lies on a smooth surface"):
+        run(tmp_path, cloud.points + (85000, 446000, 0), np.ones(len(cloud)))
+
+
+def test_a_roof_that_was_cut_out_is_one_building(tmp_path):
+    town = make_town(1)
+    roof = town.xyz[town.classification == 6]
+    with pytest.warns(InputWarning, match="taken for the points of one roof"):
+        rows = run(tmp_path, roof, np.zeros(len(roof)))
+    assert [row["status"] for row in rows.values()] == ["modelled"]
+
+
+def test_a_footprint_in_a_forest_holds_no_roof_and_says_so(tmp_path):
+    points = forest(np.random.default_rng(0), 40.0, 5.0).points + (85000, 446000, 0)
+    with pytest.warns(InputWarning):
+        rows = run(tmp_path, points, np.ones(len(points)), {"wood": shapely.box(84994, 445995, 85006, 446004)})
+    assert rows["wood"]["status"] == "no_roof"
+    assert "no roof seen: its points are leaves" in rows["wood"]["detail"]
+
+
+def test_a_footprint_on_a_lawn_holds_no_roof_and_says_so(tmp_path):
+    town = make_town(1)
+    lawn = shapely.box(85000, 446000, 85007, 446010)
+    with pytest.warns(InputWarning):
+        rows = run(tmp_path, town.xyz, np.ones(len(town.xyz)), {"lawn": lawn})
+    assert rows["lawn"]["status"] == "no_roof"
+    assert "its points are ground" in rows["lawn"]["detail"]
+
+
+@pytest.mark.parametrize(("share", "remarks"), [(0.4, False), (0.95, True)])
+def test_a_house_under_a_tree_is_its_roof_or_mostly_not_seen(tmp_path, share, remarks):
+    cloud, building = house_under_a_tree(np.random.default_rng(2), share)
+    points = cloud.points + (85000, 446000, 0)
+    outline = shapely.transform(building.footprint, lambda xy: xy + (85000, 446000))
+    with pytest.warns(InputWarning):
+        row = run(tmp_path, points, np.ones(len(points)), {"house": outline})["house"]
+    assert row["status"] == "modelled"
+    assert ("mostly not seen" in row["detail"]) == remarks
+    at = shapely.get_coordinates(building.outline.centroid)
+    truth = building.roof.height_at(at) + building.roof.frame.origin[2]
+    assert abs(height_of(row, at + building.roof.frame.origin[:2] + (85000, 446000)) - truth)[0] < 0.3
+
+
+def test_a_drones_cloud_is_as_good_as_it_is_dense(tmp_path):
+    cloud, building = drone(np.random.default_rng(1), density=200.0)
+    points = cloud.points + (85000, 446000, 0)
+    outline = shapely.transform(building.footprint, lambda xy: xy + (85000, 446000))
+    with pytest.warns(InputWarning):
+        row = run(tmp_path, points, np.ones(len(points)), {"house": outline})["house"]
+    assert row["status"] == "modelled" and "fitted to 20000 of its" in row["detail"]
+    inner, rng = building.outline.buffer(-0.3), np.random.default_rng(0)
+    xy = rng.uniform(inner.bounds[:2], inner.bounds[2:], (500, 2))
+    xy = xy[shapely.contains_xy(inner, *xy.T)]
+    truth = building.roof.height_at(xy) + building.roof.frame.origin[2]
+    off = height_of(row, xy + building.roof.frame.origin[:2] + (85000, 446000)) - truth
+    assert np.median(np.abs(off)) < 0.03
+
+
+def test_nothing_known_around_a_roof_leaves_all_of_it():
+    x, y = np.meshgrid(np.arange(0, 8, 0.3), np.arange(0, 6, 0.3))
+    roof = np.column_stack([x.ravel(), y.ravel(), 5 + 0.3 * x.ravel()])
+    found = found_roof(roof, shapely.box(0, 0, 8, 6), np.full(len(roof), np.nan))
+    assert len(found.points) == len(roof) and found.is_seen and not found.remark
+    assert not len(found_roof(roof, shapely.box(20, 0, 28, 6), np.full(len(roof), np.nan)).points)
