@@ -1,0 +1,137 @@
+"""Clouds without classes: ground and buildings found by shape, against the files' own classes; models of such a cloud.
+
+usage: python -m benchmarks.classes [--set delft amsterdam_west ctview stbarth] [--pictures FOLDER] [--quick]
+
+For each set (each of its files that lies alone is taken alone, Delft's two together): precision, recall and F1 by points of
+what is found to be buildings against class 6, and the mean absolute difference in height, over the metre cells that hold
+building points, between the ground found and that of the points of class 2. Delft is told in two halves: thresholds were
+chosen on the western one. Then, unless --quick, Delft with footprints and all classes made 1 is reconstructed by the command
+line's default options and measured by roof_residuals.py. `--pictures` draws hits, misses and false alarms.
+"""
+
+from __future__ import annotations
+
+import argparse
+import tempfile
+import time
+import warnings
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.classify import BUILDING, GROUND, classify
+from hiproof.classify.cells import PlanCells
+from hiproof.classify.ground import GroundGrid, filled, ground_grid
+from hiproof.model import PointCloud
+from hiproof.read import read_points
+
+from .judging import SHARED, tool
+
+SETS = ("delft", "amsterdam_west", "ctview", "stbarth")
+APART = ("amsterdam_west",)
+HALVES_X = 84930.0  # of Delft: thresholds were chosen west of it
+NOISE = 7
+
+
+def clouds_of(name: str) -> list[PointCloud]:
+    """The set's clouds, without its noise."""
+    files = sorted((SHARED / "data" / name).glob("*.laz"))
+    clouds = [read_points(file) for file in files] if name in APART else [read_points(*files)]
+    return [chosen(cloud, cloud.classification != NOISE) for cloud in clouds]
+
+
+def chosen(cloud: PointCloud, keep: np.ndarray) -> PointCloud:
+    return PointCloud(cloud.xyz[keep], cloud.classification[keep], cloud.crs, cloud.sources, cloud.units)
+
+
+def agreement(found: np.ndarray, truth: np.ndarray) -> str:
+    """Precision, recall and F1 of points (n,) `found` against the `truth`."""
+    hits = (found & truth).sum()
+    precision, recall = hits / max(found.sum(), 1), hits / max(truth.sum(), 1)
+    return f"F1 {2 * hits / (found.sum() + truth.sum()):.4f} precision {precision:.4f} recall {recall:.4f}"
+
+
+def ground_differences(cloud: PointCloud) -> np.ndarray:
+    """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold points of class 6."""
+    cells, is_ground = PlanCells(cloud.xyz, 1.0), cloud.classification == GROUND
+    count = cells.count(is_ground)
+    total = np.bincount(cells.index[is_ground], cloud.xyz[is_ground, 2], count.size).reshape(count.shape)
+    mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
+    true = GroundGrid(np.array(cells.first, float), filled(mean), 1.0)
+    under = np.argwhere(cells.count(cloud.classification == BUILDING) > 0) + np.array(cells.first) + 0.5
+    return ground_grid(cloud.xyz).height_at(under) - true.height_at(under)
+
+
+def report(name: str, pictures: Path | None) -> None:
+    clouds, found, seconds = clouds_of(name), [], time.process_time()
+    found = [classify(cloud.xyz) == BUILDING for cloud in clouds]
+    seconds = time.process_time() - seconds
+    truth = [cloud.classification == BUILDING for cloud in clouds]
+    ground = np.concatenate([ground_differences(cloud) for cloud in clouds])
+    print(
+        f"{name}: {agreement(np.concatenate(found), np.concatenate(truth))}; {seconds:.1f} s of {sum(map(len, clouds)):,} points"
+    )
+    if name == "delft":
+        west = clouds[0].xyz[:, 0] < HALVES_X
+        for half, here in (("west (chosen on)", west), ("east", ~west)):
+            print(f"  {half}: {agreement(found[0][here], truth[0][here])}")
+    print(
+        f"  terrain under buildings: mean |dz| {np.abs(ground).mean():.3f} m, mean {ground.mean():+.3f} m", flush=True
+    )
+    for number, (cloud, guess, true) in enumerate(zip(clouds, found, truth, strict=True)):
+        if pictures:
+            draw(pictures / f"{name}_{number}.png", cloud, guess, true)
+
+
+def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) -> None:
+    """Half-metre cells: grey by height, green where found and true agree, red false alarms, blue misses."""
+    from matplotlib import image
+
+    cells = PlanCells(cloud.xyz, 0.5)
+    height = cells.highest(cloud.xyz[:, 2] - ground_grid(cloud.xyz).height_at(cloud.xyz), np.ones(len(cloud), bool))
+    shade = 0.25 + 0.5 * np.clip(np.nan_to_num(height, neginf=0.0) / 12, 0, 1)
+    picture = np.repeat(shade[..., None], 3, axis=2)
+    both, only, missed = (cells.count(which) for which in (found & truth, found & ~truth, truth & ~found))
+    picture[both > 0] *= (0.7, 1.1, 0.7)
+    picture[only > both] = (1.0, 0.2, 0.2)
+    picture[(missed > both) & (missed > only)] = (0.2, 0.4, 1.0)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    image.imsave(path, np.kron(np.clip(picture, 0, 1).transpose(1, 0, 2)[::-1], np.ones((3, 3, 1))))
+
+
+def models_without_classes() -> str:
+    """Delft reconstructed from footprints and a cloud of class 1 alone, by default options."""
+    data = SHARED / "data" / "delft"
+    with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        clouds = [unclassified(file, Path(folder)) for file in sorted(data.glob("*.laz"))]
+        footprints, out = data / "footprints.gpkg", Path(folder) / "out"
+        summary = reconstruct_area(Request(tuple(map(str, clouds)), out, str(footprints)))
+        figures = tool("roof_residuals").measure(out / "buildings.city.jsonl", footprints, sorted(data.glob("*.laz")))
+    return f"delft, classes all 1, footprints: share {figures['share_within_20cm']:.4f}; {summary.by_status}"
+
+
+def unclassified(file: Path, folder: Path) -> Path:
+    """A copy of a LAZ file in `folder` whose points are all of class 1."""
+    las = laspy.read(file)
+    las.classification[:] = 1
+    las.write(folder / file.name)
+    return folder / file.name
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--set", nargs="+", choices=SETS, default=SETS)
+    parser.add_argument("--pictures", type=Path, help="folder to draw into")
+    parser.add_argument("--quick", action="store_true", help="no models")
+    arguments = parser.parse_args()
+    for name in arguments.set:
+        report(name, arguments.pictures)
+    if not arguments.quick:
+        print(models_without_classes())
+
+
+if __name__ == "__main__":
+    main()
