@@ -56,6 +56,19 @@ def test_shape_can_be_asked_for_although_there_is_a_class(tmp_path):
     assert [row["status"] for row in rows.values()] == ["modelled"] * 4
 
 
+def test_how_points_are_cut_into_files_changes_no_building(tmp_path):
+    town = make_town(2)
+    with pytest.warns(InputWarning):
+        whole = run(tmp_path, town.xyz, np.ones(len(town.xyz)), town.footprints)
+    mixed = np.random.default_rng(0).permutation(town.xyz)
+    parts = [
+        write_cloud(tmp_path / f"{i}.laz", part, np.ones(len(part))) for i, part in enumerate(np.split(mixed, [2000]))
+    ]
+    with pytest.warns(InputWarning):
+        reconstruct_area(Request(tuple(map(str, parts)), tmp_path / "cut", str(tmp_path / "footprints.geojson")))
+    assert {row["id"]: row for row in read_parameters(tmp_path / "cut" / "parameters.jsonl")} == whole
+
+
 @pytest.mark.parametrize("kind", [2, 3, 7, 9, 17])
 def test_a_cloud_of_one_class_that_holds_no_roof_is_refused(tmp_path, kind):
     town = make_town(1)
@@ -129,3 +142,14 @@ def test_nothing_known_around_a_roof_leaves_all_of_it():
     found = found_roof(roof, shapely.box(0, 0, 8, 6), np.full(len(roof), np.nan))
     assert len(found.points) == len(roof) and found.is_seen and not found.remark
     assert not len(found_roof(roof, shapely.box(20, 0, 28, 6), np.full(len(roof), np.nan)).points)
+
+
+@pytest.mark.parametrize("density", [0.5, 1.0])
+def test_a_sparse_cloud_gets_models_as_good_as_it_allows(tmp_path, density):
+    town = make_town(4, density)
+    with pytest.warns(InputWarning):
+        rows = run(tmp_path, town.xyz, np.ones(len(town.xyz)), town.footprints)
+    for i, row in enumerate(rows.values()):
+        assert row["status"] in ("modelled", "sparse")
+        corners = shapely.get_coordinates(town.footprints[f"house-{i}"].buffer(-1.0))
+        assert (height_of(row, corners) > 2.0 + 4.5).all()  # the eave lies 5 m above the ground at 2 m

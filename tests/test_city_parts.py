@@ -8,7 +8,7 @@ import pytest
 import shapely
 
 from hiproof.city.executors import InProcess, Processes, WorkerLost
-from hiproof.city.ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from hiproof.city.ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
 from hiproof.city.ledger import Ledger
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
@@ -62,7 +62,7 @@ def test_ground_around_a_building_follows_the_slope_under_it():
     assert np.isnan(terrain.height_at(np.array([[500.0, 0.0]]))).all()
 
 
-@pytest.mark.parametrize("around", [GroundAround, LowestAround])
+@pytest.mark.parametrize("around", [GroundAround, BareAround, LowestAround])
 def test_ground_of_a_building_ignores_what_lies_outside_its_box(around):
     rng = np.random.default_rng(5)
     ground = sloped_ground(rng)
@@ -101,7 +101,7 @@ def test_ground_heights_equal_plain_weighted_planes(share):
 
 def test_ground_without_points_is_unknown():
     box = np.array([0.0, 0.0, 10.0, 10.0])
-    for around in (GroundAround, LowestAround):
+    for around in (GroundAround, BareAround, LowestAround):
         assert np.isnan(around(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))).all()
 
 

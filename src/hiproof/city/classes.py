@@ -6,8 +6,10 @@ import dataclasses
 import warnings
 from collections import Counter
 
+import numpy as np
+
 from ..errors import InputError, InputWarning
-from ..read.pointcloud import as_input_error, iter_points
+from ..read.pointcloud import iter_points
 from ..settings import ReadSettings, Settings
 
 NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noise"}
@@ -53,11 +55,12 @@ def count_classes(clouds: tuple[str, ...], enough: tuple[int, ...]) -> Counter[i
     for name in clouds:
         try:
             for chunk in iter_points(name, PEEK_POINTS):
-                counts.update([0] * len(chunk) if chunk.classification is None else chunk.classification.tolist())
+                classes = np.zeros(len(chunk), np.uint8) if chunk.classification is None else chunk.classification
+                counts.update({c: int(n) for c, n in enumerate(np.bincount(classes)) if n})
                 if any(counts[c] for c in enough):
                     return counts
         except MemoryError:
             raise
-        except Exception as error:
-            as_input_error(error, name)  # the step that sorts points tells of it
+        except Exception:
+            continue  # the step that sorts points tells of it
     return counts

@@ -45,7 +45,7 @@ def surfaces_of(xyz: np.ndarray) -> Surfaces:
     from scipy.spatial import cKDTree
 
     chosen, voxel = one_a_voxel(xyz)
-    middles = xyz[chosen] - np.floor(xyz.mean(axis=0))
+    middles = xyz[chosen] - np.floor(xyz.min(axis=0))
     k = min(NEIGHBOURS, len(middles))
     distance, neighbours = cKDTree(middles).query(middles, k=[*range(1, k + 1)])
     centre, normal, residual = planes_through(middles[neighbours])
