@@ -26,6 +26,7 @@ $(VENV)/lint: $(VENV)/core
 	touch $@
 
 demo: $(VENV)/core
+	$(BIN)/hiproof warm
 	$(BIN)/hiproof demo demo
 	$(BIN)/hiproof check demo/buildings.city.jsonl
 	@echo "The models lie in demo/: buildings.gml (CityGML), buildings.city.jsonl (CityJSON), parameters.jsonl, buildings.gpkg"

@@ -4,6 +4,7 @@ import ast
 import errno
 import importlib
 import os
+import pickle
 import re
 import subprocess
 import sys
@@ -74,7 +75,14 @@ def forget():
     """Be as a new process to the package."""
     for name in [name for name in sys.modules if name.split(".")[0] == "town"]:
         del sys.modules[name]
-    for cached in (stamp.stamp_of, stamp.imported, stamp.text_of, kept.place_to_write, kept.warn_not_kept):
+    for cached in (
+        stamp.stamp_of,
+        stamp.imported,
+        stamp.text_of,
+        stamp.digest_of,
+        kept.place_to_write,
+        kept.warn_not_kept,
+    ):
         cached.cache_clear()
     kept.remove_outdated.cache_clear()
 
@@ -215,23 +223,125 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
 
 def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):
     runs = []
-    monkeypatch.setattr(warm, "run_neighbourhood", runs.append)
+    monkeypatch.setattr(warm, "compile_piece", lambda piece: not runs.append(piece))
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "kept",))
     kept.remove_outdated.cache_clear()
     for stamped in ("a", "a", "b", "b"):
         monkeypatch.setattr(warm, "stamp_of_all", lambda stamped=stamped: stamped)
-        warm.make_ready(tmp_path)
-    assert runs == [tmp_path, tmp_path]
-    assert len(files_in(tmp_path)) == 1
+        warm.make_ready(["solid"])
+    warm.make_ready(["solid", "single"])
+    assert runs == ["solid", "solid", "single"]
+    assert len(files_in(tmp_path)) == 2
 
 
 def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(warm, "run_neighbourhood", lambda scratch: pytest.fail("compiled for nothing"))
+    monkeypatch.setattr(warm, "compile_piece", lambda piece: pytest.fail("compiled for nothing"))
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "file" / "folder",))
     kept.warn_not_kept.cache_clear()
     with pytest.warns(NotKeptWarning, match="NUMBA_CACHE_DIR"):
-        warm.make_ready(tmp_path)
+        warm.make_ready()
+
+
+LONG = """
+from hiproof.compiled import compiled
+
+@compiled
+def number(x, power):
+    total = 0.0
+    for k in range(power):
+        for m in range(k):
+            total += (x + k) ** m / (x - m) + (x * m) % (k + 1.5)
+            if total > 1e9:
+                total -= {factor} * x / (k + m + 0.5)
+    return total
+"""
+CALLER = """
+from hiproof.compiled import compiled
+from .inner import number
+
+@compiled
+def answer(x):
+    total = number(x, 1)
+    for k in range(2, 5):
+        total += number(x, k)
+    return total
+"""
+
+
+def test_a_large_function_is_called_and_not_copied(town):
+    def answers():
+        forget()
+        answer = importlib.import_module("town.outer").answer
+        return answer(10.5), answer.py_func(10.5)
+
+    folder, inner = town / "town", town / "town" / "inner.py"
+    (folder / "outer.py").write_text(CALLER)
+    for factor in (3, 4):  # the second time the old code is still in this process, under another symbol
+        inner.write_text(LONG.replace("1e9", "1.0").format(factor=factor))
+        fast, slow = answers()
+        assert fast == pytest.approx(slow, rel=1e-12)
+    one, other = (pickle.loads(path.read_bytes()) for path in sorted(folder.rglob("*.nbc")))
+    assert [callee.name for callee in other[2]] == ["number"] and one[3] == other[2][0]
+    kept_files = files_in(town)
+    printed = run(town, "-c", "from town.outer import answer; print(answer(10.5))")
+    assert float(printed) == fast
+    assert files_in(town) == kept_files, "a new process loads the function that another calls"
+
+
+SORTING = """
+import numpy as np
+from hiproof.compiled import compiled
+
+@compiled
+def answer(x):
+    return np.{function}(x)
+"""
+
+
+def test_code_of_two_processes_meets_in_a_third_without_mistaking_one_for_the_other(town):
+    """numba's sort and argsort are made of functions of the same names and types."""
+    ask = "import numpy as np; from town.{0} import answer; print(*answer(np.arange(50.0)[::-1] % 7)[:7])"
+    functions = ("sort", "argsort")
+    for function in functions:
+        (town / "town" / f"{function}.py").write_text(SORTING.format(function=function))
+    alone = [run(town, "-c", ask.format(function)) for function in functions]
+    numbers = [set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes())) for path in town.rglob("*.nbc")]
+    assert len(numbers) == 2 and all(numbers) and not numbers[0] & numbers[1]
+    assert run(town, "-c", "\n".join(map(ask.format, functions))) == "".join(alone)
+
+
+def test_constants_in_a_call_compile_nothing_apart(town):
+    (town / "town" / "inner.py").write_text(LONG.format(factor=3))
+    (town / "town" / "outer.py").write_text(CALLER)
+    forget()
+    importlib.import_module("town.outer").answer(10.5)
+    assert len(sys.modules["town.inner"].number.signatures) == 1
+
+
+def test_the_pieces_compiled_beforehand_are_all_that_the_demo_calls(tmp_path):
+    """A piece that lacks a function would leave it to be compiled by every worker."""
+    script = f"""
+import sys
+from pathlib import Path
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.tasks import MAIN_JOB
+from hiproof.city.warm_pieces import PIECES
+from hiproof.compiled import kept
+from hiproof.simulate import demo_files
+
+asked, load = set(), kept.Kept.load_overload
+def noted(self, signature, context):
+    asked.add((self.name, str(signature)))
+    return load(self, signature, context)
+kept.Kept.load_overload = noted
+for piece in MAIN_JOB:
+    PIECES[piece]()
+pieces, files = set(asked), {{name: str(path) for name, path in demo_files().items()}}
+reconstruct_area(Request((files["cloud"],), Path({str(tmp_path)!r}), files["footprints"], files["terrain"]))
+print(sorted(asked - pieces))
+"""
+    assert run(tmp_path, "-c", script) == "[]\n"
 
 
 @pytest.mark.parametrize("total", [1, 7, 222])

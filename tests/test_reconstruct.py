@@ -180,10 +180,15 @@ def test_one_primitive_by_either_objective(objective):
     assert check_solid(building.solid) == ()
 
 
-def test_the_network_adds_its_opinion():
-    building = hiproof.reconstruct(gable_points(), FOOTPRINT)
+def test_the_network_adds_its_opinion_where_it_is_heeded_or_asked():
+    building = hiproof.reconstruct(
+        gable_points(), FOOTPRINT, settings=Settings.from_dict({"segment": {"always": True}})
+    )
     assert building.type == "gable"
     assert sum(building.recognised.values()) == pytest.approx(1.0)
+    unasked = hiproof.reconstruct(gable_points(), FOOTPRINT)
+    assert unasked.recognised == {}
+    assert unasked.parts[0].parameters == building.parts[0].parameters
     alone = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=Settings.from_dict({"fit": {"parts": "one"}}))
     assert sum(alone.types.values()) == pytest.approx(1.0)
 

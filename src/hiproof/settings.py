@@ -88,7 +88,8 @@ class CompoundSettings:
 class SegmentSettings:
     """[segment] recognising the roof before fitting it."""
 
-    enabled: bool = setting(True, "let the network label the points and inform the choice of type")
+    enabled: bool = setting(True, "let the network weigh points and types where one primitive is fitted to a building")
+    always: bool = setting(False, "ask it of every building and write its answer, though a fit of several does without")
     weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")
     device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
 

@@ -135,8 +135,9 @@ def remarked(building: Building, remark: str) -> Building:
 
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
-    """The network's opinion of the points (paper section 3.1), none where it is switched off or cannot tell."""
-    if not settings.segment.enabled:
+    """The network's opinion of the points (paper section 3.1), none where nobody heeds or asks for it, or it cannot tell."""
+    heeded = settings.fit.parts == "one" or settings.fit.objective == "paper"
+    if not settings.segment.enabled or not (heeded or settings.segment.always):
         return Recognised()
     from .segment import segment
 
@@ -144,8 +145,7 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
         found = segment(points, settings)
     except FitError:
         return Recognised()
-    weights = found.weights if settings.fit.parts == "one" or settings.fit.objective == "paper" else None
-    return Recognised(weights, found.types)
+    return Recognised(found.weights if heeded else None, found.types)
 
 
 def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:

@@ -1,6 +1,6 @@
 """Where tasks run: in this process, in processes of this machine, or on a Dask cluster. One verb: `run`.
 
-`prepare(scratch)` comes first: compiled code is made before workers start, so that no two make the same.
+`prepare(pieces)` comes first: compiled code is made before the work starts, so that no two workers make the same.
 `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that dies does not end the
 run: its tasks come back with a `WorkerLost`, and the caller decides whether to try them again. `isolated()` is an
 executor whose worker's death harms nobody else. Tasks are taken from their iterable only when a worker is near.
@@ -12,13 +12,12 @@ import os
 import signal
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import suppress
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
-from pathlib import Path
 from queue import Empty, SimpleQueue
 from typing import Any
 from urllib.parse import urlsplit
@@ -40,8 +39,8 @@ class WorkerLost(Exception):
 class InProcess:
     """One task after the other in this process."""
 
-    def prepare(self, scratch: Path) -> None:
-        """Nothing: this process compiles a function when it first calls it."""
+    def prepare(self, pieces: Sequence[str]) -> None:
+        make_ready(pieces)
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
         for task in tasks:
@@ -65,8 +64,8 @@ class Processes:
         self.pool: ProcessPoolExecutor | None = None
         self.word: Connection | None = None
 
-    def prepare(self, scratch: Path) -> None:
-        make_ready(str(scratch))
+    def prepare(self, pieces: Sequence[str]) -> None:
+        make_ready(pieces)
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
         try:
@@ -163,12 +162,12 @@ class Dask:
         except (OSError, ValueError) as error:
             raise InputError(f"expected a Dask scheduler at {address}, got: {error}; check the address") from error
 
-    def prepare(self, scratch: Path) -> None:
+    def prepare(self, pieces: Sequence[str]) -> None:
         """One worker of each host compiles, the others then load it; a host that joins later has to compile while it works."""
         one_of_each = {urlsplit(address).hostname: address for address in self.client.nthreads()}
         ends: SimpleQueue = SimpleQueue()
         tasks = [
-            self.submit(ends, make_ready, (str(scratch),), workers=[address], allow_other_workers=True)
+            self.submit(ends, make_ready, (tuple(pieces),), workers=[address], allow_other_workers=True)
             for address in one_of_each.values()
         ]
         patience = threading.Timer(POLL_S, news.listener, (0, count_compiled()))

@@ -32,7 +32,7 @@ from .plan import Plan
 from .quarantine import run_alone, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
-from .tasks import solve_tile, sort_cloud
+from .tasks import MAIN_JOB, solve_tile, sort_cloud
 
 MOST_LOSSES = 3
 Progress = Callable[[str, int, int], None]
@@ -82,7 +82,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         plan = resume_or_plan(request, state, ledger)
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
-            executor.prepare(state)
+            executor.prepare(pieces_of(request))
         clock.lap("prepare")
         arguments = functools.partial(task_arguments, request, state)
         work_off(ledger, executor, "sort", sort_cloud, arguments, progress)
@@ -108,6 +108,12 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         with suppress(sqlite3.Error):
             ledger.interrupt()
         ledger.close()
+
+
+def pieces_of(request: Request) -> tuple[str, ...]:
+    """What of the compiled code the run needs: one primitive by itself only where no footprint says what a building is."""
+    alone = request.footprints is None or request.settings.fit.parts == "one"
+    return (*MAIN_JOB, "single") if alone else MAIN_JOB
 
 
 class Clock:

@@ -3,7 +3,10 @@ without compiled code, the network and the readers of points."""
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Sequence
+
+MAIN_JOB = ("moves", "planes", "solid", "check", "points")
+"""Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:
@@ -20,8 +23,8 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
     return solve.solve_tile(folder, tile, terrain, avoid)
 
 
-def make_ready(scratch: str) -> None:
+def make_ready(pieces: Sequence[str]) -> None:
     """See warm.py."""
     from . import warm
 
-    warm.make_ready(Path(scratch))
+    warm.make_ready(pieces)

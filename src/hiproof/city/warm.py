@@ -1,51 +1,71 @@
-"""Compile before the workers start, in one process: all of them would else compile the same functions at the same time.
+"""Compile before any work starts, in as many processes as there are cores; later runs only look at a mark.
 
-What a run calls is compiled by running: the bundled neighbourhood, with all roof types and compounds in it, goes down the
-whole road from points to files. A mark beside the compiled code tells later runs that there is nothing to do.
+The processes are fresh ones that run `warm_pieces` each for a piece of the code: where they cannot be started, or one
+fails, the functions are compiled when they are called. A mark a piece lies beside the compiled code.
 """
 
 from __future__ import annotations
 
-import tempfile
-import warnings
-from pathlib import Path
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 
-from ..compiled import kept
+from ..compiled import kept, news
 from ..compiled.stamp import PACKAGE, stamp_of_all
-from ..errors import InputWarning
-from ..log import without_progress
+from ..log import LOGGER
+from .tasks import MAIN_JOB
+
+ALL = (*MAIN_JOB, "single")
 
 
-def make_ready(scratch: Path | None = None) -> None:
-    """Compile what a run with default settings calls, unless that was done before: minutes, of which `news` tells.
-
-    `scratch`: where temporary files go, else where the system has them.
-    """
+def make_ready(pieces: Sequence[str] = ALL) -> None:
+    """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news` tells."""
     places = kept.folders(make_ready, str(PACKAGE / "__init__.py"))
-    if any((place / mark()).exists() for place in places):
+    stamp = stamp_of_all()
+    missing = [piece for piece in pieces if not any((place / mark(piece, stamp)).exists() for place in places)]
+    folder = kept.place_to_write(places) if missing else None
+    if folder is None:  # all is there, or nothing can be kept, so that every process has to compile anyway
         return
-    folder = kept.place_to_write(places)
-    if folder is None:  # nothing can be kept, so every worker has to compile anyway
-        return
-    run_neighbourhood(scratch)
-    (folder / mark()).touch()
-    kept.remove_outdated(folder, "warm", stamp_of_all())
+    kept.remove_outdated(folder, "warm", stamp)
+    news.processes = min(cores(), len(missing))
+    news.tell()
+    with ThreadPoolExecutor(news.processes) as pool:
+        for piece, ready in zip(missing, pool.map(compile_piece, missing), strict=True):
+            if ready:
+                (folder / mark(piece, stamp)).touch()
+    news.processes = 1
 
 
-def mark() -> str:
-    """The name of the mark: another state of any compiled source, another processor or Python has another."""
+def compile_piece(piece: str) -> bool:
+    """Have a piece compiled by a process of its own, whose functions count as ready here too; whether it came to its end."""
+    command = [sys.executable, "-m", "hiproof.city.warm_pieces", piece]
+    silent = {"stdin": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    try:
+        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), **silent) as at_work:
+            for line in at_work.stdout:
+                news.ready.add(line.strip())
+                news.tell()
+    except OSError as error:
+        LOGGER.debug("no process could be started to compile %s: %s", piece, error)
+        return False
+    if at_work.returncode:
+        LOGGER.debug("compiling %s beforehand ended with exit code %d", piece, at_work.returncode)
+    return at_work.returncode == 0
+
+
+def environment() -> dict[str, str]:
+    """This process's, with its places to import from."""
+    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+
+
+def cores() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def mark(piece: str, stamp: str) -> str:
+    """The name of a piece's mark: another state of any compiled source, another processor or Python has another."""
     from llvmlite.binding import get_host_cpu_name
 
-    return f"warm.{get_host_cpu_name()}-{stamp_of_all()}-run.{kept.PYTHON}.nbc"
-
-
-def run_neighbourhood(scratch: Path | None) -> None:
-    """The whole road in this process, with all inputs and with the points alone; what comes out is thrown away."""
-    from ..simulate import demo_files
-    from .run import Request, reconstruct_area
-
-    files = {name: str(path) for name, path in demo_files().items()}
-    for footprints, terrain in ((files["footprints"], files["terrain"]), (None, None)):
-        with tempfile.TemporaryDirectory(dir=scratch) as out, without_progress(), warnings.catch_warnings():
-            warnings.simplefilter("ignore", InputWarning)
-            reconstruct_area(Request((files["cloud"],), Path(out), footprints, terrain))
+    return f"warm.{piece}.{get_host_cpu_name()}-{stamp}-run.{kept.PYTHON}.nbc"

@@ -60,7 +60,9 @@ def reconstruct(
     objective: Annotated[str | None, typer.Option(help="likelihood or paper [default: likelihood]")] = None,
     detail: Annotated[str | None, typer.Option(help="full, or main: without dormers and small parts")] = None,
     parts: Annotated[str | None, typer.Option(help="compound, or one: one primitive a building")] = None,
-    network: Annotated[bool | None, typer.Option(help="recognise roof types with the network first")] = None,
+    network: Annotated[
+        bool | None, typer.Option(help="ask the network of every building, or of none [default: with --parts one]")
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
     parquet: Annotated[bool | None, typer.Option(help="write the attributes as GeoParquet too (extra `city`)")] = None,
     models: Annotated[str | None, typer.Option(help="models merged, by work tiles, or both [default: merged]")] = None,
@@ -91,7 +93,7 @@ def reconstruct(
             "parts": parts,
         },
         "compound": {"detail": detail},
-        "segment": {"enabled": network},
+        "segment": {"enabled": network, "always": network},
         "city": {"parquet": parquet, "models": models},
     }
     inputs = {"footprints": footprints, "layer": layer, "terrain": terrain, "id_attribute": id_attribute}
@@ -104,6 +106,18 @@ def demo(folder: Annotated[Path, typer.Argument(help="folder for the results")] 
     from .demo import run
 
     raise typer.Exit(run(folder))
+
+
+@app.command()
+def warm(
+    everything: Annotated[
+        bool, typer.Option("--all", help="also what only runs without footprints or with --parts one call")
+    ] = False,
+) -> None:
+    """Compile what runs call, once for each version and machine, so that the first run starts at once."""
+    from .warm import run
+
+    raise typer.Exit(run(everything))
 
 
 @app.command()

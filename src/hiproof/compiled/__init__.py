@@ -19,6 +19,8 @@ from typing import Any
 def compiled(function: Callable | None = None, **options: Any) -> Any:
     """`numba.njit` with its options, as a decorator with or without them, for functions at the top of a module.
 
+    A division by zero gives infinity or NaN, as in NumPy.
+
     >>> @compiled(fastmath=True)
     ... def half(x):
     ...     return x / 2
@@ -29,10 +31,14 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
         return functools.partial(compiled, **options)
     import numba  # not before it is needed: the command line shows its help without
 
-    from .kept import Kept
-
-    dispatcher = numba.njit(**options)(function)
+    options = {"error_model": "numpy", "no_cfunc_wrapper": True} | options  # both only for what is compiled sooner
     file = Path(function.__code__.co_filename)
-    if file.is_file() and not numba.config.DISABLE_JIT:
-        dispatcher._cache = Kept(function, file)
+    if numba.config.DISABLE_JIT or not file.is_file():
+        return numba.njit(**options)(function)
+    from .kept import Kept
+    from .linking import pipeline_of, without_literals
+
+    kept = Kept(function, file)
+    dispatcher = numba.njit(pipeline_class=pipeline_of(kept.stamp), **options)(function)
+    dispatcher._cache, dispatcher.get_call_template = kept, without_literals(dispatcher.get_call_template)
     return dispatcher

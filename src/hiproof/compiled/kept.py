@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import Any
 
 import numba
-from numba.core import caching, compiler
+from numba.core import caching
 from numba.core.serialize import dumps
 
 from ..errors import NotKeptWarning
-from . import news
+from . import linking, news
 from .stamp import stamp_of
 
 PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
@@ -34,7 +34,7 @@ class Kept:
     """One function's code on disk, a file for each tuple of argument types; numba asks it as it asks its own cache."""
 
     def __init__(self, function: Callable, file: Path):
-        self.name = f"{function.__module__}.{function.__qualname__}"
+        self.function, self.name = function, f"{function.__module__}.{function.__qualname__}"
         self.module, self.stamp = file.stem, stamp_of(file)
         self.start = f"{file.stem}.{function.__qualname__}-{self.stamp}"
         self.folders = folders(function, str(file))
@@ -48,12 +48,12 @@ class Kept:
         context.refresh()
         for folder in self.folders:
             try:
-                kept, code = pickle.loads((folder / self.file_name(signature, context.codegen())).read_bytes())
+                kept, *code = pickle.loads((folder / self.file_name(signature, context.codegen())).read_bytes())
             except (OSError, *DAMAGED):
                 continue
             if kept == signature:
                 news.ready.add(self.name)
-                return compiler.CompileResult._rebuild(context, *code)
+                return linking.rebuilt(context, *code)
         place_to_write(self.folders)
         news.tell()
         return None
@@ -62,13 +62,19 @@ class Kept:
         """Keep what was just compiled, and remove what is out of date."""
         news.ready.add(self.name)
         news.tell()
+        if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
+            linking.settle(result, self.function, signature)
+            self.keep(signature, result)
+
+    def keep(self, signature: Any, result: Any) -> None:
+        """Write it where the next process finds it."""
         folder = place_to_write(self.folders)
-        if folder is None or result.library.has_dynamic_globals:  # addresses of this process: not to be kept
+        if folder is None:
             return
         file = folder / self.file_name(signature, result.codegen)
         beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
-            beside.write_bytes(dumps((signature, result._reduce())))
+            beside.write_bytes(dumps((signature, result._reduce(), *linking.links(result))))
             beside.replace(file)
         except OSError:  # a full disk, a folder that went away
             warn_not_kept()

@@ -1,7 +1,7 @@
 """News of compiling: how many functions are ready, and who shows it while the user waits.
 
 `listener` is called before and after a function is compiled, with the numbers of ready and of all functions. Compiling
-takes minutes, once for each version, and silence would look like a hang; where nobody listens the news goes into the log.
+takes a minute or so, once for each version, and silence would look like a hang; where nobody listens the news goes into the log.
 """
 
 from __future__ import annotations
@@ -11,17 +11,21 @@ from collections.abc import Callable
 
 from .stamp import count_compiled
 
-ready: set[str] = set()  # functions that were compiled or loaded in this process
+SECONDS_A_FUNCTION = 0.6  # of one core, with everything that it stands on
+
+ready: set[str] = set()  # functions that were compiled or loaded in this process, or by those that it started
+processes = 1  # that compile at the moment
 
 
 def headline(done: int, total: int) -> str:
-    """What is going on and how long it takes at most: a function takes a second or so.
+    """What is going on and how long it takes at most.
 
     >>> headline(20, 220)
-    'compiling for this machine, once for each version: up to 200 functions, up to 4 min'
+    'compiling for this machine, once for each version: up to 200 functions, about 120 s'
     """
     number = total - done
-    return f"compiling for this machine, once for each version: up to {number} functions, up to {-(-number // 60)} min"
+    seconds = 10 * -(-number * SECONDS_A_FUNCTION // (10 * processes))
+    return f"compiling for this machine, once for each version: up to {number} functions, about {seconds:.0f} s"
 
 
 class Lines:

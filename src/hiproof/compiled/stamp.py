@@ -21,6 +21,7 @@ IMPORT = re.compile(
 VERSIONS = ("numba", "llvmlite", "numpy")
 HERE = Path(__file__).parent
 PACKAGE = HERE.parent
+DECIDING = ("__init__.py", "linking.py")
 
 
 @functools.cache
@@ -48,9 +49,14 @@ def digest(files: Iterable[Path]) -> str:
     """One stamp of several files, whatever their order and wherever their package lies."""
     said = hashlib.sha256(" ".join([sys.version, *map(version_of, VERSIONS)]).encode())
     for file in sorted(files, key=place_in_package):
-        for text in (place_in_package(file).encode(), text_of(file)):
-            said.update(hashlib.sha256(text).digest())
+        said.update(digest_of(file))
     return said.hexdigest()[:16]
+
+
+@functools.cache
+def digest_of(file: Path) -> bytes:
+    """Digests of a file's place and of its text, one after the other."""
+    return b"".join(hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), text_of(file)))
 
 
 @functools.cache
@@ -68,14 +74,14 @@ def text_of(file: Path) -> bytes:
 def closure(file: Path) -> set[Path]:
     """The file and all files that its imports lead to, within its own package and hiproof.
 
-    How code is kept changes nothing of it, so of this folder only the decorator itself counts.
+    How code is kept changes nothing of it, so of this folder only the decorator and the linking count.
     """
     found, open_ends = set(), [file]
     while open_ends:
         at = open_ends.pop()
-        if at not in found:
+        if at not in found and (at.parent != HERE or at.name in DECIDING):
             found.add(at)
-            open_ends.extend(imported(at) if at.parent != HERE else ())
+            open_ends.extend(imported(at))
     return found
 
 
@@ -124,6 +130,7 @@ def top_of(file: Path) -> Path:
     return top
 
 
+@functools.cache
 def place_in_package(file: Path) -> str:
     """The file's path from where its package lies, with forward slashes."""
     return file.relative_to(top_of(file).parent).as_posix()

@@ -51,7 +51,7 @@ HIPROOF = (
     Attribute("detail", "text", "", "the status as a sentence about this building"),
     Attribute("roof_type", "text", "", "type of the largest part: a name of the catalogue, or free"),
     Attribute("roof_type_probability", "number", "", "probability of that type after the fits"),
-    Attribute("network_type", "text", "", "type that the network names"),
+    Attribute("network_type", "text", "", "type that the network names, where it was asked"),
     Attribute("network_type_probability", "number", "", "probability that the network gives it"),
     Attribute("parts", "count", "", "roof parts"),
     Attribute("points", "count", "", "points that the building was judged by"),
@@ -106,7 +106,7 @@ PARAMETERS = (
     Attribute("nodata_share", "number", "", "as rf_nodata_frac"),
     Attribute("unexplained_area_m2", "number", "m2", "as hiproof_unexplained_area_m2"),
     Attribute("objective", "number", "", "value of what was minimised"),
-    Attribute("recognised", "object", "", "probability by roof type, from the network"),
+    Attribute("recognised", "object", "", "probability by roof type, from the network where it was asked"),
     Attribute("types", "object", "", "probability by roof type, after the fits"),
 )
 

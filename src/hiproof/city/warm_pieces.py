@@ -1,0 +1,129 @@
+"""What a run compiles, in pieces that share next to nothing, so that several processes can compile at the same time.
+
+    python -m hiproof.city.warm_pieces check     # the names of functions as they become ready, a line each
+
+Each piece calls what the main job calls, on next to no data: compiling asks for the types of the arguments alone.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+import numpy as np
+import shapely
+
+from ..compiled import news
+
+OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)
+
+
+def house() -> np.ndarray:
+    """Points (n, 3) of a gable and a flat annex over OUTLINE."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.3, 9.0, 0.6), np.arange(0.3, 7.0, 0.6)))
+    return np.column_stack([x, y, np.where(x < 6.0, 8.0 - 0.7 * np.abs(y - 3.5), 3.0)])
+
+
+def moves() -> None:
+    """The search for volumes; their moves come first, so that `planes` is ready elsewhere when it is needed."""
+    from ..fit.union import fit_building
+    from ..fit.union.moves import improve, simplify
+    from ..fit.union.objective import objective
+    from ..fit.union.volumes import base_only
+
+    scene, base = scene_of_house()[1], base_only(-3.0)
+    value = objective(base, scene, np.inf)
+    improve(base, scene, value, np.array([0.7]), 1)
+    simplify(base, scene, value, 0.1)
+    fit_building(house(), OUTLINE)
+
+
+def planes() -> None:
+    """The planes and gables that the search begins with."""
+    from ..fit.union.candidates import candidates_of
+    from ..fit.union.grow import MOST_PLANES, grids_of
+
+    plan, scene = scene_of_house()
+    candidates_of(scene, np.arange(scene.n), grids_of(plan, scene), MOST_PLANES)
+
+
+def scene_of_house() -> tuple:
+    """The plan of the house and the scene that the search sees."""
+    from ..fit.union.plan import lay_out_plan
+    from ..fit.union.scene import allowed_shapes, directions_of, scene_of
+
+    plan = lay_out_plan(house(), OUTLINE)
+    return plan, scene_of(plan, OUTLINE, directions_of(OUTLINE, plan), 1.5, 0.25, allowed_shapes(()))
+
+
+def check() -> None:
+    """The check of a solid, and of a bent face."""
+    from ..compose import check_solid
+    from ..compose.bends import bent_faces
+    from ..model import Face, Solid
+
+    box = np.array([[x, y, z] for z in (0.0, 3.0) for y in (0.0, 5.0) for x in (0.0, 5.0)])
+    rings = [(0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5)]
+    faces = tuple(Face((ring,), "WallSurface") for ring in rings)
+    check_solid(Solid(box, faces))
+    one_face = np.array([0]), box[[0, 1, 7, 2]], np.arange(4), np.array([0, 4]), np.array([0, 1])
+    bent_faces(*one_face, np.array([[0.0, 0.0, 1.0]]))
+
+
+def solid() -> None:
+    """Plan cells, the closed shell, its quality and its texts; a building of three points is composed without a fit."""
+    from .. import reconstruct
+    from ..compose import compose
+    from ..frames import LocalFrame
+    from ..model import Part, Piece, Roof
+    from ..write.naming import FileUnits
+    from ..write.run_files import fragments
+
+    gable = Piece(shapely.box(0.0, 0.0, 6.0, 7.0), np.array([[0.0, 0.7, 5.55], [0.0, -0.7, 10.45]]))
+    annex = Piece(shapely.box(5.0, 1.0, 9.0, 7.0), np.array([[0.5, 0.0, 3.0]]))
+    compose(Roof((Part("free", (gable, annex)),), OUTLINE, LocalFrame(np.zeros(3))), 0.0)
+    fragments(reconstruct(house()[:3], OUTLINE), ("a", "a"), np.zeros(3), FileUnits())
+
+
+def single() -> None:
+    """One primitive by itself: what a roof without a footprint, or `--parts one`, begins with."""
+    from ..fit import fit_roof
+
+    fit_roof(house())
+
+
+def points() -> None:
+    """Sorting points into work tiles, those of one building, the ground around it."""
+    from .plan import Job
+    from .solve import Surroundings
+    from .sort import Reach
+
+    xyz, boxes = house(), np.array([[0.0, 0.0, 9.0, 7.0]])
+    Reach(boxes, boxes).bits(xyz, np.arange(len(xyz)))
+    around, job = Surroundings({"roof": xyz, "ground": xyz, "low": xyz}, None), Job(0, "", OUTLINE, None)
+    around.roof_of(job)
+    for terrain in around.terrain_of(job).terrains:
+        terrain.height_at(xyz[:, :2])
+
+
+PIECES: dict[str, Callable[[], None]] = {
+    piece.__name__: piece for piece in (moves, planes, solid, check, points, single)
+}
+
+
+def main(name: str) -> None:
+    """Compile one piece, and print the names of functions as they become ready."""
+    said: set[str] = set()
+
+    def tell(done: int, total: int) -> None:
+        for new in sorted(news.ready - said):
+            print(new, flush=True)
+        said.update(news.ready)
+
+    news.listener = tell
+    PIECES[name]()
+    tell(0, 0)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

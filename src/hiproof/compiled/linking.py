@@ -1,0 +1,100 @@
+"""Large functions are called by other compiled functions, not copied into them.
+
+numba links a function's code into every caller's, where LLVM optimises all of it once more. Of what is too large to be
+inlined nothing comes of that but time: here a caller gets an empty module in its place, and the address when it is
+loaded. So a function's symbol has to be the same in whatever process it was compiled (its stamp is in it), and what a
+function calls has to be loaded before it.
+"""
+
+from __future__ import annotations
+
+import itertools
+import uuid
+from collections.abc import Callable, Iterator
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import llvmlite.binding as llvm
+from numba.core import bytecode, compiler, types
+
+# numba numbers the functions of its own library from 1 in every process, and the numbers stand in their symbols: code that
+# two processes kept would meet in a third with one symbol for two functions.
+bytecode.FunctionIdentity._unique_ids = itertools.count(uuid.uuid4().int >> 80)
+
+LARGE = 80  # instructions; LLVM inlines fewer
+
+
+class Callee(NamedTuple):
+    """A large function that a caller's code refers to by its symbol."""
+
+    module: str
+    name: str
+    signature: Any
+
+    def load(self) -> None:
+        """Have its code in this process, from disk or compiled."""
+        getattr(import_module(self.module), self.name).compile(self.signature)
+
+
+def pipeline_of(stamp: str) -> type[compiler.Compiler]:
+    """numba's compiler for functions of a source file with this `stamp`, which is part of their symbols."""
+
+    class Stamped(compiler.Compiler):
+        def compile_extra(self, function: Callable) -> Any:
+            self.state.func_id = identity = bytecode.FunctionIdentity.from_function(function)
+            identity.unique_id = stamp
+            identity.unique_name = f"{identity.func_qualname}${stamp}"
+            compiler.ExtractByteCode().run_pass(self.state)
+            self.state.lifted, self.state.lifted_from = (), None
+            return self._compile_bytecode()
+
+    return Stamped
+
+
+def without_literals(call_template: Callable) -> Callable:
+    """A dispatcher's `get_call_template` that compiles nothing apart for a caller's constants."""
+
+    def template(args: tuple, kws: dict) -> Any:
+        kws = {name: types.unliteral(kind) for name, kind in kws.items()}
+        return call_template(tuple(map(types.unliteral, args)), kws)
+
+    return template
+
+
+def settle(result: Any, function: Callable, signature: Any) -> None:
+    """Note which large functions the code of a just compiled `result` calls, and be called as one if it is one."""
+    library = result.library
+    library.calls, library.is_called_as = tuple(dict.fromkeys(called_by(library))), None
+    if is_large(library.get_function(result.fndesc.mangled_name)):
+        library.is_called_as = Callee(function.__module__, function.__qualname__, signature)
+        library._shared_module = llvm.parse_assembly(str(library.codegen._create_empty_module(library.name)))
+
+
+def links(result: Any) -> tuple[tuple[Callee, ...], Callee | None]:
+    """What of a `settle`d result has to be kept beside its code."""
+    return result.library.calls, result.library.is_called_as
+
+
+def called_by(library: Any) -> Iterator[Callee]:
+    """The large functions that a library's code refers to, by itself or in what was copied into it."""
+    for linked in library._linking_libraries:
+        callee = getattr(linked, "is_called_as", None)
+        yield from getattr(linked, "calls", ()) if callee is None else (callee,)
+
+
+def is_large(function: Any) -> bool:
+    instructions = (1 for block in function.blocks for _ in block.instructions)
+    return next(itertools.islice(instructions, LARGE, None), None) is not None
+
+
+def rebuilt(context: Any, code: tuple, calls: tuple[Callee, ...], is_called_as: Callee | None) -> Any:
+    """The result of compiling from what was kept of it, after what it calls."""
+    for callee in calls:
+        callee.load()
+    names = code[1]
+    context.codegen()._engine._defined_symbols.update(
+        (names.llvm_func_name, names.llvm_cpython_wrapper_name, names.llvm_cfunc_wrapper_name)
+    )
+    result = compiler.CompileResult._rebuild(context, *code)
+    result.library.calls, result.library.is_called_as = calls, is_called_as
+    return result
