@@ -20,6 +20,7 @@ from typing import Any
 
 import numba
 from numba.core import caching
+from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from ..errors import NotKeptWarning
@@ -44,8 +45,11 @@ class Kept:
         return str(self.folders[0])
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """The code for these argument types, or None where it has to be compiled."""
-        context.refresh()
+        """The code for these argument types, or None where it has to be compiled.
+
+        What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs its memory alone.
+        """
+        rtsys.initialize(context)
         for folder in self.folders:
             try:
                 kept, *code = pickle.loads((folder / self.file_name(signature, context.codegen())).read_bytes())
@@ -74,7 +78,7 @@ class Kept:
         file = folder / self.file_name(signature, result.codegen)
         beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
-            beside.write_bytes(dumps((signature, result._reduce(), *linking.links(result))))
+            beside.write_bytes(dumps((signature, reduced(result), *linking.links(result))))
             beside.replace(file)
         except OSError:  # a full disk, a folder that went away
             warn_not_kept()
@@ -90,6 +94,13 @@ class Kept:
         for folder in self.folders:
             for file in folder.glob(f"{self.start}-*.{PYTHON}.nbc"):
                 file.unlink(missing_ok=True)
+
+
+def reduced(result: Any) -> tuple:
+    """What is pickled of a result: without the environments of copied functions that hold no constant, which no code
+    reads; loading them would import half of numba."""
+    *code, environments = result._reduce()
+    return *code, tuple(environment for environment in environments if environment.consts)
 
 
 def folders(function: Callable, file: str) -> tuple[Path, ...]:

@@ -40,6 +40,12 @@ def bent_faces(
 
 
 @compiled
+def dot(a, b):
+    """The inner product of two vectors (3,); `@` would bring BLAS along for it."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
 def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
     """Vertices (m, 3) of all rings of `faces`, the same in the planes of their faces (m, 2), and each face's start."""
     start = np.zeros(len(faces) + 1, np.int64)
@@ -52,11 +58,11 @@ def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
         aside = np.zeros(3)
         aside[np.argmin(np.abs(normal))] = 1.0
         u = np.cross(normal, aside)
-        u /= np.sqrt(u @ u)
+        u /= np.sqrt(dot(u, u))
         v = np.cross(normal, u)
         for i in range(start[k], start[k + 1]):
             corners[i] = vertices[index[low + i - start[k]]]
-            flat[i, 0], flat[i, 1] = corners[i] @ u, corners[i] @ v
+            flat[i, 0], flat[i, 1] = dot(corners[i], u), dot(corners[i], v)
     return corners, flat, start
 
 
@@ -79,9 +85,9 @@ def triangle_normals(places, owner, corners, flat, start, normals):
         b = corners[corner_at(places[t, 1, 0], places[t, 1, 1], flat, low, high)]
         c = corners[corner_at(places[t, 2, 0], places[t, 2, 1], flat, low, high)]
         normal = np.cross(b - a, c - a)
-        size = np.sqrt(normal @ normal)
+        size = np.sqrt(dot(normal, normal))
         if size > 0:
-            found[t] = normal / (size if normal @ normals[owner[t]] > 0 else -size)
+            found[t] = normal / (size if dot(normal, normals[owner[t]]) > 0 else -size)
     return found
 
 
@@ -91,9 +97,9 @@ def are_bent(places, owner, corners, flat, start, normals):
     bent = np.zeros(len(normals), np.bool_)
     found = triangle_normals(places, owner, corners, flat, start, normals)
     for t in range(len(found)):
-        if found[t] @ normals[owner[t]] >= SURELY_FLAT_COSINE or not found[t].any() or bent[owner[t]]:
+        if dot(found[t], normals[owner[t]]) >= SURELY_FLAT_COSINE or not found[t].any() or bent[owner[t]]:
             continue  # two triangles within 10 degrees of the face are within 20 of one another
         for s in range(len(found)):
-            if owner[s] == owner[t] and found[s].any() and found[s] @ found[t] < FLAT_COSINE:
+            if owner[s] == owner[t] and found[s].any() and dot(found[s], found[t]) < FLAT_COSINE:
                 bent[owner[t]] = True
     return bent

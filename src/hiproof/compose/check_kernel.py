@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from .bends import SURELY_FLAT_COSINE
+from .bends import SURELY_FLAT_COSINE, dot
 
 SAME_POINT_M = 1e-3
 TOUCH_M = 1e-9
@@ -30,7 +30,8 @@ def find_root(parent, i):
 def weld(vertices, tolerance):
     """For each vertex (n,) the lowest index of a vertex closer than `tolerance`."""
     same = np.arange(len(vertices))
-    along = vertices @ SKEW  # buildings are square to the axes: along none of them do so few vertices share a place
+    # buildings are square to the axes: along none of them do so few vertices share a place
+    along = SKEW[0] * vertices[:, 0] + SKEW[1] * vertices[:, 1] + SKEW[2] * vertices[:, 2]
     order = np.argsort(along)
     for i in range(len(order)):
         v = order[i]
@@ -284,7 +285,7 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
         first, last = face_start[f], face_start[f + 1]
         code = ring_lengths_code(index, ring_start, first, last)
         area = np.zeros(3) if code else newell(vertices, index, ring_start[first], ring_start[first + 1])
-        size = np.sqrt(area @ area)
+        size = np.sqrt(dot(area, area))
         if code == 0 and size < 1e-7:
             code = 104
         if code:
@@ -308,7 +309,7 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
         elif last - first > 1:
             signed = np.empty(last - first)
             for r in range(first, last):
-                signed[r - first] = newell(vertices, index, ring_start[r], ring_start[r + 1]) @ normals[f]
+                signed[r - first] = dot(newell(vertices, index, ring_start[r], ring_start[r + 1]), normals[f])
             count = check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f)
     return found[:count].copy(), normals, offsets, flatness, risky
 
@@ -326,21 +327,21 @@ def best_plane(vertices, index, low, high, normal):
     aside = np.zeros(3)
     aside[np.argmin(np.abs(normal))] = 1.0
     u = np.cross(normal, aside)
-    u /= np.sqrt(u @ u)
+    u /= np.sqrt(dot(u, u))
     v = np.cross(normal, u)
     uu = uv = vv = ud = vd = 0.0
     for k in range(low, high):
         p = vertices[index[k]] - centre
-        pu, pv, pd = p @ u, p @ v, p @ normal
+        pu, pv, pd = dot(p, u), dot(p, v), dot(p, normal)
         uu, uv, vv, ud, vd = uu + pu * pu, uv + pu * pv, vv + pv * pv, ud + pu * pd, vd + pv * pd
     determinant = uu * vv - uv * uv
     if determinant > 1e-9 * uu * vv:
         normal = normal - u * ((ud * vv - vd * uv) / determinant) - v * ((vd * uu - ud * uv) / determinant)
-        normal = normal / np.sqrt(normal @ normal)
+        normal = normal / np.sqrt(dot(normal, normal))
     farthest = 0.0
     for k in range(low, high):
-        farthest = max(farthest, abs((vertices[index[k]] - centre) @ normal))
-    return normal, centre @ normal, farthest
+        farthest = max(farthest, abs(dot(vertices[index[k]] - centre, normal)))
+    return normal, dot(centre, normal), farthest
 
 
 @compiled
@@ -611,7 +612,7 @@ def enclosed_volume(vertices, index, ring_start, face_start):
     for f in range(len(face_start) - 1):
         anchor = vertices[index[ring_start[face_start[f]]]]
         for r in range(face_start[f], face_start[f + 1]):
-            total += anchor @ newell(vertices, index, ring_start[r], ring_start[r + 1])
+            total += dot(anchor, newell(vertices, index, ring_start[r], ring_start[r + 1]))
     return total / 3.0
 
 
