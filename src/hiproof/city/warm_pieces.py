@@ -94,16 +94,15 @@ def single() -> None:
 
 def points() -> None:
     """Sorting points into work tiles, those of one building, the ground around it."""
-    from .plan import Job
-    from .solve import Surroundings
+    from ..read.assign import PointGrid
+    from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
     from .sort import Reach
 
     xyz, boxes = house(), np.array([[0.0, 0.0, 9.0, 7.0]])
     Reach(boxes, boxes).bits(xyz, np.arange(len(xyz)))
-    around, job = Surroundings({"roof": xyz, "ground": xyz, "low": xyz}, None), Job(0, "", OUTLINE, None)
-    around.roof_of(job)
-    for terrain in around.terrain_of(job).terrains:
-        terrain.height_at(xyz[:, :2])
+    PointGrid(xyz).inside(OUTLINE)
+    GroundAround(ground_cells(xyz), boxes[0]).height_at(xyz[:, :2])
+    LowestAround(Cells(lowest_in_cells(xyz)), boxes[0]).height_at(xyz[:, :2])
 
 
 PIECES: dict[str, Callable[[], None]] = {
