@@ -38,11 +38,16 @@ def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
         normal = np.array([math.cos(azimuth), math.sin(azimuth)])
         along = xy @ [-normal[1], normal[0]]
         low, high = sorted(corners[k % len(lines)] @ [-normal[1], normal[0]] for k in (i, i + 1))
-        if high - low > LONG_M:
-            low, high = low + END_M, high - END_M
-        depth = (distance - xy @ normal)[(along >= low) & (along <= high)]
-        moved[i, 1] += offset(depth[(depth < DEEP_M) & (depth > -OUTSIDE_M)], high - low, density)
+        moved[i, 1] += side_offset(along, distance - xy @ normal, low, high, density)
     return moved if find_corners(moved, corners) else lines
+
+
+def side_offset(along: np.ndarray, depth: np.ndarray, low: float, high: float, density: float) -> float:
+    """How far (m) outwards a side from `low` to `high` lies of the line from which `depth` (n,) of points at `along` was measured."""
+    if high - low > LONG_M:
+        low, high = low + END_M, high - END_M
+    across = (along >= low) & (along <= high) & (depth < DEEP_M) & (depth > -OUTSIDE_M)
+    return offset(depth[across], high - low, density)
 
 
 def offset(depth: np.ndarray, length: float, density: float) -> float:

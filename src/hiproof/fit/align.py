@@ -1,0 +1,153 @@
+"""How far a footprint lies beside the roof that it stands for, and how sure that is.
+
+First the footprint is slid to where it holds most points: its area is the same everywhere, so that is where an outline of its
+shape is most likely. Then each side that has free ground before it is put where the points across it put it
+(outline/settle.py), and all together tell the shift, and how far the roof reaches beyond the footprint on every side. A side
+that a neighbour's roof goes on beyond tells nothing, so a house in a row is not moved along the row.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from itertools import product
+
+import numpy as np
+import shapely
+
+from .outline.lines import lines_through
+from .outline.settle import side_offset
+from .union.plan import ring_edges, signed_depth
+
+FARTHEST_M = 3.0  # a footprint is moved at most
+AROUND_M = 4.0  # of points that are asked for around it
+COARSE_M, FINE_M, PITCH_M = 0.5, 0.1, 0.1
+BLUR_M, STRAY = 0.25, math.exp(-4.0)
+LEAST_POINTS, LEAST_SIDE_M = 20, 1.5
+FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may be so many points of those behind it
+SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
+REACH_SIGMA_M = 0.5  # how far roofs usually reach beyond footprints, or stay behind
+ROUNDS, NEAR_M = 3, 0.2
+LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.4
+
+
+@dataclass(frozen=True)
+class Shift:
+    """Where a footprint's roof lies: `xy` (2,) m from it with standard deviations `sigma` (2,), infinite along which nothing is
+    known; `beyond` (m) how far the roof reaches over the moved footprint, negative where it stays behind, and its `beyond_sigma`;
+    `disagreement` (m) of the sides; `free` the share of the footprint's border that told it."""
+
+    xy: np.ndarray = field(default_factory=lambda: np.zeros(2))
+    sigma: np.ndarray = field(default_factory=lambda: np.full(2, math.inf))
+    beyond: float = 0.0
+    beyond_sigma: float = math.inf
+    disagreement: float = math.inf
+    free: float = 0.0
+
+    @property
+    def is_none(self) -> bool:
+        """Whether the footprint is known to lie where its roof is."""
+        small = float(np.hypot(*self.xy)) < NEAR_M and float(self.sigma.max()) < NEAR_M
+        return small and self.disagreement < MOST_DISAGREEMENT_M and self.free > LEAST_FREE
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the footprint should be moved."""
+        length = float(np.hypot(*self.xy))
+        known = length > 0 and float(np.hypot(*(self.sigma * self.xy / length)))
+        return (
+            LEAST_SHIFT_M <= length <= FARTHEST_M
+            and length > SIGMAS * known
+            and self.disagreement < MOST_DISAGREEMENT_M
+            and self.free > LEAST_FREE
+        )
+
+
+def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
+    """The shift of `footprint` onto roof points `xy` (n, 2) in and AROUND_M around it, both in one local frame in metres.
+
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8, 0.4)))
+    >>> shift = find_shift(np.column_stack([x, y]), shapely.box(1.0, -0.5, 13.0, 7.5))
+    >>> shift.is_clear, np.abs(shift.xy - [-1.0, 0.5]).max() < 0.1
+    (True, np.True_)
+    """
+    ring = shapely.get_coordinates(shapely.geometry.polygon.orient(shapely.simplify(footprint, PITCH_M)).exterior)[:-1]
+    if len(xy) < LEAST_POINTS or len(ring) < 3:
+        return Shift()
+    lines = lines_through(ring)
+    shift = by_sides(xy, ring, lines, np.zeros(2))
+    if shift is not None and shift.is_none:
+        return shift
+    shift = Shift(most_points(xy, footprint))
+    for _ in range(ROUNDS):
+        found = by_sides(xy, ring, lines, shift.xy)
+        if found is None:
+            return Shift()
+        settled = np.abs(found.xy - shift.xy).max() < 0.02
+        shift = found
+        if settled:
+            break
+    return shift
+
+
+def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
+    """The shift (2,) at which the footprint holds most of `xy`, the least of those that hold as many: coarse, then fine."""
+    low = np.array(footprint.bounds[:2]) - AROUND_M - FARTHEST_M
+    count = np.ceil((np.array(footprint.bounds[2:]) + AROUND_M + FARTHEST_M - low) / (2 * PITCH_M)).astype(int)
+    nodes = low + 2 * PITCH_M * np.stack(np.indices(count), axis=-1).reshape(-1, 2)
+    depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
+    from scipy.special import ndtr
+
+    costs = -np.log(STRAY + (1.0 - STRAY) * ndtr(depth / BLUR_M)).reshape(count)
+    best = np.zeros(2)
+    for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
+        moves = np.arange(-reach, reach + 0.5 * step, step)
+        tried = best + np.array(list(product(moves, moves)))
+        tried = tried[np.hypot(*tried.T) <= FARTHEST_M]
+        cost = [cost_at(xy - move, costs, low) + 0.1 * float(move @ move) for move in tried]
+        best = tried[int(np.argmin(cost))]
+    return best
+
+
+def cost_at(xy: np.ndarray, costs: np.ndarray, low: np.ndarray) -> float:
+    i, j = np.clip(((xy - low) / (2 * PITCH_M) + 0.5).astype(int), 0, np.array(costs.shape) - 1).T
+    return float(costs[i, j].sum())
+
+
+def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray) -> Shift | None:
+    """The shift and the reach beyond that all free sides of the footprint, slid by `start`, agree on best."""
+    density = len(xy) / max(shapely.Polygon(ring).area, 1.0)
+    length = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)
+    rows = []
+    for i in np.flatnonzero(length >= LEAST_SIDE_M):
+        azimuth, distance = lines[i]
+        normal = np.array([math.cos(azimuth), math.sin(azimuth)])
+        ends = ring[[i, (i + 1) % len(ring)]] + start
+        offset = free_side_offset(xy, normal, distance + normal @ start, ends, density)
+        if offset is not None:
+            rows.append((*normal, 1.0, offset + normal @ start, SIDE_M * math.sqrt(SIDE_LENGTH_M / length[i]), length[i]))
+    if not rows:
+        return None
+    *design, wanted, sigma, told = np.array(rows).T
+    design, weight = np.array(design).T, 1.0 / sigma**2
+    prior = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
+    inverse = np.linalg.inv((design.T * weight) @ design + prior)
+    solution = inverse @ (design.T @ (weight * wanted))
+    gap = wanted - design @ solution
+    disagreement = math.sqrt(float(np.average(gap**2, weights=told)))
+    spread = np.sqrt(np.diag(inverse)) * max(1.0, math.sqrt(float((weight * gap**2).mean())))
+    return Shift(solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement, told.sum() / length.sum())
+
+
+def free_side_offset(
+    xy: np.ndarray, normal: np.ndarray, distance: float, ends: np.ndarray, density: float
+) -> float | None:
+    """How far (m) outwards the roof's side lies of the footprint's, None where roofs go on before it or there is none."""
+    along, depth = xy @ [-normal[1], normal[0]], distance - xy @ normal
+    low, high = sorted(ends @ [-normal[1], normal[0]])
+    within = (along >= low) & (along <= high)
+    before = ((depth > -FREE_TO_M) & (depth < -FREE_FROM_M) & within).sum() / (FREE_TO_M - FREE_FROM_M)
+    behind = ((depth > FREE_FROM_M) & (depth < FREE_TO_M) & within).sum() / (FREE_TO_M - FREE_FROM_M)
+    if behind < 1.0 or before > FREE_SHARE * behind:
+        return None
+    return side_offset(along, depth, low, high, density)
