@@ -192,7 +192,7 @@ class Building:
     `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for
     this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
     lines. `recognised` are the network's probabilities by roof type, `types` those after the fits, where a choice was made. `footprint` (world) and `attributes`
-    are the input's own.
+    are the input's own; `shift` (m) is how far the footprint was moved onto its roof.
     """
 
     id: str
@@ -209,6 +209,7 @@ class Building:
     types: dict[str, float] = field(default_factory=dict)
     footprint: shapely.Polygon | None = None
     attributes: dict[str, Any] = field(default_factory=dict)
+    shift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def type(self) -> str | None:

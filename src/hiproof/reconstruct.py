@@ -25,7 +25,8 @@ def reconstruct(
     """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits).
 
     points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; non-finite and repeated
-    ones are dropped. footprint: plan polygon in the same frame; without one the outline is estimated. terrain: anything
+    ones are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
+    beside its roof; without one the outline is estimated. terrain: anything
     with `height_at(xy_world (n, 2)) -> (n,)` and `source`; without one the ground is assumed below the lowest point.
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why.
 
@@ -36,7 +37,8 @@ def reconstruct(
     """
     settings = settings or Settings()
     building = stages.asked_for(footprint, id)
-    points, outline, status = stages.usable(points, building.footprint)
+    building, footprint, of_footprint = stages.aligned(building, points, settings)
+    points, outline, status = stages.usable(points, footprint)
     if status is not Status.MODELLED:
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = LocalFrame.around(points)
@@ -50,4 +52,5 @@ def reconstruct(
     ground = stages.find_ground(fitted.outline, points, frame, terrain)
     roof = Roof(fitted.parts, fitted.outline, frame)
     roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
-    return stages.remarked(stages.judge(building, roof, solid, points, fitted, ground, settings), remark)
+    building = stages.judge(building, roof, solid, points, fitted, ground, settings)
+    return stages.remarked(stages.remarked(building, of_footprint), remark)

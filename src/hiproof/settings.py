@@ -109,6 +109,9 @@ class ComposeSettings:
 class ReconstructSettings:
     """[reconstruct] one building from points to solid."""
 
+    align: str = setting(
+        "auto", "auto moves footprints that clearly lie beside their roofs, off leaves them", choices=("auto", "off")
+    )
     poor_share: float = setting(0.5, "a model with a smaller share of points within 0.2 m is called poor", "", 0.0, 1.0)
 
 

@@ -66,6 +66,39 @@ def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Buildin
     return Building(id, Status.MODELLED, footprint=footprint)
 
 
+def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple[Building, shapely.Polygon | None, str]:
+    """The building with its footprint's shift onto its points, the footprint there, and a remark: on points in and around it.
+
+    It stays where it is unless the evidence is clear.
+    """
+    footprint = building.footprint
+    if (
+        footprint is None
+        or settings.reconstruct.align == "off"
+        or not (math.isfinite(footprint.area) and footprint.area)
+    ):
+        return building, footprint, ""
+    from .fit.align import find_shift
+
+    polygon = largest_polygon(footprint)
+    origin = np.floor(polygon.bounds[:2])
+    xy = np.asarray(points, float).reshape(-1, 3)[:, :2]
+    found = find_shift(xy[np.isfinite(xy).all(axis=1)] - origin, shapely.transform(polygon, lambda c: c - origin))
+    remarks = []
+    if found.is_clear:
+        shift = (round(float(found.xy[0]), 3), round(float(found.xy[1]), 3))
+        building = dataclasses.replace(building, shift=shift)
+        footprint = shapely.transform(footprint, lambda c: c + shift)
+        error = float(np.hypot(*found.sigma))
+        remarks.append(
+            f"its footprint was moved by ({shift[0]:.2f}, {shift[1]:.2f}) m, within {error:.2f} m, onto its roof"
+        )
+    if found.is_size_clear:
+        reach = "reaches {:.1f} m beyond" if found.beyond > 0 else "stays {:.1f} m inside"
+        remarks.append(f"its roof {reach.format(abs(found.beyond))} its footprint on every side that shows")
+    return building, footprint, "; ".join(remarks)
+
+
 def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
     """Finite, distinct points inside the footprint, in one order whatever order they came in."""
     if footprint is not None:

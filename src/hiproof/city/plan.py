@@ -23,6 +23,7 @@ from ..write.naming import FileUnits, UniqueNames, gml_name
 from ..write.parameters import FileHead, crs_text
 
 PLAN_FILE = "plan.jsonl"
+AROUND_M = 4.0  # of roof points around a footprint that may be moved: as fit/align.py asks, without its compiler here
 GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 
 
@@ -59,6 +60,13 @@ class Plan:
     def terrain_reach_m(self) -> float:
         """How far around a building terrain matters: farther where the ground must be found first."""
         return FOUND_GROUND_REACH_M if self.settings.read.roofs == "shape" else GROUND_REACH_M
+
+    @functools.cached_property
+    def around_m(self) -> float:
+        """How far beyond its area a building sees roof points: as far as its footprint may have to be moved."""
+        moved = self.settings.reconstruct.align != "off" and self.settings.read.roofs != "shape"
+        moved = moved and any(job.footprint is not None for job in self.jobs)
+        return AROUND_M if moved else 0.0
 
     @functools.cached_property
     def units(self) -> Units:

@@ -40,9 +40,12 @@ class Surroundings:
         self.low = Cells(lowest_in_cells(points["low"]))
 
     def roof_of(self, job: Job) -> FoundRoof:
-        """Roof points (n, 3) inside the job's area; a point that stands in two files comes twice."""
+        """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be moved onto them.
+
+        A point that stands in two files comes twice. Roofs found by shape are those inside the area.
+        """
         if self.plan.settings.read.roofs != "shape" or job.area.is_empty:
-            return FoundRoof(self.roof[self.grid.inside(job.area)])
+            return FoundRoof(self.roof[self.grid.within(job.area, self.plan.around_m)])
         low, high = neighbourhood(job, 0.0).reshape(2, 2)
         near = self.roof[self.grid.candidates((*low, *high))]
         near = without_repeats(near[((near[:, :2] >= low) & (near[:, :2] <= high)).all(axis=1)])

@@ -73,7 +73,7 @@ class Reaches:
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
         low, high = bounds[:, :2], bounds[:, 2:]
         # a border on a whole metre belongs to the area: one metre more on the upper sides
-        self.roof_boxes = np.hstack([np.floor(low), np.ceil(high) + 1.0])
+        self.roof_boxes = np.hstack([np.floor(low - plan.around_m), np.ceil(high + plan.around_m) + 1.0])
         reach_m = plan.terrain_reach_m
         self.terrain_boxes = np.hstack([np.floor(low - reach_m), np.ceil(high + reach_m)])
         has_area = np.isfinite(bounds[:, 0])

@@ -60,6 +60,7 @@ def reconstruct(
     objective: Annotated[str | None, typer.Option(help="likelihood or paper [default: likelihood]")] = None,
     detail: Annotated[str | None, typer.Option(help="full, or main: without dormers and small parts")] = None,
     parts: Annotated[str | None, typer.Option(help="compound, or one: one primitive a building")] = None,
+    align: Annotated[str | None, typer.Option(help="auto, or off: footprints beside their roofs stay there")] = None,
     network: Annotated[
         bool | None, typer.Option(help="ask the network of every building, or of none [default: with --parts one]")
     ] = None,
@@ -93,6 +94,7 @@ def reconstruct(
             "parts": parts,
         },
         "compound": {"detail": detail},
+        "reconstruct": {"align": align},
         "segment": {"enabled": network, "always": network},
         "city": {"parquet": parquet, "models": models},
     }

@@ -15,6 +15,7 @@ from itertools import product
 import numpy as np
 import shapely
 
+from ..compiled import compiled
 from .outline.lines import lines_through
 from .outline.settle import side_offset
 from .union.plan import ring_edges, signed_depth
@@ -28,7 +29,9 @@ FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may b
 SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
 REACH_SIGMA_M = 0.5  # how far roofs usually reach beyond footprints, or stay behind
 ROUNDS, NEAR_M = 3, 0.2
-LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.4
+LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.5
+LEAST_SIDES, LEAST_OUTSIDE = 3, 0.01
+LEAST_BEYOND_M = 0.3
 
 
 @dataclass(frozen=True)
@@ -55,12 +58,18 @@ class Shift:
         """Whether the footprint should be moved."""
         length = float(np.hypot(*self.xy))
         known = length > 0 and float(np.hypot(*(self.sigma * self.xy / length)))
-        return (
+        return bool(
             LEAST_SHIFT_M <= length <= FARTHEST_M
             and length > SIGMAS * known
             and self.disagreement < MOST_DISAGREEMENT_M
             and self.free > LEAST_FREE
         )
+
+    @property
+    def is_size_clear(self) -> bool:
+        """Whether the roof surely reaches beyond the footprint on all sides, or stays behind it."""
+        agreed = self.disagreement < MOST_DISAGREEMENT_M and self.free > LEAST_FREE
+        return bool(agreed and abs(self.beyond) > max(LEAST_BEYOND_M, SIGMAS * self.beyond_sigma))
 
 
 def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
@@ -68,8 +77,8 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8, 0.4)))
     >>> shift = find_shift(np.column_stack([x, y]), shapely.box(1.0, -0.5, 13.0, 7.5))
-    >>> shift.is_clear, np.abs(shift.xy - [-1.0, 0.5]).max() < 0.1
-    (True, np.True_)
+    >>> shift.is_clear, bool(np.abs(shift.xy - [-1.0, 0.5]).max() < 0.1)
+    (True, True)
     """
     ring = shapely.get_coordinates(shapely.geometry.polygon.orient(shapely.simplify(footprint, PITCH_M)).exterior)[:-1]
     if len(xy) < LEAST_POINTS or len(ring) < 3:
@@ -78,6 +87,8 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
     shift = by_sides(xy, ring, lines, np.zeros(2))
     if shift is not None and shift.is_none:
         return shift
+    if np.mean(~shapely.contains_xy(footprint, xy[:, 0], xy[:, 1])) < LEAST_OUTSIDE:
+        return Shift()  # points cut off at the footprint look like a roof that ends there
     shift = Shift(most_points(xy, footprint))
     for _ in range(ROUNDS):
         found = by_sides(xy, ring, lines, shift.xy)
@@ -104,14 +115,21 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
         moves = np.arange(-reach, reach + 0.5 * step, step)
         tried = best + np.array(list(product(moves, moves)))
         tried = tried[np.hypot(*tried.T) <= FARTHEST_M]
-        cost = [cost_at(xy - move, costs, low) + 0.1 * float(move @ move) for move in tried]
+        cost = slid_costs(xy, costs, low, 2 * PITCH_M, tried) + 0.1 * (tried**2).sum(axis=1)
         best = tried[int(np.argmin(cost))]
     return best
 
 
-def cost_at(xy: np.ndarray, costs: np.ndarray, low: np.ndarray) -> float:
-    i, j = np.clip(((xy - low) / (2 * PITCH_M) + 0.5).astype(int), 0, np.array(costs.shape) - 1).T
-    return float(costs[i, j].sum())
+@compiled
+def slid_costs(xy, costs, low, pitch, moves):
+    """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first node lies at `low`."""
+    found = np.zeros(len(moves))
+    for m in range(len(moves)):
+        for k in range(len(xy)):
+            i = int((xy[k, 0] - moves[m, 0] - low[0]) / pitch + 0.5)
+            j = int((xy[k, 1] - moves[m, 1] - low[1]) / pitch + 0.5)
+            found[m] += costs[min(max(i, 0), costs.shape[0] - 1), min(max(j, 0), costs.shape[1] - 1)]
+    return found
 
 
 def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray) -> Shift | None:
@@ -125,8 +143,10 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
         ends = ring[[i, (i + 1) % len(ring)]] + start
         offset = free_side_offset(xy, normal, distance + normal @ start, ends, density)
         if offset is not None:
-            rows.append((*normal, 1.0, offset + normal @ start, SIDE_M * math.sqrt(SIDE_LENGTH_M / length[i]), length[i]))
-    if not rows:
+            rows.append(
+                (*normal, 1.0, offset + normal @ start, SIDE_M * math.sqrt(SIDE_LENGTH_M / length[i]), length[i])
+            )
+    if len(rows) < LEAST_SIDES:
         return None
     *design, wanted, sigma, told = np.array(rows).T
     design, weight = np.array(design).T, 1.0 / sigma**2
@@ -136,7 +156,9 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
     gap = wanted - design @ solution
     disagreement = math.sqrt(float(np.average(gap**2, weights=told)))
     spread = np.sqrt(np.diag(inverse)) * max(1.0, math.sqrt(float((weight * gap**2).mean())))
-    return Shift(solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement, told.sum() / length.sum())
+    return Shift(
+        solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement, told.sum() / length.sum()
+    )
 
 
 def free_side_offset(

@@ -52,6 +52,7 @@ def building_of(record: Mapping[str, Any]) -> Building:
         types=numbers_by_name(record.get("types") or {}, "types"),
         footprint=world,
         attributes=dict(mapping(record.get("attributes") or {}, "attributes")),
+        shift=shift_of(record),
     )
 
 
@@ -213,6 +214,14 @@ def numbers_by_name(values: Any, where: str) -> dict[str, float]:
     if far:
         raise InputError(f"expected {far[0]} in {where} within {WIDEST_M:g}, got {found[far[0]]:g}; check its unit")
     return found
+
+
+def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
+    """How far the footprint was moved; of a building made by hand not at all."""
+    value = record.get("shift", [0.0, 0.0])
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"expected two numbers [x, y] as shift, got {shown(value)}; give metres")
+    return number(value[0], "shift"), number(value[1], "shift")
 
 
 def place(value: Any, where: str) -> np.ndarray:

@@ -36,6 +36,7 @@ BUILDING_KINDS = {
     "origin": {"anyOf": [PLACE, {"type": "null"}]},
     "parts": {"type": "array", "items": {"$ref": "#/$defs/part"}},
     "outline": {"anyOf": [POLYGON, {"type": "null"}]},
+    "shift": {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2},
     "z_ground": NUMBER_OR_NULL,
     "ground_source": TEXT_OR_NULL,
     "terrain_line": {"type": "array", "items": {"type": "array", "items": PLACE}},

@@ -68,7 +68,7 @@ class PointGrid:
         """Ascending indices of the points at most `distance_m` from `polygon` or inside it."""
         if polygon.is_empty:
             return np.empty(0, np.int64)
-        return self.inside(shapely.buffer(polygon, distance_m, quad_segs=4))
+        return self.inside(shapely.buffer(polygon, distance_m, quad_segs=4) if distance_m else polygon)
 
 
 def points_of_footprints(cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]) -> list[np.ndarray]:

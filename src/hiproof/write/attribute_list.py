@@ -68,6 +68,8 @@ HIPROOF = (
     Attribute("outline_iou", "number", "", "intersection over union of the roof's outline with the footprint"),
     Attribute("unexplained_area_m2", "number", "m2", "area most of whose points lie over 0.5 m off the roof"),
     Attribute("ground_source", "text", "", "where the ground's height came from"),
+    Attribute("shift_x", "number", "m", "how far east the footprint was moved onto its roof; 0 where it was not"),
+    Attribute("shift_y", "number", "m", "the same north"),
     Attribute(
         "iso19107_lod22", "text", "", "ISO 19107 codes of our own check of the solid; [] is valid, none without a model"
     ),
@@ -96,6 +98,7 @@ PARAMETERS = (
         "m",
         "rings of the outline, the outer first, about the origin; the footprint's without a model",
     ),
+    Attribute("shift", "list", "m", "x, y by which the footprint was moved onto its roof to become the outline"),
     Attribute("z_ground", "number", "m", "height of the ground in the world"),
     Attribute("ground_source", "text", "", "where it came from"),
     Attribute("terrain_line", "list", "m", "closed lines of x, y, z in the world where the walls meet the terrain"),

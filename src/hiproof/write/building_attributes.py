@@ -91,6 +91,8 @@ def hiproof_attributes(building: Building) -> dict[str, Any]:
         "outline_iou": rounded(quality.outline_iou),
         "unexplained_area_m2": rounded(quality.unexplained_area_m2),
         "ground_source": building.ground_source or None,
+        "shift_x": rounded(building.shift[0]),
+        "shift_y": rounded(building.shift[1]),
         "iso19107_lod22": None if building.solid is None else "[]",  # only solids that pass the check get here
     }
 

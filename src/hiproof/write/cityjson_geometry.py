@@ -48,10 +48,18 @@ def building_geometry(
             for face, rings in zip(building.solid.faces, boundaries, strict=True)
             if face.kind == GROUND
         ]
+        footprint = unmoved_footprint(building, vertices) if any(building.shift) else footprint
         return [multi_surface(footprint), solid_geometry(building, figures, boundaries, prefix)]
     if has_level_footprint(building):
         return [multi_surface(footprint_boundaries(building, vertices))]
     return []
+
+
+def unmoved_footprint(building: Building, vertices: Vertices) -> list[list[list[int]]]:
+    """The ground surfaces of a solid whose footprint was moved, where the footprint lay."""
+    corners = building.solid.vertices - np.array([*building.shift, 0.0])
+    grounds = building.solid.of_kind(GROUND)
+    return [[vertices.add(corners[list(ring)])[::-1] for ring in face.rings] for face in grounds]
 
 
 def numbered(face: Face, number: list[int]) -> list[list[int]]:

@@ -114,6 +114,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "origin": None if roof is None else numbers(roof.frame.origin),
         "parts": [part_record(part) for part in building.parts],
         "outline": outline_record(building.footprint if roof is None else roof.outline),
+        "shift": [float(value) for value in building.shift],
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
         "terrain_line": [[numbers(xyz) for xyz in line] for line in building.terrain_intersection],

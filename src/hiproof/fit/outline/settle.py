@@ -58,9 +58,10 @@ def offset(depth: np.ndarray, length: float, density: float) -> float:
 
     inside = (depth > SHALLOW_M).sum() / ((DEEP_M - SHALLOW_M) * length)
     a_metre = max(inside, LEAST_DENSITY * density) * length
+    bearing = depth[depth < SHALLOW_M - OFFSETS_M[0]]  # deeper points are inside wherever the side lies
     logs = []
     for blur in BLURS_M:
-        away = (depth[:, None] + OFFSETS_M) / blur
+        away = (bearing[:, None] + OFFSETS_M) / blur
         wall = np.exp(-0.5 * away**2) / (blur * math.sqrt(2.0 * math.pi))
         logs += [
             np.log(a_metre * (ndtr(away) + walls * wall + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
@@ -81,4 +82,4 @@ def half_gap(depth: np.ndarray) -> float:
     if gaps[gaps > ROW_M].sum() > MOSTLY * gaps.sum():
         rows = np.split(depth, np.flatnonzero(gaps > ROW_M) + 1)
         gaps = np.diff([row.mean() for row in rows])
-    return float((gaps**2).sum() / (2.0 * gaps.sum())) if len(gaps) > 1 else 0.0
+    return float((gaps**2).sum() / (2.0 * gaps.sum())) if len(gaps) > 1 and gaps.sum() > 0.0 else 0.0
