@@ -30,7 +30,7 @@ FEWEST_M2 = 16.0  # ... on that much of its plan,
 NARROWEST_M = 2.0  # nowhere narrower than this,
 UNLIKELY = -3.0  # log odds of what is no building even below a roof
 SQUARE = np.ones((3, 3))
-REACH_M = 1.5  # and nothing farther from them is part of it
+REACH_M = 1.0  # and nothing farther from them is part of it
 
 
 def classify(xyz: np.ndarray) -> np.ndarray:
@@ -104,9 +104,9 @@ def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.nd
     odds[high] = smoothed(surfaces, log_odds(surfaces) + GROUND_SHARE * in_the_open)[surfaces.voxel]
     is_large[high] = surfaces.extent_m2[surfaces.voxel] >= CORE_M2
     plan = building_cells(cells.count(odds > 0), cells.count(high), cells.count(is_large & (odds > 0)) > 0, cell_m)
-    inside = ndimage.binary_dilation(plan, SQUARE).ravel()[cells.index]
+    inside, near = (where.ravel()[cells.index] for where in (plan, ndimage.binary_dilation(plan, SQUARE)))
     below_roof = (height < cells.highest(height, odds > 0).ravel()[cells.index]) & (odds > UNLIKELY)
-    return inside & (height > FOOT_M) & (~high | (odds > 0) | below_roof)
+    return (inside & ~high & (height > FOOT_M)) | (near & high & ((odds > 0) | below_roof))
 
 
 def building_cells(solid: np.ndarray, high: np.ndarray, core: np.ndarray, cell_m: float) -> np.ndarray:
