@@ -34,7 +34,7 @@ from hiproof.write.run_files import fragments
 from run_records import records
 
 REQUEST = Request(("a.laz",), Path("out"))
-NO_MATTER = {"out", "jobs", "scheduler", "restart"}
+NO_MATTER = {"out", "overrides", "jobs", "scheduler", "restart"}
 
 
 @pytest.fixture

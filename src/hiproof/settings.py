@@ -51,6 +51,9 @@ class ReadSettings:
         "unit of the clouds' coordinates; auto is that of their CRS, and metre where they name none",
         choices=("auto", "metre", "foot", "us-survey-foot"),
     )
+    override_columns: tuple[str, ...] = setting(
+        (), 'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" (docs/overrides.md)'
+    )
     split_gap_m: float = setting(
         0.0, "without footprints: clear space that separates buildings; 0 adapts it to the density", "m", 0.0, 20.0
     )

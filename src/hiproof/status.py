@@ -14,6 +14,7 @@ class Status(Enum):
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
     BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"
     NOT_BUILT = "no model: the parameters given make no valid solid; mend them"
+    LEFT_OUT = "no model: left out, as its override says"
     NO_ROOF = "no model: the points form no roof (all in one place or on one line)"
     INTERNAL_ERROR = "no model: hiproof failed on this building; please report it with its points"
 

@@ -18,9 +18,10 @@ create table if not exists task (
 create table if not exists building (
     position integer primary key, id text, task text, status text, type text, detail text, share real, psd real,
     seconds real);
+create table if not exists override (position integer primary key, digest text);
 create table if not exists output (name text primary key, bytes integer, digest text);
 """
-TABLES = ("run", "task", "building", "output")
+TABLES = ("run", "task", "building", "override", "output")
 
 
 class Ledger:
@@ -56,6 +57,28 @@ class Ledger:
 
     def claims(self) -> list[tuple[str, int, str]]:
         return self.database.execute("select name, bytes, digest from output order by name").fetchall()
+
+    def overrides(self) -> dict[int, str]:
+        """Digests of the overrides that buildings were made with, by position."""
+        return dict(self.database.execute("select position, digest from override"))
+
+    def set_overrides(self, digests: dict[int, str]) -> None:
+        self.database.execute("begin")
+        self.put_overrides(digests)
+        self.database.execute("commit")
+
+    def put_overrides(self, digests: dict[int, str]) -> None:
+        self.database.execute("delete from override")
+        self.database.executemany("insert into override values (?, ?)", list(digests.items()))
+
+    def open_again(self, solved: list[str], digests: dict[int, str]) -> None:
+        """Open the tasks `solved` and the reading of all point files, for buildings whose overrides are now of `digests`."""
+        self.database.execute("begin")
+        self.database.executemany("update task set state = 'open' where name = ?", [(name,) for name in solved])
+        self.database.execute("update task set state = 'open' where kind = 'sort'")
+        self.put_overrides(digests)
+        self.set(merged="no")
+        self.database.execute("commit")
 
     def forget(self) -> None:
         """Drop all that is known of a run."""

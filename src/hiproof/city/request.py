@@ -34,6 +34,7 @@ class Request:
     id_attribute: str | None = None
     layer: str | None = None
     settings: Settings = field(default_factory=Settings)
+    overrides: str | None = field(default=None, metadata=NO_MATTER)  # the ledger knows them building by building
     jobs: int = field(default=1, metadata=NO_MATTER)
     scheduler: str | None = field(default=None, metadata=NO_MATTER)
     restart: bool = field(default=False, metadata=NO_MATTER)

@@ -16,8 +16,9 @@ from ..log import LOGGER
 from ..masking import masked_values
 from ..write.files import atomic
 from .ledger import Ledger
-from .merge import remove_tiles
+from .merge import remove_tiles, tile_parts
 from .outputs import broken_claims
+from .overrides import REDO, settle_overrides
 from .plan import PLAN_FILE, Plan
 from .prepare import make_plan
 from .request import Request, inputs_of, mark_of
@@ -62,7 +63,10 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
         refuse_other_inputs(request.out, inputs, ledger)
         if stands(request.out, ledger):
             LOGGER.info("version %s goes on in %s", __version__, request.out)
-            return Plan.load(state / PLAN_FILE)
+            plan = Plan.load(state / PLAN_FILE)
+            if ledger.get("merged") != "yes" or has_parts(plan, state):
+                settle_overrides(request.overrides, plan, state, ledger, fresh=False)
+                return plan
     forget(state, ledger)
     plan, salt = make_plan(request), secrets.token_hex(16)
     with atomic(state / PLAN_FILE) as beside:
@@ -72,6 +76,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
     ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
     told = json.dumps(masked_values(inputs), default=str)
     ledger.set(inputs=told, salt=salt, mark=mark_of(inputs, salt), started=str(time.time()))
+    settle_overrides(request.overrides, plan, state, ledger, fresh=True)
     LOGGER.info(
         "version %s begins in %s: %d buildings in %d work tiles",
         __version__,
@@ -103,10 +108,16 @@ def stands(out: Path, ledger: Ledger) -> bool:
     return not broken
 
 
+def has_parts(plan: Plan, state: Path) -> bool:
+    """Whether the texts of all work tiles are still there."""
+    return all(tile_parts(state, tile).exists() for tile in plan.tiles)
+
+
 def forget(state: Path, ledger: Ledger) -> None:
     """Drop all that an earlier run in this folder has left of its state (its output files stay until replaced)."""
     remove_tiles(state.parent)
     ledger.forget()
+    (state / REDO).unlink(missing_ok=True)
     for name in ("tiles", "points"):
         shutil.rmtree(state / name, ignore_errors=True)
         (state / name).mkdir()

@@ -28,6 +28,7 @@ from .ledger import Ledger
 from .lock import held
 from .merge import merge, output_files
 from .outputs import claims
+from .overrides import REDO
 from .plan import Plan
 from .quarantine import run_alone, solve_in_quarantine
 from .request import Request
@@ -269,6 +270,7 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
             "footprints": request.footprints,
             "layer": request.layer,
             "terrain": request.terrain,
+            "overrides": request.overrides,
         },
         "crs": plan.crs_wkt,
         "units": {"coordinates": str(plan.units), "attributes": "metre", **metres_in(plan.units)},
@@ -290,6 +292,7 @@ def metres_in(units: Units) -> dict[str, float]:
 
 
 def clean(state: Path) -> None:
-    """Remove what a finished run no longer needs; the ledger and the plan stay for `status` and for a repeated call."""
-    for name in ("tiles", "points"):
-        shutil.rmtree(state / name, ignore_errors=True)
+    """Remove what a finished run no longer needs. The ledger and the plan stay for `status` and for a repeated call, the texts
+    of the buildings for one with other overrides."""
+    shutil.rmtree(state / "points", ignore_errors=True)
+    (state / REDO).unlink(missing_ok=True)

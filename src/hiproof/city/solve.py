@@ -14,6 +14,7 @@ import shapely
 from ..frames import Units
 from ..masking import masked
 from ..model import Building
+from ..parametric.override import Override, overridden
 from ..read.assign import PointGrid
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
@@ -21,11 +22,12 @@ from ..reconstruct import reconstruct
 from ..stages import remarked
 from ..status import Status
 from ..write.files import atomic_file
-from ..write.fragments import Fragments, save_fragments
+from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
 from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
 from .merge import tile_parts, write_tile
+from .overrides import load_overrides, load_redo
 from .plan import Job, Plan, load_plan, neighbourhood
 from .sort import load_points
 
@@ -83,19 +85,32 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
     surroundings = Surroundings(
         load_points(root, tile), terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()), plan
     )
+    overrides, kept = load_overrides(root), kept_parts(root, tile, plan)
     parts, rows = [], []
     for index in plan.tiles[tile]:
+        if index in kept:
+            parts.append(kept[index])
+            continue
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
             building, part = failed(plan, job, "the process died while it worked on this building")
         else:
-            building, part = solve_one(plan, job, surroundings)
+            building, part = solve_one(plan, job, surroundings, overrides.get(index))
         parts.append(part)
         rows.append(ledger_row(index, building, time.perf_counter() - start))
     write_tile(plan, root.parent, tile, parts)
     with atomic_file(tile_parts(root, tile)) as file:
         save_fragments(file, parts)
     return rows
+
+
+def kept_parts(root: Path, tile: str, plan: Plan) -> dict[int, Fragments]:
+    """The texts of buildings that need not be made again, by number: all of a tile but those whose override changed."""
+    redo = load_redo(root).get(tile)
+    if redo is None or set(redo) == set(plan.tiles[tile]):
+        return {}
+    texts = zip(plan.tiles[tile], load_fragments(tile_parts(root, tile)), strict=True)
+    return {index: part for index, part in texts if index not in redo}
 
 
 @functools.lru_cache(maxsize=32)
@@ -106,7 +121,9 @@ def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: i
     return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
 
 
-def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Building, Fragments]:
+def solve_one(
+    plan: Plan, job: Job, surroundings: Surroundings, override: Override | None = None
+) -> tuple[Building, Fragments]:
     """One building and its texts, whatever happens: an exception becomes its status.
 
     Only MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone.
@@ -117,7 +134,8 @@ def solve_one(plan: Plan, job: Job, surroundings: Surroundings) -> tuple[Buildin
             return fragments(not_seen(job, found.remark), plan.names_of(job), plan.translate, plan.file_units)
         points = found.points
         used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
-        building = reconstruct(used, job.footprint, surroundings.terrain_of(job), plan.settings, id=job.id)
+        known = used, job.footprint, surroundings.terrain_of(job), plan.settings
+        building = reconstruct(*known, id=job.id) if override is None else overridden(override, *known, id=job.id)
         if len(used) < len(points) and building.status is Status.MODELLED:
             building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
         building = remarked(building, found.remark)

@@ -28,6 +28,7 @@ from ..read.pointcloud import as_input_error, file_kind, iter_points, read_heade
 from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import lowest_in_cells
+from .overrides import REDO, load_redo
 from .plan import PLAN_FILE, Plan, load_plan
 
 NOISE_CLASSES = (7, 18)
@@ -67,9 +68,9 @@ class Reach:
 
 
 class Reaches:
-    """Reach of every work tile that has an area to gather points for, found by place; made once a process."""
+    """Reach of every work tile, or of those in `only`, that has an area to gather points for, found by place; made once a process."""
 
-    def __init__(self, plan: Plan):
+    def __init__(self, plan: Plan, only: Sequence[str] | None = None):
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
         low, high = bounds[:, :2], bounds[:, 2:]
         # a border on a whole metre belongs to the area: one metre more on the upper sides
@@ -77,7 +78,9 @@ class Reaches:
         reach_m = plan.terrain_reach_m
         self.terrain_boxes = np.hstack([np.floor(low - reach_m), np.ceil(high + reach_m)])
         has_area = np.isfinite(bounds[:, 0])
-        members = {tile: [i for i in own if has_area[i]] for tile, own in plan.tiles.items()}
+        self.is_partial = only is not None
+        wanted = plan.tiles if only is None else {tile: plan.tiles[tile] for tile in only}
+        members = {tile: [i for i in own if has_area[i]] for tile, own in wanted.items()}
         self.members = {tile: own for tile, own in members.items() if own}
         self.names = list(self.members)
         self.place = {tile: number for number, tile in enumerate(self.names)}
@@ -100,8 +103,8 @@ class Reaches:
 
 @functools.lru_cache(maxsize=1)
 def reaches_of(root: Path, stamp: int) -> Reaches:
-    """Reaches of the plan in `root`, whose file has the time `stamp`."""
-    return Reaches(load_plan(root))
+    """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone, of their tiles."""
+    return Reaches(load_plan(root), tuple(load_redo(root)) or None)
 
 
 class Gatherer:
@@ -174,7 +177,7 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     it comes to, so that a file's failure is that file's alone; what writing comes to passes through.
     """
     root = Path(folder)
-    plan, reaches = load_plan(root), reaches_of(root, (root / PLAN_FILE).stat().st_mtime_ns)
+    plan, reaches = load_plan(root), reaches_of(root, newest(root / PLAN_FILE, root / REDO))
     gatherer = Gatherer(reaches, plan.settings.read, root / "points", number)
     try:
         for cloud in wanted_points(address, reaches, plan.units):
@@ -188,10 +191,19 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
+def newest(*paths: Path) -> int:
+    """The latest time [ns] of those files that are there."""
+    return max(path.stat().st_mtime_ns for path in paths if path.exists())
+
+
 def wanted_points(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
     """All chunks of a file in `units`; of one with a spatial index only what holds buildings' surroundings."""
     if file_kind(path) != "las":
         return iter_points(path, units=units)
+    west, south, _, east, north, _ = read_header(path).bounds
+    box = units.to_metres(np.array([[west, south], [east, north]], float)).ravel()
+    if reaches.is_partial and np.isfinite(box).all() and not reaches.near(box):
+        return iter(())
     if is_copc(path):
         return points_by_squares(path, reaches, units)
     index = read_lax(path)

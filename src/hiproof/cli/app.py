@@ -64,6 +64,9 @@ def reconstruct(
     network: Annotated[
         bool | None, typer.Option(help="ask the network of every building, or of none [default: with --parts one]")
     ] = None,
+    overrides: Annotated[
+        str | None, typer.Option(help="what is known better of some buildings (JSONL or a table); the fit obeys it")
+    ] = None,
     config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
     parquet: Annotated[bool | None, typer.Option(help="write the attributes as GeoParquet too (extra `city`)")] = None,
     models: Annotated[str | None, typer.Option(help="models merged, by work tiles, or both [default: merged]")] = None,
@@ -99,6 +102,7 @@ def reconstruct(
         "city": {"parquet": parquet, "models": models},
     }
     inputs = {"footprints": footprints, "layer": layer, "terrain": terrain, "id_attribute": id_attribute}
+    inputs["overrides"] = overrides
     raise typer.Exit(run(clouds, out, inputs, options, config, jobs, scheduler, restart))
 
 

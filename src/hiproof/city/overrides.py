@@ -1,0 +1,157 @@
+"""Overrides of a run: read, matched to its buildings, and remembered, so that a run with others redoes those buildings alone."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import json
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError, InputWarning
+from ..log import LOGGER
+from ..parametric.file import HEAD, objects
+from ..parametric.override import Override, override_of
+from ..read.footprints import attribute_rows, reading
+from ..write.files import atomic
+from .ledger import Ledger
+from .merge import tile_parts
+from .plan import Job, Plan
+
+FILE, REDO = "overrides.jsonl", "redo.json"
+TABLES = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
+SHOWN = 5
+
+
+def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, fresh: bool) -> None:
+    """Keep the overrides at `path` for the workers; of a run that is not `fresh`, open the tiles of buildings whose override
+    is another than before. Raises InputError for a file that cannot be read or contradicts itself."""
+    records = matched(dict(read_overrides(path)) if path else {}, plan)
+    digests = {index: digest_of(record) for index, record in records.items()}
+    with atomic(state / FILE) as beside:
+        Path(beside).write_text("".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())))
+    known = ledger.overrides()
+    changed = {index for index in digests | known if digests.get(index) != known.get(index)}
+    if fresh or not changed:
+        ledger.set_overrides(digests)
+        return
+    redo = tiles_to_redo(changed, plan, state, ledger)
+    with atomic(state / REDO) as beside:
+        Path(beside).write_text(json.dumps(redo))
+    LOGGER.info("%d buildings have another override than before and are redone", len(changed))
+    ledger.open_again([f"solve:{tile}" for tile in redo], digests)
+
+
+def tiles_to_redo(changed: set[int], plan: Plan, state: Path, ledger: Ledger) -> dict[str, list[int]]:
+    """By tile the buildings to solve: those `changed`, what a killed run left to redo, and all of a tile not solved yet."""
+    finished = {row[0] for row in ledger.tasks() if row[3] == "done"}
+    left, redo = load_redo(state), {}
+    for tile, members in plan.tiles.items():
+        own = changed.intersection(members)
+        if not tile_parts(state, tile).exists():
+            own = set(members)
+        elif f"solve:{tile}" not in finished:
+            own |= set(left.get(tile, members))
+        if own:
+            redo[tile] = sorted(own)
+    return redo
+
+
+def read_overrides(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """(id, record) of every override in a JSONL file or a table; those of a parameters.jsonl are lists of parts."""
+    seen: dict[str, dict[str, Any]] = {}
+    for where, record in override_records(path):
+        try:
+            id = override_of(record).id
+        except InputError as error:
+            raise InputError(f"{where}: {error}") from error
+        if id in seen and seen[id] != record:
+            raise InputError(f"expected one override a building in {path}, got two that differ of {id!r}; keep one")
+        seen[id] = record
+        yield id, record
+
+
+def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
+    """(where, record) of every line or row."""
+    if str(path).lower().endswith(TABLES):
+        yield from ((f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1))
+        return
+    try:
+        with Path(path).open(encoding="utf-8") as file:
+            for number, record in objects(file, path):
+                if not is_other_line(record):
+                    yield f"line {number} of {path}", record
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected overrides (JSONL or a table) at {path}, got: {error}; check the path") from error
+
+
+def is_other_line(record: Any) -> bool:
+    """Whether a line of a parameters.jsonl says nothing of how to build: its head, and buildings without a model."""
+    return isinstance(record, dict) and (HEAD in record or ("status" in record and not record.get("parts")))
+
+
+def table_records(path: str) -> list[dict[str, Any]]:
+    """The rows of a table; numbers that a CSV holds as text become numbers."""
+    import pyogrio
+
+    meta, _, _, columns = reading(lambda: pyogrio.raw.read(str(path), read_geometry=False), path)
+    rows = attribute_rows(list(meta["fields"]), columns, len(columns[0]) if columns else 0)
+    return [{name: typed(name, value) for name, value in row.items()} for row in rows]
+
+
+def typed(name: str, value: Any) -> Any:
+    """A table's value as the override's key wants it."""
+    if name == "leave_out":
+        return str(value).strip().lower() in ("1", "true", "yes", "t")
+    if name in ("parts", "ridge_height", "eave_height", "z_ground", "block_height") and isinstance(value, str):
+        try:
+            return float(value) if value.strip() else None
+        except ValueError:
+            return value
+    return str(value) if name == "id" else value
+
+
+def matched(records: dict[str, dict[str, Any]], plan: Plan) -> dict[int, dict[str, Any]]:
+    """The overrides by the number of their building, with those that columns of the footprints hold; unknown ones are told."""
+    names = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
+    found, left = {}, dict(records)
+    for job in plan.jobs:
+        own = column_override(job, names) | left.pop(job.id, {})
+        if own:
+            found[job.index] = {**own, "id": job.id}
+    if left:
+        some = ", ".join(list(left)[:SHOWN]) + (" and others" if len(left) > SHOWN else "")
+        warnings.warn(f"{len(left)} of {len(records)} overrides are of no building of this run: {some}", InputWarning)
+    return found
+
+
+def column_override(job: Job, names: list[tuple[str, str]]) -> dict[str, Any]:
+    """The override in the columns of a building's footprint, empty where they say nothing."""
+    attributes = job.footprint.attributes if job.footprint else {}
+    return {key: typed(key, attributes[name]) for name, key in names if attributes.get(name) not in (None, "", False)}
+
+
+def digest_of(record: dict[str, Any]) -> str:
+    return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def load_redo(state: Path) -> dict[str, list[int]]:
+    """The buildings to redo by tile, empty where whole tiles are to be solved."""
+    try:
+        return json.loads((state / REDO).read_text())
+    except FileNotFoundError:
+        return {}
+
+
+def load_overrides(state: Path) -> dict[int, Override]:
+    """The overrides of the run whose state is in `state`, by the number of their building; read once a process."""
+    path = state / FILE
+    return overrides_at(path, path.stat().st_mtime_ns) if path.exists() else {}
+
+
+@functools.lru_cache(maxsize=1)
+def overrides_at(path: Path, stamp: int) -> dict[int, Override]:
+    with path.open(encoding="utf-8") as file:
+        return {index: override_of(record) for index, record in map(json.loads, file)}

@@ -1,0 +1,268 @@
+"""What a person says of one building, obeyed by the fit: the points determine the rest, and what they contradict is said, not refused.
+
+An override is an object with the building's `id` and any of
+
+    type, types       the type of the largest part; types that parts may have
+    parts             how many parts at most, or the parts themselves as in parameters.jsonl (with `origin`, perhaps `outline`)
+    ridge_height, eave_height     of the largest part, world metres
+    fixed             further parameters of the largest part by name
+    z_ground          height of the ground, world metres
+    block_height      a flat block so high above its ground
+    leave_out         true: no model
+    note, who, when   kept in the building's detail
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import shapely
+
+from .. import stages
+from ..errors import FitError, HiproofError, InputError
+from ..frames import LocalFrame
+from ..model import Building, Footprint
+from ..primitives.family import NAMES
+from ..settings import Settings
+from ..status import Status
+from ..write.attribute_list import PARAMETERS
+from ..write.parameters import building_record, outline_record
+from .building import build
+from .edit import built
+from .record import MOST_PARTS, mapping, number, numbers_by_name, place, polygon, shown
+from .refit import measured
+
+SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
+TOLD = ("note", "who", "when")
+KEYS = ("id", *SHAPING, "parts", "origin", "outline", "z_ground", "block_height", "leave_out", *TOLD)
+
+
+@dataclass(frozen=True)
+class Override:
+    """An override checked; None or empty where it says nothing. `fixed` holds ridge_height and eave_height too."""
+
+    id: str
+    type: str | None = None
+    types: tuple[str, ...] = ()
+    most_parts: int | None = None
+    parts: list[dict[str, Any]] | None = None
+    origin: np.ndarray | None = None
+    outline: list | None = None
+    fixed: dict[str, float] = field(default_factory=dict)
+    z_ground: float | None = None
+    block_height: float | None = None
+    leave_out: bool = False
+    told: str = ""
+
+
+def override_of(record: Mapping[str, Any]) -> Override:
+    """The override that an object tells of. Raises InputError, one sentence, where it cannot be or contradicts itself.
+
+    >>> override_of({"id": "a", "type": "hip", "ridge_height": 12.4}).fixed
+    {'ridge_height': 12.4}
+    """
+    record = {k: v for k, v in mapping(record, "an override").items() if v is not None and v != ""}
+    id = str(record.get("id", ""))
+    where = f"the override of {id!r}"
+    if not id:
+        raise InputError("expected the id of a building in every override, got none; give one")
+    has_list = isinstance(record.get("parts"), list)
+    if has_list:  # a line of parameters.jsonl is an override; its type and types are what came of the fit
+        ignored = {attribute.name for attribute in PARAMETERS} - {"id", "parts", "origin", "outline", "z_ground"}
+        record = {key: value for key, value in record.items() if key not in ignored}
+    other = [name for name in record if name not in KEYS]
+    if other:
+        raise InputError(f"expected {', '.join(KEYS)} in {where}, got also {', '.join(other[:8])}; remove it")
+    refuse_contradictions(record, has_list, where)
+    fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {where}")
+    fixed |= {
+        name: number(record[name], f"{name} of {where}") for name in ("ridge_height", "eave_height") if name in record
+    }
+    count = None if has_list or "parts" not in record else number(record["parts"], f"parts of {where}")
+    if count is not None and not (count == int(count) and 1 <= count <= MOST_PARTS):
+        raise InputError(f"expected a whole number of parts from 1 in {where}, got {count:g}; or give a list of parts")
+    types = types_of(record, where)
+    return Override(
+        id=id,
+        type=record.get("type"),
+        types=types,
+        most_parts=None if count is None else int(count),
+        parts=record["parts"] if has_list else None,
+        origin=place(record["origin"], f"origin of {where}") if "origin" in record else None,
+        outline=record["outline"]
+        if "outline" in record and polygon(record["outline"], f"outline of {where}")
+        else None,
+        fixed=fixed,
+        z_ground=number(record["z_ground"], f"z_ground of {where}") if "z_ground" in record else None,
+        block_height=number(record["block_height"], f"block_height of {where}") if "block_height" in record else None,
+        leave_out=bool(record.get("leave_out", False)),
+        told=told_of(record, has_list),
+    )
+
+
+def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
+    """Raise InputError where two things are said of which only one can be."""
+    alone = {
+        "leave_out": (bool(record.get("leave_out")), (*SHAPING, "parts", "block_height")),
+        "block_height": ("block_height" in record, (*SHAPING, "parts")),
+        "a list of parts": (has_list, SHAPING),
+    }
+    for name, (said, others) in alone.items():
+        against = [key for key in others if key in record]
+        if said and against:
+            raise InputError(f"expected {name} without {', '.join(others)} in {where}, got also {against[0]}; keep one")
+    if has_list and "origin" not in record:
+        raise InputError(f"expected the origin of its parts in {where}, got none; copy that of parameters.jsonl")
+    height = record.get("block_height")
+    if height is not None and not number(height, f"block_height of {where}") > 0.0:
+        raise InputError(f"expected a positive block_height in {where}, got {height:g}; give metres above the ground")
+
+
+def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
+    """Types that parts may have; a text names several by commas."""
+    types = record.get("types", ())
+    types = tuple(name.strip() for name in types.split(",")) if isinstance(types, str) else tuple(types)
+    for name in (*types, record.get("type", NAMES[0])):
+        if name not in NAMES:
+            raise InputError(
+                f"expected roof types ({', '.join(NAMES)}) in {where}, got {shown(name)}; choose among these"
+            )
+    if types and record.get("type", types[0]) not in types:
+        raise InputError(f"expected the type among the types in {where}, got {record['type']!r}; keep one of them")
+    return types
+
+
+def told_of(record: Mapping[str, Any], has_list: bool) -> str:
+    """The override in words, for the building's detail."""
+    said = [f"{name} {record[name]}" for name in (*SHAPING, "z_ground", "block_height") if name in record]
+    said += ["parts given"] if has_list else [f"parts {record['parts']}"] if "parts" in record else []
+    note = ", ".join(str(record[name])[:200] for name in TOLD if name in record)
+    return (
+        "overridden: "
+        + ", ".join(said or ["left out"] if record.get("leave_out") else said)
+        + (f" ({note})" if note else "")
+    )
+
+
+def overridden(
+    override: Override,
+    points: np.ndarray,
+    footprint: shapely.Polygon | Footprint | None = None,
+    terrain: Any = None,
+    settings: Settings | None = None,
+    id: str = "building",
+) -> Building:
+    """The building reconstructed as its override says; arguments and outcome as of `hiproof.reconstruct`."""
+    settings = settings or Settings()
+    building = stages.asked_for(footprint, id)
+    if override.leave_out:
+        return dataclasses.replace(building, status=Status.LEFT_OUT, detail=override.told)
+    try:
+        if override.parts is not None or override.block_height is not None:
+            found = as_given(override, points, building, terrain, settings)
+        else:
+            found = fitted_within(override, points, footprint, terrain, settings, id)
+    except HiproofError as error:
+        found = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
+    return stages.remarked(found, override.told)
+
+
+def as_given(override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings) -> Building:
+    """The building of the parts or the block given, measured on its points where there are any."""
+    points, outline, status = stages.usable(points, building.footprint)
+    if status is Status.BAD_FOOTPRINT and override.outline is None:
+        return dataclasses.replace(building, status=status, detail=status.value)
+    frame = LocalFrame(override.origin) if override.origin is not None else frame_of(points, outline)
+    local = frame.to_local(points)
+    rings = override.outline or outline_record(stages.to_local(outline, frame))
+    if rings is None:
+        raise InputError("expected an outline, or a footprint, of a building whose parts are given, got neither")
+    area = polygon(rings, "outline")
+    ground = given_ground(override, area, local, frame, terrain)
+    parts = override.parts
+    if parts is None:
+        level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
+        parts = [{"type": "flat", "parameters": {}, "position": level, "rotation": 0.0, "outlines": [rings]}]
+    place = {"origin": frame.origin.tolist(), "outline": rings, "z_ground": ground.z, "ground_source": ground.source}
+    made = build({"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts})
+    made = dataclasses.replace(
+        made,
+        detail="as given",
+        terrain_intersection=ground.intersection,
+        attributes=building.attributes,
+        footprint=made.footprint if building.footprint is None else building.footprint,
+    )
+    return measured(made, local, settings) if len(local) else made
+
+
+def frame_of(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
+    """The frame about the points, where there are none about the outline."""
+    if len(points):
+        return LocalFrame.around(points)
+    if outline is None:
+        raise InputError("expected points or a footprint of a block, got neither; give a footprint")
+    return LocalFrame.around(
+        np.column_stack([shapely.get_coordinates(outline), np.zeros(len(outline.exterior.coords))])
+    )
+
+
+def given_ground(
+    override: Override, outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Any
+) -> stages.Ground:
+    """The ground: as given, else as the terrain says."""
+    ground = stages.find_ground(outline, points if len(points) else np.zeros((1, 3)), frame, terrain)
+    if override.z_ground is not None:
+        return dataclasses.replace(ground, z=override.z_ground, source="override")
+    if not len(points) and ground.source.startswith("assumed"):
+        raise InputError(
+            "expected the height of the ground (z_ground) where neither points nor terrain tell it, got none"
+        )
+    return ground
+
+
+def fitted_within(
+    override: Override,
+    points: np.ndarray,
+    footprint: shapely.Polygon | Footprint | None,
+    terrain: Any,
+    settings: Settings,
+    id: str,
+) -> Building:
+    """The building fitted with what is given held."""
+    from ..reconstruct import reconstruct
+
+    types = override.types or ((override.type,) if override.type else ())
+    changes = {"types": types} if types else {}
+    building = reconstruct(points, footprint, terrain, settings.replace({"fit": changes}), id)
+    if building.roof is None:
+        return building
+    changed = False
+    while override.most_parts is not None and len(building.parts) > override.most_parts:
+        least = min(range(len(building.parts)), key=lambda k: building.parts[k].area)
+        building, changed = building.without_part(least), True
+    main = max(range(len(building.parts)), key=lambda k: building.parts[k].area)
+    if override.type and building.parts[main].type != override.type:
+        building, changed = building.with_part(main, type=override.type), True
+    if changed:
+        building = refitted(building, points, {}, settings)
+    if override.fixed:
+        building = building.with_part(main, **override.fixed)
+        held = {main: (*building.parts[main].parameters, "z")}
+        building = refitted(building, points, held, settings)
+    if override.z_ground is not None:
+        record = building_record(building) | {"z_ground": override.z_ground, "ground_source": "override"}
+        again = built(building, record)
+        building = dataclasses.replace(again, quality=building.quality, status=building.status, detail=building.detail)
+    return building
+
+
+def refitted(building: Building, points: np.ndarray, held: dict[int, tuple[str, ...]], settings: Settings) -> Building:
+    """The building fitted again; as it is where its points are too few."""
+    try:
+        return building.refit(points, held, settings)
+    except FitError:
+        return building

@@ -1,0 +1,218 @@
+"""Overrides: the fit obeys them and fits the rest; a run with others redoes those buildings alone."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+
+import hiproof
+from hiproof.city import run as city_run
+from hiproof.city import solve
+from hiproof.compose import check_solid
+from hiproof.errors import InputError, InputWarning
+from hiproof.parametric.override import overridden, override_of
+from hiproof.settings import Settings
+from hiproof.status import Status
+from run_records import by_id, records
+
+PLAIN = Settings.from_dict({"segment": {"enabled": False}})
+
+
+@pytest.fixture(scope="module")
+def scanned():
+    """Points of a gable of 12 by 8 m with its ridge at 8 m and eaves at 5 m, and its footprint."""
+    rng = np.random.default_rng(0)
+    xy = rng.uniform((0, 0), (12, 8), (800, 2))
+    z = 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0) + rng.normal(0, 0.02, len(xy))
+    return np.column_stack([xy, z]), shapely.box(0, 0, 12, 8)
+
+
+def obeyed(scanned, **said):
+    return overridden(override_of({"id": "a", **said}), *scanned, settings=PLAIN, id="a")
+
+
+def test_a_type_is_obeyed_and_the_rest_fitted(scanned):
+    house = obeyed(scanned, type="hip")
+    assert house.type == "hip" and not check_solid(house.solid)
+    assert "overridden: type hip" in house.detail
+
+
+def test_a_ridge_is_obeyed_and_the_contradiction_is_said(scanned):
+    house = obeyed(scanned, ridge_height=12.0)
+    assert house.solid.vertices[:, 2].max() == pytest.approx(12.0, abs=0.01)
+    assert house.status is Status.POOR_FIT and "overridden: ridge_height 12.0" in house.detail
+    assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith("ridge_height 8.0 (seen, anna)")
+
+
+def test_no_more_parts_than_asked_for():
+    rng = np.random.default_rng(1)
+    xy = rng.uniform((0, 0), (16, 8), (1600, 2))
+    z = np.where(xy[:, 0] < 10, 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0), 3.0)
+    scan = np.column_stack([xy, z]), shapely.box(0, 0, 16, 8)
+    assert len(hiproof.reconstruct(*scan, settings=PLAIN).parts) == 2
+    one = obeyed(scan, parts=1)
+    assert len(one.parts) == 1 and not check_solid(one.solid)
+
+
+def test_ground_block_and_leaving_out(scanned):
+    assert obeyed(scanned, z_ground=1.5).solid.vertices[:, 2].min() == pytest.approx(1.5)
+    block = obeyed(scanned, block_height=6.0, z_ground=1.0)
+    assert block.type == "flat" and np.ptp(block.solid.vertices[:, 2]) == pytest.approx(6.0)
+    left = obeyed(scanned, leave_out=True, note="torn down")
+    assert left.status is Status.LEFT_OUT and left.solid is None and "torn down" in left.detail
+
+
+def test_parts_given_are_the_parts(scanned):
+    part = {
+        "type": "hip",
+        "parameters": {"width": 8, "length": 12, "height": 3, "ridge_length": 5},
+        "position": [0, 0, 5],
+    }
+    house = obeyed(scanned, parts=[part], origin=[6, 4, 0])
+    assert house.type == "hip" and house.parts[0].parameters["ridge_length"] == 5.0
+    assert house.quality.points > 500 and house.attributes == {}
+    empty = overridden(
+        override_of({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}), np.zeros((0, 3)), scanned[1]
+    )
+    assert empty.status is Status.MODELLED and not check_solid(empty.solid)
+
+
+def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
+    part = {"type": "hip", "parameters": {"width": -8, "length": 12}, "position": [0, 0, 5]}
+    house = obeyed(scanned, parts=[part], origin=[6, 4, 0])
+    assert house.status is Status.NOT_BUILT and "positive width" in house.detail
+
+
+@pytest.mark.parametrize(
+    ("said", "message"),
+    [
+        ({}, "expected the id"),
+        ({"id": "a", "colour": "red"}, "got also colour"),
+        ({"id": "a", "type": "onion"}, "got 'onion'"),
+        ({"id": "a", "types": "gable,onion"}, "got 'onion'"),
+        ({"id": "a", "type": "hip", "types": ["gable"]}, "the type among the types"),
+        ({"id": "a", "leave_out": True, "type": "hip"}, "leave_out without"),
+        ({"id": "a", "block_height": 3, "ridge_height": 3}, "block_height without"),
+        ({"id": "a", "block_height": -3}, "positive block_height"),
+        ({"id": "a", "parts": 1.5}, "whole number"),
+        ({"id": "a", "parts": 0}, "whole number"),
+        ({"id": "a", "parts": []}, "the origin of its parts"),
+        ({"id": "a", "parts": [], "origin": [0, 0, 0], "type": "hip", "ridge_height": 3}, "list of parts without"),
+        ({"id": "a", "ridge_height": float("nan")}, "a number as ridge_height"),
+        ({"id": "a", "fixed": {"height": "high"}}, "a number as height"),
+        ("hip", "an object as an override"),
+    ],
+)
+def test_what_an_override_cannot_say_is_one_sentence(said, message):
+    with pytest.raises(InputError, match=message):
+        override_of(said)
+
+
+@pytest.fixture
+def counted(monkeypatch):
+    """The ids of buildings that are solved, as they are."""
+    solved, original = [], solve.solve_one
+
+    def solve_one(plan, job, surroundings, override=None):
+        solved.append(job.id)
+        return original(plan, job, surroundings, override)
+
+    monkeypatch.setattr(solve, "solve_one", solve_one)
+    return solved
+
+
+def request(town_files, out, path, *lines, **changes):
+    if path is not None:
+        path.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    settings = PLAIN.replace(changes.pop("settings", {}))
+    return hiproof.Request(
+        (town_files[0],), out, town_files[1], settings=settings, overrides=path and str(path), **changes
+    )
+
+
+def test_a_run_with_other_overrides_redoes_those_buildings_alone(town_files, tmp_path, counted):
+    out, path = tmp_path / "out", tmp_path / "o.jsonl"
+    run = city_run.reconstruct_area
+    run(request(town_files, out, None))
+    plain, rows = records(out), by_id(out)
+    assert sorted(counted) == [f"house-{i}" for i in range(4)]
+    counted.clear()
+    run(request(town_files, out, path, {"id": "house-1", "type": "hip"}))
+    assert counted == ["house-1"]
+    changed = by_id(out)
+    assert {id for id in rows if changed[id] != rows[id]} == {"house-1"} and changed["house-1"]["type"] == "hip"
+    counted.clear()
+    run(request(town_files, out, path, {"id": "house-1", "type": "hip"}))
+    assert counted == []
+    run(request(town_files, out, path, {"id": "house-2", "leave_out": True}))
+    assert sorted(counted) == ["house-1", "house-2"] and by_id(out)["house-2"]["status"] == "left_out"
+    together = records(out)
+    counted.clear()
+    run(request(town_files, out, None))
+    assert counted == ["house-2"] and records(out) == plain
+    run(request(town_files, tmp_path / "new", path, {"id": "house-2", "leave_out": True}))
+    assert records(tmp_path / "new") == together
+
+
+def test_a_run_killed_while_it_redoes_goes_on(town_files, tmp_path, counted, monkeypatch):
+    out, path = tmp_path / "out", tmp_path / "o.jsonl"
+    city_run.reconstruct_area(request(town_files, out, None))
+    ask = request(town_files, out, path, {"id": "house-0", "block_height": 4.0})
+    with monkeypatch.context() as patch:
+        patch.setattr(city_run, "solve_tile", lambda *_: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            city_run.reconstruct_area(ask)
+    counted.clear()
+    city_run.reconstruct_area(ask)
+    assert counted == ["house-0"] and by_id(out)["house-0"]["type"] == "flat"
+
+
+def test_without_kept_texts_all_is_made_again(town_files, tmp_path, counted):
+    out, path = tmp_path / "out", tmp_path / "o.jsonl"
+    city_run.reconstruct_area(request(town_files, out, None))
+    for file in (out / ".hiproof/tiles").iterdir():
+        file.unlink()
+    counted.clear()
+    city_run.reconstruct_area(request(town_files, out, path, {"id": "house-0", "type": "hip"}))
+    assert len(counted) == 4 and by_id(out)["house-0"]["type"] == "hip"
+
+
+def test_a_runs_own_parameters_are_overrides_that_change_nothing(town_files, undisturbed, tmp_path):
+    first = tmp_path / "first"
+    city_run.reconstruct_area(request(town_files, first, None))
+    ask = request(town_files, tmp_path / "again", None)
+    city_run.reconstruct_area(hiproof.Request(**{**vars(ask), "overrides": str(first / "parameters.jsonl")}))
+    was, now = by_id(first), by_id(tmp_path / "again")
+    for id in was:
+        assert now[id]["parts"] == was[id]["parts"] and now[id]["z_ground"] == was[id]["z_ground"]
+        assert now[id]["residuals"] == was[id]["residuals"]
+
+
+def test_tables_and_columns_of_the_footprints_override_too(town_files, tmp_path):
+    (tmp_path / "o.csv").write_text("id,type,ridge_height,leave_out\nhouse-0,hip,,\nhouse-1,,,true\nelsewhere,,9.5,\n")
+    with pytest.warns(InputWarning, match="1 of 3 overrides are of no building of this run: elsewhere"):
+        city_run.reconstruct_area(
+            hiproof.Request(
+                (town_files[0],), tmp_path / "out", town_files[1], settings=PLAIN, overrides=str(tmp_path / "o.csv")
+            )
+        )
+    rows = by_id(tmp_path / "out")
+    assert rows["house-0"]["type"] == "hip" and rows["house-1"]["status"] == "left_out"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ('{"id": "a", "type": "hip"}\n{"id": "a", "type": "gable"}\n', "two that differ of 'a'"),
+        ('{"id": "a", "type": "hip"\n', "line 1 of .* column"),
+        ('\n{"id": "a", "type": "onion"}\n', "line 2 of .*: expected roof types"),
+    ],
+)
+def test_overrides_that_cannot_be_read_are_refused_before_anything_is_redone(text, message, town_files, tmp_path):
+    (tmp_path / "o.jsonl").write_text(text)
+    with pytest.raises(InputError, match=message):
+        city_run.reconstruct_area(
+            hiproof.Request((town_files[0],), tmp_path / "out", town_files[1], overrides=str(tmp_path / "o.jsonl"))
+        )
+    assert not list((tmp_path / "out").glob("*.gml"))
