@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import hiproof
 from hiproof.cli import main
 from hiproof.cli.app import app
-from hiproof.compose import check_solid
+from hiproof.compose import check_solid, volume
 from hiproof.errors import CompositionError, HiproofError, InputError
 from hiproof.parametric.file import opened_parameters
 from hiproof.parametric.run import build_file
@@ -86,6 +86,15 @@ def test_every_type_can_be_built_by_its_own_parameters():
         building = hiproof.build(house(type=name, parameters=parameters))
         assert building.type == name and not check_solid(building.solid), name
         assert list(parameters) == [key for key in names_of(name) if key in parameters]
+
+
+def test_a_saw_tooth_by_hand_has_all_its_teeth():
+    parameters = {"width": 8.0, "length": 12.0, "height": 1.0, "teeth": 4.0}
+    for part in ({}, {"outlines": [[RING]]}):
+        solid = hiproof.build(house(type="shed", parameters=parameters, **part)).solid
+        assert len(solid.of_kind("RoofSurface")) == 4
+        assert np.ptp(solid.vertices[:, 2]) == pytest.approx(6.0)
+        assert volume(solid) == pytest.approx(96 * 5.5, rel=1e-3)
 
 
 def test_numbers_are_what_they_say():

@@ -20,6 +20,7 @@ from .shape import refuse_no_shape
 MOST_PARTS = 1000
 WIDEST_M = 1e5  # of any number of a part
 MOST = 1e15  # of any number
+FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 PART_KEYS = tuple(attribute.name for attribute in PART)
 FIGURES = ("density", "nodata_share", "unexplained_area_m2")
 RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
@@ -90,7 +91,10 @@ def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
     parameters = {name: settled(value) for name, value in parameters.items()}
     position = rounded(place(record.get("position"), f"position of {where}"), DIGITS)
     kappa = math.radians(settled(number(record.get("rotation", 0.0), f"rotation of {where}")))
-    outlines = [rounded_outline(o) for o in outlines_of(record, parameters, position, kappa, outline, where)]
+    outlines = outlines_of(record, parameters, position, kappa, outline, where)
+    if kind == "shed":
+        outlines = by_teeth(outlines, parameters, position, kappa)
+    outlines = [rounded_outline(o) for o in outlines]
     pieces = pieces_of(kind, parameters, kappa, position, outlines)
     if not all(np.isfinite(piece.planes).all() for piece in pieces):
         raise InputError(f"expected parameters that make finite planes, got others in {where}; check their sizes")
@@ -128,6 +132,29 @@ def rectangle_within(
     corners = np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
     covered = shapely.intersection(shapely.Polygon(corners), valid(outline), grid_size=1e-4)
     return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
+
+
+def by_teeth(
+    outlines: list[shapely.Polygon], parameters: Mapping[str, float], position: np.ndarray, kappa: float
+) -> list[shapely.Polygon]:
+    """The outlines of a saw-tooth, those that reach over several teeth cut between them."""
+    teeth, width = round(parameters["teeth"]), parameters["width"]
+    c, s = math.cos(kappa), math.sin(kappa)
+    edges = width * (np.arange(teeth + 1) / teeth - 0.5)
+    edges[[0, -1]] = -FAR_M, FAR_M
+    cut = []
+    for outline in outlines:
+        v = (shapely.get_coordinates(outline) - position[:2]) @ (-s, c)
+        own = [k for k in range(teeth) if v.max() > edges[k] + SLACK_M and v.min() < edges[k + 1] - SLACK_M]
+        if len(own) < 2:
+            cut.append(outline)
+            continue
+        for k in own:
+            uv = np.array([(-FAR_M, edges[k]), (FAR_M, edges[k]), (FAR_M, edges[k + 1]), (-FAR_M, edges[k + 1])])
+            strip = shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
+            found = shapely.get_parts(shapely.intersection(strip, valid(outline), grid_size=1e-4))
+            cut += [g for g in found if g.geom_type == "Polygon"]
+    return cut
 
 
 def valid(polygon: shapely.Polygon) -> shapely.Geometry:

@@ -1,0 +1,175 @@
+"""One figure a roof type: an ordinary roof of it with every parameter drawn where it is measured and called by its name.
+
+Roofs come from the catalogue and the family, and a line's ends from the parameters, so a figure cannot say what the code does not.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Building
+from ..parametric.building import build
+from ..parametric.change import typical_member
+from ..parametric.shape import names_of
+from ..primitives.catalogue import CATALOGUE
+from ..write.colours import TYPE_COLOURS
+from .view import WALL_COLOUR, SeenFace, projected, seen_faces, shaded
+
+WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6
+TURN_DEG, TILT_DEG = -38.0, 30.0
+SCALE, MARGIN = 26.0, 46.0
+ASIDE = 1.1  # m from the roof to a line outside it
+LINE, TEXT = "#8c1c13", "#1a1a1a"
+
+
+@dataclass(frozen=True)
+class Measure:
+    """A parameter in the figure: from `start` to `end` (3,), in the part's frame above the lowest eave; a mark without `end`."""
+
+    name: str
+    start: np.ndarray
+    end: np.ndarray | None = None
+
+    @property
+    def length(self) -> float:
+        return 0.0 if self.end is None else float(np.linalg.norm(self.end - self.start))
+
+
+def typical_parameters(kind: str) -> dict[str, float]:
+    """Parameters of an ordinary roof of a type."""
+    if kind in CATALOGUE:
+        return CATALOGUE[kind].typical(WIDTH, LENGTH, RISE)
+    return typical_member(kind, WIDTH, LENGTH, RISE)
+
+
+def typical_building(kind: str) -> Building:
+    """An ordinary roof of a type on low walls."""
+    u, v = LENGTH / 2, WIDTH / 2
+    part = {"type": kind, "parameters": typical_parameters(kind), "position": [0.0, 0.0, 0.0]}
+    ring = [[-u, -v], [u, -v], [u, v], [-u, v], [-u, -v]]
+    return build({"id": kind, "origin": [0.0, 0.0, 0.0], "outline": [ring], "z_ground": -WALL, "parts": [part]})
+
+
+def measures(kind: str) -> list[Measure]:
+    """Where every parameter of a type is measured on its ordinary roof.
+
+    >>> [(m.name, m.length) for m in measures("gable")]
+    [('width', 8.0), ('length', 12.0), ('height', 3.6)]
+    """
+    parameters = typical_parameters(kind)
+    return [measure_of(name, parameters, kind) for name in names_of(kind)]
+
+
+def measure_of(name: str, p: dict[str, float], kind: str) -> Measure:
+    """One parameter `name` among all, `p`."""
+    u, v, h = p["length"] / 2, p["width"] / 2, p.get("height", 0.0)
+    if "_" in name and name.rsplit("_", 1)[1] in ENDS:
+        return measure_of_side(name, p)
+    ridge = p.get("ridge_offset", 0.0)
+    ends = {
+        "width": ((u + ASIDE, -v, -WALL), (u + ASIDE, v, -WALL)),
+        "length": ((-u, -v - ASIDE, -WALL), (u, -v - ASIDE, -WALL)),
+        "height": height_line(p, kind, ridge),
+        "ridge_length": ((-p.get("ridge_length", 0) / 2, 0, h), (p.get("ridge_length", 0) / 2, 0, h)),
+        "hip_height": ((u, 0, h - p.get("hip_height", 0)), (u, 0, h)),
+        "top_width": ((p.get("top_length", 0) / 2, -p.get("top_width", 0) / 2, h), (p.get("top_length", 0) / 2, p.get("top_width", 0) / 2, h)),
+        "top_length": ((-p.get("top_length", 0) / 2, -p.get("top_width", 0) / 2, h), (p.get("top_length", 0) / 2, -p.get("top_width", 0) / 2, h)),
+        "ridge_offset": ((u, 0, h), (u, ridge, h)),
+        "eave_step": ((u + 0.3, v, 0), (u + 0.3, v, p.get("eave_step", 0))),
+        "break_width": ((u, -p.get("break_width", 0) / 2, p.get("break_height", 0)), (u, p.get("break_width", 0) / 2, p.get("break_height", 0))),
+        "break_height": ((u, p.get("break_width", 0) / 2, 0), (u, p.get("break_width", 0) / 2, p.get("break_height", 0))),
+    }  # fmt: skip
+    if name == "teeth":
+        return Measure("teeth", np.array([0.0, v + 0.5, h]))
+    start, end = ends[name]
+    return Measure(name, np.array(start, float), np.array(end, float))
+
+
+def height_line(p: dict[str, float], kind: str, ridge: float) -> tuple[tuple, tuple]:
+    """Where a roof's height is seen: at its end towards the eye, upright from the lowest eave's height."""
+    u, v, h = p["length"] / 2, p["width"] / 2, p.get("height", 0.0)
+    along = p["ridge_length"] / 2 if "ridge_length" in p else 0.0 if kind == "pyramid" else u
+    if kind == "shed":
+        across = -v + 2 * v / p["teeth"]
+    elif kind == "monopitch":
+        across = v
+    elif "top_width" in p:
+        along, across = p["top_length"] / 2, -p["top_width"] / 2
+    elif "pitch_front" in p:
+        along, across = (0.0, 0.0) if "pitch_back" in p else (-u / 2, v / 2)  # on the level top
+    else:
+        across = ridge
+    return (along, across, 0.0), (along, across, h)
+
+
+ENDS = {"left": (-1, 0), "right": (1, 0), "front": (0, -1), "back": (0, 1)}
+
+
+def measure_of_side(name: str, p: dict[str, float]) -> Measure:
+    """A pitch is marked on its plane; an eave is measured in the middle of its side."""
+    what, side = name.rsplit("_", 1)
+    x, y = ENDS[side]
+    u, v = p["length"] / 2, p["width"] / 2
+    if what == "eave":
+        place = np.array([x * u, y * v, 0.0])
+        return Measure(name, place, place + [0.0, 0.0, p[name]])
+    run = 0.16 * p["width"]
+    slope = math.tan(math.radians(p[name]))
+    return Measure(name, np.array([x * (u - run), y * (v - run), p[f"eave_{side}"] + slope * run]))
+
+
+def primitive_svg(kind: str) -> str:
+    """The figure of a roof type."""
+    building = typical_building(kind)
+    colours = [TYPE_COLOURS[kind] if face.kind == "RoofSurface" else WALL_COLOUR for face in building.solid.faces]
+    centre = building.solid.vertices.mean(axis=0)
+    lines = measures(kind)
+    page = {id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None] for m in lines}
+    corners = SCALE * projected(building.solid.vertices - centre, TURN_DEG, TILT_DEG)[:, :2]
+    spots = np.array([*corners, *(point for points in page.values() for point in points)])
+    (x0, y0), (x1, y1) = spots.min(axis=0) - MARGIN, spots.max(axis=0) + MARGIN
+    text = [
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x0:.0f} {y0:.0f} {x1 - x0:.0f} {y1 - y0:.0f}" '
+        f'width="{x1 - x0:.0f}" height="{y1 - y0:.0f}" font-family="sans-serif" font-size="13">',
+        f"<title>{kind}</title>",
+        '<rect x="-2000" y="-2000" width="4000" height="4000" fill="white"/>',
+        *(face_path(face) for face in seen_faces(building.solid, colours, TURN_DEG, TILT_DEG)),
+        *(drawn(m, page[id(m)]) for m in lines),
+        "</svg>",
+    ]
+    return "\n".join(text) + "\n"
+
+
+def on_page(point: np.ndarray) -> np.ndarray:
+    return SCALE * projected(point[None], TURN_DEG, TILT_DEG)[0, :2]
+
+
+def face_path(face: SeenFace) -> str:
+    d = "".join("M" + "L".join(f"{SCALE * x:.1f} {SCALE * y:.1f}" for x, y in ring) + "Z" for ring in face.rings)
+    return f'<path d="{d}" fill="{shaded(face.colour, face.light)}" stroke="#333" stroke-width="1" fill-opacity="0.8"/>'
+
+
+def drawn(measure: Measure, page: list[np.ndarray]) -> str:
+    """A line with its name beside it; the name alone of what has no length in the figure."""
+    if len(page) < 2 or measure.length < 1e-9:
+        x, y = page[0]
+        said = f"{measure.name} = 0" if measure.end is not None else measure.name
+        return label(x, y, said)
+    (x0, y0), (x1, y1) = page
+    across = np.array([y1 - y0, x0 - x1]) / max(math.hypot(x1 - x0, y1 - y0), 1e-9) * 4
+    ends = "".join(
+        f'<path d="M{x - across[0]:.1f} {y - across[1]:.1f}L{x + across[0]:.1f} {y + across[1]:.1f}"/>' for x, y in page
+    )
+    line = f'<g stroke="{LINE}" stroke-width="2" fill="none"><path d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>{ends}</g>'
+    share = 0.1 if measure.name == "height" else 0.5  # so that it stays clear of others at the same end
+    return line + label(x0 + share * (x1 - x0), y0 + share * (y1 - y0), measure.name)
+
+
+def label(x: float, y: float, text: str) -> str:
+    return (
+        f'<text x="{x:.1f}" y="{y - 4:.1f}" text-anchor="middle" fill="{TEXT}" stroke="white" stroke-width="3" '
+        f'paint-order="stroke">{text}</text>'
+    )
