@@ -130,7 +130,7 @@ def solve_one(
     """
     try:
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
-        if not found.is_seen:
+        if not found.is_seen and override is None:
             return fragments(not_seen(job, found.remark), plan.names_of(job), plan.translate, plan.file_units)
         points = found.points
         used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
