@@ -11,6 +11,7 @@ from .moves import improve
 from .objective import costs, objective
 from .plan import MIN_STRUCTURE_POINTS, Plan, cells_of
 from .planes import Grid
+from .rectangles import from_rectangles
 from .refit import refit
 from .scene import Scene
 from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, base_only, roof_heights
@@ -22,16 +23,31 @@ UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
 BASE_QUANTILE = 0.02
 MOST_SLOPES = 5
 FINAL_ROUNDS = 3
+STARTING_ROUNDS, NEAR_UNITS = 2, 4.0
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 
 def grow(scene: Scene, grids: list[Grid]) -> tuple[np.ndarray, float]:
-    """Volumes (k, COLUMNS) and their objective, found greedily from the base alone."""
+    """Volumes (k, COLUMNS) and their objective: grown from the base alone, or from the outline's rectangles if that is better."""
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
-    volumes = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
-    value = objective(volumes, scene, np.inf)
+    base = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
     candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
     slopes = typical_slopes(candidates)
+    volumes, value = grown(base, objective(base, scene, np.inf), scene, grids, candidates, slopes)
+    other = from_rectangles(base, scene, candidates)
+    if len(other) > len(base):
+        other, found = improve(other, scene, objective(other, scene, np.inf), slopes, STARTING_ROUNDS)
+        if found < value + NEAR_UNITS * scene.evidence:
+            other, found = grown(other, found, scene, grids, candidates, slopes)
+            if found < value - LEAST_GAIN:
+                return other, found
+    return volumes, value
+
+
+def grown(
+    volumes: np.ndarray, value: float, scene: Scene, grids: list[Grid], candidates: np.ndarray, slopes: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The volumes with more of them added one by one, as long as that pays."""
     fresh = False
     for _ in range(MOST_ADDITIONS):
         far = unexplained(volumes, scene)

@@ -31,6 +31,7 @@ from .volumes import (
 )
 
 STEP_M, INSIDE_M, LEAST_STEP_LENGTH_M = 0.05, 0.2, 0.55  # a gap that is a step; how far inside the outline it shows
+AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
 SAMPLE_M, MOST_SAMPLES = 0.5, 40
 TOUCH_M = 0.03
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
@@ -100,7 +101,7 @@ def edge_cost(volumes, scene, k, edge):
         return 0.0
     inside, outside = np.full(m, -np.inf), np.full(m, -np.inf)
     heights_along(volumes, scene, k, u[:m], v[:m], inside, outside)
-    any_step, a_metre, low_a_metre, low_step, loose = scene.edge_prices
+    any_step, a_metre, low_a_metre, low_step, loose, at_corner = scene.edge_prices
     shown = low = 0.0
     for p in range(m):
         gap = abs(inside[p] - outside[p])
@@ -111,7 +112,10 @@ def edge_cost(volumes, scene, k, edge):
     if shown < LEAST_STEP_LENGTH_M:
         return 0.0
     cost = any_step + a_metre * shown + low_a_metre * low
-    return cost if is_vertex_line(scene, direction, edge // 2, at) else cost + loose
+    if not is_vertex_line(scene, direction, edge // 2, at):
+        return cost + loose
+    along = v if edge < 2 else u
+    return cost - at_corner * ends_at_corners(scene, direction, edge // 2, at, along[0], along[m - 1])
 
 
 @compiled
@@ -152,6 +156,18 @@ def heights_along(volumes, scene, k, u, v, inside, outside):
                 h = lowest(c, a, b)
                 inside[p] = h if replaces else max(h, inside[p])
                 outside[p] = h if replaces else max(h, outside[p])
+
+
+@compiled
+def ends_at_corners(scene, direction, axis, at, first, last):
+    """How many of the two ends of what lies of the line `at` inside the outline are at corners of it."""
+    corners = scene.corners[direction]
+    low = high = 0
+    for q in range(len(corners)):
+        if abs(corners[q, axis] - at) < AT_CORNER_M:
+            low = max(low, int(abs(corners[q, 1 - axis] - first) < END_AT_CORNER_M))
+            high = max(high, int(abs(corners[q, 1 - axis] - last) < END_AT_CORNER_M))
+    return low + high
 
 
 @compiled

@@ -22,13 +22,15 @@ RASTER_M, RASTER_CELLS = 0.2, 120
 # lines, vertices: places an edge may move to, by direction and axis, infinite where there are no more.
 # evidence: points a unit of structure must explain; dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
 # allowed (2, 3, 3, 2): which shapes a volume may have, see `volumes.is_allowed`.
-# edge_prices: units for an edge that shows, a metre of it, a metre of it lower than low_step (m), and if in line with no corner.
+# corners (directions, c, 2): the outline's vertices.
+# edge_prices: units for an edge that shows, a metre of it, a metre of it lower than low_step (m), if in line with no corner,
+# and off for each end at a corner.
 Scene = namedtuple(
     "Scene",
-    "U V z weight n low high turn depth corner_u corner_v pitch lines vertices evidence dead width edge_prices allowed",
+    "U V z weight n low high turn depth corner_u corner_v pitch lines vertices corners evidence dead width edge_prices allowed",
 )
-EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose")
-EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6)
+EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
+EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)
 
 
 def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
@@ -84,6 +86,7 @@ def scene_of(
         pitch,
         lines,
         vertices,
+        np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in turn]),
         evidence,
         DEAD_M,
         max(tolerance_m - DEAD_M, LEAST_WIDTH_M),

@@ -1,0 +1,114 @@
+"""A start for the search: the largest rectangles inside the outline, each with the volume that explains its points best.
+
+Wings of one building often have the same planes, and the volume that gains most by itself then covers both. Two rectangles
+that overlap start from what the footprint says.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...compiled import compiled
+from .objective import costs, point_cost
+from .plan import MERGE_LINES_M
+from .scene import Scene
+from .volumes import DIRECTION, U0, V1, coefficients, lowest, roof_heights, volume_cost
+
+INSIDE_SHARE = 0.96  # of a rectangle that lies in the outline
+LEAST_SHARE, LEAST_M2 = 0.06, 4.0  # of the outline that a further rectangle adds
+AS_LARGE = 0.97
+MOST_RECTANGLES, MOST_LINES = 5, 14
+
+
+def from_rectangles(base: np.ndarray, scene: Scene, candidates: np.ndarray) -> np.ndarray:
+    """The `base` and a volume over each of the outline's largest rectangles; the base alone where these are fewer than two."""
+    found = largest_rectangles(scene)
+    if len(found) < 2 or len(candidates) == 0:
+        return base
+    volumes = base
+    for rectangle in found:
+        z_now, _ = roof_heights(volumes, scene.U, scene.V)
+        chosen = best_within(scene, candidates, rectangle, z_now, costs(z_now, scene))
+        if chosen >= 0:
+            volume = candidates[chosen].copy()
+            volume[U0 : V1 + 1] = rectangle[1:]
+            volumes = np.vstack([volumes, volume])
+    return volumes
+
+
+def largest_rectangles(scene: Scene) -> np.ndarray:
+    """Direction, u0, u1, v0, v1 (k, 5) of the rectangles between corners of the outline that together cover most of it."""
+    i, j = np.nonzero(scene.depth > 0.0)
+    u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
+    rectangles, covers = [], []
+    for direction, (c, s) in enumerate(scene.turn):
+        own, inside = rectangles_in(scene, direction, c * u + s * v, c * v - s * u)
+        rectangles.append(own)
+        covers.append(inside)
+    rectangles, covers = np.concatenate(rectangles), np.concatenate(covers)
+    area, missing, found = covers.sum(axis=1), np.ones(len(u), bool), []
+    while len(rectangles) and len(found) < MOST_RECTANGLES:
+        new = covers[:, missing].sum(axis=1)
+        if new.max() < max(LEAST_SHARE * len(u), LEAST_M2 / scene.pitch**2):
+            break
+        best = int(np.argmax(np.where(new >= AS_LARGE * new.max(), area, 0)))
+        found.append(rectangles[best])
+        missing &= ~covers[best]
+    return np.array(found).reshape(-1, 5)
+
+
+def rectangles_in(scene: Scene, direction: int, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """All rectangles (m, 5) of one direction inside the outline, and which of the nodes u, v (n,) each covers (m, n)."""
+    lines = [merged(axis[np.isfinite(axis)]) for axis in scene.vertices[direction]]
+    none = np.zeros((0, 5)), np.zeros((0, len(u)), bool)
+    if max(map(len, lines)) > MOST_LINES:
+        return none
+    (u0, u1), (v0, v1) = (np.triu_indices(len(axis), 1) for axis in lines)
+    cells = np.zeros((len(lines[0]) + 1, len(lines[1]) + 1))
+    np.add.at(cells, (np.searchsorted(lines[0], u), np.searchsorted(lines[1], v)), scene.pitch**2)
+    total = cells.cumsum(axis=0).cumsum(axis=1)  # up to each line
+    a, b, c, d = (axis.ravel() for axis in np.broadcast_arrays(u0[:, None], u1[:, None], v0, v1))
+    inside = total[b, d] - total[a, d] - total[b, c] + total[a, c]
+    area = (lines[0][b] - lines[0][a]) * (lines[1][d] - lines[1][c])
+    full = (inside > INSIDE_SHARE * area) & (area > LEAST_M2)
+    if not full.any():
+        return none
+    a, b, c, d = a[full], b[full], c[full], d[full]
+    found = np.column_stack([np.full(len(a), direction), lines[0][a], lines[0][b], lines[1][c], lines[1][d]])
+    _, low_u, high_u, low_v, high_v = found.T[:, :, None]
+    return found, (u >= low_u) & (u <= high_u) & (v >= low_v) & (v <= high_v)
+
+
+def merged(lines: np.ndarray) -> np.ndarray:
+    """Ascending lines without those within MERGE_LINES_M of the one before; the last stays."""
+    kept = [lines[0]]
+    for x in lines[1:]:
+        if x - kept[-1] > MERGE_LINES_M:
+            kept.append(x)
+    kept[-1] = max(kept[-1], lines[-1])
+    return np.array(kept)
+
+
+@compiled
+def best_within(scene, candidates, rectangle, z_now, cost_now):
+    """The candidate that, joined over `rectangle` (5,), gains most over it less its price; -1 where none is of its direction."""
+    direction = int(rectangle[0])
+    u, v = scene.U[direction], scene.V[direction]
+    best, chosen = -np.inf, -1
+    for m in range(len(candidates)):
+        if int(candidates[m, DIRECTION]) != direction:
+            continue
+        c = coefficients(candidates, m)
+        gain = -scene.evidence * volume_cost(candidates[m])
+        for i in range(len(z_now)):
+            if rectangle[1] <= u[i] <= rectangle[2] and rectangle[3] <= v[i] <= rectangle[4]:
+                h = lowest(c, u[i], v[i])
+                if h <= z_now[i]:
+                    continue
+                if i < scene.n:
+                    gain += cost_now[i] - point_cost(scene.z[i], h, scene.dead, scene.width)
+                else:
+                    gain += cost_now[i] - (scene.weight[i] if h < scene.low or h > scene.high else 0.0)
+        if gain > best:
+            best, chosen = gain, m
+    return chosen
