@@ -14,6 +14,7 @@ trim        hidden edges drawn in
 search      these in order, and the simplification that a draughtsman would make
 sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
+unite       volumes that only skewed walls keep apart, made one
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
 larger      saw-teeth and gambrels put together
@@ -30,7 +31,6 @@ from ...model import Part, Piece
 from ...primitives.family import name_among
 from ...settings import Settings
 from .clamp import clamped
-from .finish import finished
 from .fit import BuildingFit
 from .larger import put_together
 from .names import part_of
@@ -39,7 +39,7 @@ from .outline import outline_of_points
 from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
 from .search import find_volumes
-from .sides import sides_of
+from .unite import united
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -70,8 +70,8 @@ def fit_building(
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    sides = sides_of(volumes, plan, outline, scene)
-    planes = finished(volumes, sides, scene)
+    roof = united(volumes, plan, outline, scene)
+    volumes, sides, planes = roof.volumes, roof.sides, roof.planes
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
         part_of(*each, own, plan, scene, types)

@@ -7,7 +7,7 @@ the eaves on the outline are at one height. Everything is linear in c and s, so 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
@@ -64,9 +64,9 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
     start = planes_as_found(volume)
     there = np.isfinite(volume[OFFSET : OFFSET + LEVEL + 1])
     direction = int(volume[DIRECTION])
-    if len(members) < FEWEST_POINTS:
-        return start
     points = np.stack([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
+    if len(members) < FEWEST_POINTS:
+        return replace(start, cost=cost_of(start.rows, points, scene))
     tolerance = scene.dead + scene.width
     base = scene.evidence * PARAMETER_COST
     best, facing = None, None
@@ -187,9 +187,15 @@ def fitted(start: Planes, design: np.ndarray, points: np.ndarray, scene: Scene, 
         rows, modes = new, np.moveaxis(design @ spread, 2, 0)
     if not proper(rows):
         return Planes(start.rows, start.modes, np.inf)
-    _, height = lowest_of(rows, plan)
+    return Planes(rows, modes, cost_of(rows, points, scene))
+
+
+def cost_of(rows: np.ndarray, points: np.ndarray, scene: Scene) -> float:
+    """What `points` (3, m) cost under the planes."""
+    u, v, z = points
+    _, height = lowest_of(rows, np.stack([u, v, np.ones_like(u)], axis=1))
     r = np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0)
-    return Planes(rows, modes, float((r**2).sum()))
+    return float((r**2).sum())
 
 
 def lowest_of(rows: np.ndarray, plan: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

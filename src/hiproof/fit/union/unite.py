@@ -1,0 +1,99 @@
+"""Volumes that only skewed walls keep apart: one over both, where planes along its own sides explain its points as well.
+
+The search's planes face along two axes. A roof over walls that are not quite parallel has planes that do not, and two volumes
+beside each other then stand for one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from .finish import Planes, finished
+from .moves import without
+from .objective import edge_cost
+from .plan import Plan
+from .refit import refit
+from .scene import Scene
+from .sides import Side, sides_of
+from .volumes import DIRECTION, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, volume_cost
+
+BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
+SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Volumes (k, COLUMNS) with their sides and planes, and what the roof costs with these (points)."""
+
+    volumes: np.ndarray
+    sides: list[list[Side]]
+    planes: list[Planes]
+    cost: float
+
+
+def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Settled:
+    """The volumes along their sides, pairs of them united wherever that costs less."""
+    best = settled(volumes, plan, outline, scene)
+    tried = True
+    while tried:
+        tried = False
+        for j, k in combinations(range(1, len(best.volumes)), 2):
+            if not alike(best.volumes[j], best.volumes[k]):
+                continue
+            trial = best.volumes.copy()
+            trial[j] = over_both(trial[j], trial[k])
+            trial = without(trial, k)
+            refit(trial, scene, j)
+            found = settled(trial, plan, outline, scene)
+            if found.cost < best.cost:
+                best, tried = found, True
+                break
+    return best
+
+
+def settled(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Settled:
+    """The volumes with the sides and planes that suit them."""
+    sides = sides_of(volumes, plan, outline, scene)
+    planes = finished(volumes, sides, scene)
+    units = sum(volume_cost(volume) for volume in volumes[1:])
+    units += sum(edge_cost(volumes, scene, k, edge) for k in range(1, len(volumes)) for edge in range(4))
+    return Settled(volumes, sides, planes, sum(own.cost for own in planes) + scene.evidence * units)
+
+
+def alike(one: np.ndarray, other: np.ndarray) -> bool:
+    """Whether two volumes lie beside each other in one line, with all but the same planes."""
+    if one[DIRECTION] != other[DIRECTION] or one[REPLACES] or other[REPLACES]:
+        return False
+    rectangles = np.array([one[U0 : V0 + 2], other[U0 : V0 + 2]]).reshape(2, 2, 2)  # volume, axis, end
+    gap = rectangles[:, :, 0].max(axis=0) - rectangles[:, :, 1].min(axis=0)
+    apart = np.abs(rectangles[0] - rectangles[1]).max(axis=1)
+    if not any(gap[axis] < BESIDE_M and apart[1 - axis] < IN_LINE_M for axis in (0, 1)):
+        return False
+    there = np.isfinite(one[OFFSET : OFFSET + PLANES]), np.isfinite(other[OFFSET : OFFSET + PLANES])
+    both = there[0] & there[1]
+    if both.sum() < min(there[0].sum(), there[1].sum()) or both.sum() == 0:
+        return False
+    middle = rectangles.mean(axis=(0, 2))
+    x = np.array([middle[0], -middle[0], middle[1], -middle[1], 0.0])
+    slopes = np.array([np.r_[row[SLOPE : SLOPE + LEVEL], 0.0] for row in (one, other)])
+    heights = np.array([one[OFFSET : OFFSET + PLANES], other[OFFSET : OFFSET + PLANES]]) + slopes * x
+    near = np.abs(heights[0, both] - heights[1, both]) < HEIGHTS_ALIKE_M
+    return bool(near.all() and (np.abs(slopes[0] - slopes[1])[both] < SLOPES_ALIKE).all())
+
+
+def over_both(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """One volume over the rectangles of two, with the planes of either."""
+    large, small = sorted((one, other), key=lambda row: -(row[U0 + 1] - row[U0]) * (row[V0 + 1] - row[V0]))
+    row = large.copy()
+    row[[U0, V0]] = np.minimum(one[[U0, V0]], other[[U0, V0]])
+    row[[U0 + 1, V0 + 1]] = np.maximum(one[[U0 + 1, V0 + 1]], other[[U0 + 1, V0 + 1]])
+    for place in range(PLANES):
+        if not np.isfinite(row[OFFSET + place]) and np.isfinite(small[OFFSET + place]):
+            row[OFFSET + place] = small[OFFSET + place]
+            if place < LEVEL:
+                row[SLOPE + place] = small[SLOPE + place]
+    return row
