@@ -1,7 +1,8 @@
 """What a roof costs, in points: its misfit, its volumes, and every step between them that shows. Compiled.
 
     sum over points of min((max(|dz| - dead, 0) / width)^2, 1)
-    + sum over ghosts (places without points) of their weight, where the roof leaves the points' range of heights
+    + sum over ghosts (places without points) of their weight, where the roof leaves the points' range of heights,
+      and a little where it is high although no point was seen around: what is hidden is lower
     + evidence * (volumes + offsets + slopes + edges that show)
 
 An edge that shows is a step in the roof: it costs a fixed sum, more by the metre, most for low steps, which nearly always
@@ -45,15 +46,22 @@ def point_cost(z_point, z_roof, dead, width):
 
 
 @compiled
+def ghost_cost(z_roof, weight, shade, low, high):
+    if z_roof < low or z_roof > high:
+        return weight
+    return shade * (z_roof - low) / (high - low)
+
+
+@compiled
 def costs(z, scene):
     """Cost (n + g,) of every point and ghost under roof heights `z` (n + g,)."""
     cost = np.empty(len(z))
     n, low, high, dead, width = scene.n, scene.low, scene.high, scene.dead, scene.width
-    z_points, weight = scene.z, scene.weight
+    z_points, weight, shade = scene.z, scene.weight, scene.shade
     for i in range(n):
         cost[i] = point_cost(z_points[i], z[i], dead, width)
     for i in range(n, len(z)):
-        cost[i] = weight[i] if z[i] < low or z[i] > high else 0.0
+        cost[i] = ghost_cost(z[i], weight[i], shade[i], low, high)
     return cost
 
 

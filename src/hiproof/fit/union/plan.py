@@ -17,6 +17,7 @@ BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this cl
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
 GHOST_MARGIN_M = 0.3
+SHADE = 0.2  # of a point: what the highest of roofs costs for each that is missing
 
 
 @dataclass(frozen=True)
@@ -146,6 +147,14 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density)
 
 
+def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
+    """How empty (nu, nv) cells and those beside them are of the points `expected` (nu, nv): 1 quite, 0 from half of them on."""
+    count = np.zeros(expected.shape)
+    np.add.at(count, (cloud.i, cloud.j), 1.0)
+    around = [sum(np.pad(x, 1)[a : a + len(x), b : b + x.shape[1]] for a in range(3) for b in range(3)) for x in (count, expected)]
+    return np.clip(1.0 - around[0] / (0.5 * around[1]), 0.0, 1.0)
+
+
 def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon) -> Ghosts:
     """A ghost at the centre of every cell inside the outline, weighing as many points as its area usually holds."""
     centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in (grid.u, grid.v))
@@ -154,6 +163,7 @@ def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Poly
     xy = frame.xy_local(np.column_stack([u, v]))
     inside = signed_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline)) > 0.0
     weight = (np.diff(grid.u)[i] * np.diff(grid.v)[j]) * len(cloud.u) / outline.area
+    shade = SHADE * weight * emptiness(grid, cloud, weight.reshape(len(centre_u), -1)).ravel()
     low, high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
-    kept = [np.ascontiguousarray(column[inside]) for column in (u, v, weight, i, j)]
+    kept = [np.ascontiguousarray(column[inside]) for column in (u, v, weight, shade, i, j)]
     return Ghosts(*kept, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)

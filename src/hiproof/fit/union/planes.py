@@ -32,7 +32,7 @@ Grid = namedtuple(
     "Grid", "u v at_vertex_u at_vertex_v"
 )  # grid lines, ascending, and which of them pass footprint vertices
 Ghosts = namedtuple(
-    "Ghosts", "u v weight i j low high"
+    "Ghosts", "u v weight shade i j low high"
 )  # cell centres inside the outline; heights a roof may take there
 
 

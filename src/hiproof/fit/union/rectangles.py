@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import costs, point_cost
+from .objective import costs, ghost_cost, point_cost
 from .plan import MERGE_LINES_M
 from .scene import Scene
 from .volumes import DIRECTION, U0, V1, coefficients, lowest, roof_heights, volume_cost
@@ -108,7 +108,7 @@ def best_within(scene, candidates, rectangle, z_now, cost_now):
                 if i < scene.n:
                     gain += cost_now[i] - point_cost(scene.z[i], h, scene.dead, scene.width)
                 else:
-                    gain += cost_now[i] - (scene.weight[i] if h < scene.low or h > scene.high else 0.0)
+                    gain += cost_now[i] - ghost_cost(h, scene.weight[i], scene.shade[i], scene.low, scene.high)
         if gain > best:
             best, chosen = gain, m
     return chosen

@@ -17,6 +17,7 @@ LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for 
 RASTER_M, RASTER_CELLS = 0.2, 120
 
 # U, V (directions, n + g): the points, then the ghosts of unseen roof; z, weight (n + g); n: how many points.
+# shade (n + g): what the highest of roofs costs over a ghost without points around it, for walls hide only what is lower.
 # low, high: heights a roof may take over a ghost. turn (directions, 2): cosine and sine of each from the first.
 # depth (a, b): signed depth inside the outline on a raster from (corner_u, corner_v) every `pitch` metres, first direction.
 # lines, vertices: places an edge may move to, by direction and axis, infinite where there are no more.
@@ -27,7 +28,7 @@ RASTER_M, RASTER_CELLS = 0.2, 120
 # and off for each end at a corner.
 Scene = namedtuple(
     "Scene",
-    "U V z weight n low high turn depth corner_u corner_v pitch lines vertices corners evidence dead width edge_prices allowed",
+    "U V z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners evidence dead width edge_prices allowed",
 )
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)
@@ -76,6 +77,7 @@ def scene_of(
         np.array([c * v - s * u for c, s in turn]),
         np.r_[cloud.z, np.zeros(len(ghosts.u))],
         np.r_[np.ones(len(cloud.u)), ghosts.weight],
+        np.r_[np.zeros(len(cloud.u)), ghosts.shade],
         len(cloud.u),
         float(ghosts.low),
         float(ghosts.high),
@@ -98,10 +100,11 @@ def scene_of(
 def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
     """The scene with only the points `kept` (m,), ghosts weighing as many of them; what the outline gives is shared."""
     columns = np.r_[kept, scene.n : len(scene.z)]
-    weight = scene.weight[columns]
+    weight, shade = scene.weight[columns], scene.shade[columns]
     weight[len(kept) :] *= len(kept) / scene.n
+    shade *= len(kept) / scene.n
     U, V = (np.ascontiguousarray(axis[:, columns]) for axis in (scene.U, scene.V))
-    return scene._replace(U=U, V=V, z=scene.z[columns], weight=weight, n=len(kept), evidence=evidence)
+    return scene._replace(U=U, V=V, z=scene.z[columns], weight=weight, shade=shade, n=len(kept), evidence=evidence)
 
 
 def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
