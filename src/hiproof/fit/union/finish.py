@@ -65,8 +65,9 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
     there = np.isfinite(volume[OFFSET : OFFSET + LEVEL + 1])
     direction = int(volume[DIRECTION])
     points = np.stack([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
+    start = replace(start, cost=cost_of(start.rows, points, scene))
     if len(members) < FEWEST_POINTS:
-        return replace(start, cost=cost_of(start.rows, points, scene))
+        return start
     tolerance = scene.dead + scene.width
     base = scene.evidence * PARAMETER_COST
     best, facing = None, None
@@ -186,7 +187,7 @@ def fitted(start: Planes, design: np.ndarray, points: np.ndarray, scene: Scene, 
         spread = np.linalg.cholesky(inverse) * np.sqrt(variance)
         rows, modes = new, np.moveaxis(design @ spread, 2, 0)
     if not proper(rows):
-        return Planes(start.rows, start.modes, np.inf)
+        return start
     return Planes(rows, modes, cost_of(rows, points, scene))
 
 

@@ -6,17 +6,17 @@ beside each other then stand for one.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 import shapely
 
-from .finish import Planes, finished
-from .moves import without
-from .objective import edge_cost
+from .finish import SQUARE, Planes, finished
+from .moves import refit_each, without
+from .objective import base_shows, edge_cost, objective
 from .plan import Plan
-from .refit import refit
 from .scene import Scene
 from .sides import Side, sides_of
 from .volumes import DIRECTION, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, volume_cost
@@ -36,23 +36,32 @@ class Settled:
 
 
 def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Settled:
-    """The volumes along their sides, pairs of them united wherever that costs less."""
+    """The volumes along their sides, without those that do not pay once planes face as these do."""
     best = settled(volumes, plan, outline, scene)
     tried = True
     while tried:
         tried = False
-        for j, k in combinations(range(1, len(best.volumes)), 2):
-            if not alike(best.volumes[j], best.volumes[k]):
+        for trial in fewer(best):
+            if base_shows(trial, scene) and not base_shows(best.volumes, scene):
                 continue
-            trial = best.volumes.copy()
-            trial[j] = over_both(trial[j], trial[k])
-            trial = without(trial, k)
-            refit(trial, scene, j)
+            trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
             found = settled(trial, plan, outline, scene)
             if found.cost < best.cost:
                 best, tried = found, True
                 break
     return best
+
+
+def fewer(roof: Settled) -> Iterator[np.ndarray]:
+    """Volumes with two that are alike made one; and without one, where sides are not square to each other."""
+    for j, k in combinations(range(1, len(roof.volumes)), 2):
+        if alike(roof.volumes[j], roof.volumes[k]):
+            trial = roof.volumes.copy()
+            trial[j] = over_both(trial[j], trial[k])
+            yield without(trial, k)
+    if any(abs(side.lean) > SQUARE for own in roof.sides for side in own):
+        for k in range(len(roof.volumes) - 1, 0, -1):
+            yield without(roof.volumes, k)
 
 
 def settled(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Settled:
