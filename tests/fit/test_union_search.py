@@ -7,7 +7,9 @@ from hiproof.fit.union.candidates import best_rectangles, gain_by_cell
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.moves import improve, merge_volumes, refit_each, settled, simplify
 from hiproof.fit.union.objective import (
+    AT_CORNER_M,
     BASE_SHARE,
+    END_AT_CORNER_M,
     INSIDE_M,
     LEAST_STEP_LENGTH_M,
     STEP_M,
@@ -171,8 +173,14 @@ def slow_edge_cost(volumes, scene, k, edge, spacing):
     if shown < LEAST_STEP_LENGTH_M:
         return 0.0
     corner = np.abs(scene.vertices[int(volumes[k, DIRECTION]), edge // 2] - volumes[k, U0 + edge]).min() < 1e-6
-    loose = 0.0 if corner else prices.loose
-    return prices.any_step + prices.a_metre * shown + prices.low_a_metre * low_steps + loose
+    cost = prices.any_step + prices.a_metre * shown + prices.low_a_metre * low_steps
+    if not corner:
+        return cost + prices.loose
+    within = (low + (np.arange(count) + 0.5) * step)[deep >= INSIDE_M]
+    axis, vertices = edge // 2, scene.corners[int(volumes[k, DIRECTION])]
+    beside = vertices[np.abs(vertices[:, axis] - volumes[k, U0 + edge]) < AT_CORNER_M, 1 - axis]
+    ends = sum((np.abs(beside - end) < END_AT_CORNER_M).any() for end in within[[0, -1]])
+    return cost - prices.at_corner * ends
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -203,7 +211,9 @@ def test_the_objective_is_misfit_and_complexity_counted_plainly(seed):
     z, top = heights(volumes, scene.U, scene.V)
     residual = np.clip(np.abs(scene.z - z)[: scene.n] - scene.dead, 0.0, None) / scene.width
     ghosts, weight = z[scene.n :], scene.weight[scene.n :]
-    misfit = np.minimum(residual**2, 1.0).sum() + weight[(ghosts < scene.low) | (ghosts > scene.high)].sum()
+    away = (ghosts < scene.low) | (ghosts > scene.high)
+    shaded = scene.shade[scene.n :] * (ghosts - scene.low) / (scene.high - scene.low)
+    misfit = np.minimum(residual**2, 1.0).sum() + np.where(away, weight, shaded).sum()
     units = sum(units_of(row) for row in volumes[1:])
     units += sum(slow_edge_cost(volumes, scene, k, e, 0.5) for k in range(1, len(volumes)) for e in range(4))
     units += BASE_COST * (weight[top[scene.n :] == 0].sum() > BASE_SHARE * scene.n)

@@ -16,7 +16,7 @@ from .volumes import DIRECTION, U0, V1, coefficients, lowest, roof_heights, volu
 
 INSIDE_SHARE = 0.96  # of a rectangle that lies in the outline
 LEAST_SHARE, LEAST_M2 = 0.06, 4.0  # of the outline that a further rectangle adds
-AS_LARGE = 0.97
+AS_LARGE, ON_BORDER_M = 0.97, 0.01
 MOST_RECTANGLES, MOST_LINES = 5, 14
 
 
@@ -38,18 +38,14 @@ def from_rectangles(base: np.ndarray, scene: Scene, candidates: np.ndarray) -> n
 
 def largest_rectangles(scene: Scene) -> np.ndarray:
     """Direction, u0, u1, v0, v1 (k, 5) of the rectangles between corners of the outline that together cover most of it."""
-    i, j = np.nonzero(scene.depth > 0.0)
-    u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
-    rectangles, covers = [], []
-    for direction, (c, s) in enumerate(scene.turn):
-        own, inside = rectangles_in(scene, direction, c * u + s * v, c * v - s * u)
-        rectangles.append(own)
-        covers.append(inside)
-    rectangles, covers = np.concatenate(rectangles), np.concatenate(covers)
-    area, missing, found = covers.sum(axis=1), np.ones(len(u), bool), []
+    i, j = (index.ravel() for index in np.indices(scene.depth.shape))
+    u, v, inside = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch, scene.depth.ravel() > -ON_BORDER_M
+    own = [rectangles_in(scene, k, c * u + s * v, c * v - s * u, inside) for k, (c, s) in enumerate(scene.turn)]
+    rectangles, covers = np.concatenate([one for one, _ in own]), np.concatenate([other for _, other in own])
+    area, missing, found = covers.sum(axis=1), np.ones(covers.shape[1], bool), []
     while len(rectangles) and len(found) < MOST_RECTANGLES:
         new = covers[:, missing].sum(axis=1)
-        if new.max() < max(LEAST_SHARE * len(u), LEAST_M2 / scene.pitch**2):
+        if new.max() < max(LEAST_SHARE * inside.sum(), LEAST_M2 / scene.pitch**2):
             break
         best = int(np.argmax(np.where(new >= AS_LARGE * new.max(), area, 0)))
         found.append(rectangles[best])
@@ -57,25 +53,27 @@ def largest_rectangles(scene: Scene) -> np.ndarray:
     return np.array(found).reshape(-1, 5)
 
 
-def rectangles_in(scene: Scene, direction: int, u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """All rectangles (m, 5) of one direction inside the outline, and which of the nodes u, v (n,) each covers (m, n)."""
+def rectangles_in(
+    scene: Scene, direction: int, u: np.ndarray, v: np.ndarray, inside: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """All rectangles (m, 5) of one direction inside the outline, and which nodes of the outline each covers (m, n)."""
     lines = [merged(axis[np.isfinite(axis)]) for axis in scene.vertices[direction]]
-    none = np.zeros((0, 5)), np.zeros((0, len(u)), bool)
+    none = np.zeros((0, 5)), np.zeros((0, inside.sum()), bool)
     if max(map(len, lines)) > MOST_LINES:
         return none
     (u0, u1), (v0, v1) = (np.triu_indices(len(axis), 1) for axis in lines)
-    cells = np.zeros((len(lines[0]) + 1, len(lines[1]) + 1))
-    np.add.at(cells, (np.searchsorted(lines[0], u), np.searchsorted(lines[1], v)), scene.pitch**2)
-    total = cells.cumsum(axis=0).cumsum(axis=1)  # up to each line
     a, b, c, d = (axis.ravel() for axis in np.broadcast_arrays(u0[:, None], u1[:, None], v0, v1))
-    inside = total[b, d] - total[a, d] - total[b, c] + total[a, c]
-    area = (lines[0][b] - lines[0][a]) * (lines[1][d] - lines[1][c])
-    full = (inside > INSIDE_SHARE * area) & (area > LEAST_M2)
+    cells = np.zeros((2, len(lines[0]) + 1, len(lines[1]) + 1))
+    np.add.at(cells, (inside.astype(int), np.searchsorted(lines[0], u), np.searchsorted(lines[1], v)), 1.0)
+    total = cells.cumsum(axis=1).cumsum(axis=2)  # up to each line
+    outside, within = total[:, b, d] - total[:, a, d] - total[:, b, c] + total[:, a, c]
+    full = (within > INSIDE_SHARE * (within + outside)) & (within * scene.pitch**2 > LEAST_M2)
     if not full.any():
         return none
     a, b, c, d = a[full], b[full], c[full], d[full]
     found = np.column_stack([np.full(len(a), direction), lines[0][a], lines[0][b], lines[1][c], lines[1][d]])
     _, low_u, high_u, low_v, high_v = found.T[:, :, None]
+    u, v = u[inside], v[inside]
     return found, (u >= low_u) & (u <= high_u) & (v >= low_v) & (v <= high_v)
 
 

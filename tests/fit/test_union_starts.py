@@ -1,0 +1,106 @@
+"""Laws of the start from the outline's rectangles, of what goes unseen, and of volumes that skewed walls keep apart."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hiproof.fit.union import fit_building
+from hiproof.fit.union.plan import emptiness, lay_out_plan
+from hiproof.fit.union.planes import Cloud, Grid
+from hiproof.fit.union.rectangles import INSIDE_SHARE, largest_rectangles
+from hiproof.fit.union.scene import allowed_shapes, directions_of, scene_of
+from hiproof.model import Roof
+from roof_zoo import FRAME
+
+L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 7), (7, 7), (7, 15), (0, 15)])
+U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6), (6, 14), (0, 14)])
+
+
+def scene_over(outline, density=4.0):
+    """The scene of level points strewn over `outline`."""
+    rng = np.random.default_rng(0)
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    plan = lay_out_plan(np.column_stack([xy, np.zeros(len(xy))]), outline)
+    return plan, scene_of(plan, outline, directions_of(outline, plan), 1.0, 0.25, allowed_shapes(()))
+
+
+def polygons_of(rectangles, plan, scene):
+    """The rectangles (k, 5) as polygons of the frame that the outline is given in."""
+    for direction, u0, u1, v0, v1 in rectangles:
+        c, s = scene.turn[int(direction)]
+        corners = np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)]) @ np.array([[c, s], [-s, c]])
+        yield shapely.Polygon(plan.frame.xy_local(corners))
+
+
+@pytest.mark.parametrize(("outline", "count"), [(L_SHAPE, 2), (U_SHAPE, 3), (shapely.box(0, 0, 12, 8), 1)])
+@pytest.mark.parametrize("angle", [0.0, 33.0])
+def test_the_largest_rectangles_of_an_outline_are_its_wings_to_their_full_length(outline, count, angle):
+    turned = shapely.affinity.rotate(outline, angle, origin=(0, 0)) if angle else outline
+    plan, scene = scene_over(turned)
+    found = list(polygons_of(largest_rectangles(scene), plan, scene))
+    assert len(found) == count
+    for polygon in found:
+        assert polygon.intersection(turned).area > INSIDE_SHARE * polygon.area - 0.5
+    assert shapely.union_all(found).area == pytest.approx(outline.area, rel=0.02)
+
+
+def test_two_hips_that_share_a_corner_are_two_hips():
+    """Alike hips over the wings of an L: each plane of one goes on in the other."""
+    xy = scene_points(L_SHAPE, 6.0)
+    arms = [(0, 14, 0, 7), (0, 7, 0, 15)]
+    z = np.max(
+        [np.min([xy[:, 0] - a, b - xy[:, 0], xy[:, 1] - c, d - xy[:, 1]], axis=0) for a, b, c, d in arms], axis=0
+    )
+    fit = fit_building(np.column_stack([xy, 5.0 + 0.7 * z]), L_SHAPE)
+    assert len(fit.roof_parts) == 2
+    assert {part.type for part in fit.roof_parts} <= {"hip", "side_hip"}
+
+
+def scene_points(outline, density):
+    rng = np.random.default_rng(1)
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
+    return xy[shapely.contains_xy(outline, *xy.T)]
+
+
+def test_a_gable_over_walls_that_are_not_parallel_is_one_part():
+    outline = shapely.Polygon([(0, 0), (14, 0.9), (14, 8.2), (0, 8)])
+    xy = scene_points(outline, 6.0)
+    low, high = 0.9 / 14.0, 0.2 / 14.0
+    z = 6.0 + 0.7 * np.minimum((xy[:, 1] - low * xy[:, 0]), (8.0 + high * xy[:, 0] - xy[:, 1]))
+    fit = fit_building(np.column_stack([xy, z]), outline)
+    assert [part.type for part in fit.roof_parts] == ["gable"] or len(fit.roof_parts) == 1
+    assert np.abs(Roof(fit.roof_parts, fit.outline, FRAME).height_at(xy) - z).mean() < 0.05
+
+
+def test_what_a_wall_hides_is_the_lower_roof():
+    """A strip beside a high wall without points, but for some along its far side."""
+    outline = shapely.box(0, 0, 12, 8)
+    xy = scene_points(outline, 6.0)
+    high = xy[:, 0] < 9.5
+    seen = high | (xy[:, 0] > 11.4)
+    fit = fit_building(np.column_stack([xy, np.where(high, 9.0, 3.0)])[seen], outline)
+    roof = Roof(fit.roof_parts, fit.outline, FRAME)
+    strip = np.column_stack([np.full(7, 11.0), np.linspace(1.0, 7.0, 7)])
+    assert np.abs(roof.height_at(strip) - 3.0).max() < 0.1
+
+
+@given(st.integers(0, 10_000))
+@settings(max_examples=40, deadline=None)
+def test_cells_are_as_empty_as_a_plain_count_says(seed):
+    rng = np.random.default_rng(seed)
+    nu, nv = rng.integers(1, 7, 2)
+    i, j = rng.integers(0, nu, 9), rng.integers(0, nv, 9)
+    expected = rng.uniform(0.1, 2.0, (nu, nv))
+    lines = [np.arange(n + 1.0) for n in (nu, nv)]
+    grid = Grid(*lines, *(np.zeros(len(line), bool) for line in lines))
+    found = emptiness(grid, Cloud(i + 0.5, j + 0.5, np.zeros(9), i, j), expected)
+    for a in range(nu):
+        for b in range(nv):
+            count = ((np.abs(i - a) <= 1) & (np.abs(j - b) <= 1)).sum()
+            usual = expected[max(a - 1, 0) : a + 2, max(b - 1, 0) : b + 2].sum()
+            assert found[a, b] == pytest.approx(min(max(1.0 - 2.0 * count / usual, 0.0), 1.0))
