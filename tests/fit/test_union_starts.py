@@ -104,3 +104,24 @@ def test_cells_are_as_empty_as_a_plain_count_says(seed):
             count = ((np.abs(i - a) <= 1) & (np.abs(j - b) <= 1)).sum()
             usual = expected[max(a - 1, 0) : a + 2, max(b - 1, 0) : b + 2].sum()
             assert found[a, b] == pytest.approx(min(max(1.0 - 2.0 * count / usual, 0.0), 1.0))
+
+
+def test_houses_beside_a_higher_one_are_told_apart():
+    """Three gables in a row under one direction, the first and the last alike."""
+    outline = shapely.box(0, 0, 18, 8)
+    xy = scene_points(outline, 8.0)
+    middle = (xy[:, 0] > 6) & (xy[:, 0] < 12)
+    z = 6.0 + 1.2 * middle - 0.7 * np.abs(xy[:, 1] - 4.0)
+    fit = fit_building(np.column_stack([xy, z]), outline)
+    assert [part.type for part in fit.roof_parts] == ["gable"] * 3
+    lengths = sorted(part.parameters["length"] for part in fit.roof_parts)
+    assert lengths == pytest.approx([6.0, 6.0, 6.0], abs=0.2)
+
+
+def test_a_wing_that_crosses_the_roof_stays_one():
+    outline = shapely.union(shapely.box(0, 0, 20, 8), shapely.box(7, -5, 13, 13))
+    xy = scene_points(outline, 8.0)
+    main = np.where((xy[:, 1] > 0) & (xy[:, 1] < 8), 8.0 - 0.7 * np.abs(xy[:, 1] - 4.0), 0.0)
+    wing = np.where((xy[:, 0] > 7) & (xy[:, 0] < 13), 7.0 - 0.7 * np.abs(xy[:, 0] - 10.0), 0.0)
+    fit = fit_building(np.column_stack([xy, np.maximum(main, wing)]), outline)
+    assert [part.type for part in fit.roof_parts] == ["gable"] * 2

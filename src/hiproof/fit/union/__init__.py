@@ -12,6 +12,7 @@ edges, refit, moves  compiled: a volume's edges and planes, structure that comes
 grow        volumes added one by one from a level base, all improved after each
 trim        hidden edges drawn in
 search      these in order, and the simplification that a draughtsman would make
+apart       volumes that show in several places
 sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
 unite       volumes that only skewed walls keep apart, made one
@@ -30,6 +31,7 @@ from ...errors import FitError
 from ...model import Part, Piece
 from ...primitives.family import name_among
 from ...settings import Settings
+from .apart import told_apart
 from .clamp import clamped
 from .fit import BuildingFit
 from .larger import put_together
@@ -38,7 +40,9 @@ from .objective import base_shows
 from .outline import outline_of_points
 from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
+from .scene import Scene
 from .search import find_volumes
+from .trim import raster
 from .unite import united
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -70,7 +74,7 @@ def fit_building(
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    roof = united(volumes, plan, outline, scene)
+    roof = united(told_apart(volumes, scene), plan, outline, scene)
     volumes, sides, planes = roof.volumes, roof.sides, roof.planes
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
@@ -78,19 +82,36 @@ def fit_building(
         for *each, own in zip(volumes, planes, sides, regions, strict=True)
         if own
     ]
+    parts = that_show(parts, plan, scene)
     parts = [as_allowed(part, types, points_local) for part in put_together(parts, types)]
     parts = clamped(parts, *(plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max())))
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, far)
 
 
+def that_show(parts: list[Part], plan: Plan, scene: Scene) -> list[Part]:
+    """Those of the parts that are the highest somewhere in the outline."""
+    if len(parts) < 2:
+        return parts
+    U, V = raster(scene)
+    z = np.array([heights_of(part, plan.frame.xy_local(np.column_stack([U[0], V[0]]))) for part in parts])
+    shown = set(z.argmax(axis=0).tolist())
+    return [part for k, part in enumerate(parts) if k in shown]
+
+
+def heights_of(part: Part, xy: np.ndarray) -> np.ndarray:
+    """Heights (n,) of a part at local `xy` (n, 2), minus infinity where it is not."""
+    z = np.full(len(xy), -np.inf)
+    for piece in part.pieces:
+        inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
+        z[inside] = np.maximum(z[inside], piece.height_at(xy[inside]))
+    return z
+
+
 def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
     """The share of the plan's points further than `tolerance_m` from the max of the parts."""
     xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
-    z = np.full(len(xy), -np.inf)
-    for piece in (piece for part in parts for piece in part.pieces):
-        inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
-        z[inside] = np.maximum(z[inside], piece.height_at(xy[inside]))
+    z = np.max([heights_of(part, xy) for part in parts], axis=0)
     return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 

@@ -39,7 +39,11 @@ def from_rectangles(base: np.ndarray, scene: Scene, candidates: np.ndarray) -> n
 def largest_rectangles(scene: Scene) -> np.ndarray:
     """Direction, u0, u1, v0, v1 (k, 5) of the rectangles between corners of the outline that together cover most of it."""
     i, j = (index.ravel() for index in np.indices(scene.depth.shape))
-    u, v, inside = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch, scene.depth.ravel() > -ON_BORDER_M
+    u, v, inside = (
+        scene.corner_u + i * scene.pitch,
+        scene.corner_v + j * scene.pitch,
+        scene.depth.ravel() > -ON_BORDER_M,
+    )
     own = [rectangles_in(scene, k, c * u + s * v, c * v - s * u, inside) for k, (c, s) in enumerate(scene.turn)]
     rectangles, covers = np.concatenate([one for one, _ in own]), np.concatenate([other for _, other in own])
     area, missing, found = covers.sum(axis=1), np.ones(covers.shape[1], bool), []

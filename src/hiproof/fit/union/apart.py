@@ -1,0 +1,88 @@
+"""Volumes that show in several places told apart: houses of one height on both sides of another, dormers on both slopes.
+
+One long volume under what stands between explains them as well, and more cheaply; a person sees two. A wing that crosses the
+main roof stays one: it stands out of it on both sides.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .scene import Scene
+from .trim import COVER_M, raster
+from .volumes import DIRECTION, U0, roof_heights
+
+HIDDEN_M, LEAST_M2 = 0.8, 1.0  # hidden for so long between two places of so much area at least
+IN_LINE_M = 0.5  # what stands in a row is as deep as its neighbours
+NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
+
+
+def told_apart(volumes: np.ndarray, scene: Scene) -> np.ndarray:
+    """The volumes with each that shows in several places of a row, or of a roof that it stands out of, as several."""
+    U, V = raster(scene)
+    heights, top = roof_heights(volumes, U, V)
+    for k in range(len(volumes) - 1, 0, -1):
+        for axis in (0, 1):
+            pieces = pieces_of(volumes, k, axis, U, V, top, scene)
+            if len(pieces) > 1:
+                trial = np.concatenate([volumes[:k], pieces, volumes[k + 1 :]])
+                if np.array_equal(roof_heights(trial, U, V)[0], heights):
+                    volumes = trial
+                    break
+    return volumes
+
+
+def pieces_of(
+    volumes: np.ndarray, k: int, axis: int, U: np.ndarray, V: np.ndarray, top: np.ndarray, scene: Scene
+) -> np.ndarray:
+    """Volume k cut along an axis where others hide it: (m, COLUMNS); none where it is one. `top` (n,) is what shows at U, V."""
+    own = volumes[k]
+    low, cross = U0 + 2 * axis, U0 + 2 * (1 - axis)
+    x = np.stack([U, V])[axis, int(own[DIRECTION])]
+    y = np.stack([U, V])[1 - axis, int(own[DIRECTION])]
+    within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])
+    seen = np.sort(x[within & (top == k)])
+    gaps = np.nonzero(np.diff(seen) > HIDDEN_M)[0]
+    if len(gaps) == 0:
+        return volumes[:0]
+    starts, ends = seen[np.r_[0, gaps + 1]], seen[np.r_[gaps, len(seen) - 1]]
+    counts = np.diff(np.r_[0, gaps + 1, len(seen)])
+    between = within & np.any([(x > a) & (x < b) for a, b in zip(ends[:-1], starts[1:], strict=True)], axis=0)
+    covers = volumes[np.unique(top[between])]
+    if counts.min() * scene.pitch**2 < LEAST_M2 or not (in_a_row(own, covers, cross) or inside(own, low, cross, scene)):
+        return volumes[:0]
+    pieces = np.repeat(own[None], len(starts), axis=0)
+    for n, (a, b) in enumerate(zip(starts, ends, strict=True)):
+        if n > 0:
+            pieces[n, low] = max(own[low], edge_near(covers, own, low, a, -COVER_M))
+        if n < len(starts) - 1:
+            pieces[n, low + 1] = min(own[low + 1], edge_near(covers, own, low, b, COVER_M))
+    return pieces
+
+
+def in_a_row(own: np.ndarray, covers: np.ndarray, cross: int) -> bool:
+    """Whether what hides a volume lies along its direction and is no deeper."""
+    along = covers[:, DIRECTION] == own[DIRECTION]
+    deeper = (covers[:, cross] < own[cross] - IN_LINE_M) | (covers[:, cross + 1] > own[cross + 1] + IN_LINE_M)
+    return bool((along & ~deeper & (covers[:, cross] > -1e3)).all())
+
+
+def inside(own: np.ndarray, low: int, cross: int, scene: Scene) -> bool:
+    """Whether both ends of a volume along an axis lie inside the outline."""
+    middle = 0.5 * (own[cross] + own[cross + 1])
+    c, s = scene.turn[int(own[DIRECTION])]
+    for end in (own[low], own[low + 1]):
+        u, v = (end, middle) if low == U0 else (middle, end)
+        i = round((c * u - s * v - scene.corner_u) / scene.pitch)
+        j = round((s * u + c * v - scene.corner_v) / scene.pitch)
+        on = 0 <= i < scene.depth.shape[0] and 0 <= j < scene.depth.shape[1]
+        if not on or scene.depth[i, j] < INSIDE_M:
+            return False
+    return True
+
+
+def edge_near(covers: np.ndarray, own: np.ndarray, low: int, seen_to: float, beyond: float) -> float:
+    """The edge of one of `covers` near the end of what shows, or a place as far `beyond` it as hidden edges reach."""
+    edges = covers[covers[:, DIRECTION] == own[DIRECTION]][:, [low, low + 1]].ravel()
+    near = edges[np.abs(edges - seen_to) < NEAR_EDGE_M]
+    return float(near[np.argmin(np.abs(near - seen_to))]) if len(near) else seen_to + beyond
