@@ -19,6 +19,7 @@ unite       volumes that only skewed walls keep apart, made one
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
 larger      saw-teeth and gambrels put together
+shown       parts that show nowhere go
 clamp       no height far beyond those of the points
 """
 
@@ -40,9 +41,8 @@ from .objective import base_shows
 from .outline import outline_of_points
 from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
-from .scene import Scene
 from .search import find_volumes
-from .trim import raster
+from .shown import heights_of, that_show
 from .unite import united
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -85,27 +85,9 @@ def fit_building(
     parts = that_show(parts, plan, scene)
     parts = [as_allowed(part, types, points_local) for part in put_together(parts, types)]
     parts = clamped(parts, *(plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max())))
+    parts = that_show(parts, plan, scene, widest_m2=0.0)
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, far)
-
-
-def that_show(parts: list[Part], plan: Plan, scene: Scene) -> list[Part]:
-    """Those of the parts that are the highest somewhere in the outline."""
-    if len(parts) < 2:
-        return parts
-    U, V = raster(scene)
-    z = np.array([heights_of(part, plan.frame.xy_local(np.column_stack([U[0], V[0]]))) for part in parts])
-    shown = set(z.argmax(axis=0).tolist())
-    return [part for k, part in enumerate(parts) if k in shown]
-
-
-def heights_of(part: Part, xy: np.ndarray) -> np.ndarray:
-    """Heights (n,) of a part at local `xy` (n, 2), minus infinity where it is not."""
-    z = np.full(len(xy), -np.inf)
-    for piece in part.pieces:
-        inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
-        z[inside] = np.maximum(z[inside], piece.height_at(xy[inside]))
-    return z
 
 
 def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
