@@ -16,6 +16,7 @@ import shapely
 from ..compiled import news
 
 OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)
+L_OUTLINE = shapely.box(0.0, 0.0, 6.0, 7.0) | shapely.box(6.0, 2.0, 9.0, 7.0)
 
 
 def house() -> np.ndarray:
@@ -35,7 +36,7 @@ def moves() -> None:
     value = objective(base, scene, np.inf)
     improve(base, scene, value, np.array([0.7]), 1)
     simplify(base, scene, value, 0.1)
-    fit_building(house(), OUTLINE)
+    fit_building(house(), L_OUTLINE)
 
 
 def planes() -> None:
