@@ -12,6 +12,7 @@ edges, refit, moves  compiled: a volume's edges and planes, structure that comes
 grow        volumes added one by one from a level base, all improved after each
 trim        hidden edges drawn in
 search      these in order, and the simplification that a draughtsman would make
+slivers     planes of which a narrow strip shows
 apart       volumes that show in several places
 sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
@@ -43,6 +44,7 @@ from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
 from .search import find_volumes
 from .shown import heights_of, that_show
+from .slivers import without_slivers
 from .unite import united
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -74,7 +76,8 @@ def fit_building(
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    roof = united(told_apart(volumes, scene), plan, outline, scene)
+    volumes = told_apart(without_slivers(volumes, scene), scene)
+    roof = united(volumes, plan, outline, scene)
     volumes, sides, planes = roof.volumes, roof.sides, roof.planes
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
