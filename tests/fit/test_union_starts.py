@@ -125,3 +125,13 @@ def test_a_wing_that_crosses_the_roof_stays_one():
     wing = np.where((xy[:, 0] > 7) & (xy[:, 0] < 13), 7.0 - 0.7 * np.abs(xy[:, 0] - 10.0), 0.0)
     fit = fit_building(np.column_stack([xy, np.maximum(main, wing)]), outline)
     assert [part.type for part in fit.roof_parts] == ["gable"] * 2
+
+
+def test_what_a_scanner_saw_of_a_wall_makes_no_plane():
+    """A monopitch with returns of the wall under its upper edge."""
+    outline = shapely.box(0, 0, 10, 6)
+    rng = np.random.default_rng(2)
+    xy = scene_points(outline, 6.0)
+    wall = np.column_stack([rng.uniform(0, 10, 14), rng.uniform(5.7, 5.84, 14), rng.uniform(6.5, 8.0, 14)])
+    fit = fit_building(np.vstack([np.column_stack([xy, 5.0 + 0.55 * xy[:, 1]]), wall]), outline)
+    assert [part.type for part in fit.roof_parts] == ["monopitch"]

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from .moves import refit_each
 from .objective import objective
-from .refit import refit
 from .scene import Scene
 from .trim import raster
-from .volumes import DIRECTION, LEVEL, OFFSET, SLOPE, coefficients, lowest_plane, plane_count, roof_heights
+from .volumes import DIRECTION, OFFSET, PLANES, SIDES, SLOPE, roof_heights
 
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
 DEAREST_UNITS = 3.0  # what leaving a plane out may cost
@@ -20,13 +20,12 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     U, V = raster(scene)
     for k in range(1, len(volumes)):
         for plane in narrow_planes(volumes, k, U, V):
-            if plane_count(volumes[k]) < 2:
+            if np.isfinite(volumes[k, OFFSET : OFFSET + PLANES]).sum() < 2:
                 break
             trial = volumes.copy()
             trial[k, OFFSET + plane], trial[k, SLOPE + plane] = np.inf, 0.0
-            refit(trial, scene, k)
-            found = objective(trial, scene, value + DEAREST_UNITS * scene.evidence)
-            if np.isfinite(found):
+            trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
+            if found < value + DEAREST_UNITS * scene.evidence:
                 volumes, value = trial, min(value, found)
     return volumes
 
@@ -34,11 +33,14 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
 def narrow_planes(volumes: np.ndarray, k: int, U: np.ndarray, V: np.ndarray) -> list[int]:
     """Inclined planes of volume k that show at U, V (directions, n) nowhere, or over a strip narrower than NARROW_M."""
     _, top = roof_heights(volumes, U, V)
-    direction, c = int(volumes[k, DIRECTION]), coefficients(volumes, k)
-    uv = np.stack([U[direction], V[direction]])[:, top == k]
-    lowest = np.array([lowest_plane(c, u, v)[1] for u, v in uv.T])
-    there = [p for p in range(LEVEL) if volumes[k, OFFSET + p] < np.inf]
-    return [p for p in there if width_of(uv[p // 2, lowest == p]) < NARROW_M] if len(lowest) else []
+    u, v = np.stack([U, V])[:, int(volumes[k, DIRECTION]), top == k]
+    if len(u) == 0:
+        return []
+    slopes = np.append(volumes[k, SLOPE : SLOPE + SIDES], 0.0)
+    falls = np.stack([u, -u, v, -v, np.zeros_like(u)])
+    lowest = np.argmin(volumes[k, OFFSET : OFFSET + PLANES, None] + slopes[:, None] * falls, axis=0)
+    there = [p for p in range(SIDES) if volumes[k, OFFSET + p] < np.inf]
+    return [p for p in there if width_of(falls[p, lowest == p]) < NARROW_M]
 
 
 def width_of(x: np.ndarray) -> float:
