@@ -7,7 +7,7 @@ import importlib.util
 import io
 import json
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from types import ModuleType
 
@@ -15,7 +15,7 @@ import numpy as np
 import shapely
 
 from hiproof.fit.union import BuildingFit, fit_building
-from hiproof.model import Building, Part, Roof
+from hiproof.model import Building, Roof
 from hiproof.settings import Settings
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
@@ -43,16 +43,6 @@ def wireframe_figures(models: Path, truth: Path, worst: int = 0) -> tuple[dict[s
     return json.loads(figures), lines
 
 
-def heights(parts: Sequence[Part], xy: np.ndarray) -> np.ndarray:
-    """Height (p, n) of each of `parts` at plan points (n, 2), minus infinity beside it."""
-    z = np.full((len(parts), len(xy)), -np.inf)
-    for row, part in zip(z, parts, strict=True):
-        for piece in part.pieces:
-            inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
-            row[inside] = np.maximum(row[inside], piece.height_at(xy[inside]))
-    return z
-
-
 def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
     """Plan points (n, 2) inside `outline` on a square grid; one point within it where the grid has none."""
     x0, y0, x1, y1 = outline.bounds
@@ -64,7 +54,8 @@ def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
 
 def visible_areas(roof: Roof) -> np.ndarray:
     """Plan area (m2) where each part is the highest: what is hidden under another does not count."""
-    top = heights(roof.parts, raster(roof.outline)).argmax(axis=0)
+    xy = raster(roof.outline)
+    top = np.argmax([part.height_at(xy) for part in roof.parts], axis=0)
     return roof.outline.area * np.bincount(top, minlength=len(roof.parts)) / len(top)
 
 

@@ -16,8 +16,6 @@ from scipy.optimize import linear_sum_assignment
 
 from hiproof.model import Part, Piece
 
-from .judging import heights
-
 FOUND_IOU, HIDDEN_SLACK_M, SAME = 0.5, 0.02, 1e-6
 ONE_END_LESS = {"hip": "side_hip", "half_hip": "side_half_hip", "mansard": "side_mansard"}
 ALONG = ("length", "ridge_length", "t_x", "t_y")
@@ -58,7 +56,7 @@ def one_of(a: Part, b: Part) -> Part | None:
 
 def matched(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
     """For each true part the index of the fitted one that stands for it at plan points (n, 2), -1 where none does."""
-    tops = [heights(parts, xy).argmax(axis=0) for parts in (truth, fit)]
+    tops = [np.argmax([part.height_at(xy) for part in parts], axis=0) for parts in (truth, fit)]
     common = np.zeros((len(truth), len(fit)))
     np.add.at(common, tuple(tops), 1.0)
     iou = common / np.maximum(common.sum(axis=1, keepdims=True) + common.sum(axis=0) - common, 1.0)
@@ -78,7 +76,8 @@ def hidden_end(part: Part, others: Sequence[Part]) -> bool:
     for sign in (-1, 1):
         corners = ring[np.argsort(-sign * (ring @ along))[:2]] - sign * 0.01 * along
         xy = corners[0] + np.linspace(0.02, 0.98, 9)[:, None] * (corners[1] - corners[0])
-        if (part.pieces[0].height_at(xy) <= heights(others, xy).max(axis=0) + HIDDEN_SLACK_M).all():
+        above = np.max([other.height_at(xy) for other in others], axis=0)
+        if (part.pieces[0].height_at(xy) <= above + HIDDEN_SLACK_M).all():
             return True
     return False
 

@@ -56,15 +56,6 @@ def test_starting_again_adds_to_the_file_and_repeats_nothing(tmp_path, capsys):
     assert capsys.readouterr().err == "hiproof: once\n" * 2
 
 
-def test_work_that_nobody_asked_for_shows_its_warnings_alone(tmp_path):
-    log.start(log.Level.debug, tmp_path / "run.log")
-    with log.without_progress():
-        log.LOGGER.info("sorted")
-        log.LOGGER.warning("compiling")
-    log.LOGGER.info("begun")
-    assert said(tmp_path / "run.log") == [("WARNING", "compiling"), ("INFO", "begun")]
-
-
 def test_a_file_that_cannot_be_written_gets_one_sentence(tmp_path):
     with pytest.raises(OutputError, match="--log-file"):
         log.start(file=tmp_path)

@@ -10,8 +10,6 @@ from __future__ import annotations
 import logging
 import sys
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from enum import StrEnum
 from pathlib import Path
 
@@ -84,17 +82,6 @@ def started() -> tuple:
         return ()
     file = next((Path(handler.baseFilename) for handler in LOGGER.handlers if hasattr(handler, "baseFilename")), None)
     return Level(logging.getLevelName(console.level).lower()), file
-
-
-@contextmanager
-def without_progress() -> Iterator[None]:
-    """Log warnings and errors alone for the block: what goes on in it is not what the user asked for."""
-    level = LOGGER.level
-    LOGGER.setLevel(max(level, logging.WARNING))
-    try:
-        yield
-    finally:
-        LOGGER.setLevel(level)
 
 
 def log_warning(

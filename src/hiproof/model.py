@@ -76,6 +76,14 @@ class Part:
     def area(self) -> float:
         return float(sum(piece.outline.area for piece in self.pieces))
 
+    def height_at(self, xy_local: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_local` (n, 2) in the roof's frame; minus infinity beside the part, for roofs are the max of these."""
+        z = np.full(len(xy_local), -np.inf)
+        for piece in self.pieces:
+            inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
+            z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
+        return z
+
 
 @dataclass(frozen=True)
 class Roof:
@@ -97,10 +105,7 @@ class Roof:
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
         """Roof height (n,) at `xy_local` (n, 2) in the local frame; NaN where no piece covers."""
         xy_local = np.asarray(xy_local, float)
-        z = np.full(len(xy_local), -np.inf)
-        for piece in self.pieces:
-            inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
-            z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
+        z = np.max([part.height_at(xy_local) for part in self.parts], axis=0)
         return np.where(np.isfinite(z), z, np.nan)
 
 

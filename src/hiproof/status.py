@@ -4,11 +4,10 @@ from enum import Enum
 
 
 class Status(Enum):
-    """Outcome of one building. `is_model` tells whether a solid exists, `is_failure` whether it was our fault."""
+    """Outcome of one building. `is_model` tells whether a solid exists."""
 
     MODELLED = "modelled: the roof follows its points"
     POOR_FIT = "modelled, but poorly: many of its points lie away from the roof; look at it before you use it"
-    SPARSE = "modelled from few points: heights are right, the roof's shape may be simplified"
     SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a flat block stands in for it"
     FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
@@ -21,10 +20,6 @@ class Status(Enum):
     @property
     def is_model(self) -> bool:
         return not self.value.startswith("no model")
-
-    @property
-    def is_failure(self) -> bool:
-        return self is Status.INTERNAL_ERROR
 
     @property
     def code(self) -> str:

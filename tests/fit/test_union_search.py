@@ -19,7 +19,8 @@ from hiproof.fit.union.objective import (
     objective,
 )
 from hiproof.fit.union.refit import refit
-from hiproof.fit.union.trim import NEAR_EDGE_M, SLACK_UNITS, drawn_in, raster, trim
+from hiproof.fit.union.scene import nodes
+from hiproof.fit.union.trim import NEAR_EDGE_M, SLACK_UNITS, drawn_in, trim
 from hiproof.fit.union.volumes import (
     BASE_COST,
     DIRECTION,
@@ -288,7 +289,7 @@ def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
 @pytest.mark.parametrize("seed", SEEDS)
 def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_changes(seed):
     rng, volumes, scene = drawn(seed)
-    value, (U, V) = objective(volumes, scene, np.inf), raster(scene)
+    value, (U, V) = objective(volumes, scene, np.inf), nodes(scene)
     for k in range(1, len(volumes)):
         for edge in (U0, U0 + 1, U0 + 2, V1):
             seen_to = rng.uniform(volumes[k, edge - (edge - U0) % 2], volumes[k, edge - (edge - U0) % 2 + 1])

@@ -43,7 +43,7 @@ from .outline import outline_of_points
 from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
 from .search import find_volumes
-from .shown import heights_of, that_show
+from .shown import that_show
 from .slivers import without_slivers
 from .unite import united
 
@@ -96,7 +96,7 @@ def fit_building(
 def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
     """The share of the plan's points further than `tolerance_m` from the max of the parts."""
     xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
-    z = np.max([heights_of(part, xy) for part in parts], axis=0)
+    z = np.max([part.height_at(xy) for part in parts], axis=0)
     return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 

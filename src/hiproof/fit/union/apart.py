@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from .scene import Scene
-from .trim import COVER_M, raster
+from .scene import Scene, nodes
+from .trim import COVER_M
 from .volumes import DIRECTION, U0, roof_heights
 
 HIDDEN_M, LEAST_M2 = 0.8, 1.0  # hidden for so long between two places of so much area at least
@@ -19,7 +19,7 @@ NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
 
 def told_apart(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """The volumes with each that shows in several places of a row, or of a roof that it stands out of, as several."""
-    U, V = raster(scene)
+    U, V = nodes(scene)
     heights, top = roof_heights(volumes, U, V)
     for k in range(len(volumes) - 1, 0, -1):
         for axis in (0, 1):

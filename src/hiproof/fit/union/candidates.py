@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import ghost_cost, point_cost
+from .objective import place_cost
 from .plan import cells_of
 from .planes import (
     Cloud,
@@ -184,11 +184,8 @@ def gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacin
         h = lowest(c, u[i], v[i])
         if h <= z_now[i] + 1e-9 and not replacing:
             continue
-        if i < scene.n:
-            cost = point_cost(scene.z[i], h, scene.dead, scene.width)
-            gain = cost_now[i] - (cost if cost < 1.0 else 1.0 + WRONG_COVER)
-        else:
-            gain = cost_now[i] - ghost_cost(h, scene.weight[i], scene.shade[i], scene.low, scene.high)
+        cost = place_cost(scene, i, h)
+        gain = cost_now[i] - (cost + WRONG_COVER if i < scene.n and cost >= 1.0 else cost)
         cells[i_of[i], j_of[i]] += gain
         gained += max(gain, 0.0)
     return gained

@@ -89,7 +89,7 @@ def grids_of(plan: Plan, scene: Scene) -> list[Grid]:
     grids = [plan.grid]
     for lines in scene.lines[1:]:
         u, v = (axis[np.isfinite(axis)] for axis in lines)
-        grids.append(Grid(u, v, np.zeros(len(u), bool), np.zeros(len(v), bool)))
+        grids.append(Grid(u, v))
     return grids
 
 

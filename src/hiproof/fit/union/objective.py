@@ -53,15 +53,19 @@ def ghost_cost(z_roof, weight, shade, low, high):
 
 
 @compiled
+def place_cost(scene, i, z_roof):
+    """Cost of point or ghost i under a roof `z_roof` high there."""
+    if i < scene.n:
+        return point_cost(scene.z[i], z_roof, scene.dead, scene.width)
+    return ghost_cost(z_roof, scene.weight[i], scene.shade[i], scene.low, scene.high)
+
+
+@compiled
 def costs(z, scene):
     """Cost (n + g,) of every point and ghost under roof heights `z` (n + g,)."""
     cost = np.empty(len(z))
-    n, low, high, dead, width = scene.n, scene.low, scene.high, scene.dead, scene.width
-    z_points, weight, shade = scene.z, scene.weight, scene.shade
-    for i in range(n):
-        cost[i] = point_cost(z_points[i], z[i], dead, width)
-    for i in range(n, len(z)):
-        cost[i] = ghost_cost(z[i], weight[i], shade[i], low, high)
+    for i in range(len(z)):
+        cost[i] = place_cost(scene, i, z[i])
     return cost
 
 

@@ -94,8 +94,8 @@ def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
 
 
-def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`; and which pass a vertex."""
+def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> np.ndarray:
+    """Lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`."""
     kept = [float(low), float(high)]
     for x in sorted(vertices.tolist()):
         if min(abs(x - y) for y in kept) > MERGE_LINES_M:
@@ -111,8 +111,7 @@ def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> tu
         step *= 1.1
         fill = [max(1, round(gap / step)) for gap in gaps]
     lines = [a + gap * q / count for a, gap, count in zip(kept, gaps, fill, strict=False) for q in range(count)]
-    at_vertex = [q == 0 for count in fill for q in range(count)]
-    return np.array([*lines, kept[-1]]), np.array([*at_vertex, True])
+    return np.array([*lines, kept[-1]])
 
 
 def cells_of(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -139,9 +138,9 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     corners = (shapely.get_coordinates(outline.exterior)[:-1] - centroid) @ rotation.T
     cell = max(CELL_M, CELL_SPACINGS / math.sqrt(max(density, 1e-9)))
     (low_u, low_v), (high_u, high_v) = corners.min(axis=0), corners.max(axis=0)
-    u_lines, u_vertex = grid_lines(low_u, high_u, corners[:, 0], cell)
-    v_lines, v_vertex = grid_lines(low_v, high_v, corners[:, 1], cell)
-    grid = Grid(u_lines, v_lines, u_vertex, v_vertex)
+    u_lines = grid_lines(low_u, high_u, corners[:, 0], cell)
+    v_lines = grid_lines(low_v, high_v, corners[:, 1], cell)
+    grid = Grid(u_lines, v_lines)
     u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
     cloud = Cloud(u, v, z, cells_of(u_lines, u), cells_of(v_lines, v))
     return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density)
@@ -168,5 +167,5 @@ def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Poly
     weight = (np.diff(grid.u)[i] * np.diff(grid.v)[j]) * len(cloud.u) / outline.area
     shade = SHADE * weight * emptiness(grid, cloud, weight.reshape(len(centre_u), -1)).ravel()
     low, high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
-    kept = [np.ascontiguousarray(column[inside]) for column in (u, v, weight, shade, i, j)]
+    kept = [np.ascontiguousarray(column[inside]) for column in (u, v, weight, shade)]
     return Ghosts(*kept, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)

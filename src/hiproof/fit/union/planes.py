@@ -28,12 +28,8 @@ SAME_PLANE = 0.05
 TEMPLATE_POINTS = 150
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
-Grid = namedtuple(
-    "Grid", "u v at_vertex_u at_vertex_v"
-)  # grid lines, ascending, and which of them pass footprint vertices
-Ghosts = namedtuple(
-    "Ghosts", "u v weight shade i j low high"
-)  # cell centres inside the outline; heights a roof may take there
+Grid = namedtuple("Grid", "u v")  # grid lines, ascending
+Ghosts = namedtuple("Ghosts", "u v weight shade low high")  # cell centres inside the outline; heights a roof may take
 
 
 @compiled

@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import costs, ghost_cost, point_cost
+from .objective import costs, place_cost
 from .plan import MERGE_LINES_M
-from .scene import Scene
+from .scene import Scene, nodes
 from .volumes import DIRECTION, U0, V1, coefficients, lowest, roof_heights, volume_cost
 
 INSIDE_SHARE = 0.96  # of a rectangle that lies in the outline
@@ -38,13 +38,8 @@ def from_rectangles(base: np.ndarray, scene: Scene, candidates: np.ndarray) -> n
 
 def largest_rectangles(scene: Scene) -> np.ndarray:
     """Direction, u0, u1, v0, v1 (k, 5) of the rectangles between corners of the outline that together cover most of it."""
-    i, j = (index.ravel() for index in np.indices(scene.depth.shape))
-    u, v, inside = (
-        scene.corner_u + i * scene.pitch,
-        scene.corner_v + j * scene.pitch,
-        scene.depth.ravel() > -ON_BORDER_M,
-    )
-    own = [rectangles_in(scene, k, c * u + s * v, c * v - s * u, inside) for k, (c, s) in enumerate(scene.turn)]
+    inside = scene.depth.ravel() > -ON_BORDER_M
+    own = [rectangles_in(scene, k, u, v, inside) for k, (u, v) in enumerate(zip(*nodes(scene, -np.inf), strict=True))]
     rectangles, covers = np.concatenate([one for one, _ in own]), np.concatenate([other for _, other in own])
     area, missing, found = covers.sum(axis=1), np.ones(covers.shape[1], bool), []
     while len(rectangles) and len(found) < MOST_RECTANGLES:
@@ -107,10 +102,7 @@ def best_within(scene, candidates, rectangle, z_now, cost_now):
                 h = lowest(c, u[i], v[i])
                 if h <= z_now[i]:
                     continue
-                if i < scene.n:
-                    gain += cost_now[i] - point_cost(scene.z[i], h, scene.dead, scene.width)
-                else:
-                    gain += cost_now[i] - ghost_cost(h, scene.weight[i], scene.shade[i], scene.low, scene.high)
+                gain += cost_now[i] - place_cost(scene, i, h)
         if gain > best:
             best, chosen = gain, m
     return chosen

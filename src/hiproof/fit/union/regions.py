@@ -87,13 +87,7 @@ def gaps_filled(
     rest = shapely.difference(outline, shapely.union_all(quads[1:]), grid_size=GRID_M)
     xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
     for gap in polygons_of(rest):
-        near = shapely.buffer(gap, 1e-3, quad_segs=1)
-        beside = [
-            (shapely.intersection(near, polygon, grid_size=GRID_M).area, k, q)
-            for k, own in enumerate(regions[1:], 1)
-            for q, polygon in enumerate(own)
-        ]
-        shared, k, q = max(beside, default=(0.0, 0, 0))
+        near, shared, k, q = shares_most(gap, [[], *regions[1:]])
         if shared > 0.0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], xy, plan, scene)):
             merged = polygons_of(
                 shapely.intersection(shapely.union_all([regions[k][q], near]), outline, grid_size=GRID_M)
@@ -107,6 +101,17 @@ def gaps_filled(
         if not regions[0] or not shapely.covers(shapely.union_all(regions[0]).buffer(1e-3), gap):
             regions[0].append(gap)
     return regions
+
+
+def shares_most(gap: shapely.Polygon, polygons: list[list[shapely.Polygon]]) -> tuple[shapely.Polygon, float, int, int]:
+    """The `gap` a millimetre wider, the area of it that one of the `polygons` shares at most, and that one's two indices."""
+    near = shapely.buffer(gap, 1e-3, quad_segs=1)
+    beside = [
+        (shapely.intersection(near, polygon, grid_size=GRID_M).area, k, q)
+        for k, own in enumerate(polygons)
+        for q, polygon in enumerate(own)
+    ]
+    return near, *max(beside, default=(0.0, 0, 0))
 
 
 def is_base(

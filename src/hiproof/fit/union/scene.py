@@ -135,6 +135,14 @@ def depth_raster(plan: Plan, outline: shapely.Polygon) -> tuple[np.ndarray, np.n
     return depth.reshape(len(axes[0]), len(axes[1])), low, pitch
 
 
+def nodes(scene: Scene, least_depth: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    """The raster's nodes at least so deep inside the outline, in every direction: U, V (directions, n)."""
+    i, j = np.nonzero(scene.depth >= least_depth)
+    u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
+    c, s = scene.turn[:, :1], scene.turn[:, 1:]
+    return c * u + s * v, c * v - s * u
+
+
 def lines_of(plan: Plan, ring: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Grid lines and vertex lines (directions, 2, m), ascending, padded with infinity."""
     cell = float(np.median(np.diff(plan.grid.u)))
@@ -144,7 +152,7 @@ def lines_of(plan: Plan, ring: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray
         for axis in range(2):
             x = own[:, axis]
             first = number == 0
-            lines.append((plan.grid.u, plan.grid.v)[axis] if first else grid_lines(x.min(), x.max(), x, cell)[0])
+            lines.append((plan.grid.u, plan.grid.v)[axis] if first else grid_lines(x.min(), x.max(), x, cell))
             vertices.append(np.unique(np.round(x, 3)))
     return padded(lines), padded(vertices)
 

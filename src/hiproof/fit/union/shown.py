@@ -10,8 +10,8 @@ import shapely
 
 from ...model import Part, Piece
 from .plan import Plan
-from .regions import GRID_M, polygons_of
-from .scene import Scene
+from .regions import GRID_M, polygons_of, shares_most
+from .scene import Scene, nodes
 
 BORDER_M = 0.1  # a part shows that is the highest somewhere so far inside the outline
 
@@ -20,23 +20,14 @@ def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = ma
     """Those of the parts that show, over all that the parts cover; what would leave more than `widest_m2` bare stays too."""
     if len(parts) < 2:
         return parts
-    i, j = np.nonzero(scene.depth >= BORDER_M)
-    xy = plan.frame.xy_local(np.column_stack([scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch]))
-    top = set(np.argmax([heights_of(part, xy) for part in parts], axis=0).tolist())
+    u, v = nodes(scene, BORDER_M)
+    xy = plan.frame.xy_local(np.column_stack([u[0], v[0]]))
+    top = set(np.argmax([part.height_at(xy) for part in parts], axis=0).tolist())
     shown, hidden = ([part for k, part in enumerate(parts) if (k in top) == seen] for seen in (True, False))
     for part in hidden:
         taken = shown and with_slivers(shown, part, widest_m2)
         shown = taken or [*shown, part]
     return shown
-
-
-def heights_of(part: Part, xy: np.ndarray) -> np.ndarray:
-    """Heights (n,) of a part at local `xy` (n, 2), minus infinity where it is not."""
-    z = np.full(len(xy), -np.inf)
-    for piece in part.pieces:
-        inside = shapely.intersects_xy(piece.outline, xy[:, 0], xy[:, 1])
-        z[inside] = np.maximum(z[inside], piece.height_at(xy[inside]))
-    return z
 
 
 def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part] | None:
@@ -48,12 +39,7 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
     for sliver in bare:
-        near = shapely.buffer(sliver, 1e-3, quad_segs=1)
-        _, k, q = max(
-            (shapely.intersection(near, piece.outline, grid_size=GRID_M).area, k, q)
-            for k, mine in enumerate(pieces)
-            for q, piece in enumerate(mine)
-        )
+        near, _, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
         grown = shapely.union(pieces[k][q].outline, shapely.intersection(near, own), grid_size=GRID_M)
         merged = polygons_of(shapely.union(grown, sliver, grid_size=GRID_M))
         if len(merged) != 1:

@@ -6,8 +6,7 @@ import numpy as np
 
 from .moves import refit_each
 from .objective import objective
-from .scene import Scene
-from .trim import raster
+from .scene import Scene, nodes
 from .volumes import DIRECTION, OFFSET, PLANES, SIDES, SLOPE, roof_heights
 
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
@@ -17,9 +16,10 @@ DEAREST_UNITS = 3.0  # what leaving a plane out may cost
 def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     """The volumes without inclined planes of which only a narrow strip shows, where that costs no more than a part would."""
     value = objective(volumes, scene, np.inf)
-    U, V = raster(scene)
+    U, V = nodes(scene)
+    _, top = roof_heights(volumes, U, V)
     for k in range(1, len(volumes)):
-        for plane in narrow_planes(volumes, k, U, V):
+        for plane in narrow_planes(volumes[k], np.stack([U, V])[:, int(volumes[k, DIRECTION]), top == k]):
             if np.isfinite(volumes[k, OFFSET : OFFSET + PLANES]).sum() < 2:
                 break
             trial = volumes.copy()
@@ -27,19 +27,19 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
             if found < value + DEAREST_UNITS * scene.evidence:
                 volumes, value = trial, min(value, found)
+                _, top = roof_heights(volumes, U, V)
     return volumes
 
 
-def narrow_planes(volumes: np.ndarray, k: int, U: np.ndarray, V: np.ndarray) -> list[int]:
-    """Inclined planes of volume k that show at U, V (directions, n) nowhere, or over a strip narrower than NARROW_M."""
-    _, top = roof_heights(volumes, U, V)
-    u, v = np.stack([U, V])[:, int(volumes[k, DIRECTION]), top == k]
+def narrow_planes(volume: np.ndarray, seen: np.ndarray) -> list[int]:
+    """Inclined planes of a volume that show nowhere, or over a strip narrower than NARROW_M; it shows at `seen` (2, n), u and v."""
+    u, v = seen
     if len(u) == 0:
         return []
-    slopes = np.append(volumes[k, SLOPE : SLOPE + SIDES], 0.0)
+    slopes = np.append(volume[SLOPE : SLOPE + SIDES], 0.0)
     falls = np.stack([u, -u, v, -v, np.zeros_like(u)])
-    lowest = np.argmin(volumes[k, OFFSET : OFFSET + PLANES, None] + slopes[:, None] * falls, axis=0)
-    there = [p for p in range(SIDES) if volumes[k, OFFSET + p] < np.inf]
+    lowest = np.argmin(volume[OFFSET : OFFSET + PLANES, None] + slopes[:, None] * falls, axis=0)
+    there = [p for p in range(SIDES) if volume[OFFSET + p] < np.inf]
     return [p for p in there if width_of(falls[p, lowest == p]) < NARROW_M]
 
 

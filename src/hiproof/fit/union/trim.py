@@ -6,7 +6,7 @@ import numpy as np
 
 from .moves import without
 from .objective import objective
-from .scene import Scene
+from .scene import Scene, nodes
 from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
 
 HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
@@ -16,7 +16,7 @@ SLACK_UNITS = 0.02
 
 def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
     """The volumes without those that nowhere show, hidden edges drawn in to what shows of each; and the objective."""
-    U, V = raster(scene)
+    U, V = nodes(scene)
     _, top = roof_heights(volumes, U, V)
     shown = [top == k for k in range(len(volumes))]
     k = 1
@@ -34,14 +34,6 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
                 volumes, value = drawn_in(volumes, scene, value, k, edge, float(seen_to), U, V)
         k += 1
     return volumes, value
-
-
-def raster(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes inside the outline: U, V (directions, n)."""
-    i, j = np.nonzero(scene.depth >= 0.0)
-    u, v = scene.corner_u + i * scene.pitch, scene.corner_v + j * scene.pitch
-    c, s = scene.turn[:, :1], scene.turn[:, 1:]
-    return c * u + s * v, c * v - s * u
 
 
 def drawn_in(

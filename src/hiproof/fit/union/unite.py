@@ -26,7 +26,7 @@ SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5
 
 
 @dataclass(frozen=True)
-class Settled:
+class Drawn:
     """Volumes (k, COLUMNS) with their sides and planes, and what the roof costs with these (points)."""
 
     volumes: np.ndarray
@@ -35,9 +35,9 @@ class Settled:
     cost: float
 
 
-def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Settled:
+def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
     """The volumes along their sides, without those that do not pay once planes face as these do."""
-    best = settled(volumes, plan, outline, scene)
+    best = drawn(volumes, plan, outline, scene)
     tried = True
     while tried:
         tried = False
@@ -45,14 +45,14 @@ def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Sce
             if base_shows(trial, scene) and not base_shows(best.volumes, scene):
                 continue
             trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
-            found = settled(trial, plan, outline, scene)
+            found = drawn(trial, plan, outline, scene)
             if found.cost < best.cost:
                 best, tried = found, True
                 break
     return best
 
 
-def fewer(roof: Settled) -> Iterator[np.ndarray]:
+def fewer(roof: Drawn) -> Iterator[np.ndarray]:
     """Volumes with two that are alike made one; and without one, where sides are not square to each other."""
     for j, k in combinations(range(1, len(roof.volumes)), 2):
         if alike(roof.volumes[j], roof.volumes[k]):
@@ -64,13 +64,13 @@ def fewer(roof: Settled) -> Iterator[np.ndarray]:
             yield without(roof.volumes, k)
 
 
-def settled(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Settled:
+def drawn(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
     """The volumes with the sides and planes that suit them."""
     sides = sides_of(volumes, plan, outline, scene)
     planes = finished(volumes, sides, scene)
     units = sum(volume_cost(volume) for volume in volumes[1:])
     units += sum(edge_cost(volumes, scene, k, edge) for k in range(1, len(volumes)) for edge in range(4))
-    return Settled(volumes, sides, planes, sum(own.cost for own in planes) + scene.evidence * units)
+    return Drawn(volumes, sides, planes, sum(own.cost for own in planes) + scene.evidence * units)
 
 
 def alike(one: np.ndarray, other: np.ndarray) -> bool:
