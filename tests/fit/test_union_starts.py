@@ -135,3 +135,12 @@ def test_what_a_scanner_saw_of_a_wall_makes_no_plane():
     wall = np.column_stack([rng.uniform(0, 10, 14), rng.uniform(5.7, 5.84, 14), rng.uniform(6.5, 8.0, 14)])
     fit = fit_building(np.vstack([np.column_stack([xy, 5.0 + 0.55 * xy[:, 1]]), wall]), outline)
     assert [part.type for part in fit.roof_parts] == ["monopitch"]
+
+
+def test_a_level_roof_is_one_part_however_long():
+    """Longer than the raster's nodes lie close: its steps are no gaps."""
+    outline = shapely.box(0, 0, 130, 14)
+    xy = scene_points(outline, 1.5)
+    tower = (xy[:, 0] > 60) & (xy[:, 0] < 75)
+    fit = fit_building(np.column_stack([xy, np.where(tower, 12.0, 6.0)]), outline)
+    assert len(fit.roof_parts) <= 3

@@ -13,6 +13,7 @@ from .trim import COVER_M
 from .volumes import DIRECTION, U0, roof_heights
 
 HIDDEN_M, LEAST_M2 = 0.8, 1.0  # hidden for so long between two places of so much area at least
+LEAST_NODES = 2.5  # and for so many of the raster's steps, which are long on large roofs
 IN_LINE_M = 0.5  # what stands in a row is as deep as its neighbours
 NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
 
@@ -42,7 +43,7 @@ def pieces_of(
     y = np.stack([U, V])[1 - axis, int(own[DIRECTION])]
     within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])
     seen = np.sort(x[within & (top == k)])
-    gaps = np.nonzero(np.diff(seen) > HIDDEN_M)[0]
+    gaps = np.nonzero(np.diff(seen) > max(HIDDEN_M, LEAST_NODES * scene.pitch))[0]
     if len(gaps) == 0:
         return volumes[:0]
     starts, ends = seen[np.r_[0, gaps + 1]], seen[np.r_[gaps, len(seen) - 1]]
