@@ -10,6 +10,7 @@ from hiproof.fit.union.scene import allowed_shapes, scene_of
 from hiproof.fit.union.volumes import (
     COLUMNS,
     DIRECTION,
+    LEAN,
     LEVEL,
     OFFSET,
     PLANES,
@@ -46,6 +47,7 @@ def random_volume(rng, replacing=0.2):
         row[OFFSET + k] = rng.uniform(-1.0, 2.0)
         if k < LEVEL:
             row[SLOPE + k] = rng.uniform(0.1, 1.2)
+            row[LEAN + k] = rng.choice([0.0, rng.uniform(-0.3, 0.3)])
             low = u[0] if k == 0 else -u[1] if k == 1 else v[0] if k == 2 else -v[1]
             row[OFFSET + k] -= row[SLOPE + k] * low
     row[TIE], row[REPLACES] = rng.integers(3), float(rng.random() < replacing)
@@ -64,7 +66,8 @@ def heights(volumes, U, V):
     for k, row in enumerate(volumes):
         u, v = U[int(row[DIRECTION])], V[int(row[DIRECTION])]
         offset, slope = row[OFFSET : OFFSET + PLANES, None], row[SLOPE : SLOPE + SIDES, None]
-        h = np.min([*(offset[:LEVEL] + slope * [u, -u, v, -v]), np.broadcast_to(offset[LEVEL], u.shape)], axis=0)
+        up = np.array([u, -u, v, -v]) + row[LEAN : LEAN + SIDES, None] * [v, v, u, u]
+        h = np.min([*(offset[:LEVEL] + slope * up), np.broadcast_to(offset[LEVEL], u.shape)], axis=0)
         shows = (row[U0] <= u) & (u <= row[U1]) & (row[V0] <= v) & (v <= row[V1]) & ((h > z) | (row[REPLACES] > 0))
         z, top = np.where(shows, h, z), np.where(shows, k, top)
     return z, top

@@ -12,7 +12,7 @@ from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
 from hiproof.fit.union.scene import allowed_shapes, scene_of
 from hiproof.fit.union.sides import Side, corners_of, sides_of
-from hiproof.fit.union.volumes import LEVEL, OFFSET, U0, V1, base_only, roof_heights
+from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, U0, V1, base_only, roof_heights
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
@@ -65,7 +65,7 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     rng = np.random.default_rng(seed)
     outline, volumes = OUTLINES[0], level_volumes(rng, 3)
     volumes[-1, U0 : V1 + 1] = -3.0, 1.0, -2.0, 2.0
-    volumes[-1, -1] = 1.0
+    volumes[-1, REPLACES] = 1.0
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, plan, outline, scene)
     regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, True)

@@ -25,6 +25,8 @@ from hiproof.fit.union.volumes import (
     BASE_COST,
     DIRECTION,
     FREE,
+    LEAN,
+    LEANING_COST,
     LEVEL,
     OFFSET,
     OPPOSITE,
@@ -129,11 +131,13 @@ def test_a_roof_united_with_itself_moved_under_it_is_itself(seed):
 
 
 def units_of(row):
-    """Units of complexity of a volume: itself, its offsets, the slopes that its tie leaves it, and that it replaces."""
+    """Units of complexity of a volume: itself, its offsets, the slopes that its tie leaves it, its leans, that it replaces."""
     there = np.isfinite(row[OFFSET : OFFSET + PLANES])
     along, across = there[:2].sum(), there[2:SIDES].sum()
     slopes = {FREE: along + across, OPPOSITE: min(along, 1) + min(across, 1)}.get(row[TIE], min(along + across, 1))
-    return PART_COST + PARAMETER_COST * (there.sum() + slopes) + REPLACING_COST * (row[REPLACES] > 0)
+    leaning = (there[:SIDES] & (row[LEAN : LEAN + SIDES] != 0)).sum()
+    units = PART_COST + PARAMETER_COST * (there.sum() + slopes) + LEANING_COST * leaning
+    return units + REPLACING_COST * (row[REPLACES] > 0)
 
 
 def grown_by_touch(volumes):

@@ -22,6 +22,7 @@ from .volumes import (
     ALL,
     COLUMNS,
     DIRECTION,
+    LEAN,
     LEVEL,
     OFFSET,
     OPPOSITE,
@@ -38,7 +39,7 @@ from .volumes import (
 
 POOL_POINTS, SEEDS, PAIRS = 500, 100, 200
 MOST_GABLES = 6
-ALONG_AXIS = 0.12  # a plane that leans so little off an axis is taken along it
+ALONG_AXIS = 0.12  # a plane that leans so little off an axis or a wall is taken along it
 RIDGE_INSIDE_M = 0.4
 MOST_TOPS, MOST_PAIRS = 2, 3  # level tops and pairs of slopes, strongest first, that make hips and mansards
 WRONG_COVER = 0.02  # of a point: what covering one without explaining it costs
@@ -76,7 +77,7 @@ def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid,
         return []
     gables, counts = gable_pool(few, grid, pool, tolerance, evidence, MOST_GABLES)
     middle = np.array([np.median(u), np.median(v)])
-    along = [plane for plane in (along_axis(plane, middle) for plane in pool) if plane is not None]
+    along = [facing for plane in pool for facing in facings(plane, middle, scene.leans[direction])]
     pairs = [list(g[:c]) for g, c in zip(gables, counts, strict=True)]
     pairs += [[p, q] for i, p in enumerate(along) for q in along[:i] if has_ridge(p, q, grid)]
     groups = [[plane] for plane in along] + pairs + larger_groups(along, pairs)
@@ -86,50 +87,60 @@ def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid,
 
 def larger_groups(planes: list[np.ndarray], pairs: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
     """Hips of two pairs across each other, and pairs and hips with a level top: those of the strongest few."""
-    flats = [plane for plane in planes if kind_of(plane) == 0][:MOST_TOPS]
-    across = [[pair for pair in pairs if len(pair) == 2 and kind_of(pair[0]) == kind][:MOST_PAIRS] for kind in (1, 2)]
+    flats = [plane for plane in planes if axis_of(plane) < 0][:MOST_TOPS]
+    across = [[pair for pair in pairs if len(pair) == 2 and axis_of(pair[0]) == axis][:MOST_PAIRS] for axis in (0, 1)]
     hips = [one + other for one in across[0] for other in across[1]]
     return hips + [group + [flat] for flat in flats for group in (*across[0], *across[1], *hips)]
 
 
-def along_axis(plane: np.ndarray, middle: np.ndarray) -> np.ndarray | None:
-    """The plane without the little it leans along the other axis, turned about the points' `middle`; None if that is much."""
-    if kind_of(plane) != 3:
-        return plane
-    axis = int(abs(plane[0]) > abs(plane[1]))
-    if abs(plane[axis]) >= ALONG_AXIS * abs(plane[1 - axis]):
-        return None
-    plane = plane.copy()
-    plane[2] += plane[axis] * middle[axis]
-    plane[axis] = 0.0
-    return plane
+def facings(plane: np.ndarray, middle: np.ndarray, leans: np.ndarray) -> list[np.ndarray]:
+    """The plane facing along an axis, and square to the walls that lean by `leans` (2, m), where it very nearly does.
+
+    It is turned about the points' `middle`.
+    """
+    axis = axis_of(plane)
+    if axis < 0:
+        return [plane]
+    found = []
+    for lean in (0.0, *leans[axis][np.isfinite(leans[axis])]):
+        turned = plane.copy()
+        turned[1 - axis] = -lean * plane[axis]
+        if abs(turned[1 - axis] - plane[1 - axis]) < ALONG_AXIS * abs(plane[axis]):
+            turned[2] += (plane - turned)[:2] @ middle
+            found.append(turned)
+    return found
+
+
+def axis_of(plane: np.ndarray) -> int:
+    """The axis that an inclined plane faces most nearly along; -1 for a level one."""
+    return int(abs(plane[1]) > abs(plane[0])) if kind_of(plane) else -1
 
 
 def has_ridge(one: np.ndarray, other: np.ndarray, grid: Grid) -> bool:
     """Whether two planes fall away from a ridge inside the plan."""
-    kind = kind_of(one)
-    if kind not in (1, 2) or kind_of(other) != kind or one[kind - 1] * other[kind - 1] >= 0.0:
+    axis = axis_of(one)
+    if axis < 0 or axis_of(other) != axis or one[axis] * other[axis] >= 0.0:
         return False
-    rising, falling = (one, other) if one[kind - 1] > 0.0 else (other, one)
-    at = (falling[2] - rising[2]) / (rising[kind - 1] - falling[kind - 1])
-    lines = (grid.u, grid.v)[kind - 1]
+    rising, falling = (one, other) if one[axis] > 0.0 else (other, one)
+    lines, across = (grid.u, grid.v)[axis], (grid.v, grid.u)[axis]
+    y = 0.5 * (across[0] + across[-1])
+    at = (falling[2] - rising[2] + (falling - rising)[1 - axis] * y) / (rising[axis] - falling[axis])
     return bool(lines[0] + RIDGE_INSIDE_M < at < lines[-1] - RIDGE_INSIDE_M)
 
 
 def volume_of(direction: int, planes: list[np.ndarray]) -> np.ndarray | None:
-    """A volume of planes (a, b, c) along the axes; None where two face the same way or one leans along neither axis."""
+    """A volume of planes (a, b, c); None where two face the same way."""
     volume = np.zeros(COLUMNS)
     volume[DIRECTION], volume[OFFSET : OFFSET + PLANES] = direction, np.inf
     for plane in planes:
-        kind = kind_of(plane)
-        if kind == 3:
-            return None
-        place = LEVEL if kind == 0 else 2 * (kind - 1) + (plane[kind - 1] < 0.0)
+        axis = axis_of(plane)
+        place = LEVEL if axis < 0 else 2 * axis + (plane[axis] < 0.0)
         if volume[OFFSET + place] < np.inf:
             return None
         volume[OFFSET + place] = plane[2]
-        if kind:
-            volume[SLOPE + place] = abs(plane[kind - 1])
+        if axis >= 0:
+            volume[SLOPE + place] = abs(plane[axis])
+            volume[LEAN + place] = plane[1 - axis] / abs(plane[axis])
     volume[TIE] = tie_of(volume)
     return volume
 

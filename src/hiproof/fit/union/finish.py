@@ -17,6 +17,7 @@ from .sides import Side
 from .volumes import (
     ALL,
     DIRECTION,
+    LEAN,
     LEVEL,
     OFFSET,
     OPPOSITE,
@@ -71,7 +72,7 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
     tolerance = scene.dead + scene.width
     base = scene.evidence * PARAMETER_COST
     best, facing = None, None
-    for leans in facings(sides, there):
+    for leans in facings(volume[LEAN : LEAN + SIDES], sides, there):
         design = design_of(volume, sides, leans, there, level=())
         found = fitted(start, design, points, scene, tolerance)
         price = FACING_GAIN * base if any(leans) else 0.0
@@ -112,15 +113,16 @@ def planes_as_found(volume: np.ndarray) -> Planes:
             rows[k] = (0.0, 0.0, volume[OFFSET + k])
             if k < LEVEL:
                 rows[k, k // 2] = SIGN[k] * volume[SLOPE + k]
+                rows[k, 1 - k // 2] = volume[SLOPE + k] * volume[LEAN + k]
     return Planes(rows, np.zeros((0, 5, 3)), np.inf)
 
 
-def facings(sides: list[Side], there: np.ndarray) -> list[tuple[float, ...]]:
-    """Ways (4 leans each) that the planes may face: along the axes first, each pair square to its sides or to one of them."""
+def facings(found: np.ndarray, sides: list[Side], there: np.ndarray) -> list[tuple[float, ...]]:
+    """Ways (4 leans each) that the planes may face: along the axes, as `found` (4,), each pair square to its sides or one of them."""
     pairs = []
     for low, high in ((0, 1), (2, 3)):
         one, other = (0.0 if abs(lean) < SQUARE else lean for lean in (sides[low].lean, sides[high].lean))
-        ways = [(0.0, 0.0)]
+        ways = [(0.0, 0.0), (float(found[low]), float(found[high]))]
         if there[low] or there[high]:
             ways += [(-one, other), (-one, one), (-other, other)]
         pairs.append(list(dict.fromkeys(ways)))

@@ -4,6 +4,7 @@
     drop a volume, a plane                what does not pay goes
     flatten                               slopes next to level become a level top
     tie, untie                            equal slopes
+    face a wall                           planes square to walls that are not quite along the axes
     add an end, a level top               a gable becomes a hip, a hip a mansard
     let it join again                     a volume that replaces becomes part of the max
     merge                                 one volume over the rectangles of two
@@ -21,6 +22,7 @@ from .objective import objective
 from .refit import refit
 from .volumes import (
     DIRECTION,
+    LEAN,
     LEVEL,
     OFFSET,
     PARAMETER_COST,
@@ -34,8 +36,10 @@ from .volumes import (
     V0,
     V1,
     coefficients,
+    distance_up,
     equalise_slopes,
     lowest,
+    lowest_plane,
     plane_count,
     roof_heights,
     slope_count,
@@ -114,13 +118,19 @@ def drop_planes(volumes, scene, value, k, steepest):
         if plane < LEVEL and volumes[k, SLOPE + plane] > steepest:
             continue
         trial = volumes.copy()
-        trial[k, OFFSET + plane] = np.inf
-        if plane < LEVEL:
-            trial[k, SLOPE + plane] = 0.0
+        remove_plane(trial[k], plane)
         trial, found = settled(trial, scene, k, value, EVERYWHERE)
         if found < np.inf:
             volumes, value = trial, found
     return volumes, value
+
+
+@compiled
+def remove_plane(row, plane):
+    """Take a plane off a volume, in place."""
+    row[OFFSET + plane] = np.inf
+    if plane < LEVEL:
+        row[SLOPE + plane] = row[LEAN + plane] = 0.0
 
 
 @compiled
@@ -134,9 +144,8 @@ def flatten(volumes, scene, value, k):
     total = 0.0
     for plane in range(SIDES):
         if flat[plane]:
-            x = u if plane < 2 else v
-            total += volumes[k, OFFSET + plane] + volumes[k, SLOPE + plane] * (x if plane % 2 == 0 else -x)
-            trial[k, OFFSET + plane], trial[k, SLOPE + plane] = np.inf, 0.0
+            total += volumes[k, OFFSET + plane] + volumes[k, SLOPE + plane] * distance_up(volumes[k], plane, u, v)
+            remove_plane(trial[k], plane)
     trial[k, OFFSET + LEVEL] = total / flat.sum()
     trial, found = settled(trial, scene, k, value, EVERYWHERE)
     return (trial, found) if found < np.inf else (volumes, value)
@@ -163,6 +172,65 @@ def change_ties(volumes, scene, value, k):
         if found < np.inf:
             volumes, value = trial, found
     return volumes, value
+
+
+@compiled
+def face_walls(volumes, scene, value, k):
+    """The two planes along each axis of volume k face along it or square to walls, each to one of `scene.leans`."""
+    for axis in range(2):
+        walls = scene.leans[int(volumes[k, DIRECTION]), axis]
+        low, high = 2 * axis, 2 * axis + 1
+        if walls[0] == np.inf or (volumes[k, OFFSET + low] == np.inf and volumes[k, OFFSET + high] == np.inf):
+            continue
+        middles = middles_of_planes(volumes, scene, k)
+        best, best_value = volumes, value - LEAST_GAIN
+        for a in range(-1, len(walls)):
+            for b in range(-1, len(walls)):
+                trial = volumes.copy()
+                for plane, wall in ((low, a), (high, b)):
+                    lean = 0.0 if wall < 0 else walls[wall]
+                    turn_plane(trial[k], plane, (lean if plane % 2 else -lean) + 0.0, middles[plane])
+                refit(trial, scene, k)
+                found = objective(trial, scene, best_value)
+                if found < best_value:
+                    best, best_value = trial, found
+        if best_value < value - LEAST_GAIN:
+            volumes, value = best, best_value
+            trial, found = settled(volumes.copy(), scene, k, value, EVERYWHERE)
+            if found < np.inf:
+                volumes, value = trial, found
+    return volumes, value
+
+
+@compiled
+def middles_of_planes(volumes, scene, k):
+    """u, v (4, 2) in the middle of the points that each inclined plane of volume k explains; of its rectangle where none."""
+    direction, n = int(volumes[k, DIRECTION]), scene.n
+    u, v, c = scene.U[direction], scene.V[direction], coefficients(volumes, k)
+    _, top = roof_heights(volumes, scene.U[:, :n], scene.V[:, :n])
+    sums = np.zeros((SIDES, 3))
+    for i in range(n):
+        h, plane = lowest_plane(c, u[i], v[i])
+        if top[i] == k and plane < LEVEL and abs(scene.z[i] - h) < scene.dead + scene.width:
+            sums[plane, 0] += 1.0
+            sums[plane, 1] += u[i]
+            sums[plane, 2] += v[i]
+    middles = np.empty((SIDES, 2))
+    for plane in range(SIDES):
+        for axis in range(2):
+            middle = 0.5 * (volumes[k, U0 + 2 * axis] + volumes[k, U1 + 2 * axis])
+            middles[plane, axis] = sums[plane, 1 + axis] / sums[plane, 0] if sums[plane, 0] > 0.0 else middle
+    return middles
+
+
+@compiled
+def turn_plane(row, plane, lean, middle):
+    """Make a plane of a volume lean by `lean`, in place, as high at `middle` (u, v) as it was; one that is not there stays so."""
+    if row[OFFSET + plane] == np.inf:
+        return
+    across = middle[1] if plane < 2 else middle[0]
+    row[OFFSET + plane] += row[SLOPE + plane] * (row[LEAN + plane] - lean) * across
+    row[LEAN + plane] = lean
 
 
 @compiled
@@ -329,6 +397,7 @@ def improve(volumes, scene, value, slopes, rounds):
             volumes, value = drop_planes(volumes, scene, value, k, np.inf)
             volumes, value = flatten(volumes, scene, value, k)
             volumes, value = change_ties(volumes, scene, value, k)
+            volumes, value = face_walls(volumes, scene, value, k)
             volumes, value = add_planes(volumes, scene, value, k, slopes)
         volumes, value = merge_volumes(volumes, scene, value, np.inf)
         volumes, value = without_base(volumes, scene, value)

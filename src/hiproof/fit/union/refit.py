@@ -18,6 +18,7 @@ from .volumes import (
     SLOPE_LOW,
     TIE,
     coefficients,
+    distance_up,
     lowest_plane,
     roof_heights,
 )
@@ -45,10 +46,7 @@ def refit(volumes, scene, k):
             if w <= 0.0:
                 continue
             w *= w
-            x = 0.0
-            if plane < LEVEL:
-                x = u[i] if plane < 2 else v[i]
-                x = x if plane % 2 == 0 else -x
+            x = distance_up(volumes[k], plane, u[i], v[i]) if plane < LEVEL else 0.0
             sums[0, plane] += w
             sums[1, plane] += w * x
             sums[2, plane] += w * z_points[i]

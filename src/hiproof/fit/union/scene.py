@@ -15,6 +15,12 @@ MOST_DIRECTIONS = 2
 APART_RAD, NEAR_RAD = math.radians(7.0), math.radians(3.0)  # directions differ by more; edges support one within
 LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for a further direction
 RASTER_M, RASTER_CELLS = 0.2, 120
+MOST_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
+    0.45,
+    0.035,
+    3,
+    2.0,
+)  # walls that planes may face besides those along the axes
 
 # U, V (directions, n + g): the points, then the ghosts of unseen roof; z, weight (n + g); n: how many points.
 # shade (n + g): what the highest of roofs costs over a ghost without points around it, for walls hide only what is lower.
@@ -24,11 +30,12 @@ RASTER_M, RASTER_CELLS = 0.2, 120
 # evidence: points a unit of structure must explain; dead, width: a point costs min((max(|dz| - dead, 0) / width)^2, 1).
 # allowed (2, 3, 3, 2): which shapes a volume may have, see `volumes.is_allowed`.
 # corners (directions, c, 2): the outline's vertices.
+# leans (directions, 2, m): of walls that are not quite along an axis, x = at + lean y; infinite where there are no more.
 # edge_prices: units for an edge that shows, a metre of it, a metre of it lower than low_step (m), if in line with no corner,
 # and off for each end at a corner.
 Scene = namedtuple(
     "Scene",
-    "U V z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners evidence dead width edge_prices allowed",
+    "U V z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
 )
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)
@@ -89,6 +96,7 @@ def scene_of(
         lines,
         vertices,
         np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in turn]),
+        padded([leans_along(ring @ np.array([[c, -s], [s, c]]), axis) for c, s in turn for axis in (0, 1)]),
         evidence,
         DEAD_M,
         max(tolerance_m - DEAD_M, LEAST_WIDTH_M),
@@ -157,9 +165,22 @@ def lines_of(plan: Plan, ring: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray
     return padded(lines), padded(vertices)
 
 
+def leans_along(ring: np.ndarray, axis: int) -> list[float]:
+    """Leans of those of a ring's (n, 2) edges that are nearly but not quite along an axis' lines, the longest first."""
+    step = np.diff(np.vstack([ring, ring[:1]]), axis=0)
+    length, along = np.hypot(*step.T), np.abs(step[:, 1 - axis])
+    walls = (np.abs(step[:, axis]) < MOST_LEAN * along) & (length > WALL_M)
+    lean = step[walls, axis] / step[walls, 1 - axis]
+    found: list[float] = []
+    for k in np.argsort(-length[walls], kind="stable"):
+        if len(found) < MOST_LEANS and min(abs(lean[k] - x) for x in (0.0, *found)) > LEANS_APART:
+            found.append(float(lean[k]))
+    return found
+
+
 def padded(rows: list[np.ndarray]) -> np.ndarray:
     """Rows of several lengths, two a direction, as (directions, 2, m), filled up with infinity."""
-    filled = np.full((len(rows), max(map(len, rows))), np.inf)
+    filled = np.full((len(rows), max(1, *map(len, rows))), np.inf)
     for row, values in zip(filled, rows, strict=True):
         row[: len(values)] = values
     return filled.reshape(len(rows) // 2, 2, -1)

@@ -4,6 +4,7 @@ A volume is a rectangle in one of the building's directions and a min of at most
 
     rising along +u, rising along -u, rising along +v, rising along -v, level
 
+The four inclined ones may lean: face square to a wall that is not quite along the axes.
 The roof is the max of the volumes in whose rectangle a place lies, but a volume that replaces (a recess cut into a slope, a
 low annex beside a gable's wall) is all that shows within it of what came before. Row 0 is the base: level, everywhere.
 """
@@ -15,12 +16,14 @@ import numpy as np
 from ...compiled import compiled
 
 # Columns of a volume's row: its direction's number, rectangle (metres in that direction's axes), the slopes of the four
-# inclined planes, the offsets of all five (z at u = v = 0; infinite where it has no such plane), tie and whether it replaces.
+# inclined planes, the offsets of all five (z at u = v = 0; infinite where it has no such plane), tie and whether it replaces,
+# leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y the other of u, v.
 DIRECTION = 0
 U0, U1, V0, V1 = 1, 2, 3, 4
 SLOPE, OFFSET = 5, 9
 TIE, REPLACES = 14, 15
-COLUMNS = 16
+LEAN = 16
+COLUMNS = 20
 SIDES, PLANES, LEVEL = 4, 5, 4
 
 FREE, OPPOSITE, ALL = 0.0, 1.0, 2.0  # which slopes are equal: none, those that face each other, all
@@ -28,6 +31,7 @@ SLOPE_LOW, SLOPE_HIGH = 0.04, 2.75
 
 # Units of complexity: what a volume costs, each of its offsets and its own slopes, and that it replaces.
 PART_COST, PARAMETER_COST, REPLACING_COST, BASE_COST = 0.5, 0.45, 0.5, 0.95
+LEANING_COST = 0.1  # of each plane that leans: the wall says how, but which wall is a choice
 
 
 def base_only(height: float) -> np.ndarray:
@@ -41,15 +45,17 @@ def base_only(height: float) -> np.ndarray:
 
 @compiled
 def coefficients(volumes, k):
-    """The nine numbers of volume k's planes: five offsets, four slopes (as scalars they stay in registers)."""
-    row = volumes[k]
-    return row[9], row[10], row[11], row[12], row[13], row[5], row[6], row[7], row[8]
+    """The numbers of volume k's planes: five offsets, four slopes, four slopes across (as scalars they stay in registers)."""
+    r = volumes[k]
+    across = r[5] * r[16], r[6] * r[17], r[7] * r[18], r[8] * r[19]
+    return r[9], r[10], r[11], r[12], r[13], r[5], r[6], r[7], r[8], across[0], across[1], across[2], across[3]
 
 
 @compiled(inline="always")
 def lowest(c, u, v):
     """Height at u, v of the volume whose `coefficients` are c, its rectangle not asked."""
-    along, across = min(c[0] + c[5] * u, c[1] - c[6] * u), min(c[2] + c[7] * v, c[3] - c[8] * v)
+    along = min(c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v)
+    across = min(c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u)
     return min(min(along, across), c[4])
 
 
@@ -57,10 +63,19 @@ def lowest(c, u, v):
 def lowest_plane(c, u, v):
     """Height at u, v and which of the planes is the lowest there."""
     best, plane = c[4], LEVEL
-    for k, z in enumerate((c[0] + c[5] * u, c[1] - c[6] * u, c[2] + c[7] * v, c[3] - c[8] * v)):
+    along = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
+    across = c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u
+    for k, z in enumerate((along[0], along[1], across[0], across[1])):
         if z < best:
             best, plane = z, k
     return best, plane
+
+
+@compiled(inline="always")
+def distance_up(row, k, u, v):
+    """What plane k of a volume rises along, by its slope: metres from the axes' origin at u, v."""
+    x, y = (u, v) if k < 2 else (v, u)
+    return (x if k % 2 == 0 else -x) + row[LEAN + k] * y
 
 
 @compiled
@@ -126,7 +141,10 @@ def plane_count(row):
 def volume_cost(row):
     """Units of complexity of one volume, its edges not counted."""
     replacing = REPLACING_COST if row[REPLACES] > 0.0 else 0.0
-    return PART_COST + PARAMETER_COST * (plane_count(row) + slope_count(row)) + replacing
+    leaning = 0.0
+    for k in range(SIDES):
+        leaning += LEANING_COST if row[LEAN + k] != 0.0 and row[OFFSET + k] < np.inf else 0.0
+    return PART_COST + PARAMETER_COST * (plane_count(row) + slope_count(row)) + replacing + leaning
 
 
 @compiled
@@ -155,6 +173,8 @@ def equalise_slopes(row):
             if row[OFFSET + k] < np.inf:
                 low, high = (row[U0], row[U1]) if k < 2 else (row[V0], row[V1])
                 middle, quarter = 0.5 * (low + high), 0.25 * (high - low)
-                x = middle - quarter if k % 2 == 0 else -(middle + quarter)
-                row[OFFSET + k] += (row[SLOPE + k] - total / count) * x
+                x = middle - quarter if k % 2 == 0 else middle + quarter
+                y = 0.5 * (row[V0] + row[V1]) if k < 2 else 0.5 * (row[U0] + row[U1])
+                u, v = (x, y) if k < 2 else (y, x)
+                row[OFFSET + k] += (row[SLOPE + k] - total / count) * distance_up(row, k, u, v)
                 row[SLOPE + k] = total / count
