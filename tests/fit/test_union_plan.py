@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union.finish import finished
+from hiproof.fit.union.finish import cost_of, finished, weighted_moments
 from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
 from hiproof.fit.union.scene import allowed_shapes, scene_of
-from hiproof.fit.union.sides import Side, corners_of, sides_of
+from hiproof.fit.union.sides import Side, corners_of, plan_chords, plan_edges, sides_of
 from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, U0, V1, base_only, roof_heights
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
@@ -50,7 +50,7 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     outline = OUTLINES[seed % len(OUTLINES)]
     volumes = level_volumes(rng, 1 + seed % 4)
     plan, scene = laid_out(rng, outline, volumes)
-    sides = sides_of(volumes, plan, outline, scene)
+    sides = sides_of(volumes, plan_edges(outline, plan), plan_chords(outline, plan), scene)
     regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, base)
     assert len(regions) == len(volumes)
     polygons = [polygon for own in regions for polygon in own]
@@ -67,7 +67,7 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     volumes[-1, U0 : V1 + 1] = -3.0, 1.0, -2.0, 2.0
     volumes[-1, REPLACES] = 1.0
     plan, scene = laid_out(rng, outline, volumes)
-    sides = sides_of(volumes, plan, outline, scene)
+    sides = sides_of(volumes, plan_edges(outline, plan), plan_chords(outline, plan), scene)
     regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, True)
     recess = shapely.union_all(regions[-1])
     assert recess.area > 1.0
@@ -86,7 +86,7 @@ def test_a_side_lies_on_the_line_of_the_outline_that_it_all_but_follows():
     plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
     corners = (shapely.get_coordinates(outline)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
     volumes[1, U0 : V1 + 1] = corners[:, 0].min(), corners[:, 0].max(), corners[:, 1].min() + 0.3, corners[:, 1].max()
-    sides = sides_of(volumes, plan, outline, scene)[1]
+    sides = sides_of(volumes, plan_edges(outline, plan), plan_chords(outline, plan), scene)[1]
     assert all(side.anchored for side in sides)
     found = shapely.Polygon(plan.frame.xy_local(corners_of(sides)))
     assert found.symmetric_difference(outline).area < 1e-6
@@ -111,7 +111,7 @@ def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
     volumes = np.vstack([base_only(-5.0), base_only(2.0)])
     volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
     plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
-    side = sides_of(volumes, plan, outline, scene)[1][1]
+    side = sides_of(volumes, plan_edges(outline, plan), plan_chords(outline, plan), scene)[1][1]
     assert side == Side(1.3)
 
 
@@ -231,3 +231,24 @@ def test_a_gable_beside_a_truncated_gable_is_no_gambrel():
         upper.translation + [0.0, 12.0, 0.0],
     )
     assert sorted(part.type for part in put_together([lower, aside])) == ["gable", "truncated_gable"]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_moments_are_the_sums_over_the_points_of_each_plane(seed):
+    rng = np.random.default_rng(seed)
+    rows = np.full((5, 3), np.nan)
+    there = rng.permutation(5)[:3]
+    rows[there] = rng.uniform(-1.0, 1.0, (3, 3))
+    points = rng.uniform(-2.0, 2.0, (3, 60))
+    at = np.vstack([points[:2], np.ones(60)])
+    heights = np.where(np.isfinite(rows[:, 2:]), np.nan_to_num(rows) @ at, np.inf)
+    left = points[2] - heights.min(axis=0)
+    weight = np.clip(1.0 - (left / 0.8) ** 2, 0.0, None) ** 2
+    moments, products, total, misfit = weighted_moments(rows, points, 0.8)
+    for k in range(5):
+        own = weight * (heights.argmin(axis=0) == k)
+        assert moments[k] == pytest.approx((at * own) @ at.T, abs=1e-9)
+        assert products[k] == pytest.approx(at @ (own * points[2]), abs=1e-9)
+    assert (total, misfit) == pytest.approx((weight.sum(), (weight * left**2).sum()))
+    plain = np.clip((np.abs(left) - 0.05) / 0.3, 0.0, 1.0) ** 2
+    assert cost_of(rows, points, 0.05, 0.3) == pytest.approx(plain.sum())

@@ -8,10 +8,11 @@ the eaves on the outline are at one height. Everything is linear in c and s, so 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 
+from ...compiled import compiled
+from .objective import point_cost
 from .scene import Scene
 from .sides import Side
 from .volumes import (
@@ -66,18 +67,19 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
     there = np.isfinite(volume[OFFSET : OFFSET + LEVEL + 1])
     direction = int(volume[DIRECTION])
     points = np.stack([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
-    start = replace(start, cost=cost_of(start.rows, points, scene))
+    start = replace(start, cost=cost_of(start.rows, points, scene.dead, scene.width))
     if len(members) < FEWEST_POINTS:
         return start
     tolerance = scene.dead + scene.width
     base = scene.evidence * PARAMETER_COST
-    best, facing = None, None
-    for leans in facings(volume[LEAN : LEAN + SIDES], sides, there):
-        design = design_of(volume, sides, leans, there, level=())
-        found = fitted(start, design, points, scene, tolerance)
-        price = FACING_GAIN * base if any(leans) else 0.0
-        if best is None or found.cost + price < best.cost - 1e-9:
-            best, facing = found, leans
+    facing = (0.0, 0.0, 0.0, 0.0)
+    best = fitted(start, design_of(volume, sides, facing, there, level=()), points, scene, tolerance)
+    for pair in (0, 2):
+        for way in facings(volume[LEAN : LEAN + SIDES], sides, there, pair):
+            leans = (*facing[:pair], *way, *facing[pair + 2 :])
+            found = fitted(start, design_of(volume, sides, leans, there, level=()), points, scene, tolerance)
+            if found.cost + FACING_GAIN * base < best.cost - 1e-9:
+                best, facing = found, leans
     anchored = tuple(k for k in range(SIDES) if there[k] and sides[k].anchored)
     if len(anchored) > 1:
         square = own_leans(sides, anchored, facing)
@@ -117,16 +119,14 @@ def planes_as_found(volume: np.ndarray) -> Planes:
     return Planes(rows, np.zeros((0, 5, 3)), np.inf)
 
 
-def facings(found: np.ndarray, sides: list[Side], there: np.ndarray) -> list[tuple[float, ...]]:
-    """Ways (4 leans each) that the planes may face: along the axes, as `found` (4,), each pair square to its sides or one of them."""
-    pairs = []
-    for low, high in ((0, 1), (2, 3)):
-        one, other = (0.0 if abs(lean) < SQUARE else lean for lean in (sides[low].lean, sides[high].lean))
-        ways = [(0.0, 0.0), (float(found[low]), float(found[high]))]
-        if there[low] or there[high]:
-            ways += [(-one, other), (-one, one), (-other, other)]
-        pairs.append(list(dict.fromkeys(ways)))
-    return [(*u, *v) for u, v in product(*pairs)]
+def facings(found: np.ndarray, sides: list[Side], there: np.ndarray, pair: int) -> list[tuple[float, float]]:
+    """Ways (2 leans each) for planes `pair` and the next to face other than along the axis: as `found` (4,), square to their
+    sides or both to one of them."""
+    one, other = (0.0 if abs(side.lean) < SQUARE else side.lean for side in sides[pair : pair + 2])
+    ways = [(float(found[pair]), float(found[pair + 1]))]
+    if there[pair] or there[pair + 1]:
+        ways += [(-one, other), (-one, one), (-other, other)]
+    return [way for way in dict.fromkeys(ways) if any(way)]
 
 
 def own_leans(sides: list[Side], anchored: tuple[int, ...], facing: tuple[float, ...]) -> tuple[float, ...]:
@@ -170,42 +170,67 @@ def slope_groups(volume: np.ndarray, there: np.ndarray) -> list[int]:
 
 def fitted(start: Planes, design: np.ndarray, points: np.ndarray, scene: Scene, tolerance: float) -> Planes:
     """The planes of `design` by biweighted least squares from `start` on `points` (3, m), and their cost."""
-    u, v, z = points
     there = np.isfinite(start.rows[:, 2])
-    plan = np.stack([u, v, np.ones_like(u)], axis=1)
-    rows, modes = start.rows, start.modes
+    rows = start.rows
     anchor = np.linalg.lstsq(design[there].reshape(-1, design.shape[2]), rows[there].ravel(), rcond=None)[0]
     for turn in range(ROUNDS):
-        active, height = lowest_of(rows, plan)
-        weight = np.clip(1.0 - ((z - height) / (tolerance * (2.0 if turn == 0 else 1.5))) ** 2, 0.0, None) ** 2
-        x = np.einsum("mi,mip->mp", plan, design[active])
-        normal = (x * weight[:, None]).T @ x
+        moments, products, weight, misfit = weighted_moments(rows, points, tolerance * (2.0 if turn == 0 else 1.5))
+        normal = np.einsum("kip,kij,kjq->pq", design, moments, design)
         ridge = 1e-6 * max(np.trace(normal) / len(normal), 1e-6)
         inverse = np.linalg.inv(normal + ridge * np.eye(len(normal)))
-        unknowns = inverse @ (x.T @ (weight * z) + ridge * anchor)
-        new = design @ unknowns
-        new[~there] = np.nan
-        variance = float((weight * (z - height) ** 2).sum() / max(weight.sum(), 1.0))
-        spread = np.linalg.cholesky(inverse) * np.sqrt(variance)
-        rows, modes = new, np.moveaxis(design @ spread, 2, 0)
+        rows = design @ (inverse @ (np.einsum("kip,ki->p", design, products) + ridge * anchor))
+        rows[~there] = np.nan
     if not proper(rows):
         return start
-    return Planes(rows, modes, cost_of(rows, points, scene))
+    spread = np.linalg.cholesky(inverse) * np.sqrt(misfit / max(weight, 1.0))
+    return Planes(rows, np.moveaxis(design @ spread, 2, 0), cost_of(rows, points, scene.dead, scene.width))
 
 
-def cost_of(rows: np.ndarray, points: np.ndarray, scene: Scene) -> float:
-    """What `points` (3, m) cost under the planes."""
-    u, v, z = points
-    _, height = lowest_of(rows, np.stack([u, v, np.ones_like(u)], axis=1))
-    r = np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0)
-    return float((r**2).sum())
+@compiled
+def lowest_row(rows, u, v):
+    """Height at u, v of the lowest of planes (5, 3), NaN where there is none, and its index."""
+    best, plane = np.inf, 0
+    for k in range(len(rows)):
+        h = rows[k, 0] * u + rows[k, 1] * v + rows[k, 2]
+        if h < best:
+            best, plane = h, k
+    return best, plane
 
 
-def lowest_of(rows: np.ndarray, plan: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Which plane is the lowest at points (m, 3) of u, v, 1, and its height."""
-    heights = np.where(np.isfinite(rows[:, 2]), plan @ np.nan_to_num(rows).T, np.inf)
-    active = heights.argmin(axis=1)
-    return active, heights[np.arange(len(plan)), active]
+@compiled
+def weighted_moments(rows, points, scale):
+    """Of `points` (3, m) about the planes (5, 3), each with a biweight of that scale and with the plane that is lowest there:
+
+    sums (5, 3, 3) of the products of u, v, 1, and (5, 3) of these with z; the sum of the weights, and of the weighted squares
+    of what is left.
+    """
+    moments, products = np.zeros((len(rows), 3, 3)), np.zeros((len(rows), 3))
+    total = misfit = 0.0
+    at = np.ones(3)
+    for i in range(points.shape[1]):
+        at[0], at[1], z = points[0, i], points[1, i], points[2, i]
+        h, plane = lowest_row(rows, at[0], at[1])
+        w = 1.0 - ((z - h) / scale) ** 2
+        if w <= 0.0:
+            continue
+        w *= w
+        total += w
+        misfit += w * (z - h) ** 2
+        for p in range(3):
+            products[plane, p] += w * at[p] * z
+            for q in range(3):
+                moments[plane, p, q] += w * at[p] * at[q]
+    return moments, products, total, misfit
+
+
+@compiled
+def cost_of(rows, points, dead, width):
+    """What `points` (3, m) cost under the planes (5, 3)."""
+    total = 0.0
+    for i in range(points.shape[1]):
+        h, _ = lowest_row(rows, points[0, i], points[1, i])
+        total += point_cost(points[2, i], h, dead, width)
+    return total
 
 
 def proper(rows: np.ndarray) -> bool:

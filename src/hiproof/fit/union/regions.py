@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .finish import Planes, lowest_of
+from .finish import Planes
 from .plan import Plan
 from .scene import Scene
 from .sides import Side, corners_of
@@ -67,7 +67,8 @@ def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan,
     """Heights (n,) of a volume, in the plan's z, at local `xy` (n, 2)."""
     c, s = scene.turn[int(volume[DIRECTION])]
     uv = (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
-    return lowest_of(planes.rows, np.column_stack([uv, np.ones(len(uv))]))[1]
+    rows = planes.rows[np.isfinite(planes.rows[:, 2])]
+    return (np.column_stack([uv, np.ones(len(uv))]) @ rows.T).min(axis=1)
 
 
 def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:

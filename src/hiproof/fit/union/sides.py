@@ -38,9 +38,11 @@ class Side:
     anchored: bool = False
 
 
-def sides_of(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> list[list[Side]]:
-    """The four sides (u low, u high, v low, v high) of every volume; those of the base are far away."""
-    edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
+def sides_of(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: Scene) -> list[list[Side]]:
+    """The four sides (u low, u high, v low, v high) of every volume, on the outline's edges or chords where these are near.
+
+    The sides of the base are far away.
+    """
     sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
     for k in range(1, len(volumes)):
         direction = int(volumes[k, DIRECTION])

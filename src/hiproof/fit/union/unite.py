@@ -18,7 +18,7 @@ from .moves import refit_each, without
 from .objective import base_shows, edge_cost, objective
 from .plan import Plan
 from .scene import Scene
-from .sides import Side, sides_of
+from .sides import Side, plan_chords, plan_edges, sides_of
 from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, distance_up, volume_cost
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
@@ -37,7 +37,8 @@ class Drawn:
 
 def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
     """The volumes along their sides, without those that do not pay once planes face as these do."""
-    best = drawn(volumes, plan, outline, scene)
+    lines = plan_edges(outline, plan), plan_chords(outline, plan)
+    best = drawn(volumes, *lines, scene)
     tried = True
     while tried:
         tried = False
@@ -45,7 +46,7 @@ def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Sce
             if base_shows(trial, scene) and not base_shows(best.volumes, scene):
                 continue
             trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
-            found = drawn(trial, plan, outline, scene)
+            found = drawn(trial, *lines, scene)
             if found.cost < best.cost:
                 best, tried = found, True
                 break
@@ -64,9 +65,9 @@ def fewer(roof: Drawn) -> Iterator[np.ndarray]:
             yield without(roof.volumes, k)
 
 
-def drawn(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
-    """The volumes with the sides and planes that suit them."""
-    sides = sides_of(volumes, plan, outline, scene)
+def drawn(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: Scene) -> Drawn:
+    """The volumes with the sides and planes that suit them; `edges` and `chords` are those of the outline."""
+    sides = sides_of(volumes, edges, chords, scene)
     planes = finished(volumes, sides, scene)
     units = sum(volume_cost(volume) for volume in volumes[1:])
     units += sum(edge_cost(volumes, scene, k, edge) for k in range(1, len(volumes)) for edge in range(4))
