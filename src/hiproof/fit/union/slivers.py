@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from .moves import refit_each, remove_plane
+from .moves import refit_each
 from .objective import objective
 from .scene import Scene, nodes
-from .volumes import DIRECTION, OFFSET, PLANES, SIDES, SLOPE, distance_up, roof_heights
+from .volumes import DIRECTION, LEAN, OFFSET, PLANES, SIDES, SLOPE, distances_up, roof_heights
 
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
 DEAREST_UNITS = 3.0  # what leaving a plane out may cost
@@ -23,7 +23,8 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
             if np.isfinite(volumes[k, OFFSET : OFFSET + PLANES]).sum() < 2:
                 break
             trial = volumes.copy()
-            remove_plane(trial[k], plane)
+            trial[k, OFFSET + plane] = np.inf
+            trial[k, [SLOPE + plane, LEAN + plane]] = 0.0
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
             if found < value + DEAREST_UNITS * scene.evidence:
                 volumes, value = trial, min(value, found)
@@ -37,7 +38,7 @@ def narrow_planes(volume: np.ndarray, seen: np.ndarray) -> list[int]:
     if len(u) == 0:
         return []
     slopes = np.append(volume[SLOPE : SLOPE + SIDES], 0.0)
-    falls = np.stack([*(distance_up(volume, k, u, v) for k in range(SIDES)), np.zeros_like(u)])
+    falls = np.stack([*distances_up(volume, u, v), np.zeros_like(u)])
     lowest = np.argmin(volume[OFFSET : OFFSET + PLANES, None] + slopes[:, None] * falls, axis=0)
     there = [p for p in range(SIDES) if volume[OFFSET + p] < np.inf]
     return [p for p in there if width_of(falls[p, lowest == p]) < NARROW_M]

@@ -19,7 +19,7 @@ from .objective import base_shows, edge_cost, objective
 from .plan import Plan
 from .scene import Scene
 from .sides import Side, plan_chords, plan_edges, sides_of
-from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, distance_up, volume_cost
+from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, distances_up, volume_cost
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5
@@ -88,7 +88,7 @@ def alike(one: np.ndarray, other: np.ndarray) -> bool:
     if both.sum() < min(there[0].sum(), there[1].sum()) or both.sum() == 0:
         return False
     middle = rectangles.mean(axis=(0, 2))
-    x = np.array([[*(distance_up(row, k, *middle) for k in range(LEVEL)), 0.0] for row in (one, other)])
+    x = np.array([[*distances_up(row, *middle), 0.0] for row in (one, other)])
     slopes = np.array([np.r_[row[SLOPE : SLOPE + LEVEL], 0.0] for row in (one, other)])
     heights = np.array([one[OFFSET : OFFSET + PLANES], other[OFFSET : OFFSET + PLANES]]) + slopes * x
     near = np.abs(heights[0, both] - heights[1, both]) < HEIGHTS_ALIKE_M

@@ -78,6 +78,12 @@ def distance_up(row, k, u, v):
     return (x if k % 2 == 0 else -x) + row[LEAN + k] * y
 
 
+def distances_up(row: np.ndarray, u: np.ndarray, v: np.ndarray) -> np.ndarray:
+    """What each of a volume's four inclined planes rises along at u, v (n,): (4, n) metres from the axes' origin."""
+    lean = row[LEAN : LEAN + SIDES]
+    return np.stack([u + lean[0] * v, -u + lean[1] * v, v + lean[2] * u, -v + lean[3] * u])
+
+
 @compiled
 def roof_heights(volumes, U, V):
     """Height (n,) of the roof and the volume (n,) that shows, at U, V (directions, n)."""
