@@ -9,8 +9,8 @@ import typer
 
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
-from hiproof.write.gltf import write_glb
-from hiproof.write.obj import write_obj
+from hiproof.write.gltf import write_models as write_glb
+from hiproof.write.obj import write_models as write_obj
 from hiproof.write.triangles import face_triangles, ring_normal
 from sample_models import SOLIDS, courtyard_solid, gable_solid, write_sample_run
 

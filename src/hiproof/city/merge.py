@@ -6,28 +6,23 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+from ..formats import FORMATS, OF_TILES, asked_files
 from ..write.fragments import Fragments, load_fragments
 from ..write.run_files import join_fragments
 from .plan import Plan
 
-MODELS = {"gml": "buildings.gml", "cityjson": "buildings.city.jsonl"}
-TABLES = {"parameters": "parameters.jsonl", "gpkg": "buildings.gpkg"}
-PARQUET = {
-    "parquet": "buildings.parquet",
-    "parquet_parts": "parts.parquet",
-    "parquet_surfaces": "roof_surfaces.parquet",
-}
-TILE_FOLDER, TILE_ENDINGS = "models", {"gml": ".gml", "cityjson": ".city.jsonl"}
-TILE_FILE = re.compile(r"\.?-?\d+_-?\d+_\d+\.(gml|city\.jsonl).*")  # a dot before it: unfinished
+TILE_FOLDER = "models"
+ENDINGS = "|".join(re.escape(format.tile_ending) for format in OF_TILES.values())
+TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: unfinished
 
 
 def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
     """Write the files of the run, each whole or not at all, and remove what a killed merge left unfinished."""
-    for name in (*MODELS.values(), *TABLES.values(), *PARQUET.values()):
+    for name in (format.file for format in FORMATS.values() if format.fragment):
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
     remove_tiles(out, ".*")
-    join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.head())
+    join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.head)
 
 
 def parts_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
@@ -48,21 +43,19 @@ def output_files(plan: Plan, out: Path) -> list[Path]:
 
 
 def whole_files(plan: Plan, out: Path) -> dict[str, Path]:
-    """Files of the whole area by what they hold."""
-    city = plan.settings.city
-    names = (MODELS if city.models != "tiles" else {}) | TABLES | (PARQUET if city.parquet else {})
-    return {kind: out / name for kind, name in names.items()}
+    """Files of the whole area by format."""
+    return asked_files(plan.settings, out)
 
 
 def tile_files(out: Path, tile: str) -> dict[str, Path]:
-    """Files of one work tile's models by what they hold."""
-    return {kind: out / TILE_FOLDER / f"{tile}{ending}" for kind, ending in TILE_ENDINGS.items()}
+    """Files of one work tile's models by format."""
+    return {name: out / TILE_FOLDER / f"{tile}{format.tile_ending}" for name, format in OF_TILES.items()}
 
 
 def write_tile(plan: Plan, out: Path, tile: str, parts: list[Fragments]) -> None:
     """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
     if plan.settings.city.models != "merged":
-        join_fragments(tile_files(out, tile), parts, plan.head())
+        join_fragments(tile_files(out, tile), parts, plan.head)
 
 
 def remove_tiles(out: Path, pattern: str = "*") -> None:

@@ -19,8 +19,9 @@ from ..read.crs import parse_crs
 from ..settings import Settings
 from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
-from ..write.naming import FileUnits, UniqueNames, gml_name
-from ..write.parameters import FileHead, crs_text
+from ..write.head import FileHead
+from ..write.naming import UniqueNames, gml_name
+from ..write.parameters import crs_text
 
 PLAN_FILE = "plan.jsonl"
 AROUND_M = 4.0  # of roof points around a footprint that may be moved: as fit/align.py asks, without its compiler here
@@ -75,16 +76,12 @@ class Plan:
 
         return units_of(self.crs(), named=self.settings.read.unit)
 
-    @functools.cached_property
-    def file_units(self) -> FileUnits:
-        """Units of the coordinates in the files written."""
-        return FileUnits.of(self.crs(), self.units)
-
     def crs(self) -> Any:
         """The output's reference system, None where no input names one; by its code where that says all of it, so that
         also its plan alone has one."""
         return parse_crs(crs_text(self.crs_wkt))
 
+    @functools.cached_property
     def head(self) -> FileHead:
         """What the files written have in common."""
         return FileHead(self.crs(), self.settings.read.unit, self.translate, self.settings.compose)

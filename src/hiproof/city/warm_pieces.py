@@ -77,13 +77,13 @@ def solid() -> None:
     from ..compose import compose
     from ..frames import LocalFrame
     from ..model import Part, Piece, Roof
-    from ..write.naming import FileUnits
+    from ..write.head import FileHead
     from ..write.run_files import fragments
 
     gable = Piece(shapely.box(0.0, 0.0, 6.0, 7.0), np.array([[0.0, 0.7, 5.55], [0.0, -0.7, 10.45]]))
     annex = Piece(shapely.box(5.0, 1.0, 9.0, 7.0), np.array([[0.5, 0.0, 3.0]]))
     compose(Roof((Part("free", (gable, annex)),), OUTLINE, LocalFrame(np.zeros(3))), 0.0)
-    fragments(reconstruct(house()[:3], OUTLINE), ("a", "a"), np.zeros(3), FileUnits())
+    fragments(reconstruct(house()[:3], OUTLINE), ("a", "a"), FileHead(offset=np.zeros(3)))
 
 
 def single() -> None:

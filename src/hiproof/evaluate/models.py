@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..formats import FORMATS
 from ..frames import METRES, Units
 from ..model import ROOF, WALL, Face, Solid
 from ..read.cityjson_text import UNUSABLE, documents, reference_system
 from ..read.plausible import is_plausible
 from ..write.naming import units_named
 
-RUN_MODELS = "buildings.city.jsonl"
+RUN_MODELS = FORMATS["cityjson"].file
 
 
 @dataclass(frozen=True)

@@ -17,32 +17,22 @@ import shapely
 
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError
+from ..formats import asked_files
 from ..masking import masked, masked_values
 from ..model import Building
-from ..read.crs import units_of
+from ..settings import Settings
 from ..status import Status
 from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
 from ..write.files import atomic
-from ..write.fragments import Fragments
+from ..write.fragments import Fragment, Fragments
+from ..write.head import FileHead
 from ..write.json_text import dump
 from ..write.naming import FileUnits, UniqueNames, gml_name
-from ..write.parameters import FileHead
 from ..write.run_files import fragments, join_fragments
 from .building import build
 from .file import opened_parameters
 
-FILES = {
-    "gml": "buildings.gml",
-    "cityjson": "buildings.city.jsonl",
-    "parameters": "parameters.jsonl",
-    "gpkg": "buildings.gpkg",
-}
-PARQUET = {
-    "parquet": "buildings.parquet",
-    "parquet_parts": "parts.parquet",
-    "parquet_surfaces": "roof_surfaces.parquet",
-}
 MOST_TOLD = 1000
 
 
@@ -87,12 +77,12 @@ def build_file(
     path, out, built = Path(path), Path(out), Built()
     refuse_folder_of_a_run(out)
     with opened_parameters(path) as (head, records):
-        maker = Maker(head)
-        files = {kind: out / name for kind, name in (FILES | (PARQUET if parquet else {})).items()}
+        settings = Settings.from_dict({"city": {"parquet": parquet}})
+        maker = Maker(head, settings)
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
         maker.settle_offset(first)
-        join_fragments(files, made(maker, records, built, progress), maker.head)
+        join_fragments(asked_files(settings, out), made(maker, records, built, progress), maker.head)
     write_record(path, out, head, built)
     return built
 
@@ -123,15 +113,14 @@ def made(maker: Maker, records: Iterator[dict], built: Built, progress: Callable
 class Maker:
     """Makes the texts of building after building, as the files of one run hold them."""
 
-    def __init__(self, head: FileHead) -> None:
-        self.head = head
-        self.units = FileUnits.of(head.crs, units_of(head.crs, named=head.unit))
+    def __init__(self, head: FileHead, settings: Settings) -> None:
+        self.head, self.settings = head, settings
         self.names = UniqueNames(), UniqueNames()
 
     def settle_offset(self, first: Mapping[str, Any] | None) -> None:
         """The offset of the CityJSON file where the head tells none: by the first building."""
         if self.head.offset is None:
-            self.head = dataclasses.replace(self.head, offset=offset_by(first, self.units))
+            self.head = dataclasses.replace(self.head, offset=offset_by(first, self.head.units))
 
     def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
         """The building of an object and its texts; where it cannot be built, without a model and with its parameters kept."""
@@ -140,7 +129,7 @@ class Maker:
         try:
             if names[0] != plain_text(id):
                 raise InputError(f"expected buildings of different ids, got {id!r} again; give this one another")
-            return fragments(build(record, self.head.compose), names, self.head.offset, self.units)
+            return fragments(build(record, self.head.compose), names, self.head, self.settings)
         except HiproofError as error:
             why, status = str(error), Status.NOT_BUILT
         except MemoryError:
@@ -150,9 +139,9 @@ class Maker:
             why = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
             status = Status.INTERNAL_ERROR
         building = Building(id, status, masked(why))
-        building, texts = fragments(building, names, self.head.offset, self.units)
+        building, texts = fragments(building, names, self.head, self.settings)
         kept = finite({**record, "status": status.code, "detail": building.detail})
-        return building, dataclasses.replace(texts, parameters=dump(kept) + b"\n")
+        return building, texts | {"parameters": Fragment(dump(kept) + b"\n")}
 
 
 def finite(value: Any) -> Any:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from ..formats import FORMATS
+
 PREFIX = "rf_"
 OWN = "hiproof_"
 
@@ -261,7 +263,16 @@ metres also where coordinates are not. Made by `hiproof attributes`.
 
 def attributes_text() -> str:
     """All tables as Markdown: what `hiproof attributes` prints and docs/attributes.md holds."""
-    return "\n".join([PREFACE, *map(table_text, TABLES)])
+    return "\n".join([PREFACE, files_text(), *map(table_text, TABLES)])
+
+
+def files_text() -> str:
+    """Every kind of file as Markdown."""
+    rows = [
+        f"| `{format.file}` | {format.what} | `hiproof {'reconstruct' if format.fragment else f'convert --format {name}'}` |"
+        for name, format in FORMATS.items()
+    ]
+    return "\n".join(["## Files", "", "| file | what | written by |", "| --- | --- | --- |", *rows, ""])
 
 
 def table_text(table: Table) -> str:

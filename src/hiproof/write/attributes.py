@@ -21,6 +21,8 @@ from ..model import Building
 from .attribute_list import HIPROOF, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
 from .building_attributes import building_attributes, figures_of
 from .files import atomic, scratch
+from .fragments import Fragment, Sheet
+from .head import FileHead
 from .naming import FileUnits, plan_wkt
 from .roof_figures import RoofFigures
 from .table_rows import Row, Rows, table_rows
@@ -102,10 +104,12 @@ class AttributesWriter(BuildingWriter):
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
         attributes = building_attributes(building, figures, self.prefix, self.units)
-        self.put(table_rows(building, figures, attributes, self.units))
+        self.put_rows(table_rows(building, figures, attributes, self.units))
 
-    def put(self, rows: Rows) -> None:
-        """Write a building that `table_rows` made, here or in another process."""
+    def put(self, fragment: Fragment) -> None:
+        self.put_rows(Rows.of_text(fragment.text))
+
+    def put_rows(self, rows: Rows) -> None:
         for layer, waiting in self.waiting.items():
             for row in getattr(rows, layer):
                 waiting.put(row)
@@ -140,6 +144,16 @@ class AttributesWriter(BuildingWriter):
             raise OutputError(
                 f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions and the space left"
             ) from error
+
+
+def writer(path: str | os.PathLike, head: FileHead) -> AttributesWriter:
+    """The writer of a run's file."""
+    return AttributesWriter(path, head.crs)
+
+
+def fragment(sheet: Sheet) -> Fragment:
+    """A building's rows in the tables of a run, as text."""
+    return Fragment(table_rows(sheet.building, sheet.figures, sheet.attributes, sheet.head.units.gml).to_text())
 
 
 @contextmanager

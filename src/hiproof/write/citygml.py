@@ -12,7 +12,6 @@ import math
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,6 +19,8 @@ import numpy as np
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, WALL, Building, Face
 from .building_attributes import PREFIX, building_attributes, figures_of, ground_height, rounded
+from .fragments import Fragment, Sheet
+from .head import FileHead
 from .naming import FileUnits, UniqueNames, gml_name, srs_name
 from .roof_codes import roof_type_code
 from .roof_figures import RoofFigures
@@ -87,10 +88,11 @@ class CityGMLWriter(BuildingWriter):
         name = self.names.take(gml_name(building.id))
         self.put(gml_member(building, figures, attributes, name, self.units, self.creation_date))
 
-    def put(self, member: Member) -> None:
-        """Write a building that `gml_member` made, here or in another process."""
-        self.low, self.high = np.minimum(self.low, member.low), np.maximum(self.high, member.high)
-        self.file.write(b"\n" + member.text)
+    def put(self, fragment: Fragment) -> None:
+        if fragment.extent is not None:
+            self.low = np.minimum(self.low, fragment.extent[:3])
+            self.high = np.maximum(self.high, fragment.extent[3:])
+        self.file.write(b"\n" + fragment.text)
 
     def finish(self) -> None:
         self.file.write(b"\n</core:CityModel>")
@@ -109,13 +111,14 @@ class CityGMLWriter(BuildingWriter):
         ).encode()
 
 
-@dataclass(frozen=True)
-class Member:
-    """One building as XML text, and its extent (3,) in the file's unit; infinite and reversed where it has none."""
+def writer(path: str | os.PathLike, head: FileHead) -> CityGMLWriter:
+    """The writer of a run's file."""
+    return CityGMLWriter(path, head.crs)
 
-    text: bytes
-    low: np.ndarray
-    high: np.ndarray
+
+def fragment(sheet: Sheet) -> Fragment:
+    """A building's part of a run's file."""
+    return gml_member(sheet.building, sheet.figures, sheet.attributes, sheet.gml_name, sheet.head.units.gml)
 
 
 def gml_member(
@@ -125,16 +128,16 @@ def gml_member(
     name: str,
     units: Units = METRES,
     creation_date: datetime.date | None = None,
-) -> Member:
+) -> Fragment:
     """The cityObjectMember of `building`, whose gml:ids end in `name`; the root's namespaces are taken as declared."""
     text = city_object_member(building, figures, attributes, name, units, creation_date)
     lines = terrain_lines(building, units)
     if figures is not None:
         lines = [*lines, units.from_metres(building.solid.vertices)]
-    low, high = np.full(3, np.inf), np.full(3, -np.inf)
-    for line in lines:
-        low, high = np.minimum(low, line.min(axis=0)), np.maximum(high, line.max(axis=0))
-    return Member(text.encode(), low, high)
+    if not lines:
+        return Fragment(text.encode())
+    xyz = np.concatenate(lines)
+    return Fragment(text.encode(), (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
 
 
 def city_object_member(

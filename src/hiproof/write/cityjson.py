@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,8 @@ from ..model import Building
 from .building_attributes import PREFIX, building_attributes, figures_of, metres, plain_text
 from .cityjson_geometry import Vertices, building_geometry, first_corner
 from .files import scratch
+from .fragments import Fragment, Sheet
+from .head import FileHead
 from .json_text import dump
 from .naming import FileUnits, UniqueNames, reference_system
 from .roof_figures import RoofFigures
@@ -89,12 +90,12 @@ class CityJSONWriter(BuildingWriter):
         else:
             self.put(feature_line(building, figures, attributes, name, vertices, self.prefix))
 
-    def put(self, feature: Feature) -> None:
-        """Write a building that `feature_line` made, here or in another process, about this file's `translate`."""
-        self.widen(feature.extent)
-        self.file.write(feature.line)
+    def put(self, fragment: Fragment) -> None:
+        """Write a building whose line is about this file's `translate`."""
+        self.widen(fragment.extent)
+        self.file.write(fragment.text)
 
-    def widen(self, extent: list[float] | None) -> None:
+    def widen(self, extent: tuple[float, ...] | None) -> None:
         if extent is not None:
             self.low, self.high = np.minimum(self.low, extent[:3]), np.maximum(self.high, extent[3:])
 
@@ -145,12 +146,15 @@ class CityJSONWriter(BuildingWriter):
         return dump({**head, "CityObjects": {}, "vertices": []})
 
 
-@dataclass(frozen=True)
-class Feature:
-    """One building as a line of a CityJSONSeq, and its extent (low x y z, high x y z), None where it has none."""
+def writer(path: str | os.PathLike, head: FileHead) -> CityJSONWriter:
+    """The writer of a run's file."""
+    return CityJSONWriter(path, head.crs, translate=head.offset)
 
-    line: bytes
-    extent: list[float] | None
+
+def fragment(sheet: Sheet) -> Fragment:
+    """A building's line in a run's file."""
+    vertices = Vertices(sheet.head.offset, SCALE, sheet.head.units.cityjson)
+    return feature_line(sheet.building, sheet.figures, sheet.attributes, sheet.name, vertices)
 
 
 def offset_of(corner_xy: np.ndarray) -> np.ndarray:
@@ -165,23 +169,23 @@ def feature_line(
     name: str,
     vertices: Vertices,
     prefix: str = PREFIX,
-) -> Feature:
+) -> Fragment:
     """The CityJSONFeature of `building` under the id `name`; `vertices` are empty, about the file's offset."""
     city_object, extent = city_object_of(building, figures, attributes, vertices, prefix)
     feature = {"type": "CityJSONFeature", "id": name, "CityObjects": {name: city_object}, "vertices": vertices.grid}
-    return Feature(dump(feature) + b"\n", extent)
+    return Fragment(dump(feature) + b"\n", extent)
 
 
 def city_object_of(
     building: Building, figures: RoofFigures | None, attributes: dict[str, Any], vertices: Vertices, prefix: str
-) -> tuple[dict[str, Any], list[float] | None]:
+) -> tuple[dict[str, Any], tuple[float, ...] | None]:
     """The CityObject and its extent, None where it has no geometry; its vertices go to `vertices`."""
     geometry = building_geometry(building, figures, vertices, prefix)
     if not geometry:
         return {"type": "Building", "attributes": attributes}, None
     grid = np.array(vertices.grid)
     low, high = (edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0)))
-    extent = [metres(v) for v in (*low, *high)]
+    extent = tuple(metres(v) for v in (*low, *high))
     return {"type": "Building", "geographicalExtent": extent, "attributes": attributes, "geometry": geometry}, extent
 
 

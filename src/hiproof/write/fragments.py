@@ -7,48 +7,56 @@ file that somebody else could have written is only ever read as data.
 from __future__ import annotations
 
 import itertools
-import json
 import zipfile
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
 from ..errors import OutputError
-from .citygml import Member
-from .cityjson import Feature
-from .table_rows import Rows
+from ..model import Building
+from .head import FileHead
+from .roof_figures import RoofFigures
 
-NOTHING = [np.nan] * 6
+NOTHING = (np.nan,) * 6
+EXTENT, ENDS = ".extent", ".ends"
 
 
 @dataclass(frozen=True)
-class Fragments:
-    """One building as each file of a run holds it."""
+class Sheet:
+    """A building with all that its texts are made of: the `figures` of its solid (None without one), its `attributes`, its names in
+    CityJSON and in GML, and what the files of its run have in common."""
 
-    gml: Member
-    cityjson: Feature
-    parameters: bytes
-    rows: Rows
+    building: Building
+    figures: RoofFigures | None
+    attributes: dict[str, Any]
+    name: str
+    gml_name: str
+    head: FileHead
+
+
+@dataclass(frozen=True)
+class Fragment:
+    """A building as a file of a run holds it: its bytes and its extent there (low x y z, high x y z), None where it has none."""
+
+    text: bytes
+    extent: tuple[float, ...] | None = None
+
+
+Fragments = dict[str, Fragment]
+"""One building's texts by the module that made them."""
 
 
 def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
     """Write the buildings `parts` to `file`, without compression."""
-    texts = {
-        "gml": [part.gml.text for part in parts],
-        "cityjson": [part.cityjson.line for part in parts],
-        "parameters": [part.parameters for part in parts],
-        "rows": [rows_text(part.rows) for part in parts],
-    }
-    arrays = {
-        "gml_extent": np.array([[*part.gml.low, *part.gml.high] for part in parts], float).reshape(-1, 6),
-        "cityjson_extent": np.array([part.cityjson.extent or NOTHING for part in parts], float).reshape(-1, 6),
-    }
-    for name, several in texts.items():
-        arrays[name] = np.frombuffer(b"".join(several), np.uint8)
-        arrays[f"{name}_ends"] = np.cumsum([len(text) for text in several], dtype=np.int64)
+    arrays = {}
+    for kind in parts[0] if parts else ():
+        several = [part[kind] for part in parts]
+        arrays[kind] = np.frombuffer(b"".join(fragment.text for fragment in several), np.uint8)
+        arrays[kind + ENDS] = np.cumsum([len(fragment.text) for fragment in several], dtype=np.int64)
+        arrays[kind + EXTENT] = np.array([fragment.extent or NOTHING for fragment in several], float)
     np.savez(file, **arrays)
 
 
@@ -56,29 +64,19 @@ def load_fragments(path: Path) -> Iterator[Fragments]:
     """The buildings that `save_fragments` wrote to `path`. Raises OutputError for a file that is not whole."""
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            names = ("gml", "cityjson", "parameters", "rows")
-            texts = zip(*(cut(arrays[name], arrays[f"{name}_ends"]) for name in names), strict=True)
-            extents = zip(arrays["gml_extent"], arrays["cityjson_extent"].tolist(), strict=True)
-            for (gml, line, parameters, rows), (box, extent) in zip(texts, extents, strict=True):
-                feature = Feature(line, None if np.isnan(extent[0]) else extent)
-                yield Fragments(Member(gml, box[:3], box[3:]), feature, parameters, rows_of(rows))
+            kinds = [name for name in arrays.files if not name.endswith((ENDS, EXTENT))]
+            columns = [column(arrays[kind], arrays[kind + ENDS], arrays[kind + EXTENT]) for kind in kinds]
+            for several in zip(*columns, strict=True):
+                yield dict(zip(kinds, several, strict=True))
     except (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile) as error:
         raise OutputError(
             f"expected a work tile's buildings in {path}, got: {error}; begin anew with --restart"
         ) from error
 
 
-def rows_text(rows: Rows) -> bytes:
-    """Rows as JSON, geometries in hexadecimal digits."""
-    return json.dumps([[[wkb and wkb.hex(), values] for wkb, values in table] for table in rows]).encode()
-
-
-def rows_of(text: bytes) -> Rows:
-    """The rows that `rows_text` wrote."""
-    return Rows(*(tuple((wkb and bytes.fromhex(wkb), values) for wkb, values in table) for table in json.loads(text)))
-
-
-def cut(joined: np.ndarray, ends: np.ndarray) -> list[bytes]:
-    """The texts whose bytes stand one after the other in `joined` (n,), each up to its end."""
+def column(joined: np.ndarray, ends: np.ndarray, extents: np.ndarray) -> list[Fragment]:
+    """The texts whose bytes stand one after the other in `joined` (n,), each up to its end, with their extents (b, 6)."""
     content, starts = joined.tobytes(), [0, *ends.tolist()]
-    return [content[start:end] for start, end in itertools.pairwise(starts)]
+    texts = [content[start:end] for start, end in itertools.pairwise(starts)]
+    known = [None if np.isnan(extent[0]) else tuple(extent) for extent in extents.tolist()]
+    return [Fragment(text, extent) for text, extent in zip(texts, known, strict=True)]

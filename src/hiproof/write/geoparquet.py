@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..frames import Units
 from .attributes import BUILDINGS, AttributesWriter, column_names
 from .building_attributes import PREFIX
+from .head import FileHead
 from .table_rows import Row
 
 GEOMETRY = "geometry"
@@ -55,6 +56,11 @@ class GeoParquetWriter(AttributesWriter):
         geometry = {"encoding": "WKB", "geometry_types": GEOMETRY_TYPES[self.layers[0]], "crs": crs}
         geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
         return pyarrow.schema([*fields, pyarrow.field(GEOMETRY, pyarrow.binary())], {"geo": json.dumps(geo)})
+
+
+def writer(path: str | os.PathLike, head: FileHead, layer: str = BUILDINGS) -> GeoParquetWriter:
+    """The writer of a run's file; buildings' parts of it are those of the GeoPackage."""
+    return GeoParquetWriter(path, head.crs, layer=layer)
 
 
 def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:

@@ -21,7 +21,9 @@ from .triangles import face_triangles, ring_normal
 ARRAY_BUFFER, FLOAT, VEC3 = 34962, 5126, "VEC3"
 
 
-def write_glb(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None) -> int:
+def write_models(
+    path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None
+) -> int:
     """Write `buildings` (id, roof type, solid in world metres, attributes) to `path`; returns how many.
 
     `crs` is kept as text beside the origin, which is in metres too, whatever the unit of the CRS. Raises OutputError when the file cannot be written.

@@ -17,7 +17,9 @@ from .colours import GROUND_COLOUR, TYPE_COLOURS, WALL_COLOUR, srgb
 from .triangles import face_triangles
 
 
-def write_obj(path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None) -> int:
+def write_models(
+    path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None
+) -> int:
     """Write `buildings` (id, roof type, solid in world metres, attributes) to `path` with its `.mtl`; returns how many.
 
     Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file cannot be written.

@@ -10,33 +10,21 @@ import math
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 import shapely
 
 from ..model import Building, Part
-from ..settings import ComposeSettings
 from .building_attributes import plain, plain_text
+from .fragments import Fragment, Sheet
+from .head import FileHead
 from .json_text import dump
 from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
 VERSION = 1
 LENGTH_DIGITS = 6  # micrometres and millionths of a degree
-
-
-@dataclass(frozen=True)
-class FileHead:
-    """What the files of a run have in common: the CRS (anything pyproj understands, or None), the unit of coordinates
-    without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
-    settles it, and how solids are composed."""
-
-    crs: Any = None
-    unit: str = "auto"
-    offset: np.ndarray | None = None
-    compose: ComposeSettings = field(default_factory=ComposeSettings)
 
 
 def write_parameters(
@@ -63,11 +51,20 @@ class ParametersWriter(BuildingWriter):
         self.file.write(dump(head_record(self.head)) + b"\n")
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
-        self.put(parameters_line(building))
+        self.put(Fragment(parameters_line(building)))
 
-    def put(self, line: bytes) -> None:
-        """Write a building that `parameters_line` made, here or in another process."""
-        self.file.write(line)
+    def put(self, fragment: Fragment) -> None:
+        self.file.write(fragment.text)
+
+
+def writer(path: str | os.PathLike, head: FileHead) -> ParametersWriter:
+    """The writer of a run's file."""
+    return ParametersWriter(path, head)
+
+
+def fragment(sheet: Sheet) -> Fragment:
+    """A building's line in a run's file."""
+    return Fragment(parameters_line(sheet.building))
 
 
 def head_record(head: FileHead) -> dict[str, Any]:

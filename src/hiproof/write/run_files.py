@@ -1,4 +1,4 @@
-"""The four files of a run, written in one pass over the buildings.
+"""The files of a run, written in one pass over the buildings.
 
 A building's text is the same in whichever process it is made: `fragments` makes it for all files at once, in a worker,
 and `join_fragments` only puts texts one after the other.
@@ -15,19 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from ..formats import FORMATS, Format, asked_files, asked_fragments, module_of
 from ..model import Building
+from ..settings import Settings
 from ..status import Status
-from .attributes import AttributesWriter
 from .building_attributes import building_attributes, figures_of
-from .citygml import CityGMLWriter, gml_member
-from .cityjson import SCALE, CityJSONWriter, feature_line
-from .cityjson_geometry import Vertices
-from .fragments import Fragments
-from .geoparquet import GeoParquetWriter
-from .naming import FileUnits
-from .parameters import FileHead, ParametersWriter, parameters_line
+from .fragments import Fragments, Sheet
+from .head import FileHead
 from .roof_figures import RoofFigures
-from .table_rows import table_rows
 from .writer import BuildingWriter
 
 
@@ -39,17 +34,11 @@ def write_all(folder: str | os.PathLike, buildings: Iterable[Building], crs: Any
     else goes wrong before the last building none of the files appears and older ones stay. Raises OutputError when the
     folder cannot be written.
     """
-    folder, broken = Path(folder), []
+    broken, head = [], FileHead(crs)
     with ExitStack() as stack:
-        writers: list[BuildingWriter] = [
-            CityGMLWriter(folder / "buildings.gml", crs),
-            CityJSONWriter(folder / "buildings.city.jsonl", crs),
-            ParametersWriter(folder / "parameters.jsonl", FileHead(crs)),
-            AttributesWriter(folder / "buildings.gpkg", crs),
-        ]
+        files = asked_files(Settings(), Path(folder))
         # The table does most of its work at the end: entered last it is closed first, and its failure stops the others.
-        for writer in writers:
-            stack.enter_context(writer)
+        writers = [stack.enter_context(writer_of(FORMATS[name], path, head)) for name, path in files.items()]
         for asked in buildings:
             building, figures = measured(asked)
             if building is not asked:
@@ -59,46 +48,39 @@ def write_all(folder: str | os.PathLike, buildings: Iterable[Building], crs: Any
     return broken
 
 
+def writer_of(format: Format, path: Path, head: FileHead) -> BuildingWriter:
+    """The incremental writer of a file of a run."""
+    return module_of(format.module).writer(path, head, **format.given)
+
+
 def fragments(
-    asked: Building, names: tuple[str, str], translate: np.ndarray, units: FileUnits
+    asked: Building, names: tuple[str, str], head: FileHead, settings: Settings | None = None
 ) -> tuple[Building, Fragments]:
     """The texts of one building, `names` being its CityJSON id and its gml:id, and the building they tell of.
 
-    `translate` (3,) is the offset of the CityJSON file, `units` those of coordinates in each file. A solid that cannot
-    be measured is left out, as in `write_all`.
+    They are those of the files that a run of `settings` writes, `head` what these have in common, the offset of the CityJSON file
+    included. A solid that cannot be measured is left out, as in `write_all`.
     """
     building, figures = measured(asked)
-    attributes = building_attributes(building, figures, units=units.gml)
-    feature = feature_line(building, figures, attributes, names[0], Vertices(translate, SCALE, units.cityjson))
-    member = gml_member(building, figures, attributes, names[1], units.gml)
-    return building, Fragments(
-        member, feature, parameters_line(building), table_rows(building, figures, attributes, units.gml)
-    )
+    attributes = building_attributes(building, figures, units=head.units.gml)
+    sheet = Sheet(building, figures, attributes, *names, head)
+    kinds = asked_fragments(settings or Settings())
+    return building, {kind: module_of(kind).fragment(sheet) for kind in kinds}
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
     """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
 
-    `files` are paths by what they hold: gml, cityjson, parameters, gpkg (the tables) or parquet, parquet_parts,
-    parquet_surfaces (the same as GeoParquet). Raises OutputError when one cannot be written.
+    `files` are paths by format, a key of FORMATS. Raises OutputError when one cannot be written.
     """
-    writers = {
-        "gml": lambda path: (CityGMLWriter(path, head.crs), "gml"),
-        "cityjson": lambda path: (CityJSONWriter(path, head.crs, translate=head.offset), "cityjson"),
-        "parameters": lambda path: (ParametersWriter(path, head), "parameters"),
-        "gpkg": lambda path: (AttributesWriter(path, head.crs), "rows"),
-        "parquet": lambda path: (GeoParquetWriter(path, head.crs), "rows"),
-        "parquet_parts": lambda path: (GeoParquetWriter(path, head.crs, layer="parts"), "rows"),
-        "parquet_surfaces": lambda path: (GeoParquetWriter(path, head.crs, layer="roof_surfaces"), "rows"),
-    }
     with ExitStack() as stack:
-        opened = []
-        for kind, path in files.items():
-            writer, content = writers[kind](path)
-            opened.append((stack.enter_context(writer), content))
+        opened = [
+            (stack.enter_context(writer_of(FORMATS[name], path, head)), FORMATS[name].fragment)
+            for name, path in files.items()
+        ]
         for part in parts:
             for writer, content in opened:
-                writer.put(getattr(part, content))
+                writer.put(part[content])
 
 
 def measured(building: Building) -> tuple[Building, RoofFigures | None]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from typing import Any, NamedTuple
 
@@ -23,6 +24,17 @@ class Rows(NamedTuple):
     buildings: tuple[Row, ...]
     parts: tuple[Row, ...] = ()
     roof_surfaces: tuple[Row, ...] = ()
+
+    def to_text(self) -> bytes:
+        """The rows as JSON, geometries in hexadecimal digits."""
+        return json.dumps([[[wkb and wkb.hex(), values] for wkb, values in table] for table in self]).encode()
+
+    @classmethod
+    def of_text(cls, text: bytes) -> Rows:
+        """The rows that `to_text` wrote."""
+        return cls(
+            *(tuple((wkb and bytes.fromhex(wkb), values) for wkb, values in table) for table in json.loads(text))
+        )
 
 
 def table_rows(

@@ -8,6 +8,7 @@ from typing import BinaryIO
 
 from ..model import Building
 from .files import atomic_file
+from .fragments import Fragment
 from .roof_figures import RoofFigures
 
 
@@ -15,7 +16,7 @@ class BuildingWriter(AbstractContextManager):
     """Base of the incremental writers: `with Writer(path, ...) as writer: writer.add(building)`.
 
     The file appears when the block ends well; after an exception nothing is left and an older file stays. A format
-    fills in `begin`, `add` and `finish`.
+    fills in `begin`, `add`, `put` and `finish`.
     """
 
     file: BinaryIO
@@ -28,6 +29,10 @@ class BuildingWriter(AbstractContextManager):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         """Write one building; `figures` of its solid if the caller has them already."""
+        raise NotImplementedError
+
+    def put(self, fragment: Fragment) -> None:
+        """Write a building whose text the format's `fragment` made, here or in another process."""
         raise NotImplementedError
 
     def finish(self) -> None:

@@ -1,0 +1,138 @@
+"""Every kind of output file once: its name, what stands in it, and the module of `write` that makes it.
+
+A run, its merge, `hiproof build`, `hiproof convert`, help and documents derive from FORMATS: a new format is a module and a line
+here. The module of a file that a run writes has
+
+    writer(path, head, **given)      the incremental writer (a write.writer.BuildingWriter) of the file
+    fragment(sheet)                  a building's part of it (a write.fragments.Fragment), made in a worker
+
+and that of one that `hiproof convert` makes of finished models has
+
+    write_models(path, buildings, crs)      buildings of (id, roof type, solid, attributes); returns how many it wrote
+
+Modules are imported when a file of theirs is asked for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from .settings import Settings
+
+
+def always(settings: Settings) -> bool:
+    return True
+
+
+def merged(settings: Settings) -> bool:
+    return settings.city.models != "tiles"
+
+
+def parquet(settings: Settings) -> bool:
+    return settings.city.parquet
+
+
+@dataclass(frozen=True)
+class Format:
+    """A kind of output file: its `file` name, `what` it holds, and the `module` of `write` that makes it, with `given`.
+
+    `fragment` is the module that makes a building's part of it, empty for a format of `hiproof convert`; `asked` whether a run of
+    these settings writes it; `tile_ending` that of the files of work tiles, empty where they have none.
+    """
+
+    file: str
+    what: str
+    module: str
+    fragment: str = ""
+    asked: Callable[[Settings], bool] = always
+    tile_ending: str = ""
+    given: dict[str, Any] = field(default_factory=dict)
+
+
+FORMATS = {
+    "gml": Format(
+        file="buildings.gml",
+        what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection curves, roofType",
+        module="citygml",
+        fragment="citygml",
+        asked=merged,
+        tile_ending=".gml",
+    ),
+    "cityjson": Format(
+        file="buildings.city.jsonl",
+        what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG use (`rf_...`)",
+        module="cityjson",
+        fragment="cityjson",
+        asked=merged,
+        tile_ending=".city.jsonl",
+    ),
+    "parameters": Format(
+        file="parameters.jsonl",
+        what="the parametric models, of which `hiproof build` makes all other files again",
+        module="parameters",
+        fragment="parameters",
+    ),
+    "gpkg": Format(
+        file="buildings.gpkg",
+        what="outlines, parts and roof surfaces as tables, for QGIS",
+        module="attributes",
+        fragment="attributes",
+    ),
+    "parquet": Format(
+        file="buildings.parquet",
+        what="the outlines as GeoParquet (`--parquet`)",
+        module="geoparquet",
+        fragment="attributes",
+        asked=parquet,
+    ),
+    "parquet_parts": Format(
+        file="parts.parquet",
+        what="the parts as GeoParquet (`--parquet`)",
+        module="geoparquet",
+        fragment="attributes",
+        asked=parquet,
+        given={"layer": "parts"},
+    ),
+    "parquet_surfaces": Format(
+        file="roof_surfaces.parquet",
+        what="the roof surfaces as GeoParquet (`--parquet`)",
+        module="geoparquet",
+        fragment="attributes",
+        asked=parquet,
+        given={"layer": "roof_surfaces"},
+    ),
+    "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="gltf"),
+    "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="obj"),
+}
+OF_MODELS = {name: format for name, format in FORMATS.items() if not format.fragment}
+"""What `hiproof convert` makes of the models of a run."""
+
+OF_TILES = {name: format for name, format in FORMATS.items() if format.tile_ending}
+"""What a work tile may have of its own."""
+
+
+def asked_files(settings: Settings, folder: Path) -> dict[str, Path]:
+    """Paths in `folder` of the files that a run of these settings writes for the whole area, by format.
+
+    >>> [path.name for path in asked_files(Settings(), Path("models")).values()]
+    ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
+    """
+    formats = FORMATS.items()
+    return {name: folder / format.file for name, format in formats if format.fragment and format.asked(settings)}
+
+
+def asked_fragments(settings: Settings) -> list[str]:
+    """The modules that make a building's parts of all files of such a run, those of its work tiles included."""
+    by_tile = settings.city.models != "merged"
+    formats = [format for format in FORMATS.values() if format.asked(settings) or (by_tile and format.tile_ending)]
+    return list(dict.fromkeys(format.fragment for format in formats if format.fragment))
+
+
+def module_of(name: str) -> ModuleType:
+    """The module of `write` of that name."""
+    return import_module(f".write.{name}", __package__)
