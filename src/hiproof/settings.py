@@ -22,13 +22,15 @@ def setting(
     high: float | None = None,
     choices: tuple = (),
     fewest: int = 0,
+    option: str = "",
 ) -> Any:
     """Declare one setting of a section; `low` and `high` are inclusive bounds, `choices` the allowed values.
 
-    Of a setting of several values they hold for each, and there are at least `fewest`.
+    Of a setting of several values they hold for each, and there are at least `fewest`. With an `option` (such as
+    "--roofs") the command line has it, its help and default made of this; settings that share one are set together.
     """
     metadata = {"help": help, "unit": unit, "low": low, "high": high, "choices": choices, "fewest": fewest}
-    return field(default=default, metadata=metadata)
+    return field(default=default, metadata=metadata | {"option": option})
 
 
 @dataclass(frozen=True)
@@ -36,20 +38,24 @@ class ReadSettings:
     """[read] which points count."""
 
     building_classes: tuple[int, ...] = setting(
-        (6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)", "", 0, 255, fewest=1
+        (6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)", "", 0, 255, fewest=1, option="--building-class"
     )
-    ground_classes: tuple[int, ...] = setting((2,), "LAS classes of terrain points", "", 0, 255)
+    ground_classes: tuple[int, ...] = setting(
+        (2,), "LAS classes of terrain points", "", 0, 255, option="--ground-class"
+    )
     roofs: str = setting(
         "auto",
         "class: roofs are the points of the building classes; shape: they are looked for among all others that may be roofs; "
         "auto: by shape where no point has the building class",
         choices=("auto", "class", "shape"),
+        option="--roofs",
     )
-    crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say')
+    crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say', option="--crs")
     unit: str = setting(
         "auto",
         "unit of the clouds' coordinates; auto is that of their CRS, and metre where they name none",
         choices=("auto", "metre", "foot", "us-survey-foot"),
+        option="--unit",
     )
     override_columns: tuple[str, ...] = setting(
         (), 'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" (docs/overrides.md)'
@@ -64,8 +70,12 @@ class ReadSettings:
 class FitSettings:
     """[fit] one primitive fitted to points."""
 
-    types: tuple[str, ...] = setting((), "roof types to choose among; empty means the whole catalogue")
-    objective: str = setting("likelihood", "objective to minimise", choices=("likelihood", "paper"))
+    types: tuple[str, ...] = setting(
+        (), "roof types to choose among; empty means the whole catalogue", option="--types"
+    )
+    objective: str = setting(
+        "likelihood", "objective to minimise", choices=("likelihood", "paper"), option="--objective"
+    )
     side_softness_m: tuple[float, ...] = setting(
         (0.1, 0.04, 0.015, 0.006),
         "softness of the roof's sides tried at last, the most likely kept",
@@ -74,14 +84,18 @@ class FitSettings:
         1.0,
         fewest=1,
     )
-    parts: str = setting("compound", "as many primitives as the evidence pays for, or one", choices=("compound", "one"))
+    parts: str = setting(
+        "compound", "as many primitives as the evidence pays for, or one", choices=("compound", "one"), option="--parts"
+    )
 
 
 @dataclass(frozen=True)
 class CompoundSettings:
     """[compound] several parts chosen by evidence."""
 
-    detail: str = setting("full", "main leaves out dormers and small parts", choices=("full", "main"))
+    detail: str = setting(
+        "full", "main leaves out dormers and small parts", choices=("full", "main"), option="--detail"
+    )
     tolerance_m: float = setting(0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
     evidence_points: float = setting(1.1, "points that one unit of structure must explain at least", "", 0.1, 100.0)
     evidence_area_m2: float = setting(0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0)
@@ -91,8 +105,14 @@ class CompoundSettings:
 class SegmentSettings:
     """[segment] recognising the roof before fitting it."""
 
-    enabled: bool = setting(True, "let the network weigh points and types where one primitive is fitted to a building")
-    always: bool = setting(False, "ask it of every building and write its answer, though a fit of several does without")
+    enabled: bool = setting(
+        True, "let the network weigh points and types where one primitive is fitted to a building", option="--network"
+    )
+    always: bool = setting(
+        False,
+        "ask it of every building and write its answer, though a fit of several does without",
+        option="--network",
+    )
     weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")
     device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
 
@@ -113,7 +133,10 @@ class ReconstructSettings:
     """[reconstruct] one building from points to solid."""
 
     align: str = setting(
-        "auto", "auto moves footprints that clearly lie beside their roofs, off leaves them", choices=("auto", "off")
+        "auto",
+        "auto moves footprints that clearly lie beside their roofs, off leaves them",
+        choices=("auto", "off"),
+        option="--align",
     )
     poor_share: float = setting(0.5, "a model with a smaller share of points within 0.2 m is called poor", "", 0.0, 1.0)
 
@@ -125,11 +148,12 @@ class CitySettings:
     max_points_a_building: int = setting(
         20000, "a building with more points is thinned to so many, evenly and by a fixed rule", "", 1000, 10**7
     )
-    parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `city`)")
+    parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `city`)", option="--parquet")
     models: str = setting(
         "merged",
         "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or both",
         choices=("merged", "tiles", "both"),
+        option="--models",
     )
 
 

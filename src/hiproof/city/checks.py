@@ -17,7 +17,7 @@ def refuse_unusable(request: Any) -> None:
         raise SettingsError(
             f"expected --jobs between 1 and {MOST_JOBS}, got {shown(request.jobs)}; a job a core is enough"
         )
-    for name in ("layer", "id_attribute"):
+    for name in ("layer", "where", "id_attribute"):
         if getattr(request, name) is not None and request.footprints is None:
             option = "--" + name.replace("_", "-")
             raise SettingsError(f"expected footprints with {option}, got none; name them with --footprints")

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import dataclasses
+
+from ..errors import InputError
+from ..frames import Units
 from ..settings import Settings
 from ..write.naming import FileUnits
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
-from .request import Request
+from .request import Box, Request
 
 TILE_M = 250.0
 MOST_BUILDINGS_A_TILE = 100
@@ -28,6 +32,7 @@ def make_plan(request: Request) -> Plan:
         jobs = jobs_from_footprints(request, headers, frame)
     else:
         jobs, settings = jobs_from_cloud(request.clouds, settings)
+        jobs = jobs_in_box(jobs, request, frame.units)
     return Plan(
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
@@ -66,9 +71,34 @@ def jobs_from_footprints(request, headers: list, frame) -> tuple[Job, ...]:
     from .frame import plan_bounds
 
     footprints = read_footprints(
-        request.footprints, request.layer, request.id_attribute, frame.cloud, settings=request.settings
+        request.footprints,
+        request.layer,
+        request.id_attribute,
+        frame.cloud,
+        settings=request.settings,
+        where=request.where,
+        bbox=request.bbox,
     )
+    if request.bbox and not footprints:
+        raise InputError(nothing_in(request.bbox))
     bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     if len(bounds):
         check_overlap(footprints, bounds, frame.footprints, frame.cloud, frame.units)
     return jobs_of_footprints(footprints)
+
+
+def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[Job, ...]:
+    """Those of the `jobs` that meet the box asked for, numbered again; all where none is. Raises InputError where none does."""
+    from ..read.footprints import meets
+
+    if request.bbox is None:
+        return jobs
+    met = [job for job in jobs if meets(job.area, request.bbox, units)]
+    if not met:
+        raise InputError(nothing_in(request.bbox))
+    return tuple(dataclasses.replace(job, index=index) for index, job in enumerate(met))
+
+
+def nothing_in(bbox: Box) -> str:
+    box = ",".join(f"{side:.10g}" for side in bbox)
+    return f"expected buildings in --bbox {box}, got none; it is in the coordinates of the clouds"

@@ -18,6 +18,7 @@ from typing import Any
 from .. import __version__
 from ..settings import Settings
 
+Box = tuple[float, float, float, float]
 NO_MATTER = {"changes_result": False}
 BESIDE = (".dbf", ".shx", ".prj", ".cpg", ".tfw")  # parts of one file that formats keep beside it
 APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
@@ -38,6 +39,8 @@ class Request:
     jobs: int = field(default=1, metadata=NO_MATTER)
     scheduler: str | None = field(default=None, metadata=NO_MATTER)
     restart: bool = field(default=False, metadata=NO_MATTER)
+    where: str | None = None
+    bbox: Box | None = None
 
 
 def inputs_of(request: Request) -> dict[str, Any]:

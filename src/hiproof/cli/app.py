@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -13,6 +13,7 @@ from .build import build
 from .classify import classify
 from .convert import convert
 from .evaluate import evaluate
+from .options import box_of, with_settings
 from .report import report
 from .segment import segment
 from .train import train
@@ -44,37 +45,30 @@ def common(
 
 
 @app.command()
+@with_settings
 def reconstruct(
     clouds: Clouds,
     out: Annotated[Path, typer.Option(help="folder for the results")],
     footprints: Annotated[str | None, typer.Option(help="building polygons; without them the cloud is split")] = None,
     layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
-    terrain: Annotated[str | None, typer.Option(help="terrain model (GeoTIFF); else the cloud's ground class")] = None,
-    crs: Annotated[str | None, typer.Option(help="CRS of the clouds, such as EPSG:7415 [default: as they say]")] = None,
-    unit: Annotated[str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")] = None,
-    id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
-    building_class: Annotated[list[int] | None, typer.Option(help="LAS class of roof points [default: 6]")] = None,
-    ground_class: Annotated[list[int] | None, typer.Option(help="LAS class of terrain points [default: 2]")] = None,
-    roofs: Annotated[str | None, typer.Option(help="found by class, by shape, or auto [default: auto]")] = None,
-    types: Annotated[str | None, typer.Option(help="roof types to choose among, such as gable,hip")] = None,
-    objective: Annotated[str | None, typer.Option(help="likelihood or paper [default: likelihood]")] = None,
-    detail: Annotated[str | None, typer.Option(help="full, or main: without dormers and small parts")] = None,
-    parts: Annotated[str | None, typer.Option(help="compound, or one: one primitive a building")] = None,
-    align: Annotated[str | None, typer.Option(help="auto, or off: footprints beside their roofs stay there")] = None,
-    network: Annotated[
-        bool | None, typer.Option(help="ask the network of every building, or of none [default: with --parts one]")
+    where: Annotated[str | None, typer.Option(help='SQL condition on the footprints, such as "year < 1950"')] = None,
+    bbox: Annotated[
+        str | None, typer.Option(help="only buildings in this box: xmin,ymin,xmax,ymax in the clouds' coordinates")
     ] = None,
+    id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
+    terrain: Annotated[str | None, typer.Option(help="terrain model (GeoTIFF); else the cloud's ground class")] = None,
     overrides: Annotated[
         str | None, typer.Option(help="what is known better of some buildings (JSONL or a table); the fit obeys it")
     ] = None,
-    config: Annotated[Path | None, typer.Option(help="settings file (see `hiproof settings`)")] = None,
-    parquet: Annotated[bool | None, typer.Option(help="write the attributes as GeoParquet too (extra `city`)")] = None,
-    models: Annotated[str | None, typer.Option(help="models merged, by work tiles, or both [default: merged]")] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)")
+    ] = None,
     jobs: Annotated[int, typer.Option(help="processes on this machine")] = 1,
     scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
     restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
     log_file: Annotated[Path | None, typer.Option(help="keep the log from progress on here, added at the end")] = None,
     log_level: Annotated[Level, typer.Option(help="what of the log to show; debug also in the file")] = Level.warning,
+    changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
     """Reconstruct the buildings of point clouds into CityGML, CityJSON, parameters and attributes.
 
@@ -83,27 +77,9 @@ def reconstruct(
     from .reconstruct import run
 
     start(log_level, log_file)
-    options = {
-        "read": {
-            "building_classes": building_class,
-            "ground_classes": ground_class,
-            "roofs": roofs,
-            "crs": crs,
-            "unit": unit,
-        },
-        "fit": {
-            "types": [name.strip() for name in types.split(",")] if types else None,
-            "objective": objective,
-            "parts": parts,
-        },
-        "compound": {"detail": detail},
-        "reconstruct": {"align": align},
-        "segment": {"enabled": network, "always": network},
-        "city": {"parquet": parquet, "models": models},
-    }
-    inputs = {"footprints": footprints, "layer": layer, "terrain": terrain, "id_attribute": id_attribute}
-    inputs["overrides"] = overrides
-    raise typer.Exit(run(clouds, out, inputs, options, config, jobs, scheduler, restart))
+    inputs = {"footprints": footprints, "layer": layer, "where": where, "id_attribute": id_attribute}
+    inputs |= {"bbox": None if bbox is None else box_of(bbox), "terrain": terrain, "overrides": overrides}
+    raise typer.Exit(run(clouds, out, inputs, changes, config, jobs, scheduler, restart))
 
 
 @app.command()

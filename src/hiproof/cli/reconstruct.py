@@ -9,24 +9,28 @@ from typing import Any, ClassVar
 
 from ..city.run import Request, Summary, reconstruct_area
 from ..compiled import news
+from ..errors import SettingsError
+from ..log import LOGGER
 from ..read.pointcloud import expand_paths
 from ..settings import Settings
 from ..status import Status
+
+BESIDE = "hiproof.toml"
 
 
 def run(
     clouds: list[str],
     out: Path,
-    inputs: dict[str, str | None],
-    options: dict[str, dict[str, Any]],
+    inputs: dict[str, Any],
+    changes: dict[str, dict[str, Any]],
     config: Path | None,
     jobs: int,
     scheduler: str | None,
     restart: bool,
 ) -> int:
     """Run the main job and print its summary; returns the exit code. `inputs` are further fields of the request."""
-    given = {s: {k: v for k, v in changes.items() if v is not None} for s, changes in options.items()}
-    settings = (Settings.from_toml(config) if config else Settings()).replace({s: c for s, c in given.items() if c})
+    config = config or settings_beside(*clouds, inputs["footprints"])
+    settings = (Settings.from_toml(config) if config else Settings()).replace(changes)
     request = Request(
         clouds=tuple(map(str, expand_paths(tuple(clouds)))),
         out=out,
@@ -37,6 +41,22 @@ def run(
         restart=restart,
     )
     return run_request(request)
+
+
+def settings_beside(*inputs: str | None) -> Path | None:
+    """The settings file in the folder of any input, which the log names; None where there is none.
+
+    Raises SettingsError where there are two: which of them counts is not to be guessed.
+    """
+    paths = [Path(name) for name in inputs if name and "://" not in name]
+    folders = dict.fromkeys((path if path.is_dir() else path.parent).absolute() for path in paths)
+    found = [folder / BESIDE for folder in folders if (folder / BESIDE).is_file()]
+    if len(found) > 1:
+        names = ", ".join(map(str, found))
+        raise SettingsError(f"expected one {BESIDE} beside the data, got {names}; name one with --config")
+    if found:
+        LOGGER.warning("settings are those of %s; name others with --config", found[0])
+    return found[0] if found else None
 
 
 def run_request(request: Request) -> int:

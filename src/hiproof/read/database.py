@@ -28,16 +28,18 @@ def is_database(source: Any) -> bool:
     return isinstance(source, str) and urlsplit(source).scheme in SCHEMES
 
 
-def read_table(source: str) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
+def read_table(
+    source: str, where: str | None = None
+) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
     """The table a source names, in the shape pyogrio gives files: metadata (fields, crs), row numbers, geometries, columns.
 
-    Raises InputError in a full sentence when the database, the table or the geometry column cannot be used.
+    `where` is a condition beside the source's own. Raises InputError in a full sentence when the database, the table or the geometry column cannot be used.
     """
-    with opened(source) as table:
+    with opened(source, where) as table:
         rows = list(table.rows())
     if not rows:
         raise InputError(
-            f"expected footprints in {table.name}, got a table without rows; name another, or relax &where="
+            f"expected footprints in {table.name}, got a table without rows; name another, or relax the condition"
         )
     srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None}
     names = sorted({name for _, attributes in rows for name in attributes})
@@ -94,9 +96,11 @@ class Table:
 
 
 @contextmanager
-def opened(source: str) -> Iterator[Table]:
+def opened(source: str, condition: str | None = None) -> Iterator[Table]:
     """The table of a source in a database that stays open for the block, whose errors become InputErrors."""
     dsn, table, geometry, where = parse_source(source)
+    # each on lines of its own: a comment at its end must not swallow the bracket
+    where = f"({where}\n) and ({condition}\n)" if where and condition else where or condition
     psycopg = import_psycopg()
     try:
         with psycopg.connect(dsn, connect_timeout=10) as connection, connection.cursor() as cursor:

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyogrio
 import shapely
-from pyogrio.errors import DataLayerError, DataSourceError
+from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 from pyproj import CRS, Transformer
 
 from ..errors import InputError, InputWarning
+from ..frames import Units
 from ..model import Footprint
 from ..settings import Settings
 from .crs import described, parse_crs, same_horizontal, units_of
@@ -22,6 +23,7 @@ from .overlap import refuse_degrees
 from .polygons import simple_polygons
 from .remote import is_url
 
+Box = tuple[float, float, float, float]
 ID_NAMES = (
     *("id", "building_id", "identificatie", "identificatiebagpnd", "gml_id", "gmlid", "fid", "osm_id", "egid"),
     *("objectid", "globalid", "uuid", "cleabs", "lokaalid"),
@@ -34,25 +36,34 @@ def read_footprints(
     id_attribute: str | None = None,
     target_crs: Any = None,
     settings: Settings | None = None,
+    where: str | None = None,
+    bbox: Box | None = None,
 ) -> tuple[Footprint, ...]:
     """Footprints of a file, URL or data source name in world metres, in `target_crs` (the cloud's) where one is given.
 
     `layer` names one of a file's layers, which may be left out where only one holds geometries. Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the feature's id; polygons
-    without area stay, with an empty polygon. Ids come from `id_attribute`, else from the first usual column without
+    without area stay, with an empty polygon. `where` is an SQL condition on their attributes; of those, only the ones that
+    meet `bbox` (xmin, ymin, xmax, ymax), in the coordinates of `target_crs`, are given. Ids come from `id_attribute`, else from the first usual column without
     gaps or repeats, else they are the feature's number. `settings.read.crs` stands in for a `target_crs` that is None,
     `settings.read.unit` for the unit where there is no CRS. Raises InputError for what cannot be read, holds no features
     or several layers, or names a CRS that cannot be transformed.
     """
     read = (settings or Settings()).read
     target = parse_crs(target_crs) or parse_crs(read.crs)
-    meta, numbers, geometries, columns = read_features(path, layer)
+    meta, numbers, geometries, columns = read_features(path, layer, where, bbox, target)
     attributes = attribute_rows(list(meta["fields"]), columns, len(geometries))
     ids = feature_ids(attributes, numbers, id_attribute, path)
     source = parse_crs(meta["crs"])
     geometries = transformed(geometries, source, target, path)
     units = units_of(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
-    return tuple(unique_ids(split_features(ids, geometries, attributes, path), path))
+    footprints = tuple(unique_ids(split_features(ids, geometries, attributes, path), path))
+    return footprints if bbox is None else tuple(f for f in footprints if meets(f.polygon, bbox, units))
+
+
+def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
+    """Whether a polygon in world metres meets a box in coordinates of `units`."""
+    return bool(shapely.intersects(polygon, shapely.box(*units.to_metres(np.reshape(bbox, (2, 2))).ravel())))
 
 
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
@@ -77,21 +88,38 @@ def one_layer(path: str | Path, layer: str | int | None) -> str | int | None:
     return layers[0] if layers else None
 
 
-def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
-    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and attribute columns."""
+def read_features(
+    path: str | Path,
+    layer: str | int | None,
+    where: str | None = None,
+    bbox: Box | None = None,
+    bbox_crs: CRS | None = None,
+) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
+    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and attribute columns.
+
+    Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
+    """
     if is_database(path):
-        return read_table(path)
+        return read_table(str(path), where)
     if not is_url(path) and not str(path).startswith(("/vsi", "PG:")):
         if not Path(path).exists():
             raise InputError(f"expected footprints at {path}, got no such file; check the path")
         if Path(path).is_file() and Path(path).stat().st_size == 0:
             raise InputError(f"expected footprints in {path}, got an empty file; copy or download it again")
     layer = one_layer(path, layer)
+    info = reading(lambda: pyogrio.read_info(str(path), layer=layer), path)
+    chosen = {"where": where, "bbox": bbox and box_in(parse_crs(info["crs"]), bbox, bbox_crs)}
     meta, numbers, wkb, columns = reading(
-        lambda: pyogrio.raw.read(str(path), layer=layer, return_fids=True, datetime_as_string=True), path
+        lambda: pyogrio.raw.read(str(path), layer=layer, return_fids=True, datetime_as_string=True, **chosen),
+        path,
+        info,
     )
     if wkb is None:
         raise InputError(f"expected polygons in {path}, got a table without geometry; name another file or layer")
+    if not len(wkb) and (where or bbox):
+        raise InputError(
+            f"expected footprints in {path} that --where and --bbox let through, got none; relax them, or leave them out"
+        )
     if not len(wkb):
         raise InputError(f"expected footprints in {path}, got a layer without features; name another file or layer")
     geometries = shapely.from_wkb(wkb, on_invalid="fix")
@@ -103,20 +131,37 @@ def read_features(path: str | Path, layer: str | int | None) -> tuple[dict, np.n
     return meta, numbers, geometries, columns
 
 
-def reading(read, path: str | Path):
-    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that helps."""
+def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
+    """A box in `crs` around all of `bbox` in `bbox_crs`; as it is where either is unknown."""
+    if crs is None or bbox_crs is None or same_horizontal(crs, bbox_crs):
+        return bbox
+    return Transformer.from_crs(bbox_crs, crs, always_xy=True).transform_bounds(*bbox)
+
+
+def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None) -> Any:
+    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that helps; with the `info` of
+    a layer, its attributes for a condition that does not go with them."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # pyogrio remarks on measured geometries and mixed layers, which are fine
             return read()
+    except FeatureError as error:
+        if info is None or "SQL" not in str(error):
+            raise unreadable(path, error) from error
+        told, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
+        raise InputError(f"expected --where in SQL on the attributes of {path} ({names}), got: {told}") from error
     except DataLayerError as error:
         layers = ", ".join(str(name) for name, _ in pyogrio.list_layers(str(path)))
         raise InputError(f"expected a layer of {path} (it has {layers}), got: {error}; use one of these") from error
     except (DataSourceError, ValueError, OSError, RuntimeError) as error:
-        raise InputError(
-            f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, got: {error}; "
-            "check the file, or convert it with ogr2ogr"
-        ) from error
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: str | Path, error: Exception) -> InputError:
+    return InputError(
+        f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, got: {error}; "
+        "check the file, or convert it with ogr2ogr"
+    )
 
 
 def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> list[dict[str, Any]]:

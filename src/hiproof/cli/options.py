@@ -1,0 +1,118 @@
+"""Options of the command line that settings declare: name, help and default are told once, in `settings.py`."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable
+from typing import Annotated, Any, NamedTuple
+
+import typer
+
+from ..errors import SettingsError
+from ..settings import Settings, shown, toml_value
+
+
+class Declared(NamedTuple):
+    """A setting that the command line has: its section's name, the heading of that, and its field."""
+
+    section: str
+    heading: str
+    field: dataclasses.Field
+
+    @property
+    def parameter(self) -> str:
+        """Its option's name as that of a function's parameter."""
+        return str(self.field.metadata["option"]).lstrip("-").replace("-", "_")
+
+
+def with_settings(command: Callable[..., None]) -> Callable[..., None]:
+    """`command(..., changes)` with an option for each setting that declares one; what is given of them comes as `changes`.
+
+    The options follow the command's own, a panel of its help a section.
+    """
+    declared = [one for one in declared_settings() if one.field.metadata["option"]]
+    by_name: dict[str, list[Declared]] = {}
+    for one in declared:
+        by_name.setdefault(one.parameter, []).append(one)
+    own = [p for p in inspect.signature(command, eval_str=True).parameters.values() if p.name != "changes"]
+    parameters = [*own, *(parameter_of(name, same) for name, same in by_name.items())]
+
+    def typed(**values: Any) -> None:
+        given = {name: values.pop(name) for name in by_name}
+        command(**values, changes=changes_of(declared, given))
+
+    typed.__name__, typed.__doc__ = command.__name__, command.__doc__
+    typed.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    typed.__annotations__ = {p.name: p.annotation for p in parameters}
+    return typed
+
+
+def declared_settings() -> list[Declared]:
+    """Every setting, in the order of `settings.py`."""
+    sections = [(s.name, getattr(Settings(), s.name)) for s in dataclasses.fields(Settings)]
+    return [
+        Declared(name, f"Settings: {(section.__doc__ or '').partition('] ')[2].rstrip('.')}", field)
+        for name, section in sections
+        for field in dataclasses.fields(section)
+    ]
+
+
+def parameter_of(name: str, same: list[Declared]) -> inspect.Parameter:
+    """The parameter `name` for those settings that are set together, None where it is not given."""
+    told = same[-1].field.metadata
+    metavar = "|".join(map(str, told["choices"])) or None
+    option = typer.Option(
+        help="; ".join(help_of(one.field) for one in same), metavar=metavar, rich_help_panel=same[0].heading
+    )
+    kind = Annotated[KINDS[same[0].field.type] | None, option]
+    return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
+
+
+KINDS: dict[Any, Any] = {
+    "bool": bool,
+    "int": int,
+    "float": float,
+    "str": str,
+    "tuple[int, ...]": list[int],
+    "tuple[float, ...]": list[float],
+    "tuple[str, ...]": str,
+}
+"""What the command line takes for a setting of a declared type: numbers one option each, texts joined by commas."""
+
+
+def help_of(field: dataclasses.Field) -> str:
+    """A setting's meaning and default."""
+    default = toml_value(field.default).strip("[]").replace('"', "")
+    return field.metadata["help"] + (f" (default: {default})" if default else "")
+
+
+def changes_of(declared: list[Declared], given: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """Settings by section and name, of the options `given`; those that are None are left out."""
+    changes: dict[str, dict[str, Any]] = {}
+    for one in declared:
+        value = given[one.parameter]
+        if value is not None:
+            several_texts = one.field.type == "tuple[str, ...]"
+            value = [text.strip() for text in value.split(",")] if several_texts else value
+            changes.setdefault(one.section, {})[one.field.name] = value
+    return changes
+
+
+def box_of(text: str) -> tuple[float, float, float, float]:
+    """The box that `--bbox` names. Raises SettingsError for anything else than four numbers in order.
+
+    >>> box_of("85000,446000, 85100,446050")
+    (85000.0, 446000.0, 85100.0, 446050.0)
+    """
+    try:
+        xmin, ymin, xmax, ymax = map(float, text.replace(",", " ").split())
+    except ValueError:
+        pass
+    else:
+        if xmin < xmax and ymin < ymax:
+            return xmin, ymin, xmax, ymax
+    raise SettingsError(
+        f"expected --bbox as xmin,ymin,xmax,ymax with xmin < xmax and ymin < ymax, got {shown(text)}; "
+        "try --bbox 85000,446000,85500,446500"
+    )

@@ -1,0 +1,128 @@
+"""What of the data is asked for, and how: options made of settings, a settings file beside the data, --where and --bbox."""
+
+import dataclasses
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+import typer
+from typer.testing import CliRunner
+
+from hiproof.city.plan import jobs_of_footprints
+from hiproof.city.prepare import make_plan
+from hiproof.city.request import Request
+from hiproof.cli.app import app
+from hiproof.cli.options import declared_settings
+from hiproof.cli.reconstruct import settings_beside
+from hiproof.errors import InputError, SettingsError
+from hiproof.read.footprints import read_footprints
+from hiproof.settings import Settings
+
+OPTIONED = [one for one in declared_settings() if one.field.metadata["option"]]
+PARAMETERS = {p.name: p for p in typer.main.get_command(app).commands["reconstruct"].params}
+HOUSES = {f"house-{i}": shapely.box(20 * i, 0, 20 * i + 10, 8) for i in range(5)}
+
+
+@pytest.fixture
+def houses(tmp_path):
+    """A file of five houses in a row, each with a year and a name."""
+    geometry = shapely.to_wkb(list(HOUSES.values()))
+    columns = [np.array(list(HOUSES), object), np.arange(1900, 1950, 10)]
+    path = tmp_path / "houses.gpkg"
+    pyogrio.raw.write(path, geometry, columns, ["id", "year"], geometry_type="Polygon", crs="EPSG:28992")
+    return path
+
+
+@pytest.mark.parametrize("one", OPTIONED, ids=[f"{o.section}.{o.field.name}" for o in OPTIONED])
+def test_an_option_tells_what_its_setting_tells(one):
+    parameter = PARAMETERS[one.parameter]
+    assert one.field.metadata["option"] in parameter.opts
+    assert one.field.metadata["help"] in parameter.help
+
+
+def test_options_and_settings_are_told_once():
+    own = {p.name for p in PARAMETERS.values()} - {one.parameter for one in OPTIONED}
+    assert own.isdisjoint(
+        field.name for section in dataclasses.fields(Settings) for field in dataclasses.fields(section.default_factory)
+    )
+
+
+def test_a_settings_file_beside_the_data_is_found_and_named(tmp_path, caplog):
+    (tmp_path / "hiproof.toml").write_text('[fit]\nobjective = "paper"\n')
+    assert settings_beside(str(tmp_path / "a.laz"), None) == tmp_path / "hiproof.toml"
+    assert str(tmp_path / "hiproof.toml") in caplog.text
+    assert settings_beside(str(tmp_path), "https://example.org/b.gpkg") == tmp_path / "hiproof.toml"
+    assert settings_beside(str(tmp_path / "other" / "a.laz"), None) is None
+
+
+def test_two_settings_files_beside_the_data_are_one_too_many(tmp_path):
+    for name in ("clouds", "footprints"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "hiproof.toml").touch()
+    with pytest.raises(SettingsError, match=r"expected one hiproof\.toml .*--config"):
+        settings_beside(str(tmp_path / "clouds"), str(tmp_path / "footprints" / "b.gpkg"))
+
+
+@pytest.mark.parametrize(
+    ("chosen", "expected"),
+    [
+        ({"where": "year < 1920"}, [0, 1]),
+        ({"where": "id = 'house-3'"}, [3]),
+        ({"bbox": (25.0, 1.0, 45.0, 2.0)}, [1, 2]),
+        ({"bbox": (11.0, 0.0, 21.0, 8.0)}, [1]),
+        ({"bbox": (0.0, 0.0, 41.0, 8.0), "where": "year > 1905"}, [1, 2]),
+    ],
+)
+def test_footprints_are_those_that_condition_and_box_let_through(chosen, expected, houses):
+    assert [f.id for f in read_footprints(houses, **chosen)] == [f"house-{i}" for i in expected]
+
+
+def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
+    """Whatever the footprints are in: the same houses, though their coordinates are others."""
+    far = (155000.0, 463000.0)
+    moved = shapely.transform(list(HOUSES.values()), lambda xy: xy + far)
+    path = houses.with_name("moved.gpkg")
+    pyogrio.raw.write(
+        path, shapely.to_wkb(moved), [np.array(list(HOUSES), object)], ["id"], geometry_type="Polygon", crs="EPSG:28992"
+    )
+    here = read_footprints(path, target_crs="EPSG:32631")
+    box = tuple(here[2].polygon.buffer(1.0).bounds)
+    assert [f.id for f in read_footprints(path, target_crs="EPSG:32631", bbox=box)] == ["house-2"]
+
+
+@pytest.mark.parametrize(
+    ("chosen", "message"),
+    [
+        ({"where": "height > 3"}, r"--where in SQL on the attributes of .* \(id, year\), got: no such column: height"),
+        ({"where": "year ="}, "--where in SQL"),
+        ({"where": "year > 3000"}, "let through, got none"),
+        ({"bbox": (500.0, 500.0, 501.0, 501.0)}, "let through, got none"),
+    ],
+)
+def test_a_choice_that_leaves_nothing_gets_a_sentence(chosen, message, houses):
+    with pytest.raises(InputError, match=message):
+        read_footprints(houses, **chosen)
+
+
+@pytest.mark.parametrize("text", ["1,2,3", "3,2,1,4", "a,b,c,d", "1,2,nan,4", ""])
+def test_a_box_that_is_none_gets_a_sentence(text, tmp_path):
+    done = CliRunner().invoke(app, ["reconstruct", "a.laz", "--out", str(tmp_path), f"--bbox={text}"])
+    assert isinstance(done.exception, SettingsError) and "--bbox as xmin,ymin,xmax,ymax" in str(done.exception)
+
+
+def test_without_footprints_the_box_chooses_among_what_is_found(town_files, tmp_path):
+    request = Request((town_files[0],), tmp_path)
+    everything = make_plan(request).jobs
+    assert len(everything) == 4
+    box = everything[2].area.buffer(0.5).bounds
+    (job,) = make_plan(dataclasses.replace(request, bbox=box)).jobs
+    assert job == dataclasses.replace(everything[2], index=0)
+    with pytest.raises(InputError, match="buildings in --bbox 0,0,1,1, got none"):
+        make_plan(dataclasses.replace(request, bbox=(0.0, 0.0, 1.0, 1.0)))
+
+
+def test_a_plan_holds_the_footprints_chosen(town_files, tmp_path):
+    request = Request((town_files[0],), tmp_path, town_files[1], where="id in ('house-1', 'house-3')")
+    expected = [f for f in read_footprints(town_files[1], target_crs="EPSG:7415") if f.id in ("house-1", "house-3")]
+    assert [job.id for job in make_plan(request).jobs] == [job.id for job in jobs_of_footprints(tuple(expected))]
