@@ -86,7 +86,7 @@ def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int, settings:
     warm_up = out.with_name("warm-up")
     reconstruct_area(Request((str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True))
     before, started = used(), time.perf_counter()
-    summary = reconstruct_area(Request(tuple(clouds), out, footprints, settings=settings, jobs=jobs, restart=True))
+    summary = reconstruct_area(Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True))
     wall, after = time.perf_counter() - started, used()
     peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
     return Cost(summary.buildings, after[0] - before[0], after[1] - before[1], wall, peak)

@@ -9,7 +9,7 @@ import shapely
 
 from hiproof.city.executors import InProcess, Processes, WorkerLost
 from hiproof.city.ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
-from hiproof.city.ledger import Ledger
+from hiproof.city.ledger import Ledger, Outcome
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
 
@@ -125,7 +125,7 @@ def test_the_ledger_remembers_after_being_closed(tmp_path):
     path = tmp_path / "ledger.sqlite"
     ledger = Ledger(path)
     ledger.add_tasks([("solve:a", "solve", 0, 2), ("solve:b", "solve", 1, 1)])
-    ledger.finish("solve:a", "done", "", [(0, "x", "modelled", "gable", "", 0.9, 0.05, 0.01)])
+    ledger.finish("solve:a", "done", "", [Outcome(0, "x", "modelled", "gable", "", 0.9, 0.05, 0.01)])
     ledger.close()
     again = Ledger(path)
     again.add_tasks([("solve:a", "solve", 0, 2)])

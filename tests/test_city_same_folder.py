@@ -20,9 +20,10 @@ import planted
 from handmade import courtyard, gable_house, modelled, unmodelled
 from hiproof.city import run as city_run
 from hiproof.city.lock import held
+from hiproof.city.marks import choice_of, file_stamps, inputs_of, mark_of
 from hiproof.city.outputs import broken_claims, claims
 from hiproof.city.plan import Job, Plan
-from hiproof.city.request import Request, file_stamps, inputs_of, mark_of
+from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
 from hiproof.errors import OutputError
@@ -34,7 +35,8 @@ from hiproof.write.run_files import fragments
 from run_records import records
 
 REQUEST = Request(("a.laz",), Path("out"))
-NO_MATTER = {"out", "overrides", "jobs", "scheduler", "restart"}
+NO_MATTER = {"out", "overrides", "processes", "scheduler", "restart"}
+WHICH = {"footprints", "layer", "id_attribute", "where", "bbox"}
 
 
 @pytest.fixture
@@ -55,13 +57,14 @@ def other(value):
 
 
 def mark(request):
-    return mark_of(inputs_of(request), "salt")
+    return mark_of(inputs_of(request), "salt"), mark_of(choice_of(request), "salt")
 
 
 @pytest.mark.parametrize("name", [f.name for f in dataclasses.fields(Request)])
 def test_every_field_of_a_request_is_in_its_mark_unless_declared_otherwise(name):
     changed = dataclasses.replace(REQUEST, **{name: other(getattr(REQUEST, name))})
-    assert (mark(changed) == mark(REQUEST)) == (name in NO_MATTER)
+    same = [was == now for was, now in zip(mark(REQUEST), mark(changed), strict=True)]
+    assert same == [name in NO_MATTER | WHICH, name not in WHICH]
 
 
 def test_a_field_added_later_is_in_the_mark():
@@ -97,14 +100,12 @@ def test_a_folder_is_stamped_by_its_files_and_no_text_by_accident(tmp_path):
     assert file_stamps(Path("x" * 5000)) == file_stamps(Path("a\0b")) == []
 
 
-def test_another_id_attribute_is_refused_by_name_and_the_same_request_is_not(town_files, tmp_path, quick):
+def test_another_setting_is_refused_by_name_and_the_same_request_is_not(town_files, tmp_path, quick):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
     assert reconstruct_area(request).buildings == 4
-    with pytest.raises(OutputError, match=r"differs in id_attribute; .*--restart"):
-        reconstruct_area(dataclasses.replace(request, id_attribute="id"))
     one = Settings.from_dict({"fit": {"parts": "one"}})
-    with pytest.raises(OutputError, match=r"differs in settings\.fit\.parts;"):
+    with pytest.raises(OutputError, match=r"differs in settings\.fit\.parts; .*--restart"):
         reconstruct_area(dataclasses.replace(request, settings=one))
 
 

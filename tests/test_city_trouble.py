@@ -28,7 +28,7 @@ def small_tiles(monkeypatch):
 
 def test_a_worker_killed_from_outside_changes_no_byte(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
-    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], jobs=2))
+    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
     assert (tmp_path / ".hiproof" / "killed").exists()
     assert records(tmp_path) == records(undisturbed)
 
@@ -38,7 +38,7 @@ def test_a_building_that_ends_its_process_is_left_out_alone(solve, town_files, u
     monkeypatch.setattr(city_run, "solve_tile", solve)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
     monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
-    summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], jobs=2))
+    summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
     assert summary.exit_code == 1
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
     rows = by_id(tmp_path)
@@ -183,16 +183,15 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(undisturbed, 
     alone = write_footprints(tmp_path / "alone.geojson", dict(list(town.footprints.items())[:1]))
     reconstruct_area(Request((str(cloud),), tmp_path / "alone", str(alone)))
     assert by_id(tmp_path / "alone")["house-0"] == by_id(undisturbed)["house-0"]
-    ((_, _, _, _, _, told, _),) = [
-        r for r in Ledger(tmp_path / "alone" / ".hiproof" / "ledger.sqlite").tasks() if r[1] == "sort"
-    ]
-    assert json.loads(told)["points"] < 0.6 * len(town.xyz)
+    tasks = Ledger(tmp_path / "alone" / ".hiproof" / "ledger.sqlite").tasks()
+    (sort,) = [task for task in tasks if task.kind == "sort"]
+    assert json.loads(sort.message)["points"] < 0.6 * len(town.xyz)
 
 
 def test_models_by_work_tile_are_the_merged_ones_cut(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     by_tile, out = Settings.from_dict({"city": {"models": "tiles"}}), tmp_path / "out"
-    reconstruct_area(Request((town_files[0],), out, town_files[1], jobs=2, settings=by_tile))
+    reconstruct_area(Request((town_files[0],), out, town_files[1], processes=2, settings=by_tile))
     files = sorted(path.name for path in (out / "models").iterdir())
     assert len(files) == 4 and not any(name.startswith(".") for name in files)
     assert not (out / "buildings.gml").exists() and not (out / "buildings.city.jsonl").exists()

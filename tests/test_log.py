@@ -73,7 +73,7 @@ def test_workers_write_to_the_same_places(tmp_path, capfd):
 def test_the_file_tells_of_every_step_and_of_lost_workers(town_files, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     log.start(log.Level.debug, tmp_path / "run.log")
-    reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], jobs=2))
+    reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], processes=2))
     lines = said(tmp_path / "run.log")
     told = "\n".join(f"{level} {text}" for level, text in lines)
     assert "INFO version" in told and "4 buildings in 1 work tiles" in told

@@ -125,7 +125,7 @@ def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_pat
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
     make_ready()
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
-    reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), jobs=2))
+    reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
     assert records(tmp_path) == records(finished[0])
 
 

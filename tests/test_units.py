@@ -255,9 +255,9 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
             (
                 parameters(out),
                 [
-                    json.loads(row[5])["points"]
-                    for row in Ledger(out / ".hiproof/ledger.sqlite").tasks()
-                    if row[1] == "sort"
+                    json.loads(task.message)["points"]
+                    for task in Ledger(out / ".hiproof/ledger.sqlite").tasks()
+                    if task.kind == "sort"
                 ],
             )
         )

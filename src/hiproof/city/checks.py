@@ -8,14 +8,14 @@ from typing import Any
 from ..errors import InputError, SettingsError
 from ..settings import Settings, shown
 
-MOST_JOBS = 1024
+MOST_PROCESSES = 1024
 
 
 def refuse_unusable(request: Any) -> None:
     """Raise SettingsError or InputError for options of a `run.Request` that cannot be met here."""
-    if not (type(request.jobs) is int and 1 <= request.jobs <= MOST_JOBS):
+    if not (type(request.processes) is int and 1 <= request.processes <= MOST_PROCESSES):
         raise SettingsError(
-            f"expected --jobs between 1 and {MOST_JOBS}, got {shown(request.jobs)}; a job a core is enough"
+            f"expected --jobs between 1 and {MOST_PROCESSES}, got {shown(request.processes)}; a process a core is enough"
         )
     for name in ("layer", "where", "id_attribute"):
         if getattr(request, name) is not None and request.footprints is None:

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import sqlite3
 import time
+from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 SCHEMA = """
 create table if not exists run (key text primary key, value text);
@@ -21,6 +23,33 @@ create table if not exists building (
 create table if not exists override (position integer primary key, digest text);
 create table if not exists output (name text primary key, bytes integer, digest text);
 """
+
+
+class Task(NamedTuple):
+    """A row of the tasks: what is to be done, of how many buildings, and what became of it."""
+
+    name: str
+    kind: str
+    buildings: int
+    state: str
+    losses: int
+    message: str
+    finished: float | None
+
+
+class Outcome(NamedTuple):
+    """A row of the buildings: `position` in the plan, what came of it, how good it is, and what it took."""
+
+    position: int
+    id: str
+    status: str
+    type: str | None
+    detail: str
+    share: float | None
+    psd: float | None
+    seconds: float
+
+
 TABLES = ("run", "task", "building", "override", "output")
 
 
@@ -115,18 +144,41 @@ class Ledger:
     def losses(self, name: str) -> int:
         return self.database.execute("select losses from task where name = ?", (name,)).fetchone()[0]
 
-    def finish(self, name: str, state: str, message: str = "", outcomes: list[tuple] = ()) -> None:
-        """Close a task together with its buildings' (position, id, status, type, detail, share, psd, seconds) rows."""
+    def finish(self, name: str, state: str, message: str = "", outcomes: Iterable[Outcome] = ()) -> None:
+        """Close a task together with the rows of its buildings."""
         self.database.execute("begin")
         sql = "update task set state = ?, message = ?, finished = ? where name = ?"
         self.database.execute(sql, (state, message, time.time(), name))
-        rows = [(position, id, name, *rest) for position, id, *rest in outcomes]
-        self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        self.put_outcomes(name, outcomes)
         self.database.execute("commit")
 
-    def tasks(self) -> list[tuple]:
-        sql = "select name, kind, buildings, state, losses, message, finished from task order by kind, position"
-        return self.database.execute(sql).fetchall()
+    def begin_again(self, tasks: list[Task], outcomes: dict[int, Outcome], overrides: dict[int, str]) -> None:
+        """Enter the tasks of another plan as far as they are, and what is known of its buildings, by position."""
+        self.database.execute("begin")
+        sql = (
+            "insert into task (name, kind, position, buildings, state, message, finished) values (?, ?, ?, ?, ?, ?, ?)"
+        )
+        positions = (
+            (t.name, t.kind, i, t.buildings, t.state, t.message, t.finished or time.time()) for i, t in enumerate(tasks)
+        )
+        self.database.executemany(sql, positions)
+        self.put_outcomes("", outcomes.values())
+        self.put_overrides(overrides)
+        self.set(merged="no")
+        self.database.execute("commit")
+
+    def put_outcomes(self, task: str, outcomes: Iterable[Outcome]) -> None:
+        rows = [(position, id, task, *rest) for position, id, *rest in outcomes]
+        self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+
+    def outcomes(self) -> dict[int, Outcome]:
+        """What came of the buildings that were solved, by position."""
+        sql = f"select {', '.join(Outcome._fields)} from building"
+        return {outcome.position: outcome for outcome in map(Outcome._make, self.database.execute(sql))}
+
+    def tasks(self) -> list[Task]:
+        sql = f"select {', '.join(Task._fields)} from task order by kind, position"
+        return list(map(Task._make, self.database.execute(sql)))
 
     def counts(self, column: str) -> dict[str, int]:
         """Buildings by `column` ("status" or "type"), most frequent first."""

@@ -46,7 +46,7 @@ def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, 
 
 def tiles_to_redo(changed: set[int], plan: Plan, state: Path, ledger: Ledger) -> dict[str, list[int]]:
     """By tile the buildings to solve: those `changed`, what a killed run left to redo, and all of a tile not solved yet."""
-    finished = {row[0] for row in ledger.tasks() if row[3] == "done"}
+    finished = {task.name for task in ledger.tasks() if task.state == "done"}
     left, redo = load_redo(state), {}
     for tile, members in plan.tiles.items():
         own = changed.intersection(members)

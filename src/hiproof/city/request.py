@@ -1,85 +1,41 @@
-"""What the user asked for, and the mark by which an output folder knows whose run it holds.
-
-The mark is made of every field of the request, of what stands in the files that it names, and of the version. A field
-takes no part only where its declaration says `NO_MATTER`: one that is added later cannot be forgotten.
-"""
+"""What the user asked for."""
 
 from __future__ import annotations
 
-import dataclasses
-import hashlib
-import json
-from collections.abc import Iterator
-from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
-from .. import __version__
 from ..settings import Settings
 
 Box = tuple[float, float, float, float]
-NO_MATTER = {"changes_result": False}
-BESIDE = (".dbf", ".shx", ".prj", ".cpg", ".tfw")  # parts of one file that formats keep beside it
-APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
+NO_MATTER = {"decides": "nothing"}
+WHICH = {"decides": "which buildings"}
 
 
 @dataclass(frozen=True)
 class Request:
-    """What the user asked for."""
+    """A run: the point clouds (files, addresses), the folder `out` for the results, and how the one becomes the other.
+
+    `footprints` (file, address or database) with their `layer`, the `id_attribute` that names them, an SQL condition
+    `where` and a `bbox` (xmin, ymin, xmax, ymax) in the coordinates of the clouds say which buildings there are; without
+    footprints the clouds are split. `terrain` is a raster, `overrides` a file of what is known better; `processes` work on
+    this machine, or those of the Dask `scheduler`; `restart` begins anew in a folder that holds another run.
+
+    >>> from pathlib import Path
+    >>> Request(("tile.laz",), Path("models"), footprints="footprints.gpkg").settings.fit.objective
+    'likelihood'
+    """
 
     clouds: tuple[str, ...]
     out: Path = field(metadata=NO_MATTER)
-    footprints: str | None = None
+    footprints: str | None = field(default=None, metadata=WHICH)
     terrain: str | None = None
-    id_attribute: str | None = None
-    layer: str | None = None
+    id_attribute: str | None = field(default=None, metadata=WHICH)
+    layer: str | None = field(default=None, metadata=WHICH)
     settings: Settings = field(default_factory=Settings)
     overrides: str | None = field(default=None, metadata=NO_MATTER)  # the ledger knows them building by building
-    jobs: int = field(default=1, metadata=NO_MATTER)
+    processes: int = field(default=1, metadata=NO_MATTER)
     scheduler: str | None = field(default=None, metadata=NO_MATTER)
     restart: bool = field(default=False, metadata=NO_MATTER)
-    where: str | None = None
-    bbox: Box | None = None
-
-
-def inputs_of(request: Request) -> dict[str, Any]:
-    """Everything that decides the result, by name: values, and size and time of the files they name."""
-    return {"version": __version__} | dict(named_values("", request))
-
-
-def named_values(name: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """(name, JSON value) of each leaf of `value`; the names of a dataclass's fields are joined by dots."""
-    if dataclasses.is_dataclass(value):
-        for declared in dataclasses.fields(value):
-            if declared.metadata.get("changes_result", True):
-                inner = f"{name}.{declared.name}" if name else declared.name
-                yield from named_values(inner, getattr(value, declared.name))
-    else:
-        yield name, with_files(value)
-
-
-def with_files(value: Any) -> Any:
-    """`value` for JSON; a text that names a file or a folder goes with what stands there."""
-    if isinstance(value, (tuple, list)):
-        return [with_files(inner) for inner in value]
-    stamps = file_stamps(Path(value)) if value and isinstance(value, (str, Path)) else []
-    return stamps or (str(value) if isinstance(value, Path) else value)
-
-
-def file_stamps(path: Path) -> list[tuple[str, int, int]]:
-    """(path, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none if nothing is there."""
-    with suppress(OSError, ValueError):  # ValueError: a text that is no path at all
-        if path.is_dir():
-            files = [file for file in path.rglob("*") if file.is_file()]
-        else:
-            beside = [path.with_suffix(end) for end in BESIDE] + [Path(f"{path}{end}") for end in APPENDED]
-            files = [file for file in {path, *beside} if path.is_file() and file.is_file()]
-        return sorted((str(file.resolve()), (stat := file.stat()).st_size, stat.st_mtime_ns) for file in files)
-    return []
-
-
-def mark_of(inputs: dict[str, Any], salt: str) -> str:
-    """The mark of a run. A slow digest with a salt: an address may hold a password, and nobody shall try them out on it."""
-    text = json.dumps(inputs, sort_keys=True, default=str).encode()
-    return hashlib.scrypt(text, salt=salt.encode(), n=1 << 14, r=8, p=1, dklen=32).hex()
+    where: str | None = field(default=None, metadata=WHICH)
+    bbox: Box | None = field(default=None, metadata=WHICH)

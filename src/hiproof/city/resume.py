@@ -15,13 +15,15 @@ from ..errors import OutputError, OutputWarning
 from ..log import LOGGER
 from ..masking import masked_values
 from ..write.files import atomic
+from .changed import take_over
 from .ledger import Ledger
+from .marks import choice_of, inputs_of, mark_of
 from .merge import remove_tiles, tile_parts
 from .outputs import broken_claims
 from .overrides import REDO, settle_overrides
 from .plan import PLAN_FILE, Plan
 from .prepare import make_plan
-from .request import Request, inputs_of, mark_of
+from .request import Request
 
 
 def open_state(out: Path) -> Path:
@@ -57,34 +59,55 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
 
 
 def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
-    """The plan of an earlier run of the same request whose files stand as it left them, else a new one."""
-    inputs = inputs_of(request)
-    if ledger.get("mark") is not None and not request.restart:
-        refuse_other_inputs(request.out, inputs, ledger)
-        if stands(request.out, ledger):
-            LOGGER.info("version %s goes on in %s", __version__, request.out)
-            plan = Plan.load(state / PLAN_FILE)
-            if ledger.get("merged") != "yes" or has_parts(plan, state):
-                settle_overrides(request.overrides, plan, state, ledger, fresh=False)
-                return plan
-    forget(state, ledger)
-    plan, salt = make_plan(request), secrets.token_hex(16)
-    with atomic(state / PLAN_FILE) as beside:
-        plan.save(Path(beside))
-    ledger.add_tasks([(f"sort:{i}", "sort", i, 0) for i in range(len(request.clouds))])
-    tiles = enumerate(plan.tiles.items())
-    ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
-    told = json.dumps(masked_values(inputs), default=str)
-    ledger.set(inputs=told, salt=salt, mark=mark_of(inputs, salt), started=str(time.time()))
-    settle_overrides(request.overrides, plan, state, ledger, fresh=True)
+    """The plan of an earlier run of the same request whose files stand as it left them, else a new one; where the
+    footprints changed since, a new one that takes over what is known of the others."""
+    fresh = True
+    plan = None if request.restart else plan_to_go_on(request, state, ledger)
+    if plan is None or ledger.get("choice") != mark_of(choice_of(request), ledger.get("salt")):
+        old, plan = plan, make_plan(request)
+        fresh = old is None or not take_over(plan, old, state, ledger)
+        if fresh:
+            begin(plan, request, state, ledger)
+        enter(request, ledger)
+    settle_overrides(request.overrides, plan, state, ledger, fresh=fresh)
     LOGGER.info(
-        "version %s begins in %s: %d buildings in %d work tiles",
+        "version %s %s in %s: %d buildings in %d work tiles",
         __version__,
+        "begins" if fresh else "goes on",
         request.out,
         len(plan.jobs),
         len(plan.tiles),
     )
     return plan
+
+
+def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> Plan | None:
+    """The plan of the run that the folder holds, None where it holds none to go on from. Raises OutputError for another's."""
+    if ledger.get("mark") is None:
+        return None
+    refuse_other_inputs(request.out, inputs_of(request), ledger)
+    if not stands(request.out, ledger):
+        return None
+    plan = Plan.load(state / PLAN_FILE)
+    return plan if ledger.get("merged") != "yes" or has_parts(plan, state) else None
+
+
+def begin(plan: Plan, request: Request, state: Path, ledger: Ledger) -> None:
+    """Put the run on `plan`, with nothing done yet."""
+    forget(state, ledger)
+    with atomic(state / PLAN_FILE) as beside:
+        plan.save(Path(beside))
+    ledger.add_tasks([(f"sort:{i}", "sort", i, 0) for i in range(len(request.clouds))])
+    tiles = enumerate(plan.tiles.items())
+    ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
+
+
+def enter(request: Request, ledger: Ledger) -> None:
+    """Enter whose run it is, which makes it one to go on from."""
+    inputs, salt = inputs_of(request), secrets.token_hex(16)
+    told = json.dumps(masked_values(inputs), default=str)
+    marks = {"mark": mark_of(inputs, salt), "choice": mark_of(choice_of(request), salt)}
+    ledger.set(inputs=told, salt=salt, started=str(time.time()), **marks)
 
 
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:

@@ -77,7 +77,7 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
 def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summary:
     """The steps of a run that has its folder `state` to itself."""
     clock = Clock()
-    executor = make_executor(request.jobs, request.scheduler)
+    executor = make_executor(request.processes, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
         plan = resume_or_plan(request, state, ledger)
@@ -135,7 +135,7 @@ def work_off(
 
     `arguments` are those of `function` by the name of a task.
     """
-    total = len([row for row in ledger.tasks() if row[1] == kind])
+    total = len([task for task in ledger.tasks() if task.kind == kind])
     while names := ledger.open_tasks(kind):
         done = total - len(names)
         progress(kind, done, total)
@@ -182,9 +182,9 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
             ledger.finish(name, "done", json.dumps(result))
         else:
             ledger.finish(name, "done", "", result)
-            for _, id, status, _, detail, *_ in result:
-                level = logging.ERROR if status == Status.INTERNAL_ERROR.code else logging.DEBUG
-                LOGGER.log(level, "building %s: %s", id, detail)
+            for outcome in result:
+                level = logging.ERROR if outcome.status == Status.INTERNAL_ERROR.code else logging.DEBUG
+                LOGGER.log(level, "building %s: %s", outcome.id, outcome.detail)
         LOGGER.info("%s is done: %s", name, f"{len(result)} buildings" if kind == "solve" else result)
     elif kind == "sort" and isinstance(error, InputError):
         ledger.finish(name, "failed", str(error))
@@ -209,16 +209,16 @@ def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Cal
 
 def refuse_without_points(plan: Plan, ledger: Ledger) -> None:
     """A clear sentence when no file could be read, or none holds a point of the building classes."""
-    rows = [row for row in ledger.tasks() if row[1] == "sort"]
-    failed = [row[5] for row in rows if row[3] == "failed"]
-    if rows and len(failed) == len(rows):
+    tasks = [task for task in ledger.tasks() if task.kind == "sort"]
+    failed = [task.message for task in tasks if task.state == "failed"]
+    if tasks and len(failed) == len(tasks):
         raise InputError(
-            failed[0] if len(failed) == 1 else f"none of the {len(rows)} point files could be read; first: {failed[0]}"
+            failed[0] if len(failed) == 1 else f"none of the {len(tasks)} point files could be read; first: {failed[0]}"
         )
     classes: Counter[int] = Counter()
-    for row in rows:
-        if row[3] == "done":
-            classes.update({int(c): n for c, n in json.loads(row[5])["classes"].items()})
+    for task in tasks:
+        if task.state == "done":
+            classes.update({int(c): n for c, n in json.loads(task.message)["classes"].items()})
     wanted = plan.settings.read.building_classes
     if sum(classes.values()) and not any(classes[c] for c in wanted):
         present = ", ".join(f"{c} ({n:,} points)" for c, n in sorted(classes.items()))
@@ -230,7 +230,8 @@ def refuse_without_points(plan: Plan, ledger: Ledger) -> None:
 
 def summarise(request: Request, plan: Plan, ledger: Ledger, clock: Clock) -> Summary:
     clock.lap("merge")
-    broken = tuple((request_name(row[0], request), row[5]) for row in ledger.tasks() if row[3] == "failed")
+    failed = [task for task in ledger.tasks() if task.state == "failed"]
+    broken = tuple((request_name(task.name, request), task.message) for task in failed)
     return Summary(
         out=Path(request.out),
         buildings=sum(ledger.counts("status").values()),
@@ -269,12 +270,14 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
             "clouds": list(request.clouds),
             "footprints": request.footprints,
             "layer": request.layer,
+            "where": request.where,
+            "bbox": request.bbox,
             "terrain": request.terrain,
             "overrides": request.overrides,
         },
         "crs": plan.crs_wkt,
         "units": {"coordinates": str(plan.units), "attributes": "metre", **metres_in(plan.units)},
-        "jobs": request.jobs,
+        "processes": request.processes,
         "buildings": summary.buildings,
         "by_status": summary.by_status,
         "by_type": summary.by_type,

@@ -26,6 +26,7 @@ from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
 from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from .ledger import Outcome
 from .merge import tile_parts, write_tile
 from .overrides import load_overrides, load_redo
 from .plan import Job, Plan, load_plan, neighbourhood
@@ -74,11 +75,11 @@ class Surroundings:
         return TerrainChain([*grounds, None if grounds[-1] is None else lowest])
 
 
-def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[tuple]:
+def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
     """Reconstruct all buildings of `tile` over the terrain model `terrain` and write its part file.
 
     `avoid` are the buildings that killed their worker before: they become internal errors without being tried again.
-    Returns a row a building for the ledger: (position, id, status, type, detail, share, psd, seconds).
+    Returns a row a building for the ledger.
     """
     root = Path(folder)
     plan = load_plan(root)
@@ -97,7 +98,7 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
         else:
             building, part = solve_one(plan, job, surroundings, overrides.get(index))
         parts.append(part)
-        rows.append(ledger_row(index, building, time.perf_counter() - start))
+        rows.append(outcome_of(index, building, time.perf_counter() - start))
     write_tile(plan, root.parent, tile, parts)
     with atomic_file(tile_parts(root, tile)) as file:
         save_fragments(file, parts)
@@ -160,7 +161,8 @@ def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:
     return fragments(building, plan.names_of(job), plan.head, plan.settings)
 
 
-def ledger_row(position: int, building: Building, seconds: float) -> tuple:
+def outcome_of(position: int, building: Building, seconds: float) -> Outcome:
     quality = building.quality
     share, psd = (float(v) if np.isfinite(v) else None for v in (quality.share_within_20cm, quality.psd_mean))
-    return position, building.id, building.status.code, building.type, building.detail, share, psd, seconds
+    status = building.status.code
+    return Outcome(position, building.id, status, building.type, building.detail, share, psd, seconds)

@@ -5,6 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from .ledger import Outcome
+
 MAIN_JOB = ("moves", "planes", "solid", "check", "points")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
@@ -16,7 +18,7 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     return sort.sort_cloud(folder, number, address)
 
 
-def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[tuple]:
+def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
     """See solve.py."""
     from . import solve
 

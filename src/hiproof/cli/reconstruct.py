@@ -36,7 +36,7 @@ def run(
         out=out,
         **inputs,
         settings=settings,
-        jobs=jobs,
+        processes=jobs,
         scheduler=scheduler,
         restart=restart,
     )

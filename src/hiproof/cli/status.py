@@ -28,19 +28,19 @@ def describe(ledger: Ledger) -> list[str]:
     tasks = ledger.tasks()
     lines = []
     for kind, what in (("sort", "point files read"), ("solve", "work tiles solved")):
-        rows = [row for row in tasks if row[1] == kind]
-        lines.append(f"{what}: {sum(row[3] in CLOSED for row in rows)} of {len(rows)}")
-    solve = [row for row in tasks if row[1] == "solve"]
-    total, done = sum(row[2] for row in solve), [row for row in solve if row[3] in CLOSED]
-    finished = sum(row[2] for row in done)
+        own = [task for task in tasks if task.kind == kind]
+        lines.append(f"{what}: {sum(task.state in CLOSED for task in own)} of {len(own)}")
+    solve = [task for task in tasks if task.kind == "solve"]
+    total, done = sum(task.buildings for task in solve), [task for task in solve if task.state in CLOSED]
+    finished = sum(task.buildings for task in done)
     lines.append(f"buildings done: {finished} of {total}")
-    by_time = sorted(done, key=lambda row: row[6])
-    if len(done) > 1 and by_time[-1][6] > by_time[0][6]:
-        rate = (finished - by_time[0][2]) / (by_time[-1][6] - by_time[0][6])
+    by_time = sorted((task.finished or 0.0, task.buildings) for task in done)
+    if len(done) > 1 and (seconds := by_time[-1][0] - by_time[0][0]) > 0:
+        rate = (finished - by_time[0][1]) / seconds
         left = f", about {(total - finished) / rate:.0f} s left" if finished < total and rate else ""
         lines.append(f"throughput: {rate:.1f} buildings a second{left}")
     lines += [f"{number} {status}" for status, number in ledger.counts("status").items()]
-    lines += [f"failed: {row[0]}: {row[5]}" for row in tasks if row[3] == "failed"]
+    lines += [f"failed: {task.name}: {task.message}" for task in tasks if task.state == "failed"]
     lines += [f"internal error: building {id}: {detail}" for id, detail in ledger.failures()]
     lines.append("finished" if ledger.get("merged") == "yes" else "not finished: the same command goes on")
     return lines

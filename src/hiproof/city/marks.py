@@ -1,0 +1,69 @@
+"""The mark by which an output folder knows whose run it holds.
+
+The mark is made of every field of the request, of what stands in the files that it names, and of the version. A field
+takes no part only where its declaration says what else it decides: one that is added later cannot be forgotten.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from .. import __version__
+from .request import Request
+
+BESIDE = (".dbf", ".shx", ".prj", ".cpg", ".tfw")  # parts of one file that formats keep beside it
+APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
+
+
+def inputs_of(request: Request) -> dict[str, Any]:
+    """Everything that decides the result of a building, by name: values, and size and time of the files they name."""
+    return {"version": __version__} | dict(named_values("", request, "the result"))
+
+
+def choice_of(request: Request) -> dict[str, Any]:
+    """Everything that decides which buildings there are, as `inputs_of` tells it."""
+    return dict(named_values("", request, "which buildings"))
+
+
+def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any]]:
+    """(name, JSON value) of each leaf of `value` whose declaration says that it `decides` so; the names of a dataclass's
+    fields are joined by dots."""
+    if dataclasses.is_dataclass(value):
+        for declared in dataclasses.fields(value):
+            if declared.metadata.get("decides", "the result") == decides:
+                inner = f"{name}.{declared.name}" if name else declared.name
+                yield from named_values(inner, getattr(value, declared.name), decides)
+    else:
+        yield name, with_files(value)
+
+
+def with_files(value: Any) -> Any:
+    """`value` for JSON; a text that names a file or a folder goes with what stands there."""
+    if isinstance(value, (tuple, list)):
+        return [with_files(inner) for inner in value]
+    stamps = file_stamps(Path(value)) if value and isinstance(value, (str, Path)) else []
+    return stamps or (str(value) if isinstance(value, Path) else value)
+
+
+def file_stamps(path: Path) -> list[tuple[str, int, int]]:
+    """(path, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none if nothing is there."""
+    with suppress(OSError, ValueError):  # ValueError: a text that is no path at all
+        if path.is_dir():
+            files = [file for file in path.rglob("*") if file.is_file()]
+        else:
+            beside = [path.with_suffix(end) for end in BESIDE] + [Path(f"{path}{end}") for end in APPENDED]
+            files = [file for file in {path, *beside} if path.is_file() and file.is_file()]
+        return sorted((str(file.resolve()), (stat := file.stat()).st_size, stat.st_mtime_ns) for file in files)
+    return []
+
+
+def mark_of(inputs: dict[str, Any], salt: str) -> str:
+    """The mark of a run. A slow digest with a salt: an address may hold a password, and nobody shall try them out on it."""
+    text = json.dumps(inputs, sort_keys=True, default=str).encode()
+    return hashlib.scrypt(text, salt=salt.encode(), n=1 << 14, r=8, p=1, dklen=32).hex()
