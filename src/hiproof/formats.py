@@ -108,6 +108,7 @@ FORMATS = {
     ),
     "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="gltf"),
     "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="obj"),
+    "3dtiles": Format(file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="tiles"),
 }
 OF_MODELS = {name: format for name, format in FORMATS.items() if not format.fragment}
 """What `hiproof convert` makes of the models of a run."""

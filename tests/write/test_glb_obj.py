@@ -1,12 +1,10 @@
 """glTF and OBJ files read back by a few lines of their own, and their triangles weighed."""
 
-import json
-import struct
-
 import numpy as np
 import pytest
 import typer
 
+from glb_files import accessor_values, parse_glb
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
 from hiproof.write.gltf import write_models as write_glb
@@ -17,23 +15,9 @@ from sample_models import SOLIDS, courtyard_solid, gable_solid, write_sample_run
 BUILDINGS = [(id, kind, solid, {"height": 3.5}) for id, (kind, solid) in SOLIDS.items()]
 
 
-def parse_glb(path):
-    data = path.read_bytes()
-    magic, version, length = struct.unpack("<III", data[:12])
-    assert (magic, version, length) == (0x46546C67, 2, len(data))
-    size, kind = struct.unpack("<II", data[12:20])
-    assert kind == 0x4E4F534A and size % 4 == 0
-    return json.loads(data[20 : 20 + size]), data[28 + size :]
-
-
 def glb_positions(document, binary, mesh):
-    parts = []
-    for primitive in document["meshes"][mesh]["primitives"]:
-        accessor = document["accessors"][primitive["attributes"]["POSITION"]]
-        count = accessor["count"]
-        values = np.frombuffer(binary, "<f4", count * 3, accessor["byteOffset"]).reshape(-1, 3)
-        assert values.min(axis=0).tolist() == accessor["min"] and values.max(axis=0).tolist() == accessor["max"]
-        parts.append(values)
+    primitives = document["meshes"][mesh]["primitives"]
+    parts = [accessor_values(document, binary, primitive["attributes"]["POSITION"]) for primitive in primitives]
     return np.concatenate(parts).reshape(-1, 3, 3)
 
 

@@ -17,6 +17,7 @@ from .options import box_of, with_settings
 from .report import report
 from .segment import segment
 from .train import train
+from .view import view
 
 app = typer.Typer(
     name="hiproof",
@@ -154,5 +155,5 @@ def load(
     raise typer.Exit(run(folder, database, prefix))
 
 
-for command in (build, evaluate, report, convert, classify, segment, train):
+for command in (build, evaluate, report, convert, view, classify, segment, train):
     app.command()(command)

@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
 from ..formats import OF_MODELS, module_of
 
 Made = StrEnum("Made", {name: name for name in OF_MODELS})
@@ -16,20 +17,35 @@ KINDS = ", ".join(f"{name} ({format.what})" for name, format in OF_MODELS.items(
 
 def convert(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
-    format: Annotated[Made, typer.Option(help=f"what to make: {KINDS}")] = Made.glb,
     out: Annotated[
-        Path | None, typer.Option(help="file to write [default: in the folder, named buildings as the run's own]")
+        Path | None, typer.Argument(help="what to write [default: in the folder, named buildings as the run's own]")
+    ] = None,
+    format: Annotated[
+        Made | None, typer.Option(help=f"what to make: {KINDS} [default: by the name to write, else glb]")
+    ] = None,
+    crs: Annotated[str | None, typer.Option(help="CRS of the models [default: the run's]")] = None,
+    geoid_height: Annotated[
+        float | None,
+        typer.Option(help="height of the geoid above the ellipsoid, m, for 3dtiles [default: by pyproj's grid]"),
     ] = None,
 ) -> None:
-    """Convert the models of a run to a format of 3D viewers, with building ids and roof types as properties."""
-    from ..evaluate.models import read_models, run_models
-    from ..evaluate.run import run_record, run_units
-    from ..read.cityjson_text import documents, reference_system
+    """Convert the models of a run to a format of 3D viewers, with building ids, roof types and parameters as properties."""
+    from ..view.run_models import run_buildings, run_crs_text
 
-    models, made = run_models(folder), OF_MODELS[format.value]
-    path = out or Path(folder) / made.file
-    found = read_models(models, run_units(run_record(folder)))
-    buildings = ((m.id, m.roof_type, m.solid, m.attributes) for m in found if m.solid is not None)
-    header, _ = next(documents(models))
-    count = module_of(made.module).write_models(path, buildings, crs=reference_system(header))
+    name = format.value if format else format_of(out)
+    given = {} if geoid_height is None else {"geoid_height_m": geoid_height}
+    if given and name != "3dtiles":
+        raise InputError(f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out")
+    path = out or Path(folder) / OF_MODELS[name].file
+    buildings = run_buildings(folder)
+    count = module_of(OF_MODELS[name].module).write_models(path, buildings, crs or run_crs_text(folder), **given)
     typer.echo(f"{path}: {count} buildings")
+
+
+def format_of(out: Path | None) -> str:
+    """The format that a name ends in, glb without a name. Raises InputError where that is none."""
+    ending = "glb" if out is None else out.suffix.lower().removeprefix(".")
+    if ending not in OF_MODELS:
+        endings = ", ".join(f".{name}" for name in OF_MODELS)
+        raise InputError(f"expected a name that ends in one of {endings}, got {out}; or say --format")
+    return ending

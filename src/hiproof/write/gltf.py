@@ -6,8 +6,6 @@ east is x, north is -z.
 
 from __future__ import annotations
 
-import json
-import struct
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -16,9 +14,8 @@ import numpy as np
 
 from ..model import GROUND, ROOF, WALL, Solid
 from .colours import GROUND_COLOUR, TYPE_COLOURS, WALL_COLOUR, linear_rgb
+from .glb import GlbDocument, y_up
 from .triangles import face_triangles, ring_normal
-
-ARRAY_BUFFER, FLOAT, VEC3 = 34962, 5126, "VEC3"
 
 
 def write_models(
@@ -39,82 +36,49 @@ def write_models(
 
 
 class GlbContent:
-    """The document as it grows: JSON tables beside one binary buffer."""
+    """The document as it grows, a node a building."""
 
     def __init__(self) -> None:
+        self.document = GlbDocument()
         self.nodes: list[dict[str, Any]] = []
         self.meshes: list[dict[str, Any]] = []
-        self.accessors: list[dict[str, Any]] = []
         self.materials: dict[str, int] = {}
-        self.chunks: list[bytes] = []
-        self.size = 0
         self.origin: np.ndarray | None = None
 
     def add(self, id: str, roof_type: str, solid: Solid, attributes: dict[str, Any]) -> None:
         """One building: a primitive for its roof, its walls and its ground each."""
         if self.origin is None:
             self.origin = np.floor(solid.vertices.min(axis=0))
-        colours = {ROOF: TYPE_COLOURS.get(roof_type, TYPE_COLOURS["unknown"]), WALL: WALL_COLOUR, GROUND: GROUND_COLOUR}
         primitives = []
-        for kind, colour in colours.items():
+        for kind, colour in surface_colours(roof_type).items():
             corners, normals = flat_triangles(solid, kind, self.origin)
             if len(corners):
                 name = f"roof {roof_type}" if kind == ROOF else kind
-                places = {"POSITION": self.accessor(corners, bounds=True), "NORMAL": self.accessor(normals)}
+                normal = self.document.accessor(normals.astype("<f4"))
+                places = {"POSITION": self.document.positions(corners), "NORMAL": normal}
                 primitives.append({"attributes": places, "material": self.material(name, colour)})
         extras = {"id": id, "roof_type": roof_type, **attributes}
         self.nodes.append({"name": id, "mesh": len(self.meshes), "extras": extras})
         self.meshes.append({"name": id, "primitives": primitives})
 
-    def accessor(self, vectors: np.ndarray, bounds: bool = False) -> int:
-        """Append float32 `vectors` (n, 3) to the buffer; the index of their accessor."""
-        vectors = vectors.astype("<f4")
-        table = {
-            "bufferView": 0,
-            "byteOffset": self.size,
-            "componentType": FLOAT,
-            "count": len(vectors),
-            "type": VEC3,
-        }
-        if bounds:
-            table |= {"min": vectors.min(axis=0).tolist(), "max": vectors.max(axis=0).tolist()}
-        self.chunks.append(vectors.tobytes())
-        self.size += vectors.nbytes
-        self.accessors.append(table)
-        return len(self.accessors) - 1
-
     def material(self, name: str, colour: str) -> int:
         return self.materials.setdefault(f"{name}|{colour}", len(self.materials))
 
     def to_bytes(self, crs: str | None) -> bytes:
-        """The whole file: header, JSON chunk, binary chunk, each padded to four bytes."""
+        """The whole file."""
         origin = (np.zeros(3) if self.origin is None else self.origin).tolist()
-        document: dict[str, Any] = {
-            "asset": {
-                "version": "2.0",
-                "generator": "hiproof",
-                "extras": {"origin": origin, "unit": "metre", "crs": crs, "axes": "x east, y up, z south"},
-            },
-            "scene": 0,
-            "scenes": [{"nodes": list(range(len(self.nodes)))} if self.nodes else {}],
-        }
+        tables = self.document.tables
+        tables["asset"]["extras"] = {"origin": origin, "unit": "metre", "crs": crs, "axes": "x east, y up, z south"}
         if self.nodes:
-            document |= {
-                "nodes": self.nodes,
-                "meshes": self.meshes,
-                "materials": [material_table(key) for key in self.materials],
-                "accessors": self.accessors,
-                "bufferViews": [
-                    {"buffer": 0, "byteLength": self.size, "byteStride": 12, "target": ARRAY_BUFFER},
-                ],
-                "buffers": [{"byteLength": self.size}],
-            }
-        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
-        text += b" " * (-len(text) % 4)
-        parts = [struct.pack("<II", len(text), 0x4E4F534A), text]
-        if self.nodes:
-            parts += [struct.pack("<II", self.size, 0x004E4942), *self.chunks]
-        return struct.pack("<III", 0x46546C67, 2, 12 + sum(map(len, parts))) + b"".join(parts)
+            tables["scenes"] = [{"nodes": list(range(len(self.nodes)))}]
+            tables |= {"nodes": self.nodes, "meshes": self.meshes}
+            tables["materials"] = [material_table(key) for key in self.materials]
+        return self.document.to_bytes()
+
+
+def surface_colours(roof_type: str) -> dict[str, str]:
+    """The colour of each kind of face of a building."""
+    return {ROOF: TYPE_COLOURS.get(roof_type, TYPE_COLOURS["unknown"]), WALL: WALL_COLOUR, GROUND: GROUND_COLOUR}
 
 
 def material_table(key: str) -> dict[str, Any]:
@@ -132,8 +96,3 @@ def flat_triangles(solid: Solid, kind: str, origin: np.ndarray) -> tuple[np.ndar
         corners.append(solid.vertices[triangles.ravel()] - origin)
         normals.append(np.tile(normal / max(np.linalg.norm(normal), 1e-12), (triangles.size, 1)))
     return y_up(np.concatenate(corners)), y_up(np.concatenate(normals))
-
-
-def y_up(vectors: np.ndarray) -> np.ndarray:
-    """East, north, up to glTF's x, y, z."""
-    return np.column_stack([vectors[:, 0], vectors[:, 2], -vectors[:, 1]])

@@ -53,7 +53,7 @@ class Viewer {
   }
 
   matrix() {
-    const { back, right, up } = this.axes(), eye = this.target.map((t, k) => t + this.distance * back[k]);
+    const { back, right, up } = this.axes(), eye = this.eye();
     const near = this.distance / 50, far = this.distance * 60, f = 1 / Math.tan(0.4);
     const aspect = this.canvas.width / Math.max(1, this.canvas.height);
     const rows = [right.map(v => v * f / aspect), up.map(v => v * f), back];
@@ -109,7 +109,7 @@ class Viewer {
       this.draw();
     });
     canvas.addEventListener("pointerup", event => {
-      if (held && moved < 5) { const found = this.pick(event.offsetX, event.offsetY); if (found >= 0) this.onpick(found); }
+      if (held && moved < 5) { const found = this.pick(event.offsetX, event.offsetY); if (found !== null) this.onpick(found); }
       held = null;
     });
     canvas.addEventListener("wheel", event => {
@@ -117,38 +117,48 @@ class Viewer {
     }, { passive: false });
   }
 
-  // Building under a place of the canvas (CSS pixels), -1 for none: the ray against every triangle (Moller and Trumbore).
+  // Building under a place of the canvas (CSS pixels), null for none.
   pick(x, y) {
+    const { triangle } = nearest(this.corners, this.ray(x, y));
+    return triangle < 0 ? null : this.owner[triangle];
+  }
+
+  // The ray from the eye through a place of the canvas.
+  ray(x, y) {
     const { back, right, up } = this.axes(), half = Math.tan(0.4);
     const u = (2 * x / this.canvas.clientWidth - 1) * half * this.canvas.clientWidth / this.canvas.clientHeight;
     const v = (1 - 2 * y / this.canvas.clientHeight) * half;
-    const eye = this.target.map((t, k) => t + this.distance * back[k]);
-    const ray = back.map((b, k) => -b + u * right[k] + v * up[k]);
-    const c = this.corners;
-    let nearest = Infinity, found = -1;
-    for (let t = 0, i = 0; t < this.owner.length; t++, i += 9) {
-      const ax = c[i + 3] - c[i], ay = c[i + 4] - c[i + 1], az = c[i + 5] - c[i + 2];
-      const bx = c[i + 6] - c[i], by = c[i + 7] - c[i + 1], bz = c[i + 8] - c[i + 2];
-      const px = ray[1] * bz - ray[2] * by, py = ray[2] * bx - ray[0] * bz, pz = ray[0] * by - ray[1] * bx;
-      const det = ax * px + ay * py + az * pz;
-      if (Math.abs(det) < 1e-12) continue;
-      const sx = eye[0] - c[i], sy = eye[1] - c[i + 1], sz = eye[2] - c[i + 2];
-      const s = (sx * px + sy * py + sz * pz) / det;
-      if (s < 0 || s > 1) continue;
-      const qx = sy * az - sz * ay, qy = sz * ax - sx * az, qz = sx * ay - sy * ax;
-      const r = (ray[0] * qx + ray[1] * qy + ray[2] * qz) / det;
-      if (r < 0 || s + r > 1) continue;
-      const far = (bx * qx + by * qy + bz * qz) / det;
-      if (far > 0 && far < nearest) { nearest = far; found = this.owner[t]; }
-    }
-    return found;
+    return { eye: this.eye(), way: back.map((b, k) => -b + u * right[k] + v * up[k]) };
   }
+
+  eye() { const { back } = this.axes(); return this.target.map((t, k) => t + this.distance * back[k]); }
 
   // Where a place of the scene falls on the canvas, CSS pixels.
   project(place) {
     const m = this.matrix(), at = k => m[k] * place[0] + m[4 + k] * place[1] + m[8 + k] * place[2] + m[12 + k];
     return [(at(0) / at(3) + 1) / 2 * this.canvas.clientWidth, (1 - at(1) / at(3)) / 2 * this.canvas.clientHeight];
   }
+}
+
+// The triangle that a ray meets first, and how far along; -1 for none (Moller and Trumbore).
+function nearest(corners, { eye, way }) {
+  const c = corners, found = { triangle: -1, far: Infinity };
+  for (let t = 0, i = 0; i < c.length; t++, i += 9) {
+    const ax = c[i + 3] - c[i], ay = c[i + 4] - c[i + 1], az = c[i + 5] - c[i + 2];
+    const bx = c[i + 6] - c[i], by = c[i + 7] - c[i + 1], bz = c[i + 8] - c[i + 2];
+    const px = way[1] * bz - way[2] * by, py = way[2] * bx - way[0] * bz, pz = way[0] * by - way[1] * bx;
+    const det = ax * px + ay * py + az * pz;
+    if (Math.abs(det) < 1e-12) continue;
+    const sx = eye[0] - c[i], sy = eye[1] - c[i + 1], sz = eye[2] - c[i + 2];
+    const s = (sx * px + sy * py + sz * pz) / det;
+    if (s < 0 || s > 1) continue;
+    const qx = sy * az - sz * ay, qy = sz * ax - sx * az, qz = sx * ay - sy * ax;
+    const r = (way[0] * qx + way[1] * qy + way[2] * qz) / det;
+    if (r < 0 || s + r > 1) continue;
+    const far = (bx * qx + by * qy + bz * qz) / det;
+    if (far > 0 && far < found.far) { found.far = far; found.triangle = t; }
+  }
+  return found;
 }
 
 function link(gl) {

@@ -1,0 +1,1 @@
+"""Models in the browser: a run as 3D Tiles, and a page that shows them without a network."""

@@ -1,0 +1,55 @@
+// The page: what lies under a click, and which roof types are in view.
+
+const colours = JSON.parse(document.getElementById("colours").textContent), types = new Map();
+let scene = null;
+
+function show(found) {
+  const rows = found ? found.tile.table.row(found.row).filter(({ value }) => value !== null && value !== "") : [];
+  const lines = rows.flatMap(row => row.name === "parameters" ? parts(row) : [row]);
+  document.getElementById("details").replaceChildren(...lines.map(line));
+  document.getElementById("hint").hidden = rows.length > 0;
+  scene.select(found);
+}
+
+function line({ name, told, value }) {
+  const cells = [name, value].map(text => Object.assign(document.createElement("td"), { textContent: text }));
+  const made = Object.assign(document.createElement("tr"), { title: told });
+  made.append(...cells);
+  return made;
+}
+
+// The parts of a roof, a line each.
+function parts({ value, told }) {
+  return JSON.parse(value).parts.map(({ type, parameters }, number) => {
+    const named = Object.entries(parameters).map(([name, size]) => `${name} ${Math.round(100 * size) / 100}`);
+    return { name: `part ${number}`, told, value: `${type}: ${named.join(", ")}` };
+  });
+}
+
+function legend(tile) {
+  for (let row = 0; row < tile.table.count; row++) {
+    const type = tile.table.row(row).find(({ name }) => name === "type").value;
+    types.set(type, (types.get(type) || 0) + 1);
+  }
+  document.getElementById("legend").replaceChildren(...[...types].sort((a, b) => b[1] - a[1]).map(([type]) => {
+    const mark = document.createElement("span"), square = document.createElement("i");
+    square.style.background = colours[type] || colours.unknown;
+    mark.append(square, type || "unknown");
+    return mark;
+  }));
+}
+
+async function begin() {
+  const answer = await fetch("tileset.json");
+  scene = new TileScene(document.getElementById("scene"), await answer.json(), "");
+  if (!scene.gl) { document.getElementById("hint").textContent = "This browser offers no WebGL, so there is no 3D view."; return; }
+  scene.onload = legend;
+  scene.onpick = show;
+  document.addEventListener("keydown", event => {
+    if (event.key === "Home") { scene.home(); scene.draw(); }
+    if (event.key === "Escape") show(null);
+  });
+  scene.draw();
+}
+
+const ready = begin();

@@ -1,0 +1,56 @@
+"""The finished models of a run's folder with all that is told of them: attributes, parameters, the CRS."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..evaluate.models import read_models, run_models
+from ..evaluate.run import run_crs, run_record, run_units
+from ..formats import FORMATS
+from ..model import Solid
+from ..parametric.file import opened_parameters
+from ..read.cityjson_text import documents, reference_system
+from ..write.parameters import crs_text
+
+TOLD = ("type", "parameters", "position", "rotation")
+
+
+def run_crs_text(folder: Path) -> str | None:
+    """The CRS of the run in `folder`, heights included where they are known; None where it has none."""
+    header, _ = next(documents(run_models(folder)))
+    return crs_text(run_crs(run_record(folder))) or reference_system(header)
+
+
+def run_buildings(folder: Path) -> Iterator[tuple[str, str, Solid, dict[str, Any]]]:
+    """(id, roof type, solid in world metres, attributes) of the run's buildings that have a solid.
+
+    Among the attributes are the `parameters` of the roof as JSON, where the folder has them. Raises InputError for what cannot
+    be read.
+    """
+    path, records = Path(folder) / FORMATS["parameters"].file, None
+    with ExitStack() as stack:
+        if path.is_file():
+            _, records = stack.enter_context(opened_parameters(path))
+        for model in read_models(run_models(folder), run_units(run_record(folder))):
+            attributes = model.attributes
+            if records is not None:  # a line a building, in the order of the models
+                attributes = {"parameters": parameters_text(next(records, {}), model.id, path), **attributes}
+            if model.solid is not None:
+                yield model.id, model.roof_type, model.solid, attributes
+
+
+def parameters_text(record: dict[str, Any], id: str, path: Path) -> str | None:
+    """What the parameters say of the building `id` as JSON, its parts without outlines; None where it has no parts."""
+    known = str(record.get("id"))
+    if id != known and not id.startswith(f"{known}.."):  # where an id comes twice, models number it
+        raise InputError(
+            f"expected {path} of the same run as the models, got {known!r} where these have {id!r}; "
+            "make both anew with `hiproof build`"
+        )
+    parts = [{name: part.get(name) for name in TOLD} for part in record.get("parts") or ()]
+    return json.dumps({"origin": record.get("origin"), "parts": parts}, separators=(",", ":")) if parts else None

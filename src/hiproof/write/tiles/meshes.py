@@ -1,0 +1,47 @@
+"""One building as triangles of one draw call: places, normals and colours by corner, waiting in a file until its tile is known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import BinaryIO
+
+import numpy as np
+
+from ...model import Solid
+from ..colours import linear_rgb
+from ..gltf import flat_triangles, surface_colours
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Corners (3 t, 3), y up, their face's `normals` (3 t, 3) and `colours` (3 t, 4) as linear bytes."""
+
+    corners: np.ndarray
+    normals: np.ndarray
+    colours: np.ndarray
+
+    @property
+    def triangles(self) -> int:
+        return len(self.corners) // 3
+
+    def save(self, file: BinaryIO) -> None:
+        for array in (self.corners, self.normals, self.colours):
+            np.save(file, array, allow_pickle=False)
+
+    @classmethod
+    def load(cls, file: BinaryIO) -> Mesh:
+        """The mesh that `save` wrote where `file` stands now."""
+        return cls(*(np.load(file, allow_pickle=False) for _ in range(3)))
+
+
+def mesh_of(solid: Solid, roof_type: str) -> Mesh:
+    """The mesh of `solid`, whose vertices are east, north, up of the tileset's frame; the roof has its type's colour."""
+    corners, normals, colours = [], [], []
+    for kind, colour in surface_colours(roof_type).items():
+        places, facing = flat_triangles(solid, kind, np.zeros(3))
+        corners.append(places)
+        normals.append(facing)
+        colours.append(np.tile(np.round(np.multiply([*linear_rgb(colour), 1.0], 255)), (len(places), 1)))
+    return Mesh(
+        np.concatenate(corners), np.concatenate(normals).astype("<f4"), np.concatenate(colours).astype(np.uint8)
+    )

@@ -1,0 +1,107 @@
+"""What is told of buildings in a tile: a class and a table of EXT_structural_metadata, numbers as float64, all else as text.
+
+The extension knows no null: what is unknown is `NO_NUMBER` or empty text, and the class says so. One class serves all
+tiles, so that a style made for one works on every other.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..attribute_list import HIPROOF, OWN, PREFIX, ROOFER
+from ..glb import GlbDocument
+from ..naming import UniqueNames
+
+EXTENSION = "EXT_structural_metadata"
+CLASS = "building"
+NO_NUMBER = -9999.0
+WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is told as text
+TOLD = {
+    "id": "the building's id",
+    "type": "roof type of the largest part",
+    "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see docs/parameters.md)",
+} | {
+    prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
+    for prefix, table in ((PREFIX, ROOFER), (OWN, HIPROOF))
+    for a in table
+}
+
+
+class Property(NamedTuple):
+    """A column: its `id` in the class, the attribute's `name`, and whether its values are numbers."""
+
+    id: str
+    name: str
+    is_number: bool
+
+
+class Found:
+    """The attributes met so far, and whether all values of each are numbers."""
+
+    def __init__(self) -> None:
+        self.are_numbers: dict[str, bool] = {}
+
+    def add(self, values: dict[str, Any]) -> None:
+        for name, value in values.items():
+            known = self.are_numbers.get(name)
+            if value is not None:
+                self.are_numbers[name] = known is not False and is_number(value)
+            elif known is None and name not in self.are_numbers:
+                self.are_numbers[name] = None
+
+    def properties(self) -> list[Property]:
+        """The columns that hold them, named as the extension allows: letters, digits, underscores."""
+        names = UniqueNames()
+        return [Property(property_id(names, name), name, bool(kind)) for name, kind in self.are_numbers.items()]
+
+
+def is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= WHOLE
+
+
+def property_id(names: UniqueNames, name: str) -> str:
+    """`name` with all that an id forbids replaced; unique among `names`."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII)
+    return names.take(plain if re.match("[A-Za-z_]", plain) else f"_{plain}").replace("..", "_")
+
+
+def schema_of(properties: Iterable[Property]) -> dict[str, Any]:
+    """The schema: one class, a property a column."""
+    kinds = {
+        True: {"type": "SCALAR", "componentType": "FLOAT64", "noData": NO_NUMBER},
+        False: {"type": "STRING", "noData": ""},
+    }
+    told = {
+        p.id: {"name": p.name, "description": TOLD.get(p.name, "as given")} | kinds[p.is_number] for p in properties
+    }
+    return {"id": "hiproof", "classes": {CLASS: {"properties": told}}}
+
+
+def add_table(document: GlbDocument, properties: Sequence[Property], rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
+    """The table of `rows`, values by attribute's name; its columns go to the buffer of `document`."""
+    columns = {p.id: add_column(document, p, [row.get(p.name) for row in rows]) for p in properties}
+    return {"name": "buildings", "class": CLASS, "count": len(rows), "properties": columns}
+
+
+def add_column(document: GlbDocument, column: Property, values: list[Any]) -> dict[str, Any]:
+    if column.is_number:
+        numbers = np.array([NO_NUMBER if v is None else v for v in values], "<f8")
+        return {"values": document.view(numbers.tobytes())}
+    texts = [text_of(value).encode() for value in values]
+    ends = np.cumsum([0, *map(len, texts)]).astype("<u4")
+    return {
+        # A view may not be empty, so that a column of empty texts holds one byte that none of them uses.
+        "values": document.view(b"".join(texts) or b"\0"),
+        "stringOffsets": document.view(ends.tobytes()),
+        "stringOffsetType": "UINT32",
+    }
+
+
+def text_of(value: Any) -> str:
+    if value is None:
+        return ""
+    return str(value).lower() if isinstance(value, bool) else str(value)

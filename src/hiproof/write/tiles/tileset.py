@@ -1,0 +1,200 @@
+"""The tileset of a city: buildings as they come wait in a file; when all are known, each tile is written once.
+
+All coordinates are turned one by one into the plane's east, north, up about the first building, so that nothing is lost by the
+Earth's curvature; the root's transform puts that frame on the globe.
+"""
+
+from __future__ import annotations
+
+import json
+import shutil
+import warnings
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from ... import __version__
+from ...errors import InputError, InputWarning, OutputError
+from ...model import Solid
+from ..files import hidden_name, output_error, scratch
+from .content import tile_glb
+from .globe import Globe, east_north_up
+from .meshes import Mesh, mesh_of
+from .properties import Found
+from .quadtree import MOST_TRIANGLES, Tile, quadtree
+
+TILESET = "tileset.json"
+MISSED = 2.0  # a building left out is an error of so many times its size: at Cesium's 16 pixels, one of eight is missed
+SLACK_M = 0.01  # boxes are wider by so much, for coordinates rounded to float32
+
+
+def write_models(
+    folder: Path,
+    buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]],
+    crs: Any = None,
+    geoid_height_m: float | None = None,
+    most: int = MOST_TRIANGLES,
+) -> int:
+    """Write `buildings` (id, roof type, solid in world metres, attributes) as 3D Tiles 1.1 to `folder`; returns how many.
+
+    `crs` is anything pyproj understands; without one the tiles keep the plane's axes about the first building, for viewers that
+    need no place on the Earth. `geoid_height_m` is added to heights, else pyproj's grid is asked. A tile draws about
+    `most` triangles. An older tileset in `folder` is replaced when all is written. Warns of heights and places that are
+    guessed; raises InputError where no building has a solid or `crs` is of no use, OutputError where `folder` cannot be
+    written or holds something else.
+    """
+    folder, globe = Path(folder), None if crs is None else Globe.of(crs, geoid_height_m)
+    warn_of(globe)
+    make_room(folder)
+    with scratch(folder) as file:
+        city = WaitingCity(file, globe)
+        for id, roof_type, solid, attributes in buildings:
+            city.add(solid, roof_type, {"id": id, "type": roof_type, **attributes})
+        if not city.offsets:
+            raise InputError(
+                "expected buildings with solids, got none; their `hiproof_status` says what became of them"
+            )
+        with whole_folder(folder) as beside:
+            tiles = TileFiles(city, beside)
+            tree = quadtree(tiles.boxes.mean(axis=1)[:, :2], tiles.sizes, np.array(city.triangles), most)
+            text = json.dumps(tiles.tileset(tree), separators=(",", ":"), allow_nan=False)
+            (beside / TILESET).write_text(text)
+    return len(city.offsets)
+
+
+def warn_of(globe: Globe | None) -> None:
+    """Say in a sentence what is guessed of the place."""
+    if globe is None:
+        warnings.warn(InputWarning("no CRS is known, so the tiles stand nowhere on the globe; say it with --crs"))
+    elif not globe.is_known:
+        warnings.warn(InputWarning(globe.heights))
+
+
+class WaitingCity:
+    """Buildings in a file, and of each what decides where it is drawn: its triangles and its box, east, north, up."""
+
+    def __init__(self, file: BinaryIO, globe: Globe | None) -> None:
+        self.file, self.globe, self.found = file, globe, Found()
+        self.transform = np.eye(4)  # from east, north, up to the globe; without one, to world metres
+        self.offsets: list[int] = []
+        self.triangles: list[int] = []
+        self.boxes: list[np.ndarray] = []
+
+    def add(self, solid: Solid, roof_type: str, row: dict[str, Any]) -> None:
+        """Keep a building, of which `row` tells."""
+        local = self.local(solid.vertices)
+        mesh = mesh_of(replace(solid, vertices=local), roof_type)
+        self.found.add(row)
+        self.offsets.append(self.file.tell())
+        self.triangles.append(mesh.triangles)
+        self.boxes.append(np.array([local.min(axis=0) - SLACK_M, local.max(axis=0) + SLACK_M]))
+        self.file.write(json.dumps(row).encode() + b"\n")
+        mesh.save(self.file)
+
+    def local(self, world: np.ndarray) -> np.ndarray:
+        """East, north, up (n, 3) of world metres; the first building's corner is the origin."""
+        if not self.offsets:
+            self.transform = frame_at(np.floor(world.min(axis=0)), self.globe)
+        places = world if self.globe is None else self.globe.to_earth(world)
+        return (places - self.transform[:3, 3]) @ self.transform[:3, :3]
+
+    def at(self, index: int) -> tuple[dict[str, Any], Mesh]:
+        """The row and the mesh of a building that was added."""
+        self.file.seek(self.offsets[index])
+        return json.loads(self.file.readline()), Mesh.load(self.file)
+
+
+class TileFiles:
+    """The files of all tiles in `folder`, made of a city that is complete."""
+
+    def __init__(self, city: WaitingCity, folder: Path) -> None:
+        self.city, self.folder = city, folder
+        self.boxes = np.array(city.boxes)
+        self.sizes = np.linalg.norm(self.boxes[:, 1] - self.boxes[:, 0], axis=1)
+        self.properties = city.found.properties()
+        (folder / "tiles").mkdir()
+
+    def tileset(self, tree: Tile) -> dict[str, Any]:
+        """The content of tileset.json; the files of all tiles are written."""
+        globe, transform, root = self.city.globe, self.city.transform, self.written(tree)
+        if globe is None:
+            extras = {"crs": None, "origin": transform[:3, 3].tolist(), "unit": "metre", "axes": "east, north, up"}
+        else:
+            extras = {"crs": globe.name, "heights": globe.heights, "accuracy_m": globe.accuracy_m}
+            root = {"transform": transform.T.ravel().tolist(), **root}
+        return {
+            "asset": {"version": "1.1", "generator": f"hiproof {__version__}", "extras": extras},
+            "geometricError": MISSED * float(self.sizes.max()),
+            "root": root,
+        }
+
+    def written(self, tile: Tile) -> dict[str, Any]:
+        """`tile` as the tileset tells it, with all below; their files are written."""
+        below = tile.below()
+        told: dict[str, Any] = {
+            "boundingVolume": box_of(self.boxes[np.append(tile.items, below)]),
+            "geometricError": MISSED * float(self.sizes[below].max(initial=0.0)),
+            "refine": "ADD",
+        }
+        if len(tile.items):
+            told["content"] = {"uri": self.file_of(tile), "boundingVolume": box_of(self.boxes[tile.items])}
+        if tile.children:
+            told["children"] = [self.written(child) for child in tile.children]
+        return told
+
+    def file_of(self, tile: Tile) -> str:
+        rows, meshes = zip(*map(self.city.at, tile.items), strict=True)
+        uri = f"tiles/{tile.name}.glb"
+        (self.folder / uri).write_bytes(tile_glb(meshes, rows, self.properties))
+        return uri
+
+
+def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
+    """The transform (4, 4) from the tileset's frame at `origin` (3,), world metres, to the globe or, without one, to the world."""
+    if globe is None:
+        frame = np.eye(4)
+        frame[:3, 3] = origin
+        return frame
+    longitude, latitude, _ = globe.geographic(origin[None])[0]
+    return east_north_up(longitude, latitude, globe.to_earth(origin[None])[0])
+
+
+def box_of(boxes: np.ndarray) -> dict[str, list[float]]:
+    """The bounding volume around `boxes` (n, 2, 3): middle, then half of each axis."""
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    return {"box": [*((low + high) / 2).tolist(), *np.diag((high - low) / 2).ravel().tolist()]}
+
+
+def make_room(folder: Path) -> None:
+    """Make the parent of `folder`; raise OutputError where `folder` is no tileset, so that nothing else is ever replaced."""
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        is_ours = not folder.exists() or (folder / TILESET).is_file() or not any(folder.iterdir())
+    except OSError as error:
+        raise output_error(folder, error) from error
+    if not is_ours:
+        raise OutputError(
+            f"expected a new folder or one with a tileset for the tiles, got {folder}; choose another name"
+        )
+
+
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Yield a hidden folder that takes the place of `folder` when the block ends well, and is removed when not."""
+    beside = hidden_name(folder)
+    older = beside.with_name(beside.name + "-older")
+    try:
+        beside.mkdir()
+        yield beside
+        if folder.exists():
+            folder.rename(older)
+        beside.rename(folder)
+    except OSError as error:
+        raise output_error(folder, error) from error
+    finally:
+        for left in (beside, older):
+            shutil.rmtree(left, ignore_errors=True)

@@ -1,0 +1,143 @@
+"""`hiproof view`: the page as headless Chromium shows it, and who is served what."""
+
+import http.client
+import json
+import os
+import re
+import shutil
+import subprocess
+import threading
+from functools import partial
+from http.server import ThreadingHTTPServer
+
+import pytest
+
+from hiproof.cli.view import tiles_of
+from hiproof.errors import HiproofError, InputError
+from hiproof.view.server import HERE, Handler, page_of, server_of
+from hiproof.write.tiles import write_models
+from sample_models import SOLIDS, write_sample_run
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
+
+ACT = """<script>
+const faults = [], say = {}, told = () => document.getElementById("details").innerText;
+window.addEventListener("error", event => faults.push(String(event.message)));
+for (const level of ["error", "warn"]) console[level] = (...texts) => faults.push(texts.join(" "));
+HTMLCanvasElement.prototype.setPointerCapture = () => {};  // knows no pointers that scripts invent
+async function settled() {
+  do { await new Promise(done => setTimeout(done, 50)); scene.paint(); } while (scene.loading);
+}
+function click([x, y]) {
+  const box = scene.canvas.getBoundingClientRect();
+  for (const kind of ["pointerdown", "pointerup"]) scene.canvas.dispatchEvent(
+    new PointerEvent(kind, { clientX: box.left + x, clientY: box.top + y, button: 0, buttons: 1, pointerId: 1 }));
+}
+(async () => {
+  await ready; await settled();
+  say.webgl = Boolean(scene.gl); say.tiles = scene.layers.length;
+  say.legend = document.getElementById("legend").innerText;
+  const { corners, owner } = scene.layers[0].tile, row = owner.length - 1;
+  const top = [0, 1, 2].map(k => (corners[k] + corners[3 + k] + corners[6 + k]) / 3);  // of the first building's roof
+  click(scene.project(top)); say.clicked = told();
+  click([2, scene.canvas.clientHeight - 2]); say.kept = told();
+  document.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" })); say.cleared = told();
+  scene.target[0] += 1e6; scene.paint(); say.away = scene.layers.filter(layer => layer.visible).length;
+  document.dispatchEvent(new KeyboardEvent("keydown", { key: "Home" })); scene.paint();
+  say.home = scene.layers.filter(layer => layer.visible).length;
+  say.faults = faults;
+  document.body.append(Object.assign(document.createElement("pre"), { id: "said", textContent: JSON.stringify(say) }));
+})();
+</script>"""
+
+
+@pytest.fixture(scope="module")
+def tiles(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("view") / "a.3dtiles"
+    parameters = json.dumps({"parts": [{"type": "gable", "parameters": {"width": 8.123}}]})
+    models = [
+        (id, kind, solid, {"parameters": parameters, "rf_slope": 36.87, "unknown": None})
+        for id, (kind, solid) in SOLIDS.items()
+    ]
+    with pytest.warns(UserWarning, match="no CRS"):
+        write_models(folder, models)
+    return folder
+
+
+@pytest.fixture
+def serving():
+    """Serves what a server says in a thread; its address."""
+    servers = []
+
+    def start(server):
+        servers.append(server)
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        return server.server_address[1]
+
+    yield start
+    for server in servers:
+        server.shutdown()
+        server.server_close()
+
+
+def answer(port, path, host=None):
+    connection = http.client.HTTPConnection(HERE, port, timeout=20)
+    connection.request("GET", path, headers={"Host": host} if host else {})
+    response = connection.getresponse()
+    return response.status, response.read()
+
+
+@needs_browser
+def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving, tmp_path):
+    page = page_of("a <run>").replace("</body>", ACT + "</body>")
+    port = serving(ThreadingHTTPServer((HERE, 0), partial(Handler, directory=str(tiles), page=page)))
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={tmp_path / 'profile'}"]
+    command += ["--window-size=900,700", "--virtual-time-budget=8000", "--dump-dom", f"http://{HERE}:{port}/"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    said = re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.DOTALL)
+    assert said, f"the page's scripts did not run to their end: {done.stderr[-2000:]}"
+    say = json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
+    assert say["faults"] == [] and say["webgl"] and say["tiles"] == 1
+    assert "gable" in say["legend"] and "flat" in say["legend"]
+    assert re.search(r"id\s+house-1", say["clicked"]) and re.search(r"rf_slope\s+36.87", say["clicked"])
+    assert re.search(r"part 0\s+gable: width 8.12", say["clicked"]) and "unknown" not in say["clicked"]
+    assert say["kept"] == say["clicked"] and say["cleared"] == ""  # a click beside the buildings changes nothing
+    assert say["away"] == 0 and say["home"] == 1
+
+
+def test_page_and_tiles_are_served(tiles, serving):
+    port = serving(server_of(tiles, "a <run>"))
+    status, page = answer(port, "/")
+    assert status == 200 and b"a &lt;run&gt;" in page and b"http" not in page.replace(b"http://www.w3.org", b"")
+    assert json.loads(answer(port, "/tileset.json")[1])["asset"]["version"] == "1.1"
+    assert answer(port, "/tiles/r.glb")[1][:4] == b"glTF"
+
+
+def test_nothing_outside_is_served(tiles, serving):
+    (tiles.parent / "secret.txt").write_text("x")
+    port = serving(server_of(tiles, "run"))
+    assert answer(port, "/../secret.txt")[0] == 404
+    assert answer(port, "/", host="elsewhere.example")[0] == 403
+
+
+def test_a_port_that_is_taken_is_told(tiles, serving):
+    port = serving(server_of(tiles, "run"))
+    with pytest.raises(InputError, match="try another --port"):
+        server_of(tiles, "run", port)
+
+
+def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys):
+    write_sample_run(tmp_path)
+    folder = tiles_of(tmp_path)
+    made = (folder / "tileset.json").stat().st_mtime_ns
+    assert tiles_of(tmp_path) == folder and (folder / "tileset.json").stat().st_mtime_ns == made
+    os.utime(tmp_path / "buildings.city.jsonl", (made / 1e9 + 10, made / 1e9 + 10))
+    assert (tiles_of(tmp_path) / "tileset.json").stat().st_mtime_ns > made
+    assert tiles_of(folder) == folder
+
+
+def test_a_folder_of_neither_is_refused(tmp_path):
+    with pytest.raises(HiproofError, match="hiproof reconstruct"):
+        tiles_of(tmp_path)

@@ -1,0 +1,328 @@
+"""3D Tiles read back by lines of our own: each building once, in its place, under its own attributes."""
+
+import json
+import shutil
+import subprocess
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from pyproj import CRS
+
+from glb_files import accessor_values, parse_glb, view_bytes
+from hiproof.cli.convert import convert
+from hiproof.errors import HiproofError, InputError, InputWarning
+from hiproof.read.crs import units_of
+from hiproof.write.tiles import Globe, write_models
+from hiproof.write.tiles.properties import NO_NUMBER, Found
+from hiproof.write.tiles.quadtree import quadtree
+from sample_models import ORIGIN, courtyard_solid, gable_solid, write_sample_run
+
+GEOID_M = 43.2
+PLACES = {  # a place on land in each CRS, in its own unit
+    "EPSG:7415": (85000.0, 446000.0),
+    "EPSG:28992": (85000.0, 446000.0),
+    "EPSG:25832": (360000.0, 5700000.0),
+    "EPSG:2154+5720": (652000.0, 6862000.0),
+    "EPSG:2263+6360": (985000.0, 200000.0),
+    "EPSG:32633": (500000.0, 5000000.0),
+}
+
+
+def town(count=60, seed=0):
+    """Houses of many sizes over half a kilometre, attributes that are not always known."""
+    rng = np.random.default_rng(seed)
+    for k in range(count):
+        at = ORIGIN + [*np.round(rng.uniform(0, 500, 2), 2), np.round(rng.uniform(0, 5), 2)]
+        width = float(rng.uniform(4, 30))
+        solid = courtyard_solid(width, width / 3) if k % 5 == 0 else gable_solid(width, 1.5 * width)
+        told = {"k": k, "half known": None if k % 2 else k / 2, "name": None if k % 3 else f"Haus {k} ü", "flag": k > 3}
+        yield f"house-{k}", "flat" if k % 5 == 0 else "gable", solid.moved(at), told
+
+
+@pytest.fixture(scope="module")
+def globe():
+    return Globe.of("EPSG:7415", GEOID_M)
+
+
+@pytest.fixture(scope="module")
+def tiled(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("tiles") / "town.3dtiles"
+    assert write_models(folder, town(), "EPSG:7415", GEOID_M, most=120) == 60
+    return folder, json.loads((folder / "tileset.json").read_text())
+
+
+def tiles_below(tile, above=()):
+    """(tile, those above it) of all tiles."""
+    yield tile, above
+    for child in tile.get("children", ()):
+        yield from tiles_below(child, (*above, tile))
+
+
+def is_inside(xyz, volume, slack=1e-6):
+    """Whether all of `xyz` (n, 3) lie in a box whose axes are those of the frame."""
+    middle, half = np.array(volume["box"][:3]), np.array(volume["box"][3:]).reshape(3, 3)
+    assert (half == np.diag(np.diag(half))).all()
+    return (np.abs(xyz - middle) <= np.diag(half) + slack).all()
+
+
+def corners_of(volume):
+    middle, half = np.array(volume["box"][:3]), np.diag(np.array(volume["box"][3:]).reshape(3, 3))
+    return np.array([middle - half, middle + half])
+
+
+def content_of(folder, tile):
+    """Places (n, 3) in the tileset's frame, z up, the building of each and the table's rows."""
+    document, binary = parse_glb(folder / tile["content"]["uri"])
+    (mesh,) = document["meshes"]
+    (primitive,) = mesh["primitives"]
+    x, y, z = accessor_values(document, binary, primitive["attributes"]["POSITION"]).T.astype(float)
+    tx, ty, tz = document["nodes"][0]["translation"]
+    places = np.column_stack([x + tx, -(z + tz), y + ty])
+    ids = accessor_values(document, binary, primitive["attributes"]["_FEATURE_ID_0"]).astype(int)
+    indices = accessor_values(document, binary, primitive["indices"])
+    return places[indices], ids[indices], rows_of(document, binary)
+
+
+def rows_of(document, binary):
+    extension = document["extensions"]["EXT_structural_metadata"]
+    (table,) = extension["propertyTables"]
+    columns = {}
+    for id, told in extension["schema"]["classes"][table["class"]]["properties"].items():
+        values = view_bytes(document, binary, table["properties"][id]["values"])
+        if told["type"] == "SCALAR":
+            columns[told["name"]] = np.frombuffer(values, "<f8").tolist()
+        else:
+            ends = np.frombuffer(view_bytes(document, binary, table["properties"][id]["stringOffsets"]), "<u4")
+            columns[told["name"]] = [values[a:b].decode() for a, b in pairwise(ends.tolist())]
+    assert {len(column) for column in columns.values()} == {table["count"]}
+    return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
+
+
+def test_every_building_stands_in_one_tile_at_its_place_within_a_centimetre(tiled, globe):
+    folder, tileset = tiled
+    transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
+    expected = {id: solid for id, _, solid, _ in town()}
+    found = []
+    for tile, _ in tiles_below(tileset["root"]):
+        places, ids, rows = content_of(folder, tile)
+        world = globe.from_earth(places @ transform[:3, :3].T + transform[:3, 3])
+        for number, row in enumerate(rows):
+            found.append(row["id"])
+            drawn = world[ids == number].reshape(-1, 3, 3)
+            solid = expected[row["id"]]
+            apart = np.linalg.norm(drawn.reshape(-1, 1, 3) - solid.vertices, axis=2)
+            assert apart.min(axis=1).max() < 0.01 and apart.min(axis=0).max() < 0.01
+            own = drawn - solid.vertices.mean(axis=0)
+            volume = np.einsum("ij,ij->", own[:, 0], np.cross(own[:, 1], own[:, 2])) / 6
+            assert volume > 10  # the triangles close it, and face outwards
+    assert sorted(found) == sorted(expected)
+
+
+def test_attributes_are_those_of_the_building(tiled):
+    folder, tileset = tiled
+    expected = {id: (roof_type, told) for id, roof_type, _, told in town()}
+    for tile, _ in tiles_below(tileset["root"]):
+        for row in content_of(folder, tile)[2]:
+            roof_type, told = expected[row["id"]]
+            assert row["type"] == roof_type and row["k"] == told["k"]
+            assert row["half known"] == (NO_NUMBER if told["half known"] is None else told["half known"])
+            assert row["name"] == (told["name"] or "") and row["flag"] == str(told["flag"]).lower()
+
+
+def test_boxes_hold_what_is_drawn_in_them_and_below(tiled):
+    folder, tileset = tiled
+    for tile, above in tiles_below(tileset["root"]):
+        places, _, _ = content_of(folder, tile)
+        assert is_inside(places, tile["content"]["boundingVolume"])
+        for outer in (tile, *above):
+            assert is_inside(places, outer["boundingVolume"])
+            assert is_inside(corners_of(tile["boundingVolume"]), outer["boundingVolume"])
+
+
+def test_geometric_errors_decrease_to_nothing(tiled):
+    _, tileset = tiled
+    assert len(list(tiles_below(tileset["root"]))) > 5
+    for tile, above in tiles_below(tileset["root"]):
+        assert tile["refine"] == "ADD"
+        assert tile["geometricError"] <= (above[-1] if above else tileset)["geometricError"]
+        assert (tile["geometricError"] > 0) == bool(tile.get("children"))
+
+
+def test_a_tile_is_one_draw_call_of_so_many_triangles(tiled):
+    folder, tileset = tiled
+    for tile, _ in tiles_below(tileset["root"]):
+        places, ids, _ = content_of(folder, tile)
+        assert len(places) // 3 <= 120 or len(set(ids.tolist())) == 1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_quadtree_parts_its_buildings_and_shows_the_largest_first(seed):
+    rng = np.random.default_rng(seed)
+    centres = rng.uniform(0, 10 ** (seed + 2), (200, 2)).round(seed % 2)
+    sizes, triangles = rng.uniform(1, 50, 200), rng.integers(1, 90, 200)
+    if seed == 3:
+        centres[:150] = 5.0  # all in one place
+    root = quadtree(centres, sizes, triangles, most=300, widest=20_000)
+    items, stack = [], [root]
+    while stack:
+        tile = stack.pop()
+        items += tile.items.tolist()
+        assert len(tile.items) < 2 or triangles[tile.items].sum() <= 300
+        if len(tile.items):
+            assert np.ptp(centres[tile.items], axis=0).max() <= 20_000
+            assert sizes[tile.items].min() >= sizes[tile.below()].max(initial=0)
+        stack += tile.children
+    assert sorted(items) == list(range(200))
+
+
+@pytest.mark.parametrize("name", PLACES)
+def test_places_come_back_from_the_globe(name):
+    globe, units = Globe.of(name), units_of(CRS(name))
+    rng = np.random.default_rng(0)
+    world = units.to_metres(np.append(PLACES[name], 0.0)) + rng.uniform(0, 1000, (50, 3))
+    earth = globe.to_earth(world)
+    assert 6.3e6 < np.linalg.norm(earth, axis=1).min() < 6.4e6
+    np.testing.assert_allclose(globe.from_earth(earth), world, atol=1e-3)
+    scale = np.linalg.norm(earth[1:] - earth[0], axis=1) / np.linalg.norm(world[1:] - world[0], axis=1)
+    assert abs(scale - 1).max() < 2e-3  # a projection's own, and metres that are metres
+
+
+def test_a_geoid_height_raises_all_by_as_much():
+    world = np.append(PLACES["EPSG:28992"], 3.0)[None]
+    low, high = (Globe.of("EPSG:28992", height) for height in (0.0, 43.2))
+    assert high.geographic(world)[0, 2] == pytest.approx(46.2)
+    assert np.linalg.norm(high.to_earth(world) - low.to_earth(world)) == pytest.approx(43.2, abs=1e-6)
+    assert "43.2" in high.heights and high.is_known
+
+
+def test_heights_that_are_guessed_are_said_to_be():
+    plan = Globe.of("EPSG:28992")
+    assert not plan.is_known and "names no heights" in plan.heights
+    above_sea = Globe.of("EPSG:7415")
+    if not above_sea.is_known:  # pyproj's grid of the Dutch geoid is seldom installed
+        assert "NAP height" in above_sea.heights and "--geoid-height" in above_sea.heights
+
+
+def test_coordinates_of_another_crs_are_refused():
+    with pytest.raises(InputError, match="no place there"):
+        Globe.of("EPSG:7415").to_earth(np.array([[1e9, 1e9, 0.0]]))
+
+
+def test_without_a_crs_tiles_keep_the_planes_own_axes(tmp_path):
+    with pytest.warns(InputWarning, match="nowhere on the globe"):
+        write_models(tmp_path / "a.3dtiles", town(3))
+    tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
+    assert "transform" not in tileset["root"]
+    places, ids, rows = content_of(tmp_path / "a.3dtiles", tileset["root"])
+    solid = {id: solid for id, _, solid, _ in town(3)}[rows[0]["id"]]
+    world = places[ids == 0] + tileset["asset"]["extras"]["origin"]
+    np.testing.assert_allclose(world.min(axis=0), solid.vertices.min(axis=0), atol=0.001)
+
+
+def test_an_older_tileset_is_replaced_whole(tmp_path):
+    folder = tmp_path / "a.3dtiles"
+    write_models(folder, town(40), "EPSG:7415", GEOID_M, most=60)
+    write_models(folder, town(2), "EPSG:7415", GEOID_M)
+    assert [file.name for file in (folder / "tiles").iterdir()] == ["r.glb"]
+    assert [file.name for file in tmp_path.iterdir()] == ["a.3dtiles"]
+
+
+def test_a_failure_leaves_the_older_tileset(tmp_path):
+    folder = tmp_path / "a.3dtiles"
+    write_models(folder, town(2), "EPSG:7415", GEOID_M)
+    before = (folder / "tiles" / "r.glb").read_bytes()
+    nowhere = "x", "flat", gable_solid().moved(np.array([1e9, 1e9, 0])), {}
+    with pytest.raises(InputError, match="no place there"):
+        write_models(folder, [*town(3), nowhere], "EPSG:7415", GEOID_M)
+    assert (folder / "tiles" / "r.glb").read_bytes() == before
+    assert [file.name for file in tmp_path.iterdir()] == ["a.3dtiles"]
+
+
+def test_a_folder_of_something_else_is_left_alone(tmp_path):
+    (tmp_path / "photos").mkdir()
+    (tmp_path / "photos" / "a.jpg").write_text("x")
+    with pytest.raises(HiproofError, match="choose another name"):
+        write_models(tmp_path / "photos", town(2), "EPSG:7415", GEOID_M)
+    assert (tmp_path / "photos" / "a.jpg").read_text() == "x"
+
+
+def test_no_solids_are_told(tmp_path):
+    with pytest.raises(InputError, match="expected buildings with solids"):
+        write_models(tmp_path / "a.3dtiles", [], "EPSG:7415", GEOID_M)
+    assert not list(tmp_path.iterdir())
+
+
+def test_properties_have_ids_that_the_extension_allows():
+    found = Found()
+    found.add({"a b": 1, "a-b": "x", "9": None, "big": 2**60, "both": 1, "ü": True})
+    found.add({"a b": 2.5, "9": 3, "both": "y"})
+    told = {p.name: (p.id, p.is_number) for p in found.properties()}
+    assert told == {
+        "a b": ("a_b", True),
+        "a-b": ("a_b_2", False),
+        "9": ("_9", True),
+        "big": ("big", False),
+        "both": ("both", False),
+        "ü": ("_", False),
+    }
+
+
+def write_sample_parameters(folder, ids=("house-1", "block 2", "bare")):
+    part = {"type": "gable", "parameters": {"width": 8.0}, "position": [0, 0, 0], "rotation": 0.0, "outlines": []}
+    head = {"hiproof_parameters": 1, "crs": "EPSG:7415", "unit": "auto", "cityjson_offset": None, "compose": {}}
+    records = [{"id": id, "origin": ORIGIN.tolist(), "parts": [part] if id != "bare" else []} for id in ids]
+    (folder / "parameters.jsonl").write_text("\n".join(map(json.dumps, [head, *records])) + "\n")
+
+
+def test_the_command_tells_id_type_and_parameters(tmp_path, capsys):
+    write_sample_run(tmp_path)
+    write_sample_parameters(tmp_path)
+    convert(tmp_path, tmp_path / "city.3dtiles", geoid_height=43.2)
+    assert "2 buildings" in capsys.readouterr().out
+    tileset = json.loads((tmp_path / "city.3dtiles" / "tileset.json").read_text())
+    assert "plus 43.2 m" in tileset["asset"]["extras"]["heights"]
+    rows = content_of(tmp_path / "city.3dtiles", tileset["root"])[2]
+    assert [(row["id"], row["type"]) for row in rows] == [("house-1", "gable"), ("block 2", "flat")]
+    assert json.loads(rows[0]["parameters"])["parts"][0]["parameters"] == {"width": 8.0}
+    assert rows[0]["rf_volume_lod22"] == 1.0 and rows[0]["note"] == ""
+
+
+def test_parameters_of_another_run_are_refused(tmp_path):
+    write_sample_run(tmp_path)
+    write_sample_parameters(tmp_path, ("someone", "else", "bare"))
+    with pytest.raises(InputError, match="of the same run as the models"):
+        convert(tmp_path, tmp_path / "city.3dtiles")
+
+
+def node_has(package):
+    """Whether Node.js finds `package`, and where packages for everyone lie."""
+    if not shutil.which("node") or not shutil.which("npm"):
+        return False, ""
+    root = subprocess.run(["npm", "root", "--global"], capture_output=True, text=True).stdout.strip()
+    done = subprocess.run(["node", "-e", f"require('{package}')"], capture_output=True, env=node_environment(root))
+    return done.returncode == 0, root
+
+
+def node_environment(root):
+    import os
+
+    paths = filter(None, (root, os.environ.get("NODE_PATH")))
+    return os.environ | {"NODE_PATH": os.pathsep.join(paths)}
+
+
+def test_the_gltf_validator_finds_no_fault(tiled):
+    has, root = node_has("gltf-validator")
+    if not has:
+        pytest.skip("no gltf-validator here; npm install --global gltf-validator")
+    script = """
+    const validator = require("gltf-validator"), fs = require("fs");
+    validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1]))).then(report =>
+      console.log(JSON.stringify([report.issues.numErrors, report.issues.numWarnings, report.info.drawCallCount])));
+    """
+    folder, _ = tiled
+    for file in sorted((folder / "tiles").iterdir())[:3]:
+        done = subprocess.run(
+            ["node", "-e", script, str(file)], capture_output=True, text=True, env=node_environment(root), timeout=120
+        )
+        assert json.loads(done.stdout) == [0, 0, 1], done.stderr
