@@ -13,21 +13,14 @@ import shutil
 from pathlib import Path
 from typing import NamedTuple
 
-import numpy as np
-
+from ..formats import asked_fragments
 from ..log import LOGGER
-from ..write.citygml import Member
-from ..write.cityjson import Feature
 from ..write.files import atomic, atomic_file
-from ..write.fragments import Fragments, load_fragments, save_fragments
-from ..write.table_rows import Rows
+from ..write.fragments import Fragment, Fragments, load_fragments, save_fragments
 from .ledger import Ledger, Task
 from .merge import remove_tiles, tile_parts, write_tile
 from .overrides import REDO, load_redo
 from .plan import PLAN_FILE, Plan
-
-TO_DO = Fragments(Member(b"", np.zeros(3), np.zeros(3)), Feature(b"", None), b"", Rows(()))
-"""Stands in a tile's file where a building is to be solved."""
 
 
 class Place(NamedTuple):
@@ -107,7 +100,7 @@ def move_texts(plan: Plan, state: Path, kept: dict[int, Place], redo: dict[str, 
     remove_tiles(state.parent)
     for tile, members in plan.tiles.items():
         if any(i in kept for i in members):
-            parts = [texts_of(kept[i].tile)[kept[i].number] if i in kept else TO_DO for i in members]
+            parts = [texts_of(kept[i].tile)[kept[i].number] if i in kept else to_do(plan) for i in members]
             with atomic_file(after / tile_parts(state, tile).name) as file:
                 save_fragments(file, parts)
             if tile not in redo:
@@ -117,6 +110,11 @@ def move_texts(plan: Plan, state: Path, kept: dict[int, Place], redo: dict[str, 
     shutil.rmtree(state / "points", ignore_errors=True)
     (state / "points").mkdir()
     (state / REDO).unlink(missing_ok=True)
+
+
+def to_do(plan: Plan) -> Fragments:
+    """What stands in a tile's file where a building is to be solved."""
+    return dict.fromkeys(asked_fragments(plan.settings), Fragment(b""))
 
 
 def sorting(tasks: list[Task], again: bool) -> list[Task]:
