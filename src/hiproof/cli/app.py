@@ -12,6 +12,7 @@ from ..log import Level, start
 from .build import build
 from .classify import classify
 from .convert import convert
+from .edit import edit
 from .evaluate import evaluate
 from .options import box_of, with_settings
 from .report import report
@@ -155,5 +156,5 @@ def load(
     raise typer.Exit(run(folder, database, prefix))
 
 
-for command in (build, evaluate, report, convert, view, classify, segment, train):
+for command in (build, edit, evaluate, report, convert, view, classify, segment, train):
     app.command()(command)

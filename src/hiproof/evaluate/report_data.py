@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import shapely
 
-from ..model import ROOF, WALL
+from ..draw.mesh import packed, solid_mesh
 from ..status import Status
 from ..write.colours import TYPE_COLOURS
-from ..write.triangles import face_triangles
 from .metrics import plan_outline, psd
 from .report_pictures import RESIDUAL_STOPS
 from .run import EvaluatedRun
@@ -97,27 +95,14 @@ def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[
 
 def mesh_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
     """Triangles of roofs and walls: corners (t, 3, 3), building (t,), whether roof (t,); roof edges (e, 2, 3)."""
-    corners, owner, is_roof, edges = [np.empty((0, 3, 3))], [], [], [np.empty((0, 2, 3))]
-    for index, model in enumerate(run.models):
-        if model.solid is None:
-            continue
-        xyz = model.solid.vertices - origin
-        for face in model.solid.faces:
-            if face.kind not in (ROOF, WALL):
-                continue
-            triangles = face_triangles(model.solid.vertices, face)
-            corners.append(xyz[triangles])
-            owner += [index] * len(triangles)
-            is_roof += [face.kind == ROOF] * len(triangles)
-            if face.kind == ROOF:
-                edges += [
-                    np.stack([xyz[list(ring)], np.roll(xyz[list(ring)], -1, axis=0)], axis=1) for ring in face.rings
-                ]
+    solids = [(index, model.solid) for index, model in enumerate(run.models) if model.solid is not None]
+    meshes = [solid_mesh(solid.moved(-origin)) for _, solid in solids]
+    owners = [np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)]
     return {
-        "corners": packed(np.concatenate(corners), "<f4"),
-        "owner": packed(np.array(owner), "<u4"),
-        "roof": packed(np.array(is_roof), "u1"),
-        "edges": packed(np.concatenate(edges), "<f4"),
+        "corners": packed(np.concatenate([np.empty((0, 3, 3)), *(mesh.corners for mesh in meshes)]), "<f4"),
+        "owner": packed(np.concatenate([np.empty(0), *owners]), "<u4"),
+        "roof": packed(np.concatenate([np.empty(0), *(mesh.part >= 0 for mesh in meshes)]), "u1"),
+        "edges": packed(np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"),
     }
 
 
@@ -131,11 +116,6 @@ def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
         distances.append(psd(model.solid, points) if model.solid is not None else np.full(len(points), np.inf))
     nearness = np.nan_to_num(np.concatenate(distances), posinf=9.0)
     return {"places": packed(np.concatenate(places), "<f4"), "distances": packed(nearness, "<f4")}
-
-
-def packed(values: np.ndarray, kind: str) -> str:
-    """Base64 of the array's little-endian bytes."""
-    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")
 
 
 def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:

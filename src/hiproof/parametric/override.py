@@ -188,7 +188,7 @@ def as_given(override: Override, points: np.ndarray, building: Building, terrain
         level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
         parts = [{"type": "flat", "parameters": {}, "position": level, "rotation": 0.0, "outlines": [rings]}]
     place = {"origin": frame.origin.tolist(), "outline": rings, "z_ground": ground.z, "ground_source": ground.source}
-    made = build({"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts})
+    made = build({"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts}, settings.compose)
     made = dataclasses.replace(
         made,
         detail="as given",

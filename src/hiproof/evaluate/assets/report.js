@@ -1,44 +1,25 @@
 // The page's behaviour: one selected building and one way of colouring, shown on the map, in 3D and in the panel.
 
 const data = JSON.parse(document.getElementById("data").textContent);
-const bytes = text => Uint8Array.from(atob(text), letter => letter.charCodeAt(0)).buffer;
 const mesh = {
-  corners: new Float32Array(bytes(data.mesh.corners)), owner: new Uint32Array(bytes(data.mesh.owner)),
-  roof: new Uint8Array(bytes(data.mesh.roof)), edges: new Float32Array(bytes(data.mesh.edges)),
+  corners: unpacked(data.mesh.corners, Float32Array), owner: unpacked(data.mesh.owner, Uint32Array),
+  roof: unpacked(data.mesh.roof, Uint8Array), edges: unpacked(data.mesh.edges, Float32Array),
 };
-const places = new Float32Array(bytes(data.points.places)), distances = new Float32Array(bytes(data.points.distances));
-const rgb = colour => [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2), 16));
+const places = unpacked(data.points.places, Float32Array), distances = unpacked(data.points.distances, Float32Array);
 const unknown = "#b5b5b5";
 let mode = "type", selected = -1;
 
-function residualColour(value) {
-  if (value === null) return unknown;
-  let colour = data.colours.residual[0][1];
-  for (const [from, name] of data.colours.residual) if (value >= from) colour = name;
-  return colour;
-}
+function residualColour(value) { return value === null ? unknown : colourByStops(data.colours.residual, value); }
 
 function colourOf(building) {
   return mode === "residual" ? residualColour(building.residual) : data.colours[mode][building[mode]] || unknown;
 }
 
-// Triangles shaded once by their slope to a fixed light, so that no normals are sent to the graphics card.
-const light = new Float32Array(mesh.owner.length);
-for (let t = 0, i = 0; t < light.length; t++, i += 9) {
-  const c = mesh.corners, a = [0, 1, 2].map(k => c[i + 3 + k] - c[i + k]), b = [0, 1, 2].map(k => c[i + 6 + k] - c[i + k]);
-  const n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
-  light[t] = 0.72 + 0.28 * (0.35 * n[0] - 0.5 * n[1] + 0.79 * n[2]) / (Math.hypot(...n) || 1);
-}
+const light = lightOf(mesh.corners);
 
 function meshColours() {
-  const colours = new Uint8Array(12 * mesh.owner.length).fill(255);
   const roofs = data.buildings.map(building => rgb(colourOf(building)));
-  for (let t = 0; t < mesh.owner.length; t++) {
-    const own = mesh.owner[t] === selected ? [255, 45, 111] : roofs[mesh.owner[t]];
-    const base = mesh.roof[t] ? own : [226, 221, 210];
-    for (let v = 0; v < 3; v++) for (let k = 0; k < 3; k++) colours[12 * t + 4 * v + k] = base[k] * light[t];
-  }
-  return colours;
+  return shadedColours(light, t => !mesh.roof[t] ? [226, 221, 210] : mesh.owner[t] === selected ? [255, 45, 111] : roofs[mesh.owner[t]]);
 }
 
 const viewer = new Viewer(document.getElementById("scene"), mesh.corners, mesh.owner);

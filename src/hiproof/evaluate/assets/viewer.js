@@ -1,5 +1,6 @@
 "use strict";
-// A small WebGL view of triangles, lines and points: orbit, pan, zoom and picking, all data in typed arrays.
+// A small WebGL view of triangles, lines and points: orbit, pan, zoom and picking, all data in typed arrays. Shared by all our
+// pages.
 
 const VERTEX = `
 attribute vec3 place; attribute vec4 colour; uniform mat4 matrix; uniform float size; varying vec4 tint;
@@ -9,14 +10,22 @@ const FRAGMENT = `precision mediump float; varying vec4 tint; void main() { gl_F
 class Viewer {
   // corners: Float32Array of triangle corners; owner: building of each triangle; z is up.
   constructor(canvas, corners, owner) {
-    this.canvas = canvas; this.corners = corners; this.owner = owner;
+    this.canvas = canvas; this.setMesh(corners, owner);
     this.gl = canvas.getContext("webgl", { antialias: true });
-    this.layers = []; this.onpick = () => {}; this.frame = 0;
+    this.layers = []; this.onpick = () => {}; this.onpaint = () => {}; this.frame = 0;
     this.home();
     if (!this.gl) return;
     this.program = link(this.gl);
     this.listen();
     new ResizeObserver(() => this.draw()).observe(canvas);
+  }
+
+  // What is picked from; drawn are the layers.
+  setMesh(corners, owner) { this.corners = corners; this.owner = owner; }
+
+  clearLayers() {
+    for (const layer of this.layers) for (const held of [layer.places, layer.colours]) if (held) this.gl.deleteBuffer(held);
+    this.layers = [];
   }
 
   home() {
@@ -87,6 +96,7 @@ class Viewer {
       attribute(gl, this.program, "colour", layer.colours, 4, gl.UNSIGNED_BYTE, true);
       gl.drawArrays(gl[layer.kind], 0, layer.count);
     }
+    this.onpaint();
   }
 
   listen() {
@@ -109,7 +119,7 @@ class Viewer {
       this.draw();
     });
     canvas.addEventListener("pointerup", event => {
-      if (held && moved < 5) { const found = this.pick(event.offsetX, event.offsetY); if (found !== null) this.onpick(found); }
+      if (held && moved < 5) { const found = this.pick(event.offsetX, event.offsetY); if (found !== null) this.onpick(found, event.offsetX, event.offsetY); }
       held = null;
     });
     canvas.addEventListener("wheel", event => {
@@ -132,6 +142,12 @@ class Viewer {
   }
 
   eye() { const { back } = this.axes(); return this.target.map((t, k) => t + this.distance * back[k]); }
+
+  // The place in the scene under a place of the canvas, null for none.
+  placeUnder(x, y) {
+    const ray = this.ray(x, y), { triangle, far } = nearest(this.corners, ray);
+    return triangle < 0 ? null : ray.eye.map((e, k) => e + far * ray.way[k]);
+  }
 
   // Where a place of the scene falls on the canvas, CSS pixels.
   project(place) {
@@ -183,4 +199,38 @@ function attribute(gl, program, name, source, size, kind, normalised) {
   const place = gl.getAttribLocation(program, name);
   gl.bindBuffer(gl.ARRAY_BUFFER, source); gl.enableVertexAttribArray(place);
   gl.vertexAttribPointer(place, size, kind, normalised, 0, 0);
+}
+
+// Base64 of little-endian numbers as they were packed, such as unpacked(text, Float32Array).
+function unpacked(text, Kind) { return new Kind(Uint8Array.from(atob(text), letter => letter.charCodeAt(0)).buffer); }
+
+// [red, green, blue] of "#rrggbb".
+function rgb(colour) { return [1, 3, 5].map(i => parseInt(colour.slice(i, i + 2), 16)); }
+
+// The colour of a distance: `stops` are [from, colour] upwards.
+function colourByStops(stops, value) {
+  let colour = stops[0][1];
+  for (const [from, name] of stops) if (value >= from) colour = name;
+  return colour;
+}
+
+// Triangles shaded once by their slope to a fixed light, so that no normals are sent to the graphics card.
+function lightOf(corners) {
+  const light = new Float32Array(corners.length / 9);
+  for (let t = 0, i = 0; t < light.length; t++, i += 9) {
+    const c = corners, a = [0, 1, 2].map(k => c[i + 3 + k] - c[i + k]), b = [0, 1, 2].map(k => c[i + 6 + k] - c[i + k]);
+    const n = [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
+    light[t] = 0.72 + 0.28 * (0.35 * n[0] - 0.5 * n[1] + 0.79 * n[2]) / (Math.hypot(...n) || 1);
+  }
+  return light;
+}
+
+// Colours of triangles, four bytes a vertex: `colourAt` gives [red, green, blue] of a triangle.
+function shadedColours(light, colourAt) {
+  const colours = new Uint8Array(12 * light.length).fill(255);
+  for (let t = 0; t < light.length; t++) {
+    const base = colourAt(t);
+    for (let v = 0; v < 3; v++) for (let k = 0; k < 3; k++) colours[12 * t + 4 * v + k] = base[k] * light[t];
+  }
+  return colours;
 }

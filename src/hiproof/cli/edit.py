@@ -1,0 +1,42 @@
+"""`hiproof edit`: a page in which a person mends the buildings of a run that need eyes."""
+
+from __future__ import annotations
+
+import getpass
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def edit(
+    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    who: Annotated[str | None, typer.Option(help="name under which edits are kept [default: the user's]")] = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="port of the page [default: any that is free]")] = 0,
+) -> None:
+    """Open a page on this machine to go through doubtful buildings, mend and accept them.
+
+    What is accepted stands in edits.jsonl in the folder, which `--overrides` of the next run obeys. Ctrl-C ends it.
+    """
+    from ..edit.desk import Desk
+    from ..edit.edits import FILE
+    from ..edit.server import Server, Service
+
+    service = Service(Desk(folder, who or user_name()))
+    with Server(service, port) as server:
+        desk = service.desk
+        typer.echo(f"{len(desk.run.rows)} buildings, the most doubtful first; edits go into {folder / FILE}")
+        if desk.points.missing:
+            typer.echo(desk.points.missing, err=True)
+        typer.echo(f"open {service.address}")
+        with suppress(KeyboardInterrupt):  # Ctrl-C is how it ends: all that was accepted is on disk
+            server.serve_forever()
+
+
+def user_name() -> str:
+    """The user's name, "somebody" where the system knows none."""
+    try:
+        return getpass.getuser()
+    except (OSError, KeyError, ImportError):
+        return "somebody"

@@ -1,0 +1,40 @@
+"""A solid as a page draws it: triangles of roofs and walls, the roof's edges, packed for JavaScript."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import ROOF, WALL, Solid
+from ..write.triangles import face_triangles
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Corners (t, 3, 3) of triangles, the part (t,) that each roofs (-1: a wall), ends (e, 2, 3) of the roof's edges."""
+
+    corners: np.ndarray
+    part: np.ndarray
+    edges: np.ndarray
+
+
+def solid_mesh(solid: Solid) -> Mesh:
+    """The mesh of a solid, in its own frame; faces on the ground are left out."""
+    corners, part, edges = [np.empty((0, 3, 3))], [], [np.empty((0, 2, 3))]
+    for face in solid.faces:
+        if face.kind not in (ROOF, WALL):
+            continue
+        triangles = face_triangles(solid.vertices, face)
+        corners.append(solid.vertices[triangles])
+        part += [max(face.part, 0) if face.kind == ROOF else -1] * len(triangles)
+        if face.kind == ROOF:
+            rings = (solid.vertices[list(ring)] for ring in face.rings)
+            edges += [np.stack([ring, np.roll(ring, -1, axis=0)], axis=1) for ring in rings]
+    return Mesh(np.concatenate(corners), np.array(part, int), np.concatenate(edges))
+
+
+def packed(values: np.ndarray, kind: str) -> str:
+    """Base64 of the array's little-endian bytes."""
+    return base64.b64encode(np.ascontiguousarray(values, kind).tobytes()).decode("ascii")

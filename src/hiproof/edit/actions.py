@@ -1,0 +1,115 @@
+"""One edit of a building, as the page asks for it: parts in, a building out, by the functions of `parametric`."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..model import Building, Quality
+from ..parametric.arrange import dormer_on, merged_parts, split_part
+from ..parametric.building import build
+from ..parametric.change import changed_part
+from ..parametric.edit import BY_HAND
+from ..parametric.record import list_at, mapping, number, place
+from ..parametric.refit import measured
+from ..settings import ComposeSettings, Settings
+from ..status import Status
+
+Record = Mapping[str, Any]
+
+
+def edited(
+    record: Record, asked: Record, points: np.ndarray, compose: ComposeSettings | None = None, is_measured: bool = True
+) -> Building:
+    """The building of `record` (an object of parameters.jsonl) after the edit `asked`: {"action": ..., "part": ..., ...}.
+
+    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). Raises
+    InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
+    """
+    action = mapping(asked, "an edit").get("action")
+    if action == "refit":
+        return build(by_hand(record), compose).refit(points, held_of(asked), Settings())
+    if action not in ACTIONS:
+        raise InputError(f"expected an edit ({', '.join(ACTIONS)}, refit), got {action!r:.40}; choose one")
+    parts = list_at(record, "parts")
+    found = build(by_hand(record) | {"parts": ACTIONS[action](record, parts, asked)}, compose)
+    found = dataclasses.replace(found, quality=Quality())  # no figure of the earlier model stays
+    local = found.roof.frame.to_local(points)
+    return measured(found, local, Settings()) if is_measured and len(local) else found
+
+
+def by_hand(record: Record) -> dict[str, Any]:
+    return {**record, "status": Status.MODELLED.code, "detail": BY_HAND}
+
+
+def shown(record: Record, parts: list, asked: Record) -> list:
+    """Nothing changed: the building as its parts say."""
+    return parts
+
+
+def change(record: Record, parts: list, asked: Record) -> list:
+    """Part `part` with the values of `change`, as `Building.with_part` takes them."""
+    index = part_at(parts, asked, "part")
+    changed = changed_part(parts[index], dict(mapping(asked.get("change"), "change")), record["origin"][2])
+    return [*parts[:index], changed, *parts[index + 1 :]]
+
+
+def remove(record: Record, parts: list, asked: Record) -> list:
+    index = part_at(parts, asked, "part")
+    if len(parts) < 2:
+        raise InputError("expected two or more parts to leave one out, got one; keep it, or change its type")
+    return [*parts[:index], *parts[index + 1 :]]
+
+
+def split(record: Record, parts: list, asked: Record) -> list:
+    """Part `part` cut across `side` at `share` of it."""
+    index = part_at(parts, asked, "part")
+    share = number(asked.get("share", 0.5), "share")
+    return [*parts[:index], *split_part(parts[index], asked.get("side", "length"), share), *parts[index + 1 :]]
+
+
+def merge(record: Record, parts: list, asked: Record) -> list:
+    """Parts `part` and `other` as one, in the place of the first."""
+    first, second = part_at(parts, asked, "part"), part_at(parts, asked, "other")
+    if first == second:
+        raise InputError("expected two parts to merge, got one twice; choose another")
+    merged = merged_parts(parts[first], parts[second])
+    return [merged if index == first else part for index, part in enumerate(parts) if index != second]
+
+
+def dormer(record: Record, parts: list, asked: Record) -> list:
+    """A dormer on part `part` at `place`, [x, y, z] about the origin, or half-way up its slope."""
+    index = part_at(parts, asked, "part")
+    at = None if asked.get("place") is None else tuple(place(asked["place"], "place")[:2])
+    return [*parts, dormer_on(build(record).roof, index, at)]
+
+
+ACTIONS: dict[str, Callable[[Record, list, Record], list]] = {
+    "show": shown,
+    "change": change,
+    "remove": remove,
+    "split": split,
+    "merge": merge,
+    "dormer": dormer,
+}
+
+
+def part_at(parts: list, asked: Record, name: str) -> int:
+    """The index of a part that an edit names."""
+    index = asked.get(name)
+    if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(parts):
+        raise InputError(f"expected {name} from 0 to {len(parts) - 1}, got {index!r:.40}; choose one of the parts")
+    return index
+
+
+def held_of(asked: Record) -> dict[int, tuple[str, ...]]:
+    """What a refit holds: names of parameters, and "z", by part."""
+    held = mapping(asked.get("held") or {}, "held")
+    try:
+        return {int(index): tuple(map(str, names)) for index, names in held.items()}
+    except (TypeError, ValueError) as error:
+        raise InputError(f"expected held as names by part, got {error}; give part numbers and lists") from error

@@ -1,0 +1,341 @@
+"use strict";
+// The page's behaviour. The server keeps no drafts: every edit sends the parts it starts from, and the page keeps what came
+// before for undo. Edits go one after the other, in the order of keys and clicks.
+
+const $ = id => document.getElementById(id);
+let start = { types: [], colours: {}, stops: [[0, "#000000"]], wall: "#cccccc" };
+let rows = [], drafts = new Map(), now = null, clicked = null, merging = false, queue = Promise.resolve();
+
+class Refused extends Error { constructor(answer, code) { super(answer.error || `the server answered ${code}`); this.answer = answer; this.code = code; } }
+
+async function answered(request) {
+  const response = await request.catch(() => { throw new Refused({ error: "the server does not answer; is `hiproof edit` still running? Nothing here is lost" }, 0); });
+  const answer = await response.json();
+  if (!response.ok) throw new Refused(answer, response.status);
+  return answer;
+}
+const ask = (name, query = {}) => answered(fetch(`${name}?${new URLSearchParams(query)}`));
+const tell = (name, body) => answered(fetch(name, { method: "POST", headers: { "Content-Type": "application/json" }, body: JSON.stringify({ id: now.id, ...body }) }));
+
+function say(text, wrong = false) { $("say").textContent = text; $("say").classList.toggle("wrong", wrong); }
+
+// What is done waits for what was asked before; a refusal becomes a sentence.
+function inTurn(action) {
+  queue = queue.then(action).catch(error => { say(error.message, true); if (!(error instanceof Refused)) throw error; });
+  return queue;
+}
+
+// ---- the list
+
+async function list() {
+  const found = await ask("buildings", { find: $("find").value.trim() });
+  rows = found.rows;
+  $("count").textContent = `${found.all}, ${found.accepted} accepted`;
+  showList();
+}
+
+function showList() {
+  $("list").replaceChildren(...rows.map(row => {
+    const item = document.createElement("li"), small = document.createElement("small");
+    small.textContent = row.reasons.join(", ") || (row.share === null ? "no points" : `${Math.round(100 * row.share)} % within 0.2 m`);
+    item.append(`${row.id} ${row.type || "no model"}`, small);
+    item.dataset.id = row.id;
+    item.className = [now && row.id === now.id ? "current" : "", drafts.get(row.id)?.dirty ? "draft" : row.is_accepted ? "accepted" : ""].join(" ");
+    item.addEventListener("click", () => inTurn(() => open(row.id)));
+    return item;
+  }));
+  $("list").querySelector(".current")?.scrollIntoView({ block: "nearest" });
+}
+
+// The next building that is not accepted yet, or the one before, whatever it is.
+function step(by) {
+  const here = rows.findIndex(row => now && row.id === now.id);
+  for (let i = here + by; i >= 0 && i < rows.length; i += by) if (by < 0 || !rows[i].is_accepted) return open(rows[i].id);
+  say(by > 0 ? "no further building in the list waits" : "this is the first of the list");
+}
+
+// ---- one building
+
+async function open(id) {
+    const found = await ask("building", { id }), known = drafts.get(id);
+  const isKnown = known && known.version === found.version && known.dirty;
+  now = isKnown ? known : { id, version: found.version, accepted: found.accepted, model: found, first: found.figures, history: [], dirty: false, held: {}, part: 0, cloud: null };
+  drafts.set(id, now);
+  now.reasons = found.reasons; now.outcome = found.outcome;
+  clicked = null; merging = false; say(found.error || "", Boolean(found.error)); $("note").value = ""; $("tried").replaceChildren();
+  if (!isKnown) now.part = largest(found.handles || []);
+  show(now.model, true);
+  showList();
+  if (!now.model.mesh) return;
+  now.cloud = await ask("points", { id });
+  if (now.cloud.missing) say(now.cloud.missing);
+  if (now.cloud.count) { const model = await tell("change", { parts: now.model.parts, asked: { action: "show" } }); now.first = isKnown ? now.first : model.figures; show(model); }
+}
+
+function largest(handles) {
+  const areas = handles.map(h => (h.width || 0) * (h.length || 0));
+  return Math.max(areas.indexOf(Math.max(...areas)), 0);
+}
+
+function show(model, home = false) {
+  now.model = model;
+  now.part = Math.min(now.part, Math.max((model.parts || []).length - 1, 0));
+  $("title").textContent = `${now.id}: ${model.type || "no model"}`;
+  $("reasons").textContent = [...now.reasons, now.outcome].filter(Boolean).join("; ");
+  const accepted = now.accepted;
+  $("accepted").textContent = accepted ? `accepted by ${accepted.who || "somebody"}, ${accepted.when || "some time ago"}${accepted.note ? `: ${accepted.note}` : ""} ` : "";
+  if (accepted) $("accepted").append(takeBack());
+  draw(home);
+  showParts();
+  showFigures();
+}
+
+const FIGURES = [["share_within_20cm", "points within 0.2 m of the roof", v => `${(100 * v).toFixed(1)} %`], ["unexplained_area_m2", "unexplained area", v => `${v.toFixed(0)} m²`],
+  ["rmse", "RMSE", v => `${v.toFixed(3)} m`], ["volume_m3", "volume", v => `${v.toFixed(0)} m³`], ["ridge_height", "highest ridge", v => `${v.toFixed(2)} m`], ["points", "points", v => v]];
+
+function showFigures() {
+  $("figures").replaceChildren();
+  for (const [name, title, text] of FIGURES) {
+    const value = now.model.figures?.[name], was = now.first?.[name];
+    if (value === null || value === undefined) continue;
+    const row = $("figures").insertRow();
+    row.insertCell().textContent = title;
+    const cell = row.insertCell(); cell.textContent = text(value); cell.dataset.figure = name; cell.dataset.value = value;
+    row.insertCell().textContent = was !== null && was !== undefined && was !== value ? `was ${text(was)}` : "";
+  }
+}
+
+// ---- the view
+
+const viewer = new Viewer($("scene"), new Float32Array(0), new Int32Array(0));
+const handles = new Handles(viewer, $("handles"));
+if (!viewer.gl) say("this browser offers no WebGL, so there is no 3D view; numbers and keys work");
+
+function draw(home) {
+  viewer.clearLayers();
+  const mesh = now.model.mesh;
+  if (!mesh) { viewer.setMesh(new Float32Array(0), new Int32Array(0)); handles.show([]); viewer.draw(); return; }
+  const corners = unpacked(mesh.corners, Float32Array), owner = unpacked(mesh.part, Int32Array), edges = unpacked(mesh.edges, Float32Array);
+  viewer.setMesh(corners, owner);
+  const colours = now.model.parts.map(part => rgb(start.colours[part.type] || "#b5b5b5")), wall = rgb(start.wall);
+  const colourAt = t => owner[t] < 0 ? wall : owner[t] === now.part ? [255, 120, 160] : colours[owner[t]] || wall;
+  if ($("show-roof").checked) viewer.addLayer("TRIANGLES", corners, shadedColours(lightOf(corners), colourAt));
+  viewer.addLayer("LINES", edges, new Uint8Array(edges.length / 3 * 4).map((_, i) => i % 4 === 3 ? 255 : 60));
+  drawCloud();
+  if (home) { viewer.home(); viewer.distance *= 1.25; }
+  handles.show(handlesOf(now.model.handles[now.part], now.model.parts[now.part], now.model.origin[2]));
+  viewer.draw();
+}
+
+function drawCloud() {
+  const gaps = now.model.gaps ? unpacked(now.model.gaps, Float32Array) : [];
+  if (!now.cloud?.places || !$("show-points").checked) return;
+  const places = unpacked(now.cloud.places, Float32Array), colours = new Uint8Array(places.length / 3 * 4).fill(255);
+  gaps.forEach((gap, i) => colours.set(rgb(colourByStops(start.stops, Math.abs(gap))), 4 * i));
+  viewer.addLayer("POINTS", places, colours);
+}
+
+viewer.onpick = (owner, x, y) => { if (owner < 0) return; clicked = viewer.placeUnder(x, y); if (merging) return inTurn(() => mergeWith(owner)); choose(owner); };
+
+function choose(index) { now.part = index; clicked = clicked && viewer.owner.length ? clicked : null; draw(false); showParts(); }
+
+// While a hand drags, only the newest place counts; the edit stands when the hand lets go.
+let drag = null;
+handles.ondrag = (handle, change) => {
+  drag ??= { before: snapshot(), parts: now.model.parts, busy: false, wanted: null, change: null };
+  drag.wanted = change;
+  if (!drag.busy) follow(drag, handle);
+};
+async function follow(drag, handle) {
+  drag.busy = true;
+  while (drag.wanted) {
+    const change = drag.wanted; drag.wanted = null;
+    try {
+      show(await tell("change", { parts: drag.parts, asked: { action: "change", part: now.part, change }, dragged: true }));
+      drag.change = change; say("");
+    } catch (error) { say(error.message, true); }
+  }
+  drag.busy = false;
+  drag.idle?.();
+}
+handles.ondrop = handle => inTurn(async () => {
+  const done = drag; drag = null;
+  if (!done) return;
+  if (done.busy) await new Promise(resolve => { done.idle = resolve; });
+  if (!done.change) return;
+  const model = await tell("change", { parts: done.parts, asked: { action: "change", part: now.part, change: done.change } });
+  now.history.push(done.before); now.dirty = true;
+  if (handle.name === "ridge" || handle.name === "eave") pin(now.part, heightsOf(now.model.parts[now.part]));
+  show(model); showList();
+});
+
+// ---- edits
+
+function snapshot() { return { model: now.model, held: structuredClone(now.held), part: now.part }; }
+
+async function edit(asked, after = () => {}) {
+  if (!now?.model.parts?.length) return say("this building has no parts to change");
+  const before = snapshot(), began = performance.now(), model = await tell("change", { parts: now.model.parts, asked });
+  now.history.push(before); now.dirty = true; after(); say(""); show(model); showList();
+  $("say").dataset.ms = (performance.now() - began).toFixed(1);
+}
+
+const heightsOf = part => ["z", ...Object.keys(part.parameters).filter(name => /^(height|hip_height|break_height|eave_step|pitch_|eave_)/.test(name))];
+function pin(index, names) { now.held[index] = [...new Set([...(now.held[index] || []), ...names])]; }
+function unpin(index, name) { now.held[index] = (now.held[index] || []).filter(held => held !== name); }
+const changePart = (change, names) => inTurn(() => edit({ action: "change", part: now.part, change }, () => pin(now.part, names)));
+const setType = type => inTurn(() => edit({ action: "change", part: now.part, change: { type } }, () => { delete now.held[now.part]; }));
+const forgetPins = () => { now.held = {}; };
+const refit = () => inTurn(() => {
+  if (!now?.cloud?.count) return say(now?.cloud?.missing || "no points to refit to", true);
+  return edit({ action: "refit", held: now.held });
+});
+const split = side => inTurn(() => edit({ action: "split", part: now.part, side }, forgetPins));
+const remove = () => inTurn(() => edit({ action: "remove", part: now.part }, forgetPins));
+const dormer = () => inTurn(async () => {
+  await edit({ action: "dormer", part: now.part, place: clicked });
+  now.part = now.model.parts.length - 1; show(now.model);
+});
+
+function merge() {
+  if (now?.model.parts?.length === 2) return inTurn(() => mergeWith(1 - now.part));
+  merging = true; say("choose the part to merge with");
+}
+async function mergeWith(other) {
+  merging = false;
+  if (other < 0 || other === now.part) return say("choose another part");
+  const kept = now.part - (other < now.part ? 1 : 0);
+  await edit({ action: "merge", part: now.part, other }, () => { forgetPins(); });
+  now.part = kept; show(now.model);
+}
+
+const undo = () => inTurn(() => {
+  const before = now?.history.pop();
+  if (!before) return say("nothing to undo");
+  now.held = before.held; now.part = before.part; now.dirty = true; say(""); show(before.model); showList();
+});
+
+async function tryTypes() {
+  if (!now?.cloud?.count) return say(now?.cloud?.missing || "no points to try types on", true);
+  say("trying every type ...");
+  const { types } = await tell("alternatives", { parts: now.model.parts, part: now.part });
+  say("");
+  $("tried").replaceChildren(...types.map(row => {
+    const button = document.createElement("button");
+    button.textContent = `${row.type} ${row.share === null ? "" : (100 * row.share).toFixed(1) + " %"}`;
+    button.dataset.try = row.type;
+    button.addEventListener("click", () => { setType(row.type); refit(); });
+    return button;
+  }));
+}
+
+async function accept(version = now?.version) {
+  if (!now?.model.parts?.length) return say("this building has no parts to accept");
+  try {
+    const answer = await tell("accept", { parts: now.model.parts, version, note: $("note").value });
+    now.version = answer.version; now.accepted = { who: start.who, when: answer.when, note: $("note").value }; now.dirty = false;
+    say("accepted");
+  } catch (error) {
+    if (error.code !== 409) throw error;
+    return conflict(error);
+  }
+  await list(); show(now.model);
+}
+
+// A button that takes an accepted edit back: the building is the run's again.
+function takeBack() {
+  const button = document.createElement("button");
+  button.id = "withdraw"; button.textContent = "take back";
+  button.addEventListener("click", () => inTurn(async () => {
+    await tell("withdraw", { version: now.version });
+    now.dirty = false; drafts.delete(now.id); await list(); await open(now.id); say("taken back");
+  }));
+  return button;
+}
+
+// Another window was faster: the person decides.
+function conflict(error) {
+  say(error.message + " ", true);
+  const choices = [["look at theirs", "theirs", () => { now.dirty = false; return open(now.id); }], ["accept mine all the same", "mine", () => accept(error.answer.version)]];
+  for (const [text, id, action] of choices) {
+    const button = document.createElement("button");
+    button.textContent = text; button.id = id; button.addEventListener("click", () => inTurn(action));
+    $("say").append(button);
+  }
+}
+
+// ---- the panel
+
+function showParts() {
+  const parts = now.model.parts || [];
+  $("parts").replaceChildren(...parts.map((part, index) => {
+    const row = document.createElement("div"), swatch = document.createElement("i");
+    swatch.style.background = start.colours[part.type] || "#b5b5b5";
+    row.className = `part${index === now.part ? " current" : ""}`; row.dataset.part = index;
+    row.append(swatch, `${index} ${part.type}`);
+    row.addEventListener("click", () => { clicked = null; if (merging) inTurn(() => mergeWith(index)); else choose(index); });
+    return row;
+  }));
+  showNumbers(parts[now.part], now.model.handles?.[now.part]);
+}
+
+function showNumbers(part, handle) {
+  $("numbers").replaceChildren(); $("part-title").textContent = part ? `Part ${now.part}` : "";
+  $("drawing").hidden = !part;
+  if (!part) return;
+  if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?type=${part.type}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
+  const select = document.createElement("select");
+  select.id = "type"; select.append(...start.types.map(type => new Option(type, type, false, type === part.type)));
+  select.addEventListener("change", () => { select.blur(); setType(select.value); });
+  numberRow("type", select);
+  const z = now.model.origin[2], sigma = part.sigma || {};
+  if (handle?.place) {
+    numberRow("ridge", input("ridge_height", z + handle.ridge, value => changePart({ ridge_height: value }, heightsOf(part))), "m");
+    numberRow("eave", input("eave_height", z + handle.eave, value => changePart({ eave_height: value, ...(handle.ridge > handle.eave ? { ridge_height: z + handle.ridge } : {}) }, heightsOf(part))), "m", sigma.t_z, "z");
+  }
+  for (const [name, value] of Object.entries(part.parameters)) numberRow(name, input(name, value, v => changePart({ [name]: v }, [name])), unitOf(name), sigma[name], ["width", "length", "teeth"].includes(name) ? null : name);
+  const [x, y] = part.position;
+  numberRow("x", input("x", x, v => changePart({ position: [v, y, part.position[2]] }, [])), "m", sigma.t_x);
+  numberRow("y", input("y", y, v => changePart({ position: [x, v, part.position[2]] }, [])), "m", sigma.t_y);
+  numberRow("rotation", input("rotation", part.rotation || 0, v => changePart({ rotation: v }, [])), "°", sigma.rotation);
+}
+
+const unitOf = name => /^(pitch|skew)_/.test(name) ? "°" : name === "teeth" ? "" : "m";
+
+function input(name, value, changed) {
+  const field = document.createElement("input");
+  field.type = "number"; field.step = "any"; field.value = Number(value.toFixed(3)); field.dataset.name = name;
+  field.addEventListener("change", () => { const number = field.valueAsNumber; field.blur(); if (Number.isFinite(number)) changed(number); else show(now.model); });
+  return field;
+}
+
+// A row: name, field, unit, standard deviation, and a pin where a refit may change the number.
+function numberRow(title, field, unit = "", sigma = undefined, pinned = null) {
+  const row = $("numbers").insertRow();
+  row.insertCell().textContent = title; row.insertCell().append(field); row.insertCell().textContent = unit;
+  row.insertCell().textContent = sigma === undefined ? "" : `± ${sigma.toFixed(2)}`;
+  const cell = row.insertCell();
+  if (!pinned) return;
+  const label = document.createElement("label"), box = document.createElement("input"), index = now.part;
+  box.type = "checkbox"; box.checked = (now.held[index] || []).includes(pinned); box.dataset.pin = pinned;
+  box.addEventListener("change", () => { box.blur(); if (box.checked) pin(index, [pinned]); else unpin(index, pinned); });
+  label.title = "a refit keeps it"; label.append(box, "pin"); cell.append(label);
+}
+
+// ---- clicks and keys
+
+const next = () => inTurn(() => step(1)), previous = () => inTurn(() => step(-1)), acceptNow = () => inTurn(() => accept());
+const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: () => split("length"), "split-width": () => split("width"), merge, dormer, remove, try: () => inTurn(tryTypes) };
+for (const [id, action] of Object.entries(BUTTONS)) $(id).addEventListener("click", event => { event.currentTarget.blur(); action(); });
+const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: () => split("length"), m: merge, d: dormer, Delete: remove, t: () => inTurn(tryTypes) };
+document.addEventListener("keydown", event => {
+  if ((event.ctrlKey || event.metaKey) && event.key === "z") { event.preventDefault(); undo(); return; }
+  if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) { if (event.key === "Escape" || (event.key === "Enter" && event.target.id === "note")) event.target.blur(); return; }
+  if (/^[1-9]$/.test(event.key) && now?.model.parts?.length >= Number(event.key)) choose(Number(event.key) - 1);
+  else if (KEYS[event.key]) { event.preventDefault(); KEYS[event.key](); }
+});
+$("find").addEventListener("change", () => inTurn(list));
+for (const id of ["show-points", "show-roof"]) $(id).addEventListener("change", () => { if (now) draw(false); });
+addEventListener("beforeunload", event => { if ([...drafts.values()].some(draft => draft.dirty)) event.preventDefault(); });
+
+inTurn(async () => { start = await ask("start"); await list(); if (rows.length) await open(rows[0].id); if (start.missing) say(start.missing); });

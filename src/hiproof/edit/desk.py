@@ -1,0 +1,151 @@
+"""What the page may ask: the list of buildings, one building, its points, an edit, and the two that write: accept, take back."""
+
+from __future__ import annotations
+
+import datetime
+import functools
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..city.overrides import read_overrides
+from ..draw.mesh import packed
+from ..draw.primitives import primitive_svg
+from ..errors import HiproofError, InputError
+from ..evaluate.run import run_record
+from ..parametric.building import build
+from ..parametric.record import building_of, list_at, number, text_at
+from ..primitives.family import NAMES
+from ..write.building_attributes import plain_text
+from ..write.parameters import building_record
+from .actions import edited
+from .edits import FILE, Edits
+from .folder import Row, RunFolder
+from .points import RunPoints
+from .seen import drawn, seen
+
+MOST_ROWS = 500  # of the list at once; others are found by their id
+MOST_NOTE = 500
+BELONGS = ("origin", "outline", "z_ground", "parts")  # of an accepted edit, in place of the run's
+
+
+class Desk:
+    """The buildings of the run in `folder`, and the edits that `who` accepts."""
+
+    def __init__(self, folder: Path, who: str) -> None:
+        self.run, self.who = RunFolder(folder), plain_text(who)[:MOST_NOTE]
+        self.edits, self.points = Edits(folder, obeyed_by(folder)), RunPoints(folder)
+
+    def buildings(self, find: str = "") -> dict[str, Any]:
+        """The most doubtful buildings, of those whose id holds `find`."""
+        self.run.refresh()
+        self.edits.of("")
+        found = [row for row in self.run.rows if find in row.id]
+        rows = [self.row(row) for row in found[:MOST_ROWS]]
+        accepted = sum(id in self.run.by_id for id in self.edits.records)
+        return {"rows": rows, "found": len(found), "all": len(self.run.rows), "accepted": accepted}
+
+    def row(self, row: Row) -> dict[str, Any]:
+        return {
+            "id": row.id,
+            "type": row.type,
+            "share": row.share,
+            "doubt": row.doubt.amount,
+            "reasons": row.doubt.reasons,
+            "is_accepted": row.id in self.edits.records,
+        }
+
+    def record(self, id: str) -> tuple[dict[str, Any], dict[str, Any] | None, str]:
+        """A building's object with what was accepted of it, that override, and its version."""
+        record, (override, version) = self.run.record(id), self.edits.of(id)
+        if override and isinstance(override.get("parts"), list):
+            record = record | {name: override[name] for name in BELONGS if name in override}
+        return record, override, version
+
+    def building(self, id: str) -> dict[str, Any]:
+        """A building as it is now: its mesh and parts, or a sentence why there are none."""
+        record, override, version = self.record(id)
+        told = {name: (override or {}).get(name) for name in ("who", "when", "note")}
+        found = {"id": id, "version": version, "accepted": told if override else None, "parts": record.get("parts")}
+        found |= {"outcome": record.get("detail") or "", "reasons": self.run.by_id[id].doubt.reasons}
+        if not record.get("parts"):
+            return found | {"error": record.get("detail") or "no model"}
+        try:
+            return found | seen(build(record, self.run.head.compose), np.zeros((0, 3)))
+        except HiproofError as error:
+            return found | {"error": str(error)}
+
+    def cloud(self, id: str) -> dict[str, Any]:
+        """The points drawn of a building, about the origin of its roof; `missing` says why there are none."""
+        if self.points.missing:
+            return {"places": "", "count": 0, "missing": self.points.missing}
+        building = building_of(self.record(id)[0])
+        points = self.points.of(building)
+        missing = "" if len(points) else "the run has no points of this building"
+        places = building.roof.frame.to_local(drawn(points))
+        return {"places": packed(places, "<f4"), "count": len(points), "missing": missing}
+
+    def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
+        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        points = self.points_of(record)
+        found = edited(record, body.get("asked"), points, self.run.head.compose, not body.get("dragged"))
+        return seen(found, drawn(points))
+
+    def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
+        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        points, tried = self.points_of(record), []
+        for kind in NAMES:
+            asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
+            try:
+                changed = building_record(edited(record, asked, points, self.run.head.compose, False))
+                found = edited(changed, {"action": "refit"}, points, self.run.head.compose)
+            except HiproofError:
+                continue
+            tried.append({"type": kind, "share": number_or_none(found.quality.share_within_20cm)})
+        return {"types": sorted(tried, key=lambda row: -(row["share"] or 0.0))}
+
+    def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Keep the page's parts as an override of the building, if it is still of the `version` that the page knows."""
+        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        found = building_record(edited(record, {"action": "show"}, np.zeros((0, 3)), self.run.head.compose))
+        override = {"id": id, **{name: found[name] for name in ("origin", "outline", "parts")}}
+        known = self.edits.of(id)[0] or {}
+        if "z_ground" in known:
+            override["z_ground"] = number(known["z_ground"], "z_ground")
+        now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
+        note = plain_text(text_at(body, "note")).strip()[:MOST_NOTE]
+        override |= {"who": self.who, "when": now} | ({"note": note} if note else {})
+        return {"version": self.edits.put(id, override, text_at(body, "version")), "when": now}
+
+    def withdraw(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """Take an accepted edit back: the building is the run's again."""
+        self.run.record(id)
+        return {"version": self.edits.put(id, None, text_at(body, "version"))}
+
+    def points_of(self, record: Mapping[str, Any]) -> np.ndarray:
+        """World points (n, 3) of a building; none where the run has none."""
+        return np.zeros((0, 3)) if self.points.missing else self.points.of(building_of(record))
+
+
+@functools.cache
+def drawing(kind: str) -> str:
+    """The figure of a roof type with its parameters, as SVG. Raises InputError for no type."""
+    if kind not in NAMES:
+        raise InputError(f"expected a roof type ({', '.join(NAMES)}), got {kind!r:.40}; choose one")
+    return primitive_svg(kind)
+
+
+def number_or_none(value: float) -> float | None:
+    return round(float(value), 4) if np.isfinite(value) else None
+
+
+def obeyed_by(folder: Path) -> dict[str, dict[str, Any]]:
+    """The overrides that the run in `folder` obeyed, so that one file holds them and the edits; none if they are gone."""
+    path = (run_record(folder).get("inputs") or {}).get("overrides")
+    if not isinstance(path, str) or not Path(path).is_file() or Path(path).name == FILE:
+        return {}
+    return dict(read_overrides(path))

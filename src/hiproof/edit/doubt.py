@@ -1,0 +1,88 @@
+"""How much a building needs eyes, told from what the run wrote of it: a number, and why."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from ..status import Status
+
+POOR_SHARE = 0.9  # of points within 0.2 m of the roof
+CLOSE_CALL = 0.2  # by which the most probable type leads
+LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
+LOOSE_M = 0.3  # standard deviation of a part that few points support
+UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT)
+LENGTHS_APART = ("pitch_", "skew_", "rotation")
+
+
+@dataclass(frozen=True)
+class Doubt:
+    """`amount` is 0 where nothing speaks against the model; `reasons` are short phrases."""
+
+    amount: float
+    reasons: tuple[str, ...]
+
+
+def doubt_of(record: Mapping[str, Any]) -> Doubt:
+    """The doubt about a building, from its object in parameters.jsonl.
+
+    >>> doubt_of({"status": "modelled", "parts": [], "residuals": {"share_within_20cm": 0.6}})
+    Doubt(amount=0.4, reasons=('60 % within 0.2 m',))
+    """
+    found = [poor_share(record), unsure_status(record), unexplained(record), loose_parts(record), close_call(record)]
+    told = [pair for pair in found if pair is not None]
+    return Doubt(round(sum(amount for amount, _ in told), 4), tuple(reason for _, reason in told if reason))
+
+
+def poor_share(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """Points away from the roof; buildings that fit well are still sorted by it."""
+    share = (record.get("residuals") or {}).get("share_within_20cm")
+    if share is None:
+        return None
+    return 1.0 - share, f"{100 * share:.0f} % within 0.2 m" if share < POOR_SHARE else ""
+
+
+def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """An outcome that the run itself calls doubtful."""
+    unsure = {status.code: status for status in UNSURE}
+    status = unsure.get(record.get("status", ""))
+    return None if status is None else (0.5, status.value.split(":")[0].split(",")[0])
+
+
+def unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """Area whose points lie more than half a metre off the roof."""
+    area, rings = record.get("unexplained_area_m2"), record.get("outline")
+    if not area or not rings:
+        return None
+    share = min(area / max(ring_area(rings[0]), 1.0), 1.0)
+    is_large = area >= LARGE_M2 and share >= LARGE_SHARE
+    return share, f"{area:.0f} m² unexplained" if is_large else ""
+
+
+def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """Parts whose heights or lengths their points leave open."""
+    parts = record.get("parts") or []
+    loose = sum(is_loose(part.get("sigma") or {}) for part in parts)
+    if not loose:
+        return None
+    return 0.3 * loose / len(parts), f"{loose} of {len(parts)} parts on few points"
+
+
+def is_loose(sigma: Mapping[str, float]) -> bool:
+    return any(value > LOOSE_M for name, value in sigma.items() if not name.startswith(LENGTHS_APART))
+
+
+def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """Two types about as probable as each other, as the fits or the network say."""
+    types = record.get("types") or record.get("recognised") or {}
+    ranked = sorted(((value or 0.0, name) for name, value in types.items()), reverse=True)
+    if len(ranked) < 2 or ranked[0][0] - ranked[1][0] >= CLOSE_CALL:
+        return None
+    return 0.2, f"{ranked[0][1]} or {ranked[1][1]}"
+
+
+def ring_area(ring: list) -> float:
+    """Area (m2) of a ring of [x, y]."""
+    turned = zip(ring, ring[1:] + ring[:1], strict=True)
+    return abs(sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in turned)) / 2

@@ -1,0 +1,126 @@
+"""The file of accepted edits: a file of overrides, one line a building, that `--overrides` of the next run obeys.
+
+Every change writes the whole file beside its place, synced, and renames it, so that kill -9 and power cuts leave the
+old or the new one. A change says on which version of its building it stands; where that is not the present one, somebody else
+was faster, and nothing is written.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sqlite3
+import threading
+from collections.abc import Iterator
+from contextlib import closing, contextmanager
+from pathlib import Path
+from typing import Any
+
+from ..city.overrides import read_overrides
+from ..errors import HiproofError, InputError, OutputError
+from ..parametric.override import override_of
+from ..write.files import atomic
+
+FILE = "edits.jsonl"
+WAIT_S = 30
+UNTOUCHED = "run"  # the version of a building that the file does not name
+
+
+class OtherVersion(HiproofError):
+    """A building that was changed since; `version` is the present one."""
+
+    def __init__(self, version: str, told: str) -> None:
+        super().__init__(told)
+        self.version = version
+
+
+class Edits:
+    """The overrides in `folder`, by building. A folder without such a file starts with those `obeyed` by its run.
+
+    Raises InputError for a file that cannot be read, or that is a link to elsewhere.
+    """
+
+    def __init__(self, folder: Path, obeyed: dict[str, dict[str, Any]] | None = None) -> None:
+        self.path, self.obeyed = folder / FILE, obeyed or {}
+        if self.path.is_symlink():
+            raise InputError(f"expected a file of its own at {self.path}, got a link; remove it")
+        self.lock, self.stamp = threading.Lock(), None
+        self.records: dict[str, dict[str, Any]] = {}
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read the file where somebody else has changed it."""
+        stamp = stamp_of(self.path)
+        if stamp is None:
+            self.records = dict(self.obeyed)
+        elif stamp != self.stamp:
+            self.records = dict(read_overrides(str(self.path)))
+        self.stamp = stamp
+
+    def of(self, id: str) -> tuple[dict[str, Any] | None, str]:
+        """The override of a building, None where there is none, and its version."""
+        with self.lock:
+            self.refresh()
+            record = self.records.get(id)
+            return record, version_of(record)
+
+    def put(self, id: str, record: dict[str, Any] | None, version: str) -> str:
+        """Keep an override of the building in place of that of `version`, or with None drop it; the new version, on disk.
+
+        Raises OtherVersion where the building has another by now, InputError for what is no override, OutputError where the
+        file cannot be written.
+        """
+        if record is not None:
+            override_of(record)
+        with self.lock, alone(self.path):
+            self.refresh()
+            known = self.records.get(id)
+            if version_of(known) != version:
+                raise OtherVersion(version_of(known), told_of(id, known))
+            records = {key: value for key, value in self.records.items() if key != id}
+            if record is not None:
+                records[id] = record
+            with atomic(self.path) as beside:
+                beside.write_text("".join(json.dumps(r, allow_nan=False) + "\n" for r in records.values()))
+            self.records, self.stamp = records, stamp_of(self.path)
+            return version_of(record)
+
+
+@contextmanager
+def alone(path: Path) -> Iterator[None]:
+    """Nobody else, in whatever process, changes the file at `path` within the block; SQLite locks, as for runs."""
+    try:
+        with closing(
+            sqlite3.connect(path.with_name(f".{path.name}.lock"), isolation_level=None, timeout=WAIT_S)
+        ) as lock:
+            lock.execute("begin exclusive")
+            yield
+    except sqlite3.Error as error:
+        raise OutputError(
+            f"expected to write {path}, got: {error}; is the folder writable, and nobody else accepting?"
+        ) from error
+
+
+def version_of(record: dict[str, Any] | None) -> str:
+    """A name for what is said of a building: another for every other override."""
+    if record is None:
+        return UNTOUCHED
+    return hashlib.sha256(json.dumps(record, sort_keys=True, default=str).encode()).hexdigest()[:20]
+
+
+def told_of(id: str, record: dict[str, Any] | None) -> str:
+    """Who was faster, in a sentence."""
+    if record is None:
+        return f"expected building {id} as it was accepted, got it taken back in another window; look at it again"
+    who, when = record.get("who") or "somebody", record.get("when") or "meanwhile"
+    return f"expected building {id} as this window knows it, got one that {who} accepted ({when}); look at theirs first"
+
+
+def stamp_of(path: Path) -> tuple[int, int, int] | None:
+    """What tells a file from the one that stood there before; None where there is none."""
+    try:
+        found = os.stat(path)
+    except FileNotFoundError:
+        return None
+    return found.st_mtime_ns, found.st_size, found.st_ino

@@ -1,0 +1,100 @@
+"""The run's folder: its buildings sorted by doubt, each read from parameters.jsonl when it is asked for."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..errors import InputError
+from ..parametric.file import head_of, objects
+from ..write.parameters import FileHead
+from .doubt import Doubt, doubt_of
+from .edits import stamp_of
+
+PARAMETERS = "parameters.jsonl"
+
+
+@dataclass(frozen=True)
+class Row:
+    """A building in the list: where its line starts in the file, and what speaks for looking at it."""
+
+    id: str
+    start: int
+    type: str | None
+    status: str
+    share: float | None
+    doubt: Doubt
+
+
+class RunFolder:
+    """The buildings of a finished run. Raises InputError for a folder that holds none."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder, self.path = folder, folder / PARAMETERS
+        if not self.path.is_file():
+            raise InputError(
+                f"expected the folder of a finished `hiproof reconstruct` or `hiproof build`, got {folder} without "
+                f"{PARAMETERS}; check the path"
+            )
+        self.stamp = None
+        self.refresh()
+
+    def refresh(self) -> None:
+        """Read the file where a run has written it anew."""
+        stamp = stamp_of(self.path)
+        if stamp == self.stamp:
+            return
+        self.head, rows = read_rows(self.path)
+        self.rows = sorted(rows, key=lambda row: -row.doubt.amount)
+        self.by_id, self.stamp = {row.id: row for row in rows}, stamp
+
+    def record(self, id: str) -> dict[str, Any]:
+        """The object of a building. Raises InputError for one that the run does not have."""
+        self.refresh()
+        row = self.by_id.get(id)
+        if row is None:
+            raise InputError(f"expected a building of the run in {self.folder}, got {id!r:.80}; choose one of the list")
+        with self.path.open("rb") as file:
+            file.seek(row.start)
+            line = file.readline()
+        try:
+            record = json.loads(line)
+        except ValueError:
+            record = None
+        if not isinstance(record, dict) or record.get("id") != id:
+            raise InputError(f"expected {self.path} as it was, got another file; start `hiproof edit` again")
+        return record
+
+
+def read_rows(path: Path) -> tuple[FileHead, list[Row]]:
+    """The head of the parameters at `path`, and a row a building."""
+    starts: list[int] = []
+
+    def lines(file: Any):
+        place = 0
+        for line in file:
+            starts.append(place)
+            place += len(line)
+            yield line.decode()
+
+    try:
+        with path.open("rb") as file:
+            found = objects(lines(file), path)
+            head = head_of(next(found, None), path)
+            rows = [row_of(number, record, starts[number - 1], path) for number, record in found]
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"expected parameters that hiproof wrote at {path}, got: {error}; check the file") from error
+    return head, rows
+
+
+def row_of(number: int, record: Any, start: int, path: Path) -> Row:
+    """The row of a building's object."""
+    try:
+        share = record["residuals"]["share_within_20cm"] if record.get("residuals") else None
+        return Row(record["id"], start, record.get("type"), record.get("status", ""), share, doubt_of(record))
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"expected a building in line {number} of {path}, got one whose {error} cannot be read; mend it there"
+        ) from error

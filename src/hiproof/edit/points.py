@@ -1,0 +1,79 @@
+"""The roof points of one building, read from the clouds of its run exactly as the run read them: by its plan, a work tile at once."""
+
+from __future__ import annotations
+
+import tempfile
+import threading
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from .. import stages
+from ..city.plan import PLAN_FILE, Job, Plan
+from ..city.solve import Surroundings, terrain_model
+from ..city.sort import Gatherer, Reaches, load_points, wanted_points
+from ..evaluate.run import run_record
+from ..model import Building
+from ..read.pointcloud import is_url
+from ..read.thin import thin_to_count
+
+KEPT_TILES, KEPT_BUILDINGS = 3, 64
+
+
+class RunPoints:
+    """Points of the run in `folder`; `missing` is a sentence where they cannot be had, empty otherwise."""
+
+    def __init__(self, folder: Path) -> None:
+        self.lock, self.missing = threading.Lock(), ""
+        self.surroundings = lru_cache(maxsize=KEPT_TILES)(self.read_tile)
+        self.of_job = lru_cache(maxsize=KEPT_BUILDINGS)(self.read_job)
+        inputs = run_record(folder).get("inputs") or {}
+        self.clouds, self.terrain = [str(cloud) for cloud in inputs.get("clouds") or []], inputs.get("terrain")
+        plan = folder / ".hiproof" / PLAN_FILE
+        gone = [cloud for cloud in self.clouds if not is_url(cloud) and not Path(cloud).is_file()]
+        if not plan.is_file() or not self.clouds:
+            self.missing = "no run of `hiproof reconstruct` in this folder: its points are not known, refitting is off"
+        elif gone:
+            more = f" and {len(gone) - 1} more" if len(gone) > 1 else ""
+            self.missing = (
+                f"the run's points are gone ({gone[0]}{more} is not there): all but refitting works; start where the run "
+                "was started, or bring them back"
+            )
+        self.plan = None if self.missing else Plan.load(plan)
+        jobs = self.plan.jobs if self.plan else ()
+        self.jobs = {job.id: job for job in reversed(jobs)}
+        tiles = self.plan.tiles.items() if self.plan else ()
+        self.tile_of = {index: tile for tile, members in tiles for index in members}
+
+    def of(self, building: Building) -> np.ndarray:
+        """World points (n, 3) inside the building's roof; (0, 3) where the run has none. Raises HiproofError or OSError where
+        its clouds cannot be read."""
+        job = self.jobs.get(building.id)
+        if job is None or building.roof is None:
+            return np.zeros((0, 3))
+        outline = shapely.transform(building.roof.outline, building.roof.frame.to_world)
+        with self.lock:  # one file is read once, however many windows ask
+            found = self.of_job(job.index)
+        return stages.usable(found, outline)[0]
+
+    def read_job(self, index: int) -> np.ndarray:
+        """Points (n, 3) in and around the area of a building, as many as the run would use."""
+        job: Job = self.plan.jobs[index]
+        found = self.surroundings(self.tile_of[index]).roof_of(job).points
+        most = self.plan.settings.city.max_points_a_building
+        return found if len(found) <= most else thin_to_count(stages.distinct(found), most)
+
+    def read_tile(self, tile: str) -> Surroundings:
+        """All points that the buildings of a work tile may need; of files with a spatial index only these are read."""
+        reaches = Reaches(self.plan, [tile])
+        with tempfile.TemporaryDirectory(prefix="hiproof-edit-") as folder:
+            for number, cloud in enumerate(self.clouds):
+                gatherer = Gatherer(reaches, self.plan.settings.read, Path(folder) / "points", number)
+                for chunk in wanted_points(cloud, reaches, self.plan.units):
+                    gatherer.add(chunk)
+                gatherer.flush()
+            points = load_points(Path(folder), tile)
+        model = terrain_model(self.terrain, self.plan.crs_wkt, self.plan.units, threading.get_ident())
+        return Surroundings(points, model, self.plan)

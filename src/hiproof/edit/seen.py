@@ -1,0 +1,76 @@
+"""What the page shows of a building: its mesh, parts with their handles, numbers, heights of points over the roof."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from typing import Any
+
+import numpy as np
+
+from ..compose import volume
+from ..draw.mesh import packed, solid_mesh
+from ..errors import HiproofError
+from ..model import Building
+from ..parametric.change import rise_of, with_sizes
+from ..write.parameters import building_record, number
+
+MOST_POINTS = 4000  # drawn
+FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p95", "density")
+
+
+def seen(building: Building, points: np.ndarray) -> dict[str, Any]:
+    """The building as JSON, everything about the origin of its roof; `points` (n, 3) are the world points drawn."""
+    parts = building_record(building)["parts"]
+    roof = building.roof
+    local = roof.frame.to_local(points)
+    return {
+        "parts": parts,
+        "origin": roof.frame.origin.tolist(),
+        "handles": [handles_of(part) for part in parts],
+        "type": building.type,
+        "status": building.status.code,
+        "detail": building.detail,
+        "figures": figures_of(building),
+        "mesh": mesh_of(building),
+        "gaps": packed(np.nan_to_num(local[:, 2] - roof.height_at(local[:, :2]), nan=9.0), "<f4"),
+    }
+
+
+def drawn(points: np.ndarray) -> np.ndarray:
+    """An even selection (m, 3) of the points, as many as the page draws."""
+    return points[:: max(1, -(-len(points) // MOST_POINTS))]
+
+
+def handles_of(part: dict[str, Any]) -> dict[str, Any]:
+    """Where a hand takes hold of a part: its rectangle, its eave and its ridge, about the origin."""
+    try:
+        sized = with_sizes(part)
+        width, length = (sized["parameters"][name] for name in ("width", "length"))
+        rise = rise_of(part)
+    except (HiproofError, KeyError, ZeroDivisionError):  # a shape of somebody's own has no handles
+        return {}
+    x, y, z = sized["position"]
+    turn = math.radians(sized.get("rotation") or 0.0)
+    return {"place": [x, y], "turn": turn, "width": width, "length": length, "eave": z, "ridge": z + rise}
+
+
+def figures_of(building: Building) -> dict[str, float | None]:
+    """The numbers under the model, null where they cannot be told."""
+    quality = dataclasses.asdict(building.quality)
+    return {
+        **{name: number(quality[name], 4) for name in FIGURES},
+        "volume_m3": number(volume(building.solid), 1),
+        "ridge_height": number(building.solid.vertices[:, 2].max(), 3),
+        "z_ground": number(building.z_ground, 3),
+    }
+
+
+def mesh_of(building: Building) -> dict[str, str]:
+    """Triangles of the solid about the origin, the part that each roofs (-1: a wall), and the roof's edges."""
+    mesh = solid_mesh(building.solid.moved(-building.roof.frame.origin))
+    return {
+        "corners": packed(mesh.corners, "<f4"),
+        "part": packed(mesh.part, "<i4"),
+        "edges": packed(mesh.edges, "<f4"),
+    }

@@ -1,0 +1,210 @@
+"""The desk over HTTP, for one person at this machine.
+
+Whoever asks must know the token in the address, must have reached the loopback address by its name (so that no foreign name
+leads here), and must be the page itself where the browser says who asks. What can be asked is a fixed list; a building is
+named by its id, which is looked up, never opened.
+"""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from importlib.resources import files
+from typing import Any
+from urllib.parse import parse_qs, unquote, urlsplit
+
+from ..errors import HiproofError, InputError, OutputError
+from ..evaluate.report_pictures import RESIDUAL_STOPS
+from ..log import LOGGER
+from ..primitives.family import NAMES
+from ..write.colours import TYPE_COLOURS, WALL_COLOUR
+from .desk import Desk, drawing
+from .edits import OtherVersion
+
+LOOPBACK = "127.0.0.1"
+MOST_BYTES = 20_000_000
+QUIET_S = 60  # until a connection that says nothing is closed
+JSON, HTML, SCRIPT, STYLE, SVG = (
+    "application/json",
+    "text/html; charset=utf-8",
+    "text/javascript; charset=utf-8",
+    "text/css; charset=utf-8",
+    "image/svg+xml",
+)
+ASSETS = {
+    "": ("hiproof.edit", "assets/edit.html", HTML),
+    "edit.css": ("hiproof.edit", "assets/edit.css", STYLE),
+    "edit.js": ("hiproof.edit", "assets/edit.js", SCRIPT),
+    "handles.js": ("hiproof.edit", "assets/handles.js", SCRIPT),
+    "viewer.js": ("hiproof.evaluate", "assets/viewer.js", SCRIPT),
+}
+SAFE = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
+    "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "Cache-Control": "no-store",
+    "Cross-Origin-Resource-Policy": "same-origin",
+}
+
+
+@dataclass(frozen=True)
+class Answer:
+    """An HTTP answer: its code, what kind of text it is, and its bytes."""
+
+    code: int
+    body: bytes
+    kind: str = JSON
+
+
+class Service:
+    """Answers to requests: `answer` is all of it, without a socket. `port` is where the server listens."""
+
+    def __init__(self, desk: Desk, token: str | None = None) -> None:
+        self.desk, self.token, self.port = desk, token or secrets.token_urlsafe(24), 0
+        self.read: dict[str, Callable[[Mapping[str, str]], Any]] = {
+            "start": lambda q: started(desk),
+            "buildings": lambda q: desk.buildings(q.get("find", "")),
+            "building": lambda q: desk.building(q.get("id", "")),
+            "points": lambda q: desk.cloud(q.get("id", "")),
+        }
+        self.write = {
+            "change": desk.change,
+            "alternatives": desk.alternatives,
+            "accept": desk.accept,
+            "withdraw": desk.withdraw,
+        }
+
+    @property
+    def address(self) -> str:
+        return f"http://{LOOPBACK}:{self.port}/{self.token}/"
+
+    def answer(self, method: str, target: str, headers: Mapping[str, str], body: bytes = b"") -> Answer:
+        """The answer to a request; a wrong one gets a sentence, never a traceback."""
+        try:
+            refused = self.refusal(method, target, headers)
+            if refused is not None:
+                return refused
+            split = urlsplit(target)
+            name = split.path.removeprefix(f"/{self.token}/")
+            query = {key: values[-1] for key, values in parse_qs(split.query, keep_blank_values=True).items()}
+            return self.asset(name, query) if method == "GET" else self.changed(name, body)
+        except OtherVersion as error:
+            return said(409, str(error), version=error.version)
+        except OutputError as error:
+            return said(500, str(error))
+        except HiproofError as error:
+            return said(422, str(error))
+        except Exception as error:
+            LOGGER.error("failed on %s %s; please report this", method, unquote(target)[-80:], exc_info=True)
+            return said(500, f"hiproof failed on this ({type(error).__name__}: {error}); nothing was written")
+
+    def refusal(self, method: str, target: str, headers: Mapping[str, str]) -> Answer | None:
+        """An answer to those who may not ask, None to those who may."""
+        own = {f"{name}:{self.port}" for name in (LOOPBACK, "localhost")}
+        if headers.get("Host") not in own:
+            return said(403, f"expected a request to {LOOPBACK}, got another host; use the address that was printed")
+        origin = headers.get("Origin")
+        if origin is not None and origin not in {f"http://{name}" for name in own}:
+            return said(403, "expected a request of this page, got one of another origin")
+        if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
+            return said(403, "expected a request of this page, got one of another site")
+        first = urlsplit(target).path.split("/")[1:2]
+        if not first or not secrets.compare_digest(first[0].encode(), self.token.encode()):
+            return said(403, "expected the token in the address, got another; use the address that was printed")
+        if method == "POST" and headers.get("Content-Type", "").split(";")[0] != JSON:
+            return said(415, "expected JSON, got something else")
+        return None
+
+    def asset(self, name: str, query: Mapping[str, str]) -> Answer:
+        """What is read: a file of the page, a figure, or JSON."""
+        if name in ASSETS:
+            package, file, kind = ASSETS[name]
+            return Answer(200, (files(package) / file).read_bytes(), kind)
+        if name == "drawing":
+            return Answer(200, drawing(query.get("type", "")).encode(), SVG)
+        if name not in self.read:
+            return said(404, "expected something of this page, got another name")
+        return as_json(self.read[name](query))
+
+    def changed(self, name: str, body: bytes) -> Answer:
+        """What is asked with a body: {"id": ..., ...}."""
+        if name not in self.write:
+            return said(404, "expected something of this page, got another name")
+        try:
+            asked = json.loads(body)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"expected JSON, got what cannot be read: {error}") from error
+        if not isinstance(asked, dict) or not isinstance(asked.get("id"), str):
+            raise InputError("expected an object with the id of a building, got something else")
+        return as_json(self.write[name](asked["id"], asked))
+
+
+def started(desk: Desk) -> dict[str, Any]:
+    """What the page knows from the start."""
+    colours = {name: TYPE_COLOURS.get(name, TYPE_COLOURS["unknown"]) for name in NAMES}
+    return {
+        "folder": str(desk.run.folder),
+        "who": desk.who,
+        "types": list(NAMES),
+        "colours": colours,
+        "wall": WALL_COLOUR,
+        "stops": [list(stop) for stop in RESIDUAL_STOPS],
+        "missing": desk.points.missing,
+    }
+
+
+def as_json(value: Any, code: int = 200) -> Answer:
+    return Answer(code, json.dumps(value, separators=(",", ":"), allow_nan=False).encode())
+
+
+def said(code: int, sentence: str, **more: Any) -> Answer:
+    return as_json({"error": sentence, **more}, code)
+
+
+class Handler(BaseHTTPRequestHandler):
+    """A request and its answer; all that decides stands in `Service`."""
+
+    protocol_version, timeout = "HTTP/1.1", QUIET_S
+    server: Server
+
+    def do_GET(self) -> None:
+        self.send(self.server.service.answer("GET", self.path, self.headers))
+
+    def do_POST(self) -> None:
+        length = self.headers.get("Content-Length", "")
+        if not length.isdigit() or int(length) > MOST_BYTES:
+            self.close_connection = True
+            return self.send(said(413, f"expected a body of at most {MOST_BYTES} bytes, got {length or 'none'}"))
+        body = self.rfile.read(int(length))
+        return self.send(self.server.service.answer("POST", self.path, self.headers, body))
+
+    def send(self, answer: Answer) -> None:
+        self.send_response(answer.code)
+        for name, value in {"Content-Type": answer.kind, "Content-Length": str(len(answer.body)), **SAFE}.items():
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(answer.body)
+
+    def version_string(self) -> str:
+        return "hiproof"
+
+    def log_message(self, format: str, *arguments: Any) -> None:
+        LOGGER.debug("%s %s", self.command, arguments[1] if len(arguments) > 1 else "")  # the address holds the token
+
+
+class Server(ThreadingHTTPServer):
+    """Listens at the loopback address alone. Raises InputError where the port is taken."""
+
+    daemon_threads = True
+
+    def __init__(self, service: Service, port: int = 0) -> None:
+        self.service = service
+        try:
+            super().__init__((LOOPBACK, port), Handler)
+        except (OSError, OverflowError) as error:
+            raise InputError(f"expected a free port, got {port}: {error}; leave --port out to get any") from error
+        service.port = self.server_port

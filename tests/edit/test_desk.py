@@ -1,0 +1,240 @@
+"""What the page may ask, without a browser: edits that change the model, accepted ones that last, two windows that lose nothing."""
+
+import base64
+import json
+import shutil
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+
+import numpy as np
+import pytest
+
+import hiproof
+from flat_town import request_over
+from hiproof.city.overrides import read_overrides
+from hiproof.compose import check_solid
+from hiproof.edit.desk import Desk
+from hiproof.edit.doubt import doubt_of
+from hiproof.edit.edits import FILE, UNTOUCHED, Edits, OtherVersion
+from hiproof.errors import HiproofError, InputError
+from hiproof.read.solids import read_solids
+from run_records import by_id
+
+ID = "house-0"
+
+
+@pytest.fixture
+def desk(folder):
+    return Desk(folder, "anna")
+
+
+def edited(desk, parts, id=ID, **asked):
+    return desk.change(id, {"parts": parts, "asked": asked})
+
+
+def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
+    was = by_id(folder)
+    start = desk.building(ID)
+    assert start["type"] == "flat" and start["version"] == UNTOUCHED
+    gable = edited(desk, start["parts"], action="change", part=0, change={"type": "gable"})
+    fitted = edited(desk, gable["parts"], action="refit")
+    assert fitted["type"] == "gable"
+    assert fitted["figures"]["share_within_20cm"] > 0.95 > start["figures"]["share_within_20cm"]
+    desk.accept(ID, {"parts": fitted["parts"], "version": start["version"], "note": "seen from the street"})
+    hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
+    now = by_id(folder)
+    assert now[ID]["type"] == "gable" and "(seen from the street, anna, " in now[ID]["detail"]
+    assert now[ID]["parts"] == fitted["parts"]
+    assert next(row for row in desk.buildings()["rows"] if row["id"] == ID)["type"] == "gable"  # the page goes on
+    assert all(now[id] == was[id] for id in was if id != ID)
+    solids = dict(read_solids(folder / "buildings.gml"))
+    assert len(solids) == len(was) and not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
+
+
+def test_the_most_doubtful_come_first(desk):
+    rows = desk.buildings()["rows"]
+    assert [row["doubt"] for row in rows] == sorted((row["doubt"] for row in rows), reverse=True)
+    assert rows[-1]["id"] == "house-3" and rows[-1]["reasons"] == ()  # the only one that is flat indeed
+    assert desk.buildings("house-2")["found"] == 1
+
+
+@pytest.mark.parametrize(
+    ("said", "reason"),
+    [
+        ({"status": "poor_fit"}, "modelled"),
+        ({"types": {"hip": 0.5, "gable": 0.45}}, "hip or gable"),
+        ({"parts": [{"sigma": {"t_z": 0.5}}, {"sigma": {"rotation": 5.0}}]}, "1 of 2 parts on few points"),
+        ({"unexplained_area_m2": 12.0, "outline": [[[0, 0], [10, 0], [10, 8], [0, 8]]]}, "12 m² unexplained"),
+    ],
+)
+def test_whatever_speaks_against_a_model_adds_to_its_doubt(said, reason):
+    plain = {"status": "modelled", "parts": [], "residuals": {"share_within_20cm": 0.95}}
+    found = doubt_of(plain | said)
+    assert found.amount > doubt_of(plain).amount and found.reasons == (reason,)
+
+
+def test_every_edit_gives_a_valid_model(desk):
+    start = desk.building(ID)
+    gable = edited(desk, start["parts"], action="change", part=0, change={"type": "gable", "ridge_height": 12.0})
+    two = edited(desk, gable["parts"], action="split", part=0)
+    assert len(two["parts"]) == 2 and two["figures"]["volume_m3"] == pytest.approx(
+        gable["figures"]["volume_m3"], abs=0.2
+    )
+    one = edited(desk, two["parts"], action="merge", part=0, other=1)
+    assert len(one["parts"]) == 1 and one["figures"]["volume_m3"] == pytest.approx(
+        gable["figures"]["volume_m3"], abs=0.2
+    )
+    assert one["parts"][0]["parameters"]["length"] == pytest.approx(gable["parts"][0]["parameters"]["length"], abs=1e-3)
+    dormer = edited(desk, one["parts"], action="dormer", part=0)
+    assert len(dormer["parts"]) == 2 and dormer["figures"]["volume_m3"] > one["figures"]["volume_m3"] + 0.1
+    again = edited(desk, dormer["parts"], action="remove", part=1)
+    assert again["mesh"] == one["mesh"]
+
+
+def test_what_is_held_is_not_refitted(desk):
+    start = desk.building(ID)
+    raised = edited(desk, start["parts"], action="change", part=0, change={"type": "gable", "ridge_height": 12.0})
+    held = edited(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
+    assert held["figures"]["ridge_height"] == pytest.approx(12.0, abs=0.01)
+    assert edited(desk, raised["parts"], action="refit")["figures"]["ridge_height"] == pytest.approx(10.1, abs=0.1)
+
+
+def test_types_are_tried_and_the_right_one_wins(desk):
+    start = desk.building(ID)
+    tried = desk.alternatives(ID, {"parts": start["parts"], "part": 0})["types"]
+    share = {row["type"]: row["share"] for row in tried}
+    assert share["gable"] > 0.95 > share["flat"] and tried[0]["share"] >= share["gable"]
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        ({}, "expected an edit"),
+        ({"action": "explode"}, "got 'explode'"),
+        ({"action": "change", "part": 7, "change": {}}, "part from 0 to 0, got 7"),
+        ({"action": "change", "part": "0", "change": {}}, "got '0'"),
+        ({"action": "change", "part": 0, "change": {"type": "onion"}}, "got 'onion'"),
+        ({"action": "change", "part": 0, "change": {"width": -3.0}}, "positive width"),
+        ({"action": "change", "part": 0, "change": {"width": float("nan")}}, "got nan"),
+        ({"action": "remove", "part": 0}, "two or more parts"),
+        ({"action": "merge", "part": 0, "other": 0}, "got one twice"),
+        ({"action": "split", "part": 0, "share": 2.0}, "between 0 and 1"),
+        ({"action": "split", "part": 0, "side": "height"}, "length or width"),
+        ({"action": "dormer", "part": 0}, "a level roof there"),
+        ({"action": "refit", "held": {"0": ["colour"]}}, "got colour"),
+        ({"action": "refit", "held": {"first": []}}, "names by part"),
+    ],
+)
+def test_an_edit_that_cannot_be_is_one_sentence(desk, asked, message):
+    with pytest.raises(HiproofError, match=message) as caught:
+        desk.change(ID, {"parts": desk.building(ID)["parts"], "asked": asked})
+    assert "\n" not in str(caught.value)
+
+
+def test_two_windows_lose_nothing(folder):
+    one, other = Desk(folder, "anna"), Desk(folder, "ben")
+    seen = one.building(ID), other.building(ID)
+    flat, gable = seen[0]["parts"], edited(other, seen[1]["parts"], action="change", part=0, change={"type": "gable"})
+    mine = one.accept(ID, {"parts": flat, "version": seen[0]["version"]})
+    with pytest.raises(OtherVersion, match="anna accepted") as caught:
+        other.accept(ID, {"parts": gable["parts"], "version": seen[1]["version"]})
+    assert caught.value.version == mine["version"]
+    assert other.building(ID)["accepted"]["who"] == "anna"
+    other.accept("house-1", {"parts": other.building("house-1")["parts"], "version": UNTOUCHED})
+    other.accept(ID, {"parts": gable["parts"], "version": caught.value.version})
+    kept = dict(read_overrides(str(folder / FILE)))
+    assert {id: record["who"] for id, record in kept.items()} == {ID: "ben", "house-1": "ben"}
+    assert kept[ID]["parts"][0]["type"] == "gable"
+
+
+def test_no_process_writes_over_another(folder):
+    """Four processes accept on one folder at once, each other buildings."""
+    with ProcessPoolExecutor(4, get_context("spawn")) as pool:
+        done = list(pool.map(accept_many, [folder] * 4, range(4)))
+    kept = {id: record["ridge_height"] for id, record in read_overrides(str(folder / FILE))}
+    assert kept == {id: height for own in done for id, height in own.items()}
+
+
+def accept_many(folder, number):
+    """Keep overrides of ten buildings of this process's own; their heights."""
+    edits, done = Edits(folder), {}
+    for k in range(10):
+        id, height = f"{number}-{k}", 1.0 + k
+        edits.put(id, {"id": id, "ridge_height": height}, UNTOUCHED)
+        done[id] = height
+    return done
+
+
+def test_an_accepted_edit_can_be_taken_back(folder, desk):
+    start = desk.building(ID)
+    done = desk.accept(ID, {"parts": start["parts"], "version": start["version"]})
+    assert desk.buildings()["accepted"] == 1
+    assert desk.withdraw(ID, {"version": done["version"]}) == {"version": UNTOUCHED}
+    assert desk.building(ID)["accepted"] is None and (folder / FILE).read_text() == ""
+
+
+def test_what_makes_no_solid_is_not_accepted(folder, desk):
+    parts = desk.building(ID)["parts"]
+    wrong = [{**parts[0], "parameters": {"width": -1.0}}]
+    with pytest.raises(InputError, match="positive width"):
+        desk.accept(ID, {"parts": wrong, "version": UNTOUCHED})
+    assert not (folder / FILE).exists()
+
+
+def test_the_file_starts_with_the_overrides_that_the_run_obeyed(town_files, folder, tmp_path):
+    known = tmp_path / "known.jsonl"
+    known.write_text(json.dumps({"id": "house-1", "ridge_height": 9.5}) + "\n")
+    hiproof.reconstruct_area(request_over(town_files, folder, known))
+    desk = Desk(folder, "anna")
+    desk.accept(ID, {"parts": desk.building(ID)["parts"], "version": UNTOUCHED})
+    kept = dict(read_overrides(str(folder / FILE)))
+    assert kept["house-1"] == {"id": "house-1", "ridge_height": 9.5} and kept[ID]["who"] == "anna"
+
+
+def test_points_are_those_of_the_run(desk):
+    cloud = desk.cloud(ID)
+    assert cloud["missing"] == "" and cloud["count"] == int(desk.run.record(ID)["points"])
+
+
+def test_without_its_points_all_but_refitting_works(town_files, tmp_path):
+    cloud = shutil.copy(town_files[0], tmp_path / "cloud.laz")
+    hiproof.reconstruct_area(request_over([str(cloud), town_files[1]], tmp_path / "run"))
+    (tmp_path / "cloud.laz").unlink()
+    desk = Desk(tmp_path / "run", "anna")
+    assert "points are gone" in desk.cloud(ID)["missing"] and desk.cloud(ID)["count"] == 0
+    start = desk.building(ID)
+    gable = edited(desk, start["parts"], action="change", part=0, change={"type": "gable"})
+    assert gable["type"] == "gable" and gable["figures"]["share_within_20cm"] is None
+    with pytest.raises(HiproofError, match="3 points or more"):
+        edited(desk, gable["parts"], action="refit")
+    desk.accept(ID, {"parts": gable["parts"], "version": start["version"]})
+    assert (tmp_path / "run" / FILE).exists()
+
+
+def test_what_a_folder_must_hold(tmp_path, folder):
+    with pytest.raises(InputError, match=r"without parameters\.jsonl"):
+        Desk(tmp_path, "anna")
+    (folder / FILE).symlink_to(tmp_path / "elsewhere.jsonl")
+    with pytest.raises(InputError, match="got a link"):
+        Edits(folder)
+
+
+def test_buildings_that_are_not_there_are_a_sentence(desk):
+    for ask in (desk.building, desk.cloud, lambda id: desk.withdraw(id, {"version": UNTOUCHED})):
+        with pytest.raises(InputError, match="expected a building of the run"):
+            ask("../../etc/passwd")
+
+
+def test_gaps_are_heights_of_the_points_drawn_over_the_roof(desk):
+    start, cloud = desk.building(ID), desk.cloud(ID)
+    shown = edited(desk, start["parts"], action="show")
+    places = np.frombuffer(bytes_of(cloud["places"]), "<f4").reshape(-1, 3)
+    gaps = np.frombuffer(bytes_of(shown["gaps"]), "<f4")
+    level = start["parts"][0]["position"][2]
+    inside = gaps != 9.0  # a point on the outline itself may have no roof under it
+    assert len(gaps) == len(places) and inside.mean() > 0.98
+    assert gaps[inside] == pytest.approx(places[inside, 2] - level, abs=1e-4)
+
+
+def bytes_of(text):
+    return base64.b64decode(text)

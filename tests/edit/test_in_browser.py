@@ -1,0 +1,213 @@
+"""The page in a real browser, by clicks and keys: from wrong types to a rebuilt, valid CityGML."""
+
+import shutil
+import threading
+import time
+
+import pytest
+
+import hiproof
+from flat_town import request_over
+from hiproof.compose import check_solid
+from hiproof.edit.desk import Desk
+from hiproof.edit.edits import FILE
+from hiproof.edit.server import Server, Service
+from hiproof.read.solids import read_solids
+from run_records import by_id
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+FLAGS = ["--no-sandbox", "--disable-quic", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+WAIT_S = 60
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
+
+
+@pytest.fixture(scope="module")
+def browser():
+    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright here; pip install playwright")
+    with playwright.sync_playwright() as driver:
+        browser = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
+        yield browser
+        browser.close()
+
+
+@pytest.fixture
+def served(folder):
+    """A service that answers, over a folder of the test's own."""
+    service = Service(Desk(folder, "anna"))
+    with Server(service) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        yield service
+        server.shutdown()
+
+
+@pytest.fixture
+def page(browser, served):
+    page = opened(browser, served)
+    yield page
+    assert page.faults == []
+    page.context.close()
+
+
+def opened(browser, served):
+    """A window on the page, ready on its first building; its `faults` are what scripts complained of."""
+    page = browser.new_context(viewport={"width": 1500, "height": 900}).new_page()
+    page.set_default_timeout(60_000)
+    page.faults = []
+    page.on("pageerror", lambda error: page.faults.append(str(error)))
+    page.goto(served.address)
+    wait_for(page, "house-")
+    return page
+
+
+def until(page, expression):
+    """Wait until an expression of the page is true. The page forbids eval, which playwright's own waiting needs."""
+    end = time.monotonic() + WAIT_S
+    while not page.evaluate(expression):
+        assert time.monotonic() < end, f"still not so after {WAIT_S} s: {expression}"
+        page.wait_for_timeout(20)
+
+
+def wait_for(page, title):
+    """Wait until a building is there with its points."""
+    until(
+        page, f"$('title').textContent.startsWith('{title}') && Boolean(document.querySelector('[data-figure=points]'))"
+    )
+    page.evaluate("() => queue")
+
+
+def choose(page, id):
+    page.click(f"[data-id={id}]")
+    wait_for(page, id)
+
+
+def figure(page, name):
+    return float(page.get_attribute(f"[data-figure={name}]", "data-value"))
+
+
+def key(page, letter):
+    """Press a key, and wait until what it asks for is done."""
+    page.keyboard.press(letter)
+    page.evaluate("() => queue")
+
+
+def test_from_a_wrong_type_to_a_rebuilt_valid_citygml(town_files, page, folder):
+    choose(page, "house-0")
+    assert figure(page, "share_within_20cm") < 0.5
+    page.select_option("#type", "gable")
+    wait_for(page, "house-0: gable")
+    key(page, "r")
+    assert figure(page, "share_within_20cm") > 0.95
+    page.fill("#note", "seen from the street")
+    page.keyboard.press("Enter")
+    key(page, "a")
+    assert page.inner_text("#say") == "accepted"
+    assert page.get_attribute("[data-id=house-0]", "class").split() == ["current", "accepted"]
+    hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
+    rows = by_id(folder)
+    assert {id: row["type"] for id, row in rows.items()} == {
+        "house-0": "gable",
+        "house-1": "flat",
+        "house-2": "flat",
+        "house-3": "flat",
+    }
+    assert "seen from the street, anna" in rows["house-0"]["detail"]
+    solids = dict(read_solids(folder / "buildings.gml"))
+    assert len(solids) == 4 and not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
+
+
+def test_keys_go_through_the_buildings(page):
+    first = page.inner_text("#title")
+    for letter in "n", "p":
+        key(page, letter)
+    assert page.inner_text("#title") == first
+    key(page, "a")
+    key(page, "n")
+    second = page.inner_text("#title")
+    assert second != first
+    key(page, "s")
+    assert page.locator("[data-part]").count() == 2
+    key(page, "u")
+    assert page.locator("[data-part]").count() == 1
+    key(page, "u")
+    assert page.inner_text("#say") == "nothing to undo"
+
+
+def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
+    choose(page, "house-0")
+    page.select_option("#type", "gable")
+    wait_for(page, "house-0: gable")
+    was = figure(page, "ridge_height")
+    box = page.locator("[data-handle=ridge]").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    page.mouse.move(x, y)
+    page.mouse.down()
+    page.mouse.move(x, y - 25, steps=4)
+    page.mouse.move(x, y - 50, steps=4)
+    page.mouse.up()
+    until(page, f"now.model.figures.ridge_height > {was + 0.5}")
+    page.evaluate("() => queue")
+    assert page.is_checked("[data-pin=height]")
+    raised = figure(page, "ridge_height")
+    key(page, "r")
+    assert figure(page, "ridge_height") == pytest.approx(raised, abs=0.005)  # what a hand set is kept
+    key(page, "u")
+    key(page, "u")
+    assert figure(page, "ridge_height") == was and not page.is_checked("[data-pin=height]")
+
+
+def test_an_edge_and_a_number_change_the_model(page):
+    choose(page, "house-0")
+    volume = figure(page, "volume_m3")
+    page.fill("[data-name=ridge_height]", "11")
+    page.keyboard.press("Enter")
+    until(page, "now.model.figures.ridge_height === 11")
+    assert figure(page, "volume_m3") > volume
+    page.fill("[data-name=rotation]", "")  # no number changes nothing
+    page.keyboard.press("Tab")
+    page.evaluate("() => queue")
+    assert figure(page, "ridge_height") == 11.0 and page.input_value("[data-name=rotation]") != ""
+    page.fill("[data-name=width]", "-3")
+    page.keyboard.press("Enter")
+    page.evaluate("() => queue")
+    assert "expected a positive width" in page.inner_text("#say") and figure(page, "ridge_height") == 11.0
+
+
+def test_a_click_on_the_roof_chooses_its_part(page):
+    choose(page, "house-0")
+    key(page, "s")
+    page.fill("[data-name=ridge_height]", str(figure(page, "ridge_height") + 0.5))  # else both are one face
+    page.keyboard.press("Enter")
+    page.evaluate("() => queue")
+    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    middles = page.evaluate(
+        "() => now.model.handles.map(h => viewer.project([...h.place, h.ridge])).map(([x, y]) => { "
+        "const box = viewer.canvas.getBoundingClientRect(); return [box.left + x, box.top + y]; })"
+    )
+    # handles of the chosen part may lie over its middle, so each is chosen from the other
+    for index in (1, 0):
+        page.evaluate(f"() => choose({1 - index})")
+        page.mouse.click(*middles[index])
+        assert page.get_attribute(f"[data-part='{index}']", "class") == "part current"
+
+
+def test_two_windows_and_one_building(browser, served, page):
+    other = opened(browser, served)
+    for window in (page, other):
+        choose(window, "house-2")
+    key(page, "a")
+    other.select_option("#type", "hip")
+    wait_for(other, "house-2: hip")
+    key(other, "a")
+    assert "anna accepted" in other.inner_text("#say")
+    other.click("#mine")
+    until(other, "$('say').textContent === 'accepted'")
+    assert served.desk.edits.of("house-2")[0]["parts"][0]["type"] == "hip"
+    page.reload()
+    wait_for(page, "house-")
+    choose(page, "house-2")
+    assert page.inner_text("#title") == "house-2: hip"
+    page.click("#withdraw")
+    wait_for(page, "house-2: flat")
+    assert other.faults == []
+    other.context.close()

@@ -1,0 +1,210 @@
+"""Who may ask the page's server, and what: this machine, the token's bearer, the page itself; and what kill -9 leaves."""
+
+import http.client
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from urllib.parse import urlsplit
+
+import pytest
+
+from hiproof.city.overrides import read_overrides
+from hiproof.edit.desk import Desk
+from hiproof.edit.edits import FILE, UNTOUCHED
+from hiproof.edit.server import Server, Service
+from hiproof.errors import InputError
+
+OWN = {"Host": "127.0.0.1:8000", "Content-Type": "application/json"}
+
+
+@pytest.fixture
+def service(folder):
+    made = Service(Desk(folder, "anna"))
+    made.port = 8000
+    return made
+
+
+def code(service, target=None, method="GET", body=b"", **headers):
+    target = f"/{service.token}/buildings" if target is None else target
+    told = {**OWN, **{name.replace("_", "-"): value for name, value in headers.items()}}
+    return service.answer(method, target, {k: v for k, v in told.items() if v is not None}, body).code
+
+
+def test_the_page_and_its_own_requests_are_answered(service):
+    assert code(service) == 200
+    assert code(service, Origin="http://127.0.0.1:8000", Sec_Fetch_Site="same-origin") == 200
+    assert code(service, Host="localhost:8000", Origin="http://localhost:8000") == 200
+    for name in (
+        "",
+        "edit.js",
+        "edit.css",
+        "viewer.js",
+        "handles.js",
+        "start",
+        "drawing?type=hip",
+        "points?id=house-0",
+    ):
+        assert code(service, f"/{service.token}/{name}") == 200, name
+
+
+@pytest.mark.parametrize(
+    "headers",
+    [
+        {"Host": "evil.example:8000"},  # a foreign name that leads to this machine
+        {"Host": "127.0.0.1:9999"},
+        {"Host": None},
+        {"Origin": "http://evil.example"},
+        {"Origin": "http://127.0.0.1:9999"},
+        {"Origin": "null"},
+        {"Sec_Fetch_Site": "cross-site"},
+    ],
+)
+def test_others_are_refused(service, folder, headers):
+    body = json.dumps({"id": "house-0", "parts": service.desk.building("house-0")["parts"], "version": UNTOUCHED})
+    assert code(service, **headers) == 403
+    assert code(service, f"/{service.token}/accept", "POST", body.encode(), **headers) == 403
+    assert not (folder / FILE).exists()
+
+
+def test_without_the_token_nothing_is_told(service):
+    for target in ("/", "/buildings", "//buildings", f"/{service.token[:-1]}/", f"/{service.token}x/", "/é/", "*"):
+        found = service.answer("GET", target, OWN)
+        assert found.code == 403 and service.token.encode() not in found.body, target
+
+
+def test_no_path_leads_out_of_the_page(service, folder):
+    secret = folder.parent / "secret.txt"
+    secret.write_text("kept")
+    for name in (
+        "../secret.txt",
+        "..%2Fsecret.txt",
+        "%2e%2e/secret.txt",
+        str(secret),
+        "run.json",
+        "assets/edit.js",
+        "edits.jsonl",
+    ):
+        assert code(service, f"/{service.token}/{name}") == 404, name
+    for name in ("building", "points"):
+        assert code(service, f"/{service.token}/{name}?id=../secret.txt") == 422
+    assert code(service, f"/{service.token}/drawing?type=../secret") == 422
+
+
+@pytest.mark.parametrize(
+    ("body", "wanted"),
+    [
+        (b"", 422),
+        (b"{", 422),
+        (b"[" * 100_000, 422),
+        (b"[]", 422),
+        (b'{"id": 3}', 422),
+        (b'{"id": "house-0"}', 422),
+        (b'{"id": "house-0", "parts": [], "asked": {"action": "show"}}', 422),
+        (b'{"id": "house-0", "parts": [{"type": NaN}], "asked": {"action": "show"}}', 422),
+    ],
+)
+def test_a_body_that_makes_no_sense_is_one_sentence(service, body, wanted):
+    found = service.answer("POST", f"/{service.token}/change", OWN, body)
+    assert found.code == wanted and json.loads(found.body)["error"].startswith("expected")
+
+
+def test_only_json_is_taken_as_an_edit(service):
+    assert code(service, f"/{service.token}/accept", "POST", b"{}", Content_Type="text/plain") == 415
+    assert code(service, f"/{service.token}/delete", "POST", b'{"id": "house-0"}') == 404
+
+
+def test_another_version_is_told_to_the_page(service):
+    parts = service.desk.building("house-0")["parts"]
+    body = {"id": "house-0", "parts": parts, "version": UNTOUCHED}
+    target = f"/{service.token}/accept"
+    assert service.answer("POST", target, OWN, json.dumps(body).encode()).code == 200
+    found = service.answer("POST", target, OWN, json.dumps(body).encode())
+    assert found.code == 409
+    body["version"] = json.loads(found.body)["version"]
+    assert service.answer("POST", target, OWN, json.dumps(body).encode()).code == 200
+
+
+def test_it_listens_at_the_loopback_address_alone(service):
+    with Server(service) as server:
+        assert server.server_address[0] == "127.0.0.1" and service.port == server.server_port
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        with pytest.raises(InputError, match="expected a free port"):
+            Server(service, server.server_port)
+        answer = asked(service.address, "GET", "")
+        server.shutdown()
+    assert answer.status == 200
+    assert "frame-ancestors 'none'" in answer.headers["Content-Security-Policy"]
+    assert answer.headers["Referrer-Policy"] == "no-referrer"
+
+
+def test_a_body_without_a_length_is_refused(service):
+    with Server(service) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        with socket.create_connection(server.server_address) as line:
+            line.sendall(b"POST / HTTP/1.1\r\nHost: a\r\nContent-Length: 99999999999\r\n\r\n")
+            assert b" 413 " in line.recv(1000)
+        server.shutdown()
+
+
+def asked(address, method, name, body=None):
+    """An answer read to its end."""
+    split = urlsplit(address)
+    line = http.client.HTTPConnection(split.hostname, split.port, timeout=60)
+    headers = {"Content-Type": "application/json"}
+    line.request(method, split.path + name, None if body is None else json.dumps(body), headers)
+    answer = line.getresponse()
+    answer.text = answer.read()
+    line.close()
+    return answer
+
+
+def started(folder):
+    """A server in a process of its own, and its address."""
+    command = [sys.executable, "-m", "hiproof", "edit", str(folder), "--who", "anna"]
+    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"})
+    for line in process.stdout:
+        if found := re.match(r"open (\S+)", line):
+            return process, found[1]
+    raise AssertionError(f"the server ended with {process.wait()}")
+
+
+def test_a_kill_loses_no_accepted_edit(folder):
+    process, address = started(folder)
+    confirmed = {}
+
+    def accept_on_and_on():
+        """Accept one building after the other until nobody answers."""
+        versions, number = {}, 0
+        try:
+            while True:
+                id, number = f"house-{number % 3}", number + 1
+                if id not in versions:
+                    seen = json.loads(asked(address, "GET", f"building?id={id}").text)
+                    versions[id], parts = seen["version"], seen["parts"]
+                body = {"id": id, "parts": parts, "version": versions[id], "note": f"edit {number}"}
+                answer = asked(address, "POST", "accept", body)
+                assert answer.status == 200, answer.text
+                versions[id] = json.loads(answer.text)["version"]
+                confirmed[id] = f"edit {number}"
+        except (OSError, http.client.HTTPException):
+            return
+
+    thread = threading.Thread(target=accept_on_and_on)
+    thread.start()
+    while len(confirmed) < 3:
+        thread.join(0.05)
+        assert thread.is_alive()
+    process.send_signal(signal.SIGKILL)
+    thread.join()
+    process.wait()
+    process.stdout.close()
+    kept = dict(read_overrides(str(folder / FILE)))
+    assert set(kept) == set(confirmed)
+    for id, note in confirmed.items():  # one that was on its way may have come through as well
+        assert int(kept[id]["note"].split()[1]) >= int(note.split()[1])
+    assert Desk(folder, "ben").building("house-0")["accepted"]["who"] == "anna"
