@@ -61,7 +61,7 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
 def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
     """The plan of an earlier run of the same request whose files stand as it left them, else a new one; where the
     footprints changed since, a new one that takes over what is known of the others."""
-    fresh = True
+    fresh = False
     plan = None if request.restart else plan_to_go_on(request, state, ledger)
     if plan is None or ledger.get("choice") != mark_of(choice_of(request), ledger.get("salt")):
         old, plan = plan, make_plan(request)
