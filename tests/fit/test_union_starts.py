@@ -1,4 +1,4 @@
-"""Laws of the start from the outline's rectangles, of what goes unseen, and of volumes that skewed walls keep apart."""
+"""Laws of roofs whose first volume is not the last word, of what goes unseen, and of volumes that skewed walls keep apart."""
 
 import numpy as np
 import pytest
@@ -7,12 +7,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hiproof.fit.union import fit_building
+from hiproof.fit.union.candidates import candidates_of
+from hiproof.fit.union.grow import regrown, typical_slopes
+from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import emptiness, lay_out_plan
 from hiproof.fit.union.planes import Cloud, Grid
-from hiproof.fit.union.rectangles import INSIDE_SHARE, largest_rectangles
 from hiproof.fit.union.scene import allowed_shapes, directions_of, scene_of
 from hiproof.model import Roof
 from roof_zoo import FRAME
+from union_scenes import random_scene, random_volumes
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 7), (7, 7), (7, 15), (0, 15)])
 U_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 14), (14, 14), (14, 6), (6, 6), (6, 14), (0, 14)])
@@ -28,26 +31,6 @@ def scene_over(outline, density=4.0):
     return plan, scene_of(plan, outline, directions_of(outline, plan), 1.0, 0.25, allowed_shapes(()))
 
 
-def polygons_of(rectangles, plan, scene):
-    """The rectangles (k, 5) as polygons of the frame that the outline is given in."""
-    for direction, u0, u1, v0, v1 in rectangles:
-        c, s = scene.turn[int(direction)]
-        corners = np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)]) @ np.array([[c, s], [-s, c]])
-        yield shapely.Polygon(plan.frame.xy_local(corners))
-
-
-@pytest.mark.parametrize(("outline", "count"), [(L_SHAPE, 2), (U_SHAPE, 3), (shapely.box(0, 0, 12, 8), 1)])
-@pytest.mark.parametrize("angle", [0.0, 33.0])
-def test_the_largest_rectangles_of_an_outline_are_its_wings_to_their_full_length(outline, count, angle):
-    turned = shapely.affinity.rotate(outline, angle, origin=(0, 0)) if angle else outline
-    plan, scene = scene_over(turned)
-    found = list(polygons_of(largest_rectangles(scene), plan, scene))
-    assert len(found) == count
-    for polygon in found:
-        assert polygon.intersection(turned).area > INSIDE_SHARE * polygon.area - 0.5
-    assert shapely.union_all(found).area == pytest.approx(outline.area, rel=0.02)
-
-
 def test_two_hips_that_share_a_corner_are_two_hips():
     """Alike hips over the wings of an L: each plane of one goes on in the other."""
     xy = scene_points(L_SHAPE, 6.0)
@@ -58,6 +41,18 @@ def test_two_hips_that_share_a_corner_are_two_hips():
     fit = fit_building(np.column_stack([xy, 5.0 + 0.7 * z]), L_SHAPE)
     assert len(fit.roof_parts) == 2
     assert {part.type for part in fit.roof_parts} <= {"hip", "side_hip"}
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_growing_anew_never_costs(seed):
+    rng = np.random.default_rng(seed)
+    volumes, scene = random_volumes(rng, replacing=0.0), random_scene(rng)
+    value = objective(volumes, scene, np.inf)
+    grids = [Grid(np.arange(-8.0, 8.5, 0.5), np.arange(-8.0, 8.5, 0.5))] * len(scene.turn)
+    candidates = candidates_of(scene, np.arange(scene.n), grids, 12)
+    found, lower = regrown(volumes, value, scene, grids, candidates, typical_slopes(candidates))
+    assert lower <= value
+    assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
 
 
 def scene_points(outline, density):

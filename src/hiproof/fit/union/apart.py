@@ -10,7 +10,7 @@ import numpy as np
 
 from .scene import Scene, nodes
 from .trim import COVER_M
-from .volumes import DIRECTION, U0, roof_heights
+from .volumes import DIRECTION, LEVEL, OFFSET, U0, roof_heights
 
 HIDDEN_M, LEAST_M2 = 0.8, 1.0  # hidden for so long between two places of so much area at least
 LEAST_NODES = 2.5  # and for so many of the raster's steps, which are long on large roofs
@@ -39,6 +39,8 @@ def pieces_of(
     """Volume k cut along an axis where others hide it: (m, COLUMNS); none where it is one. `top` (n,) is what shows at U, V."""
     own = volumes[k]
     low, cross = U0 + 2 * axis, U0 + 2 * (1 - axis)
+    if np.isfinite(own[[OFFSET + LEVEL, OFFSET + 2 * axis, OFFSET + 2 * axis + 1]]).all():
+        return volumes[:0]  # what stands on a top between two slopes is the upper part of a gambrel
     x = np.stack([U, V])[axis, int(own[DIRECTION])]
     y = np.stack([U, V])[1 - axis, int(own[DIRECTION])]
     within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])

@@ -7,11 +7,10 @@ import numpy as np
 from ...compiled import compiled
 from .candidates import best_rectangles, candidates_of
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
-from .moves import improve
+from .moves import improve, without
 from .objective import costs, objective
 from .plan import MIN_STRUCTURE_POINTS, Plan, cells_of
 from .planes import Grid
-from .rectangles import from_rectangles
 from .refit import refit
 from .scene import Scene
 from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, base_only, roof_heights
@@ -23,24 +22,36 @@ UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
 BASE_QUANTILE = 0.02
 MOST_SLOPES = 5
 FINAL_ROUNDS = 3
-STARTING_ROUNDS, NEAR_UNITS = 2, 4.0
+STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 
 def grow(scene: Scene, grids: list[Grid]) -> tuple[np.ndarray, float]:
-    """Volumes (k, COLUMNS) and their objective: grown from the base alone, or from the outline's rectangles if that is better."""
+    """Volumes (k, COLUMNS) and their objective: grown from the base, then each taken out in turn and its place grown anew."""
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
     base = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
     candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
     slopes = typical_slopes(candidates)
     volumes, value = grown(base, objective(base, scene, np.inf), scene, grids, candidates, slopes)
-    other = from_rectangles(base, scene, candidates)
-    if len(other) > len(base):
-        other, found = improve(other, scene, objective(other, scene, np.inf), slopes, STARTING_ROUNDS)
-        if found < value + NEAR_UNITS * scene.evidence:
-            other, found = grown(other, found, scene, grids, candidates, slopes)
-            if found < value - LEAST_GAIN:
-                return other, found
+    return regrown(volumes, value, scene, grids, candidates, slopes)
+
+
+def regrown(
+    volumes: np.ndarray, value: float, scene: Scene, grids: list[Grid], candidates: np.ndarray, slopes: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """The volumes with each in turn taken out and what is missing grown anew, where that is clearly better.
+
+    The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
+    volume over both. Without it the others take the places that are theirs.
+    """
+    k = len(volumes) - 1
+    while k > 0 and len(volumes) > 2:
+        trial = without(volumes, k)
+        trial, found = improve(trial, scene, objective(trial, scene, np.inf), slopes, STARTING_ROUNDS)
+        trial, found = grown(trial, found, scene, grids, candidates, slopes)
+        if found < value - REGROWN_UNITS * scene.evidence:
+            volumes, value = trial, found
+        k = min(k, len(volumes)) - 1
     return volumes, value
 
 
