@@ -15,10 +15,15 @@ ROOT = Path(__file__).parents[1]
 DOCUMENTS = [*(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))]
 DOCUMENTS += sorted((ROOT / "docs").glob("*.md"))
 COMMANDS = typer.main.get_command(app).commands
-OPTIONS = {name for command in COMMANDS.values() for parameter in command.params for name in parameter.opts}
+OPTIONS = {
+    name
+    for command in COMMANDS.values()
+    for parameter in command.params
+    for name in (*parameter.opts, *parameter.secondary_opts)
+}
 OPTIONS |= {"--help", "--version"}
 PLACES = [ROOT, ROOT / "src/hiproof", ROOT / "src/hiproof/primitives", ROOT / "tests"]
-OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ")
+OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ", "projsync ")
 
 ATTRIBUTES = {table.prefix + attribute.name for table in TABLES for attribute in table.attributes}
 ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}  # tables of a database, by the prefix that is the default
