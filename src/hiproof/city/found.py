@@ -7,9 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 import shapely
 
-from ..classify import roof_points
-from ..classify.surfaces import one_a_voxel
-
 CLEAR_M = 0.5  # of a roof above the ground
 BESIDE_M = 1.0
 FEWEST_BESIDE = 10  # cells beside a building, without which nothing is known of the ground
@@ -30,6 +27,9 @@ def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray) -> 
 
     Shares are of points thinned to one a voxel, so that a wall or a crown hit often does not count as more.
     """
+    from ..classify import roof_points
+    from ..classify.surfaces import one_a_voxel
+
     inside = shapely.intersects_xy(area, near[:, 0], near[:, 1])
     if not inside.any():
         return FoundRoof(near[inside])

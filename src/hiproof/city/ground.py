@@ -10,7 +10,6 @@ import functools
 
 import numpy as np
 
-from ..classify.ground import bare_points
 from ..compiled import compiled
 from ..read.terrain import LowestPointsTerrain, TinTerrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
@@ -67,6 +66,8 @@ class BareAround:
     @functools.cached_property
     def bare(self) -> GroundAround:
         """Found when first asked for, from the cells inside the box alone."""
+        from ..classify.ground import bare_points  # with scipy.ndimage: not where the clouds have a ground class
+
         lowest = self.cells.inside(self.box)
         return GroundAround(Cells(bare_points(lowest) if len(lowest) else lowest), self.box)
 

@@ -2,7 +2,8 @@
 
 Compiling puts functions and constants of other files into a function, so the stamp is made of the file's text and of the
 texts of all files of its package that imports lead to from there, with the versions of the compiler and of NumPy. A
-change of any of them is a new stamp; one elsewhere is not.
+change of any of them is a new stamp; one elsewhere is not. Imports inside functions do not count: compiled code knows the
+names at the top of a module alone.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 IMPORT = re.compile(
-    r"^[ \t]*(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ \t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
+    r"^(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ \t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
     re.MULTILINE,
 )
 VERSIONS = ("numba", "llvmlite", "numpy")
@@ -87,7 +88,7 @@ def closure(file: Path) -> set[Path]:
 
 @functools.cache
 def imported(file: Path) -> frozenset[Path]:
-    """The files of the two packages that import statements of `file` name, at its top or inside functions."""
+    """The files of the two packages that import statements at the top of `file` name."""
     found = set()
     for statement in IMPORT.finditer(text_of(file).decode()):
         for path in named(file, statement):

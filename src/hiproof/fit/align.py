@@ -17,7 +17,7 @@ import shapely
 
 from ..compiled import compiled
 from .outline.lines import lines_through
-from .outline.settle import side_offset
+from .outline.settle import normal_share, side_offset
 from .union.plan import ring_edges, signed_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
@@ -107,9 +107,7 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     count = np.ceil((np.array(footprint.bounds[2:]) + AROUND_M + FARTHEST_M - low) / (2 * PITCH_M)).astype(int)
     nodes = low + 2 * PITCH_M * np.stack(np.indices(count), axis=-1).reshape(-1, 2)
     depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
-    from scipy.special import ndtr
-
-    costs = -np.log(STRAY + (1.0 - STRAY) * ndtr(depth / BLUR_M)).reshape(count)
+    costs = -np.log(STRAY + (1.0 - STRAY) * normal_share(depth / BLUR_M)).reshape(count)
     best = np.zeros(2)
     for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
         moves = np.arange(-reach, reach + 0.5 * step, step)

@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from ...compiled import compiled
 from .lines import find_corners
 
 BLURS_M, WALLS_M = (
@@ -54,22 +55,35 @@ def offset(depth: np.ndarray, length: float, density: float) -> float:
     """How far (m) outwards a side of `length` lies of where points `depth` (n,) were measured from."""
     if len(depth) < FEWEST:
         return 0.0
-    from scipy.special import ndtr
-
     inside = (depth > SHALLOW_M).sum() / ((DEEP_M - SHALLOW_M) * length)
     a_metre = max(inside, LEAST_DENSITY * density) * length
     bearing = depth[depth < SHALLOW_M - OFFSETS_M[0]]  # deeper points are inside wherever the side lies
     logs = []
     for blur in BLURS_M:
         away = (bearing[:, None] + OFFSETS_M) / blur
+        inner = normal_share(away.ravel()).reshape(away.shape)
         wall = np.exp(-0.5 * away**2) / (blur * math.sqrt(2.0 * math.pi))
         logs += [
-            np.log(a_metre * (ndtr(away) + walls * wall + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
+            np.log(a_metre * (inner + walls * wall + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
             for walls in WALLS_M
         ]
     likely = np.exp(np.array(logs) - np.max(logs)).sum(axis=0)
     mean = float((likely * OFFSETS_M).sum() / likely.sum())
     return mean + min(max(half_gap(depth[depth + mean > -ROW_M]) - 1.0 / a_metre, 0.0), FARTHEST_M)
+
+
+@compiled
+def normal_share(x):
+    """The share (n,) of a standard normal distribution below each of `x` (n,)."""
+    share = np.empty(len(x))
+    for i in range(len(x)):
+        z = x[i] / math.sqrt(2.0)
+        if abs(z) < 1.0:
+            share[i] = 0.5 + 0.5 * math.erf(z)
+        else:  # keeps its digits where hardly anything is beyond
+            beyond = 0.5 * math.erfc(abs(z))
+            share[i] = 1.0 - beyond if z > 0.0 else beyond
+    return share
 
 
 def half_gap(depth: np.ndarray) -> float:
