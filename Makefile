@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
 
-.PHONY: demo test test-train lint bench clean
+.PHONY: demo test test-train lint docs bench clean
 
 $(VENV)/core: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
@@ -22,7 +22,11 @@ $(VENV)/train: $(VENV)/test
 	touch $@
 
 $(VENV)/lint: $(VENV)/core
-	$(BIN)/pip install --quiet --disable-pip-version-check ruff
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[lint]'
+	touch $@
+
+$(VENV)/docs: $(VENV)/core
+	$(BIN)/pip install --quiet --disable-pip-version-check -e '.[docs]'
 	touch $@
 
 demo: $(VENV)/core
@@ -39,7 +43,12 @@ test-train: $(VENV)/train
 
 lint: $(VENV)/lint
 	$(BIN)/ruff check .
+	$(BIN)/ruff check --preview --select PLW1514 .  # a text file without a named encoding is another one on Windows
 	$(BIN)/ruff format --check .
+
+docs: $(VENV)/docs
+	$(BIN)/mkdocs build --strict --quiet
+	@echo "The site lies in build/site/index.html"
 
 bench: $(VENV)/test
 	$(BIN)/python -m benchmarks

@@ -131,7 +131,7 @@ def killed_run(clouds: list[str], footprints: str, out: Path, whole: Path, kills
 def children(pid: int) -> list[int]:
     """Processes started by `pid` that run Python code of ours, from the process table."""
     try:
-        text = Path(f"/proc/{pid}/task/{pid}/children").read_text()
+        text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8")
         return [int(c) for c in text.split() if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
     except OSError:
         return []

@@ -68,7 +68,7 @@ class TrueBuilding:
 
 def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding]:
     """The buildings of a CityJSON file with a ground of `smallest_m2` or more, in the order of their ids."""
-    objects = json.loads(path.read_text())["CityObjects"]
+    objects = json.loads(path.read_text(encoding="utf-8"))["CityObjects"]
     solids = defaultdict(dict)
     for name, solid in read_solids(path):
         solids[objects[name].get("parents", [name])[0]][name] = solid
@@ -110,7 +110,7 @@ def chosen(buildings: list, every: int = 1, parity: str | None = None, most: int
 
 def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:
     """The city objects of `buildings` out of the CityJSON file `source`, those with several as parts of one object."""
-    city = json.loads(source.read_text())
+    city = json.loads(source.read_text(encoding="utf-8"))
     objects, city["CityObjects"] = city["CityObjects"], {}
     for building in buildings:
         if list(building.solids) != [building.id]:
@@ -118,7 +118,7 @@ def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None
         for name in building.solids:
             parents = {} if name == building.id else {"type": "BuildingPart", "parents": [building.id]}
             city["CityObjects"][name] = objects[name] | parents
-    path.write_text(json.dumps(city))
+    path.write_text(json.dumps(city), encoding="utf-8")
 
 
 def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) -> None:

@@ -1,7 +1,6 @@
 """Stand-ins for `solve_tile` that worker processes can import: one that costs nothing, and some that go wrong."""
 
 import os
-import resource
 import signal
 from pathlib import Path
 
@@ -67,6 +66,8 @@ def solve_hungry(folder, tile, terrain=None, avoid=()):
 
     def reconstruct(points, footprint, terrain, settings, id):
         if id == DEADLY:
+            import resource  # Windows has none
+
             resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.getrlimit(resource.RLIMIT_AS)[1]))
             np.ones(1 << 30)
         return counted(points, footprint, terrain, settings, id)

@@ -21,7 +21,7 @@ class RangeHandler(SimpleHTTPRequestHandler):
         first, last = span.removeprefix("bytes=").split("-")
         size = path.stat().st_size
         start, stop = int(first), min(int(last) + 1 if last else size, size)
-        with Path(sys.argv[2]).open("a") as log:
+        with Path(sys.argv[2]).open("a", encoding="utf-8") as log:
             log.write(f"{self.path} {start} {stop}\n")
         self.send_response(206 if start < stop else 416)
         if start < stop:

@@ -4,18 +4,27 @@ import doctest
 import importlib
 import json
 import pkgutil
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import shapely
 import typer
 
 import hiproof
 from hiproof.cli.app import app
 from hiproof.primitives import CATALOGUE
+from hiproof.settings import Settings
+from hiproof.simulate import demo_files
 
 ROOT = Path(__file__).parents[1]
+PAGES = {
+    path.relative_to(ROOT).as_posix(): blocks
+    for path in (ROOT / "README.md", *(ROOT / "docs").rglob("*.md"))
+    if (blocks := re.findall(r"```python\n(.*?)```", path.read_text(encoding="utf-8"), re.DOTALL))
+}
 ENVIRONMENT = {"PYTHONPATH": str(ROOT / "src"), "PATH": "/usr/bin:/bin", "OPENBLAS_NUM_THREADS": "1"}
 COMMANDS = typer.main.get_command(app).commands
 MODULES = sorted(m.name for m in pkgutil.walk_packages(hiproof.__path__, "hiproof.") if not m.name.endswith("__main__"))
@@ -81,6 +90,42 @@ def test_the_notebook_runs():
             exec(compile("".join(cell["source"]), cell["id"], "exec"), names)
     assert max(names["shares"].values()) > 0.9 and names["building"].status.is_model
     assert len(set(names["volumes"])) == 100 and names["axes"].collections
+
+
+@pytest.fixture(scope="module")
+def at_hand(tmp_path_factory):
+    """What the documents' snippets speak of: a folder that holds a run in `models`, points and a footprint of one house."""
+    folder, files = tmp_path_factory.mktemp("snippets"), demo_files()
+    some = {"footprints": str(files["footprints"]), "where": "id < 'house-04'"}
+    hiproof.reconstruct_area(hiproof.Request((str(files["cloud"]),), folder / "models", **some))
+    footprint = hiproof.read_footprints(files["footprints"])[0].polygon
+    cloud = hiproof.read_points(files["cloud"])
+    roof = (cloud.classification == 6) & shapely.intersects_xy(footprint, *cloud.xyz[:, :2].T)
+    return folder, {"points": cloud.xyz[roof], "footprint": footprint}
+
+
+@pytest.mark.parametrize("page", sorted(PAGES))
+def test_snippets_run(page, at_hand, monkeypatch):
+    """The Python blocks of a page one after the other, on a run's folder, points and a footprint."""
+    folder, known = at_hand
+    if "hiproof.plot" in PAGES[page][-1]:
+        pytest.importorskip("matplotlib", reason="the snippet plots (extra `report`)").use("Agg")
+    monkeypatch.chdir(folder)
+    names = dict(known)
+    for number, block in enumerate(PAGES[page]):
+        exec(compile(block, f"{page}, block {number}", "exec"), names)
+
+
+def test_the_sites_generated_pages_tell_every_command_option_and_setting():
+    from docs.generated import commands_text, settings_text
+
+    commands, settings = commands_text(), settings_text()
+    for name, command in COMMANDS.items():
+        assert f"## hiproof {name}\n" in commands
+        assert [p.name for p in command.params if p.opts[0].startswith("--") and f"`{p.opts[0]}`" not in commands] == []
+    for section, values in Settings().to_dict().items():
+        assert f"## {section}\n" in settings
+        assert [name for name in values if f"| `{name}` |" not in settings] == []
 
 
 def test_importing_brings_neither_torch_nor_dask_nor_the_compiler():

@@ -13,7 +13,8 @@ from hiproof.write.attribute_list import TABLES
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [*(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))]
-DOCUMENTS += sorted((ROOT / "docs").glob("*.md"))
+DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
+MADE = ("commands.md", "settings.md")  # by docs/generated.py, when the site is built
 COMMANDS = typer.main.get_command(app).commands
 OPTIONS = {
     name
@@ -66,7 +67,8 @@ def is_path(span):
 @every_document
 def test_links_lead_somewhere(path):
     targets = re.findall(r"\]\(([^)#]+)\)", path.read_text())
-    assert [target for target in targets if "://" not in target and not (path.parent / target).exists()] == []
+    ours = [target for target in targets if "://" not in target and target not in MADE]
+    assert [target for target in ours if not (path.parent / target).exists()] == []
 
 
 @every_document

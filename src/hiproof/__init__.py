@@ -22,7 +22,9 @@ _HOME = {
     "reconstruct_area": "city.run",
     "Request": "city.request",
     "fit_roof": "fit",
+    "fit_building": "fit.union",
     "check_solid": "compose",
+    "Finding": "compose",
     "read_points": "read",
     "read_footprints": "read",
     "read_terrain": "read",
@@ -42,6 +44,15 @@ _HOME = {
     "Settings": "settings",
     "Status": "status",
     "HiproofError": "errors",
+    "InputError": "errors",
+    "SettingsError": "errors",
+    "OutputError": "errors",
+    "FitError": "errors",
+    "CompositionError": "errors",
+    "HiproofWarning": "errors",
+    "InputWarning": "errors",
+    "OutputWarning": "errors",
+    "Terrain": "read.terrain",
 }
 
 __all__ = ["__version__", "reconstruct", *sorted(_HOME)]

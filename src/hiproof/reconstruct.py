@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -14,11 +14,14 @@ from .model import Building, Footprint, Roof
 from .settings import Settings
 from .status import Status
 
+if TYPE_CHECKING:
+    from .read.terrain import Terrain
+
 
 def reconstruct(
     points: np.ndarray,
     footprint: shapely.Polygon | Footprint | None = None,
-    terrain: Any = None,
+    terrain: Terrain | None = None,
     settings: Settings | None = None,
     id: str = "building",
 ) -> Building:
@@ -26,8 +29,8 @@ def reconstruct(
 
     points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; non-finite and repeated
     ones are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
-    beside its roof; without one the outline is estimated. terrain: anything
-    with `height_at(xy_world (n, 2)) -> (n,)` and `source`; without one the ground is assumed below the lowest point.
+    beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
+    `hiproof.Terrain`; without one the ground is assumed below the lowest point.
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why.
 
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))

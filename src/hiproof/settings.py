@@ -148,7 +148,7 @@ class CitySettings:
     max_points_a_building: int = setting(
         20000, "a building with more points is thinned to so many, evenly and by a fixed rule", "", 1000, 10**7
     )
-    parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `city`)", option="--parquet")
+    parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `parquet`)", option="--parquet")
     models: str = setting(
         "merged",
         "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or both",
@@ -184,7 +184,7 @@ class Settings:
     def from_toml(cls, path: str | Path) -> Settings:
         """Settings from a TOML file with one table a section. Raises SettingsError when it cannot be read."""
         try:
-            values = tomllib.loads(Path(path).read_text())
+            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
         except (OSError, ValueError, RecursionError) as error:  # undecodable, no TOML, or a number of 5,000 digits
             raise SettingsError(
                 f"expected a TOML settings file at {path}, got: {error}; `hiproof settings` prints one"

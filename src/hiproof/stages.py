@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import shapely
@@ -15,6 +15,9 @@ from .frames import LocalFrame
 from .model import Building, Fit, Footprint, Part, Piece, Roof, Solid
 from .settings import Settings
 from .status import Status
+
+if TYPE_CHECKING:
+    from .read.terrain import Terrain
 
 LIKELY = 0.05
 """A roof type less probable to the network is not fitted by the paper's objective."""
@@ -263,7 +266,7 @@ def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: s
     return Fitted((part,), outline, status=status, detail=detail or status.value)
 
 
-def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Any) -> Ground:
+def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Terrain | None) -> Ground:
     """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them."""
     from .compose import terrain_intersection
     from .parametric.settle import PLAN_DIGITS, settled
@@ -282,7 +285,7 @@ def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame,
     return Ground(assumed, f"assumed {ASSUMED_WALL_M:g} m below the lowest point")
 
 
-def asked(terrain: Any, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
+def asked(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
     """Terrain heights (n,) at `xy_world` (n, 2), and the source that answered first."""
     if hasattr(terrain, "heights_and_sources"):
         heights, sources = terrain.heights_and_sources(xy_world)

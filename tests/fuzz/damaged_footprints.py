@@ -63,5 +63,5 @@ def write_beside_a_sound_one(path: Path, ring: np.ndarray | list) -> Path:
         for id, xy in rings.items()
     ]
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
-    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}), encoding="utf-8")
     return path

@@ -52,7 +52,7 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
         roof_points[str(id)] = int((labels < 3).sum())
     buildings.append(buildings[1])
     for name, rows in ((BUILDINGS, buildings), (SURFACES, surfaces)):
-        with open(folder / name, "w", newline="") as file:
+        with open(folder / name, "w", encoding="utf-8", newline="") as file:
             csv.writer(file).writerows(rows)
     return roof_points
 

@@ -170,7 +170,7 @@ def test_strange_ids_and_attributes_go_through(tmp_path, name):
 
 def test_errors_of_the_caller_pass_unchanged(tmp_path):
     with pytest.raises(FileNotFoundError), atomic_file(tmp_path / "a"):
-        open(tmp_path / "missing" / "input.laz").close()
+        open(tmp_path / "missing" / "input.laz", encoding="utf-8").close()
     assert names_in(tmp_path) == []
 
 

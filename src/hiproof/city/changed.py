@@ -49,7 +49,7 @@ def take_over(new: Plan, old: Plan, state: Path, ledger: Ledger) -> bool:
         new.save(Path(beside))
     if redo:
         with atomic(state / REDO) as beside:
-            Path(beside).write_text(json.dumps(redo))
+            Path(beside).write_text(json.dumps(redo), encoding="utf-8")
     ledger.begin_again(
         [*sorting(tasks, bool(redo)), *solving(new, redo)],
         {i: outcomes[place.position]._replace(position=i) for i, place in kept.items()},

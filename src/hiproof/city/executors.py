@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -29,6 +30,7 @@ from ..errors import InputError, NotKeptWarning, OutputError
 from .tasks import make_ready
 
 CONNECT_S = 20
+MOST_ON_WINDOWS = 61  # processes that one can wait for there
 WORKERLESS_S, POLL_S = 300, 5
 
 
@@ -60,7 +62,7 @@ class Processes:
     """`jobs` worker processes. They are spawned, not forked: a fork would copy locks of compiled code mid-flight."""
 
     def __init__(self, jobs: int):
-        self.jobs = jobs
+        self.jobs = min(jobs, MOST_ON_WINDOWS) if sys.platform == "win32" else jobs
         self.pool: ProcessPoolExecutor | None = None
         self.word: Connection | None = None
 

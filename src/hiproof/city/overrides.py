@@ -31,7 +31,9 @@ def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, 
     records = matched(dict(read_overrides(path)) if path else {}, plan)
     digests = {index: digest_of(record) for index, record in records.items()}
     with atomic(state / FILE) as beside:
-        Path(beside).write_text("".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())))
+        Path(beside).write_text(
+            "".join(json.dumps([i, record]) + "\n" for i, record in sorted(records.items())), encoding="utf-8"
+        )
     known = ledger.overrides()
     changed = {index for index in digests | known if digests.get(index) != known.get(index)}
     if fresh or not changed:
@@ -39,7 +41,7 @@ def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, 
         return
     redo = tiles_to_redo(changed, plan, state, ledger)
     with atomic(state / REDO) as beside:
-        Path(beside).write_text(json.dumps(redo))
+        Path(beside).write_text(json.dumps(redo), encoding="utf-8")
     LOGGER.info("%d buildings have another override than before and are redone", len(changed))
     ledger.open_again([f"solve:{tile}" for tile in redo], digests)
 

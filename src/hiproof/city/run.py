@@ -287,7 +287,7 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
         "seconds": summary.seconds,
     }
     with atomic(Path(request.out) / "run.json") as beside:
-        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n")
+        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
 
 
 def metres_in(units: Units) -> dict[str, float]:

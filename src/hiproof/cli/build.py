@@ -29,7 +29,7 @@ def build(
     parameters: Annotated[Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")],
     out: Annotated[Path, typer.Option(help="folder for the results")],
     parquet: Annotated[
-        bool, typer.Option("--parquet", help="write the tables as GeoParquet too (extra `city`)")
+        bool, typer.Option("--parquet", help="write the tables as GeoParquet too (extra `parquet`)")
     ] = False,
     shapes: Annotated[
         bool, typer.Option("--shapes", callback=print_shapes, is_eager=True, help="print every roof type's parameters")

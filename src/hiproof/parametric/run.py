@@ -179,13 +179,13 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         "not_built": [list(pair) for pair in built.not_built],
     }
     with atomic(out / "run.json") as beside:
-        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n")
+        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
 
 
 def earlier_record(path: Path) -> dict[str, Any]:
     """Settings, inputs and units of the run whose record lies at `path`; nothing where there is none."""
     try:
-        record = json.loads(path.read_text())
+        record = json.loads(path.read_text(encoding="utf-8"))
         return {name: record[name] for name in ("settings", "inputs", "units") if name in record}
     except (OSError, ValueError, TypeError):
         return {}

@@ -20,7 +20,7 @@ from ..errors import OutputError
 
 ADVICE = {
     errno.ENOSPC: "the disk is full; free some space or choose another --out folder",
-    errno.EDQUOT: "your disk quota is used up; free some space or choose another --out folder",
+    getattr(errno, "EDQUOT", -1): "your disk quota is used up; free some space or choose another --out folder",
     errno.EFBIG: "the file grew beyond the size allowed here; raise the limit (ulimit -f) or write fewer buildings",
     errno.EACCES: "permission denied; choose a folder you may write to",
     errno.EPERM: "permission denied; choose a folder you may write to",
@@ -32,7 +32,7 @@ ADVICE = {
 }
 
 # Reading never fails so: in a block that writes, these are errors of writing whatever file they name.
-ONLY_WRITING = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EROFS)
+ONLY_WRITING = (errno.ENOSPC, getattr(errno, "EDQUOT", -1), errno.EFBIG, errno.EROFS)  # Windows has no EDQUOT
 
 
 def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
@@ -139,9 +139,10 @@ def hidden_name(path: Path) -> Path:
 
 
 def sync(path: Path) -> None:
-    """Ask the operating system to put the file or folder at `path` on disk; folders cannot be opened everywhere."""
+    """Ask the operating system to put the file or folder at `path` on disk; folders cannot be opened everywhere, and Windows
+    does so only for files opened for writing."""
     try:
-        descriptor = os.open(path, os.O_RDONLY)
+        descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     except PermissionError:
         return
     try:

@@ -78,4 +78,4 @@ def import_pyarrow() -> None:
     try:
         import pyarrow  # noqa: F401
     except ImportError as error:
-        raise InputError("expected the extra `city` for GeoParquet; try: pip install 'hiproof[city]'") from error
+        raise InputError("expected the extra `parquet` for GeoParquet; try: pip install 'hiproof[parquet]'") from error

@@ -1,0 +1,49 @@
+"""Command lines of `hiproof`, made of what a person chose in QGIS."""
+
+import shlex
+
+
+def reconstruct(
+    program,
+    clouds,
+    out,
+    footprints=None,
+    layer=None,
+    where=None,
+    bbox=None,
+    terrain=None,
+    crs=None,
+    processes=1,
+    more="",
+):
+    """The main job. `bbox` is (xmin, ymin, xmax, ymax) in the clouds' coordinates, `more` further options as typed."""
+    given = {
+        "--footprints": footprints,
+        "--layer": layer,
+        "--where": where,
+        "--bbox": bbox and ",".join(f"{side:.10g}" for side in bbox),
+        "--terrain": terrain,
+        "--crs": crs,
+        "--jobs": str(processes) if processes > 1 else None,
+    }
+    return [program, "reconstruct", *clouds, "--out", out, *pairs(given), *shlex.split(more)]
+
+
+def evaluate(program, folder, clouds, footprints=None, layer=None):
+    """Figures of a run's models against points."""
+    return [program, "evaluate", folder, *clouds, *pairs({"--footprints": footprints, "--layer": layer})]
+
+
+def convert(program, folder, format, out=None):
+    """A run's models in a format of 3D viewers."""
+    return [program, "convert", folder, "--format", format, *pairs({"--out": out})]
+
+
+def status(program, folder):
+    """How far a run is."""
+    return [program, "status", folder]
+
+
+def pairs(given):
+    """Options with their values, those without one left out; a value that begins with a dash cannot be taken for an option."""
+    return [f"{name}={value}" for name, value in given.items() if value]

@@ -1,0 +1,74 @@
+"""A command that runs beside QGIS: what it says is handed on, and it ends when the user cancels."""
+
+import os
+import re
+import subprocess
+import sys
+import threading
+import time
+
+from . import commands
+
+POLL_S, STATUS_S = 0.2, 3.0
+DONE = re.compile(r"buildings done: (\d+) of (\d+)")
+
+
+class Failed(Exception):
+    """The command ended in an error; the text is what it said."""
+
+
+def run(command, say, cancelled, progress=None):
+    """Run `command` to its end, handing each line that it says to `say`; what it ends with, 0 or 1 (some building failed).
+
+    `cancelled()` is asked whether to stop it; `progress()` is called every few seconds. Raises Failed, with what it said
+    last, for a command that cannot be started, is used wrongly (2) or was stopped.
+    """
+    try:
+        process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL,
+            text=True,
+            **surroundings(),
+        )
+    except OSError as error:
+        raise Failed(
+            f"expected the program hiproof, got: {error}; install it (pip install hiproof) and name it in the parameter Program"
+        ) from error
+    said = []
+    reader = threading.Thread(target=hand_on, args=(process.stdout, say, said), daemon=True)
+    reader.start()
+    asked = time.monotonic()
+    while process.poll() is None:
+        if cancelled():
+            process.terminate()
+            process.wait()
+            raise Failed("stopped; what was finished is kept, and the same run goes on from there")
+        if progress and time.monotonic() - asked > STATUS_S:
+            progress()
+            asked = time.monotonic()
+        time.sleep(POLL_S)
+    reader.join()
+    if process.returncode not in (0, 1):
+        raise Failed("\n".join(said[-3:]) or f"{command[0]} ended with exit code {process.returncode}")
+    return process.returncode
+
+
+def hand_on(lines, say, said):
+    for line in lines:
+        said.append(line.rstrip())
+        say(said[-1])
+
+
+def surroundings():
+    """QGIS sets variables for its own Python, which are not for another's; on Windows no window is to open."""
+    own = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
+    return {"env": own, **({"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {})}
+
+
+def share_done(program, folder):
+    """The share of buildings done [%] of the run in `folder`, None while that is not known."""
+    asked = subprocess.run(commands.status(program, folder), capture_output=True, text=True, **surroundings())
+    found = DONE.search(asked.stdout)
+    return 100.0 * int(found[1]) / int(found[2]) if found and int(found[2]) else None

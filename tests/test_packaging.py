@@ -1,0 +1,99 @@
+"""What is published works by itself: the source archive makes the wheel, and the wheel, alone in an environment, models the demo."""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import tarfile
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+PACKAGE = ROOT / "src/hiproof"
+OURS = [path.relative_to(ROOT / "src").as_posix() for path in PACKAGE.rglob("*") if path.is_file()]
+OURS = {name for name in OURS if "__pycache__" not in name}
+
+
+def run(*command, **options):
+    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, **options)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory):
+    """(source archive, wheel made of nothing else)."""
+    pytest.importorskip("hatchling", reason="building needs hatchling, which the extra `test` brings")
+    folder = tmp_path_factory.mktemp("built")
+    run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", folder, cwd=ROOT)
+    (archive,) = folder.glob("*.tar.gz")
+    with tarfile.open(archive) as tar:
+        tar.extractall(folder, filter="data")
+    run(
+        sys.executable,
+        "-m",
+        "hatchling",
+        "build",
+        "-t",
+        "wheel",
+        "-d",
+        folder,
+        cwd=folder / archive.name[: -len(".tar.gz")],
+    )
+    (wheel,) = folder.glob("*.whl")
+    return archive, wheel
+
+
+@pytest.fixture(scope="module")
+def installed(built, tmp_path_factory):
+    """The python of an environment that holds the wheel, and beside it only what the wheel depends on."""
+    home = tmp_path_factory.mktemp("clean")
+    venv.create(home, with_pip=False)
+    python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
+    run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index", built[1])
+    (site,) = [path for path in home.rglob("site-packages") if (path / "hiproof").is_dir()]
+    dependencies = [
+        path for path in dict.fromkeys([sysconfig.get_path("purelib"), *sys.path]) if "site-packages" in path
+    ]
+    (site / "dependencies.pth").write_text("\n".join(dependencies), encoding="utf-8")
+    for kept in PACKAGE.rglob("*.nbc"):  # compiled code belongs to its sources, and these are the same
+        place = site / "hiproof" / kept.relative_to(PACKAGE)
+        place.parent.mkdir(exist_ok=True)
+        shutil.copy2(kept, place)
+    return python
+
+
+def test_the_wheel_holds_every_file_of_the_package_and_nothing_else(built):
+    with zipfile.ZipFile(built[1]) as wheel:
+        names = {name for name in wheel.namelist() if ".dist-info/" not in name}
+    assert names == OURS
+    assert "hiproof/py.typed" in names
+
+
+def test_the_archive_is_small_and_holds_what_builds_and_tests_it(built):
+    with tarfile.open(built[0]) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    assert {"pyproject.toml", "README.md", "LICENSE", "CITATION.cff", "tests/conftest.py"} <= names
+    assert not any("__pycache__" in name for name in names)
+    assert built[0].stat().st_size < 20e6
+
+
+def test_the_installed_wheel_is_imported_and_models_the_demo(installed, tmp_path):
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    code = "import hiproof; print(hiproof.__file__); print(hiproof.__version__)"
+    place, version = run(installed, "-c", code, cwd=tmp_path, env=environment).split()
+    assert Path(place).is_relative_to(installed.parents[1])
+    command = installed.with_name("hiproof.exe" if os.name == "nt" else "hiproof")
+    assert run(command, "--version", env=environment).split() == ["hiproof", version]
+    said = run(command, "demo", tmp_path / "demo", env=environment)
+    assert "26 buildings" in said and (tmp_path / "demo/buildings.gml").stat().st_size > 10_000
+
+
+def test_a_citation_names_the_version_that_is_there():
+    import hiproof
+
+    assert f"version: {hiproof.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")

@@ -1,0 +1,64 @@
+"""What Windows does otherwise, as far as it can be tried elsewhere: names that are not there, files that are in use, limits."""
+
+import ast
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hiproof
+from hiproof.city import executors
+from hiproof.write.files import atomic_file
+
+PACKAGE = Path(hiproof.__file__).parent
+NOT_ON_WINDOWS = {"fcntl", "resource", "pwd", "grp", "termios", "posix", "pty"}
+WITHOUT_POSIX = """
+import errno, os, pkgutil, importlib, signal
+del errno.EDQUOT, os.sched_getaffinity, os.fork, signal.SIGKILL
+import hiproof
+from hiproof.city import executors, lock, run, warm
+from hiproof.write import files
+print(warm.cores() > 0)
+"""
+
+
+def test_no_module_is_imported_that_windows_lacks():
+    found = {
+        name.split(".")[0]
+        for file in PACKAGE.rglob("*.py")
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
+        for name in (
+            [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "") or ""]
+        )
+        if isinstance(node, (ast.Import, ast.ImportFrom))
+    }
+    assert found & NOT_ON_WINDOWS == set() and "numpy" in found
+
+
+def test_names_that_windows_lacks_are_not_needed():
+    environment = {**os.environ, "PYTHONPATH": str(PACKAGE.parent)}
+    code = [sys.executable, "-c", WITHOUT_POSIX]
+    done = subprocess.run(code, capture_output=True, text=True, env=environment, check=False)
+    assert (done.returncode, done.stdout.strip()) == (0, "True"), done.stderr
+
+
+def test_files_are_synced_through_descriptors_that_may_write(tmp_path, monkeypatch):
+    """Windows refuses the others."""
+    fcntl = pytest.importorskip("fcntl", reason="Windows itself tells nothing of a descriptor")
+    asked = []
+
+    def fsync(descriptor):
+        if not os.path.isdir(f"/proc/self/fd/{descriptor}"):
+            asked.append(fcntl.fcntl(descriptor, fcntl.F_GETFL) & os.O_ACCMODE)
+
+    monkeypatch.setattr(os, "fsync", fsync)
+    with atomic_file(tmp_path / "a.txt") as file:
+        file.write(b"whole")
+    assert asked and all(mode != os.O_RDONLY for mode in asked)
+
+
+def test_no_more_processes_are_started_than_windows_can_wait_for(monkeypatch):
+    monkeypatch.setattr(executors.sys, "platform", "win32")
+    assert executors.Processes(100).jobs == 61 and executors.Processes(4).jobs == 4
