@@ -4,6 +4,7 @@ import numpy as np
 import shapely
 from shapely import affinity
 
+from hiproof.compose import compose
 from hiproof.frames import LocalFrame
 from hiproof.model import Part, Piece, Roof
 
@@ -220,3 +221,9 @@ def moved(made, degrees, shift):
 
     parts = tuple(Part(part.type, tuple(map(move_piece, part.pieces))) for part in made.parts)
     return Roof(parts, move_polygon(made.outline), made.frame)
+
+
+def flat_block(outline, z_roof, z_ground, frame=FRAME):
+    """A flat roof at `z_roof` over `outline`, and its solid."""
+    flat = Roof((Part("flat", (Piece(outline, np.array([[0.0, 0.0, z_roof]])),)),), outline, frame)
+    return flat, compose(flat, z_ground)

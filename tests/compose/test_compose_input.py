@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 import roof_zoo
-from hiproof.compose import check_solid, compose, flat_block, volume
+from hiproof.compose import check_solid, compose, volume
 from hiproof.errors import CompositionError
 from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings
@@ -34,7 +34,7 @@ def test_unusable_roof_raises_a_sentence(roof, sentence):
 @pytest.mark.parametrize("z_ground", [np.nan, np.inf, -np.inf])
 def test_ground_must_be_finite(z_ground):
     with pytest.raises(CompositionError, match="finite ground height"):
-        flat_block(HOUSE, 5.0, z_ground, FRAME)
+        roof_zoo.flat_block(HOUSE, 5.0, z_ground)
 
 
 def test_piece_far_from_the_outline_still_roofs_it():
@@ -44,25 +44,25 @@ def test_piece_far_from_the_outline_still_roofs_it():
 
 def test_bow_tie_outline_keeps_its_larger_half():
     bow_tie = shapely.Polygon([(0, 0), (10, 4), (10, 0), (0, 6)])
-    _, solid = flat_block(bow_tie, 5.0, 0.0, FRAME)
+    _, solid = roof_zoo.flat_block(bow_tie, 5.0, 0.0)
     assert check_solid(solid) == ()
 
 
 def test_neck_thinner_than_a_millimetre_leaves_the_larger_side():
     neck = shapely.union_all([shapely.box(0, 0, 5, 5), shapely.box(5, 2, 8, 2.0005), shapely.box(8, 0, 10, 5)])
-    _, solid = flat_block(neck, 3.0, 0.0, FRAME)
+    _, solid = roof_zoo.flat_block(neck, 3.0, 0.0)
     assert volume(solid) == pytest.approx(75.0, abs=0.01)
 
 
 def test_repeated_and_collinear_outline_vertices_do_not_matter():
     ring = [(0, 0), (0, 0), (5, 0), (5.0002, 0), (10, 0), (10, 8), (10, 8.0004), (0, 8)]
-    _, solid = flat_block(shapely.Polygon(ring), 5.0, 0.0, FRAME)
+    _, solid = roof_zoo.flat_block(shapely.Polygon(ring), 5.0, 0.0)
     assert len(solid.faces) == 6
 
 
 def test_spike_of_the_outline_vanishes():
     spike = shapely.Polygon([(0, 0), (10, 0), (10, 4), (15, 4.0003), (10, 4.0006), (10, 8), (0, 8)])
-    _, solid = flat_block(spike, 5.0, 0.0, FRAME)
+    _, solid = roof_zoo.flat_block(spike, 5.0, 0.0)
     assert volume(solid) == pytest.approx(400.0, abs=0.02)
 
 

@@ -8,7 +8,7 @@ import shapely
 
 import hiproof.read.assign
 from hiproof.model import Footprint
-from hiproof.read.assign import PointGrid, points_near_footprints, points_of_footprints
+from hiproof.read.assign import PointGrid, points_of_footprints
 
 
 def some_footprints(seed, count=12):
@@ -26,7 +26,9 @@ def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
     footprints = [Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints]
     for footprint, found in zip(footprints, points_of_footprints(xyz, footprints), strict=True):
         assert np.array_equal(found, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1])))
-    for footprint, found in zip(footprints, points_near_footprints(xyz, footprints, 3.0), strict=True):
+    grid = PointGrid(xyz)
+    for footprint in footprints:
+        found = grid.within(footprint.polygon, 3.0)
         distance = shapely.distance(footprint.polygon, shapely.points(xyz[:, :2]))
         near = np.zeros(len(xyz), bool)
         near[found] = True

@@ -8,13 +8,11 @@ import pytest
 import rasterio
 from pyproj import Transformer
 from rasterio.transform import from_origin
-from scipy.interpolate import LinearNDInterpolator
-from scipy.spatial import Delaunay
 
 import hiproof.read.thin
 from hiproof.errors import InputError
 from hiproof.read import terrain
-from hiproof.read.terrain import TerrainChain, lowest_points, read_terrain, terrain_from_points
+from hiproof.read.terrain import TerrainChain, read_terrain
 from hiproof.read.thin import thin_to_grid
 
 WEST, NORTH = 85000.0, 446200.0
@@ -90,39 +88,6 @@ def test_outside_and_without_data_is_unknown(tmp_path):
     assert np.allclose(model.height_at(edge), plane(edge), atol=0.03)
 
 
-def test_a_tin_gives_back_the_plane_and_the_nearest_height_beyond_it():
-    tin = terrain_from_points(ground(), thin_m=1.0)
-    assert np.abs(tin.height_at(inside()) - plane(inside())).max() < 0.06
-    assert terrain_from_points(ground(400), thin_m=0.001).height_at(inside(50, margin=5)) == pytest.approx(
-        plane(inside(50, margin=5)), abs=2e-4
-    )
-    beyond = np.array([[WEST - 20, NORTH - 20], [WEST - 100, NORTH - 20]])
-    heights = tin.height_at(beyond)
-    assert heights[0] == pytest.approx(plane(np.array([[WEST, NORTH - 20]]))[0], abs=0.1) and np.isnan(heights[1])
-    assert tin.source == "ground points"
-
-
-def test_the_walk_agrees_with_scipys_search():
-    rng = np.random.default_rng(3)
-    xy, z, asked = rng.uniform(0, 50, (300, 2)), rng.normal(size=300), rng.uniform(-5, 55, (2000, 2))
-    triangulation = Delaunay(xy)
-    triangle, weights = terrain.find_triangles(
-        triangulation, asked, rng.integers(0, len(triangulation.simplices), 2000)
-    )
-    slow = LinearNDInterpolator(xy, z)(asked)
-    assert np.array_equal(triangle < 0, np.isnan(slow))
-    found = triangle >= 0
-    heights = (weights[found] * z[triangulation.simplices[triangle[found]]]).sum(axis=1)
-    assert np.allclose(heights, slow[found], atol=1e-9)
-
-
-@pytest.mark.parametrize("count", [0, 1, 2, 5])
-def test_ground_points_that_span_no_triangle_still_answer_nearby(count):
-    on_a_line = np.column_stack([WEST + 5.0 * np.arange(count), np.full(count, NORTH), np.full(count, -2.5)])
-    heights = terrain_from_points(on_a_line).height_at(np.array([[WEST + 1, NORTH + 1], [WEST + 500, NORTH]]))
-    assert np.isnan(heights[1]) and (heights[0] == -2.5 if count else np.isnan(heights[0]))
-
-
 def test_thinning_depends_neither_on_order_nor_on_tiles():
     points = ground(3000)
     shuffled = points[np.random.default_rng(4).permutation(len(points))]
@@ -143,20 +108,19 @@ def test_thinning_equals_a_plain_loop_over_cells(seed):
     assert np.allclose(thin_to_grid(points, 3.0), slow, atol=1e-9)
 
 
-def test_lowest_points_find_the_street_and_not_the_well():
-    street = ground()
-    roof = street + [0, 0, 8]
-    well = np.array([[WEST + 30, NORTH - 20, -50.0]])
-    terrain = lowest_points(np.concatenate([roof, street, well]))
-    heights = terrain.height_at(np.array([[WEST + 30, NORTH - 20], [WEST + 300, NORTH]]))
-    around = plane(np.array([[WEST + 30, NORTH - 20]]))[0]
-    assert around - 0.7 < heights[0] < around and np.isnan(heights[1])
-    assert np.isnan(lowest_points(np.empty((0, 3))).height_at(np.zeros((2, 2)))).all()
+class Around:
+    """Ground known within 100 m of the model, a metre above its plane."""
+
+    source = "ground points"
+
+    def height_at(self, xy):
+        near = np.hypot(*(xy - [WEST, NORTH]).T) < 100.0
+        return np.where(near, plane(xy) + 1.0, np.nan)
 
 
 def test_a_chain_asks_the_next_where_one_does_not_know(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif", width=20, height=20))
-    chain = TerrainChain([model, None, terrain_from_points(ground() + [0, 0, 1])])
+    chain = TerrainChain([model, None, Around()])
     here, there, nowhere = [WEST + 5, NORTH - 5], [WEST + 40, NORTH - 20], [WEST + 900, NORTH]
     heights, sources = chain.heights_and_sources(np.array([here, there, nowhere]))
     assert heights[0] == pytest.approx(plane(np.array([here]))[0])

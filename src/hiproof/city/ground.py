@@ -11,7 +11,6 @@ import functools
 import numpy as np
 
 from ..compiled import compiled
-from ..read.terrain import LowestPointsTerrain, TinTerrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
 
 RINGS = (2, 5, 9)  # cells looked at around a position, the next where fewer than three are known; within the reach
@@ -44,7 +43,7 @@ class GroundAround:
     Moving least squares (Lancaster and Salkauskas 1981) with weights 1 / (distance^2 + SOFT_M2).
     """
 
-    source = TinTerrain.source
+    source = "ground points"
 
     def __init__(self, cells: Cells, box: np.ndarray):
         self.cells, self.box = cells, box
@@ -82,7 +81,7 @@ class LowestAround:
     Where ten cells or more are known the second lowest is taken: one low point is noise, two are ground.
     """
 
-    source = LowestPointsTerrain.source
+    source = "lowest points around the building"
 
     def __init__(self, cells: Cells, box: np.ndarray):
         self.cells, self.box = cells, box

@@ -6,6 +6,6 @@ ground faces that share them (`shell`). `check_solid` then asks whether the resu
 """
 
 from .check import Finding, check_solid
-from .solid import compose, flat_block, lowest_terrain, terrain_intersection, volume
+from .solid import compose, terrain_intersection, volume
 
-__all__ = ["Finding", "check_solid", "compose", "flat_block", "lowest_terrain", "terrain_intersection", "volume"]
+__all__ = ["Finding", "check_solid", "compose", "terrain_intersection", "volume"]

@@ -9,8 +9,7 @@ import numpy as np
 import shapely
 
 from ..errors import CompositionError
-from ..frames import LocalFrame
-from ..model import Part, Piece, Roof, Solid
+from ..model import Roof, Solid
 from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
 from .check import check_solid
@@ -73,20 +72,6 @@ def compose_at(
     raise CompositionError("expected at most forty corners where roof levels meet crosswise, got more")
 
 
-def flat_block(outline: shapely.Polygon, z_roof: float, z_ground: float, frame: LocalFrame) -> tuple[Roof, Solid]:
-    """The fallback: a flat roof at `z_roof` over `outline`, and its solid, all in the local `frame`.
-
-    Raises CompositionError when the outline itself has no usable area.
-
-    >>> roof, solid = flat_block(shapely.box(0, 0, 4, 5), 3.0, 0.0, LocalFrame(np.zeros(3)))
-    >>> roof.type, volume(solid)
-    ('flat', 60.0)
-    """
-    piece = Piece(outline, np.array([[0.0, 0.0, z_roof]]))
-    roof = Roof((Part("flat", (piece,), {"height": z_roof}),), outline, frame)
-    return roof, compose(roof, z_ground)
-
-
 def volume(solid: Solid) -> float:
     """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
     vertices = solid.vertices - solid.vertices.mean(axis=0)
@@ -121,9 +106,3 @@ def terrain_intersection(
         z = np.where(known, z, z[known].mean() if known.any() else z_floor)
         lines.append(np.column_stack((xy, z)))
     return tuple(lines)
-
-
-def lowest_terrain(outline: shapely.Polygon, terrain_height_at: Callable[[np.ndarray], np.ndarray]) -> float:
-    """Lowest terrain height under the outline's vertices (the paper's z_min under the eaves), NaN if none is known."""
-    z = np.asarray(terrain_height_at(shapely.get_coordinates(outline)), float)
-    return float(np.nanmin(z)) if np.isfinite(z).any() else float("nan")

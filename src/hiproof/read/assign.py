@@ -81,13 +81,5 @@ def points_of_footprints(cloud_xyz: np.ndarray, footprints: Iterable[Footprint |
     return [grid.inside(plan_of(footprint)) for footprint in footprints]
 
 
-def points_near_footprints(
-    cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon], distance_m: float
-) -> list[np.ndarray]:
-    """As `points_of_footprints`, for the points at most `distance_m` away: the ground around each building."""
-    grid = PointGrid(cloud_xyz)
-    return [grid.within(plan_of(footprint), distance_m) for footprint in footprints]
-
-
 def plan_of(footprint: Footprint | shapely.Polygon) -> shapely.Polygon:
     return footprint.polygon if isinstance(footprint, Footprint) else footprint

@@ -1,6 +1,6 @@
-"""How high is the ground: a terrain model, else a TIN of the ground points, else the lowest points around the building.
+"""How high is the ground: a terrain model; and several terrains in turn.
 
-All three answer `height_at` and name their `source`; a `TerrainChain` asks the next where one does not know.
+Each answers `height_at` and names its `source`; a `TerrainChain` asks the next where one does not know.
 """
 
 from __future__ import annotations
@@ -19,11 +19,7 @@ from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..masking import masked
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
-from .thin import rank_in_cells, thin_to_grid
 
-THIN_M = 1.0
-REACH_M = 50.0
-LOWEST_RADIUS_M = 10.0
 TILE_PX = 512
 TILES_KEPT = 8
 HEIGHT_UNITS = {
@@ -185,131 +181,6 @@ def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
     return np.where(known, (weights * np.nan_to_num(values)).sum(axis=0) / np.where(known, total, 1.0), np.nan)
 
 
-class TinTerrain:
-    """Linear interpolation in the Delaunay triangulation of thinned ground points; the nearest point beyond their hull.
-
-    Unknown (NaN) farther than `reach_m` from every point. Thinned by cells of the world's own grid, so that a tile and
-    its neighbour agree where both hold the same points.
-    """
-
-    source = "ground points"
-
-    def __init__(self, xyz_ground: np.ndarray, thin_m: float = THIN_M, reach_m: float = REACH_M):
-        self.reach_m = reach_m
-        self.xyz = thin_to_grid(np.asarray(xyz_ground, float), thin_m)
-
-    @cached_property
-    def xy(self) -> np.ndarray:
-        """Plan positions (n, 2) about a whole-metre origin, as Delaunay's predicates want small numbers."""
-        return self.xyz[:, :2] - self.origin
-
-    @cached_property
-    def origin(self) -> np.ndarray:
-        return np.floor(self.xyz[:, :2].mean(axis=0))
-
-    @cached_property
-    def nearest(self):
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.xy)
-
-    @cached_property
-    def triangulation(self):
-        """SciPy's Delaunay triangulation, or None where the points span no triangle."""
-        from scipy.spatial import Delaunay, QhullError
-
-        try:
-            return Delaunay(self.xy) if len(self.xy) > 2 else None
-        except QhullError:
-            return None
-
-    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN beyond reach."""
-        xy = np.asarray(xy_world, float)[:, :2]
-        heights = np.full(len(xy), np.nan)
-        if not len(self.xyz) or not len(xy):
-            return heights
-        distance, nearest = self.nearest.query(xy - self.origin, distance_upper_bound=self.reach_m)
-        known = np.isfinite(distance)
-        heights[known] = self.interpolate(xy[known] - self.origin, nearest[known])
-        return heights
-
-    def interpolate(self, xy: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy` about the origin, whose nearest points are `nearest` (n,)."""
-        heights = self.xyz[nearest, 2].copy()
-        if self.triangulation is None:
-            return heights
-        triangle, weights = find_triangles(self.triangulation, xy, self.triangulation.vertex_to_simplex[nearest])
-        inside = triangle >= 0
-        corners = self.triangulation.simplices[triangle[inside]]
-        heights[inside] = (weights[inside] * self.xyz[corners, 2]).sum(axis=1)
-        return heights
-
-
-def find_triangles(triangulation, xy: np.ndarray, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The triangle (n,) that holds each of `xy` (n, 2), -1 outside the hull, and the barycentric weights (n, 3) there.
-
-    All positions walk at once from their triangles `start`, each step across the edge that the position lies farthest
-    beyond: this ends in any Delaunay triangulation (Devillers et al., Walking in a triangulation, 2002). From the
-    nearest point's triangle it takes a few steps, while SciPy's own search tries every triangle outside the hull.
-    """
-    triangle, weights = start.astype(np.int64), np.zeros((len(xy), 3))
-    walking = np.flatnonzero(triangle >= 0)
-    for _ in range(len(triangulation.simplices)):
-        if not len(walking):
-            break
-        here = triangle[walking]
-        weights[walking] = barycentric(triangulation.points[triangulation.simplices[here]], xy[walking])
-        beyond = weights[walking].argmin(axis=1)
-        leaves = weights[walking, beyond] < -1e-9
-        walking, here, beyond = walking[leaves], here[leaves], beyond[leaves]
-        triangle[walking] = triangulation.neighbors[here, beyond]
-        walking = walking[triangle[walking] >= 0]
-    return triangle, weights
-
-
-def barycentric(corners: np.ndarray, xy: np.ndarray) -> np.ndarray:
-    """Weights (n, 3) of the `corners` (n, 3, 2) of a triangle at `xy` (n, 2); a third each in one without area."""
-    to_corner = corners - xy[:, None]
-    following, last = np.roll(to_corner, -1, axis=1), np.roll(to_corner, -2, axis=1)
-    areas = following[..., 0] * last[..., 1] - following[..., 1] * last[..., 0]
-    total = areas.sum(axis=1, keepdims=True)
-    return np.where(total == 0, 1 / 3, areas / np.where(total == 0, 1.0, total))
-
-
-class LowestPointsTerrain:
-    """The lowest point within `radius_m` of each position, whatever its class: the last resort.
-
-    One low point is taken for noise, two for ground, where a cell of 2 m holds ten points or more.
-    """
-
-    source = "lowest points around the building"
-    cell_m = 2.0
-
-    def __init__(self, xyz: np.ndarray, radius_m: float = LOWEST_RADIUS_M):
-        self.radius_m = radius_m
-        self.points = np.asarray(xyz, float)
-
-    @cached_property
-    def xyz(self) -> np.ndarray:
-        """One low point (m, 3) a cell; found when first asked for, as a fallback seldom is."""
-        return rank_in_cells(self.points, self.cell_m, lambda counts: (counts >= 10).astype(np.int64))
-
-    @cached_property
-    def tree(self):
-        from scipy.spatial import cKDTree
-
-        return cKDTree(self.xyz[:, :2])
-
-    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_world` (n, 2), NaN where no point is within the radius."""
-        xy = np.asarray(xy_world, float)[:, :2]
-        if not len(self.xyz):
-            return np.full(len(xy), np.nan)
-        around = self.tree.query_ball_point(xy, self.radius_m)
-        return np.array([self.xyz[found, 2].min() if found else np.nan for found in around], float)
-
-
 class TerrainChain:
     """Several terrains by preference: each position is answered by the first that knows it."""
 
@@ -346,13 +217,3 @@ def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) 
     if "://" not in str(path) and not str(path).startswith("/vsi") and not Path(path).is_file():
         raise InputError(f"expected a terrain model at {path}, got no such file; check the path")
     return RasterTerrain(path, crs, units)
-
-
-def terrain_from_points(xyz_ground: np.ndarray, thin_m: float = THIN_M, reach_m: float = REACH_M) -> TinTerrain:
-    """The ground surface through `xyz_ground` (n, 3), world metres."""
-    return TinTerrain(xyz_ground, thin_m, reach_m)
-
-
-def lowest_points(xyz: np.ndarray, radius_m: float = LOWEST_RADIUS_M) -> LowestPointsTerrain:
-    """The fallback: the lowest of all points `xyz` (n, 3) around each position."""
-    return LowestPointsTerrain(xyz, radius_m)
