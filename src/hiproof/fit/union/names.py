@@ -150,10 +150,11 @@ def level(member: Member) -> Member:
 
 
 def with_one_apex(member: Member) -> Member:
-    """A hip whose two pairs of sides meet at nearly the same height with all four meeting in one point."""
+    """A hip whose two pairs of sides meet at nearly the same height with all four meeting in one point, eaves where they are."""
     one, other = member.apex(0), member.apex(1)
     if not (math.isfinite(one) and math.isfinite(other)) or math.isfinite(member.top) or abs(one - other) > APEX_M:
         return member
-    if member.leans.any() or not (member.mirrored(0) and member.mirrored(1)):
+    if member.leans.any():
         return member
-    return replace(member, slopes=(0.5 * (one + other) - member.eaves) / member.half[AXIS])
+    runs = (np.array([one, one, other, other]) - member.eaves) / member.slopes  # from each eave to the point in plan
+    return replace(member, slopes=(0.5 * (one + other) - member.eaves) / runs)
