@@ -49,7 +49,7 @@ ROOFER = (
 )
 
 HIPROOF = (
-    Attribute("status", "text", "", "what came of the building: modelled, sparse, poor_fit, simplified, ..."),
+    Attribute("status", "text", "", "what came of the building: modelled, poor_fit, simplified, ..."),
     Attribute("detail", "text", "", "the status as a sentence about this building"),
     Attribute("roof_type", "text", "", "type of the largest part: a name of the catalogue, or free"),
     Attribute("roof_type_probability", "number", "", "probability of that type after the fits"),
