@@ -25,7 +25,7 @@ from qgis.core import (
 
 from . import commands, process, results
 
-FORMATS = ("glb", "obj")
+FORMATS = ("glb", "obj", "3dtiles")
 
 
 class Algorithm(QgsProcessingAlgorithm):
@@ -182,9 +182,7 @@ class Convert(Algorithm):
         folder = self.parameterAsString(parameters, "FOLDER", context)
         format = FORMATS[self.parameterAsEnum(parameters, "FORMAT", context)]
         out = os.path.join(folder, f"buildings.{format}")
-        self.call(
-            commands.convert(self.parameterAsString(parameters, "PROGRAM", context), folder, format, out), feedback
-        )
+        self.call(commands.convert(self.parameterAsString(parameters, "PROGRAM", context), folder, out), feedback)
         return {"FILE": out}
 
 
