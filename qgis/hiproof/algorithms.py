@@ -182,7 +182,9 @@ class Convert(Algorithm):
         folder = self.parameterAsString(parameters, "FOLDER", context)
         format = FORMATS[self.parameterAsEnum(parameters, "FORMAT", context)]
         out = os.path.join(folder, f"buildings.{format}")
-        self.call(commands.convert(self.parameterAsString(parameters, "PROGRAM", context), folder, out), feedback)
+        self.call(
+            commands.convert(self.parameterAsString(parameters, "PROGRAM", context), folder, format, out), feedback
+        )
         return {"FILE": out}
 
 

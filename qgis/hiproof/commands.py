@@ -34,9 +34,9 @@ def evaluate(program, folder, clouds, footprints=None, layer=None):
     return [program, "evaluate", folder, *clouds, *pairs({"--footprints": footprints, "--layer": layer})]
 
 
-def convert(program, folder, out):
-    """A run's models in the format of 3D viewers that the name `out` ends in."""
-    return [program, "convert", folder, out]
+def convert(program, folder, format, out=None):
+    """A run's models in a format of 3D viewers."""
+    return [program, "convert", folder, *([out] if out else []), "--format", format]
 
 
 def status(program, folder):
