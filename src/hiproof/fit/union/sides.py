@@ -27,6 +27,21 @@ FACING = 1e-9
 
 
 @dataclass(frozen=True)
+class Lines:
+    """Lines x = start + lean * y through the outline's edges and chords that may be sides, from one to the other of y (2, m).
+
+    The ends of all edges, across and along, are `x_edges`, `y_edges` (2, n).
+    """
+
+    start: np.ndarray
+    lean: np.ndarray
+    y: np.ndarray
+    is_edge: np.ndarray
+    x_edges: np.ndarray
+    y_edges: np.ndarray
+
+
+@dataclass(frozen=True)
 class Side:
     """A line x = at + lean * y in the axes of its volume's direction: x across the side, y along it.
 
@@ -44,14 +59,13 @@ def sides_of(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: 
     The sides of the base are far away.
     """
     sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
+    lines = [[lines_across(edges, chords, turn, axis) for axis in (0, 1)] for turn in scene.turn]
     for k in range(1, len(volumes)):
         direction = int(volumes[k, DIRECTION])
-        c, s = scene.turn[direction]
-        turn = np.array([[c, -s], [s, c]])
         everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
         gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
         uv = np.stack([scene.U[direction], scene.V[direction]])
-        sides.append([side_of(volumes[k], e, edges @ turn, chords @ turn, uv, gain, scene.evidence) for e in range(4)])
+        sides.append([side_of(volumes[k], e, lines[direction][e // 2], uv, gain, scene.evidence) for e in range(4)])
     return [[shared(volumes, sides, k, edge) for edge in range(4)] for k in range(len(volumes))]
 
 
@@ -74,23 +88,27 @@ def plan_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     return (ends - plan.frame.origin[:2]) @ plan.frame.rotation.T
 
 
-def side_of(
-    volume: np.ndarray,
-    edge: int,
-    edges: np.ndarray,
-    chords: np.ndarray,
-    uv: np.ndarray,
-    gain: np.ndarray,
-    evidence: float,
-) -> Side:
+def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: int) -> Lines:
+    """Those of the edges and chords (2, m, 2), in the first direction, that are nearly square to an axis of another."""
+    c, s = turn
+    edges, chords = (ends @ np.array([[c, -s], [s, c]]) for ends in (edges, chords))
+    ends = np.concatenate([edges, chords], axis=1)
+    is_edge = np.arange(ends.shape[1]) < edges.shape[1]
+    step = ends[1] - ends[0]
+    steep = np.abs(step[:, 1 - axis]) < FACING
+    lean = np.where(steep, 1e9, step[:, axis] / np.where(steep, 1.0, step[:, 1 - axis]))
+    kept = (np.abs(lean) < LEAN) & (np.hypot(*step.T) > SHORTEST_M)
+    ends, lean = ends[:, kept], lean[kept]
+    start = ends[0, :, axis] - lean * ends[0, :, 1 - axis]
+    return Lines(start, lean, ends[:, :, 1 - axis], is_edge[kept], edges[:, :, axis], edges[:, :, 1 - axis])
+
+
+def side_of(volume: np.ndarray, edge: int, lines: Lines, uv: np.ndarray, gain: np.ndarray, evidence: float) -> Side:
     """The cheapest line for one side of a volume; `gain` (n,) is what its points at `uv` (2, n) cost more within it."""
     axis, own = edge // 2, Side(float(volume[U0 + edge]))
     low, high = (volume[V0], volume[V1]) if axis == 0 else (volume[U0], volume[U1])
-    y_edges = edges[:, :, 1 - axis]
-    low, high = max(low, y_edges.min()), min(high, y_edges.max())
-    candidates = [own]
-    for ends, beyond in ((edges, BESIDE_M), (chords, CHORD_END_M)):
-        candidates += [Side(*line, True) for line in lines_near(ends, axis, own.at, low, high, beyond)]
+    low, high = max(low, lines.y_edges.min()), min(high, lines.y_edges.max())
+    candidates = [own, *(Side(*line, True) for line in lines_near(lines, own.at, low, high))]
     if len(candidates) == 1:
         return own
     x, y = uv[axis], uv[1 - axis]
@@ -103,38 +121,28 @@ def side_of(
         points = gain[sign * (x - side.at - side.lean * y) <= 0.0].sum()
         if not side.anchored:
             return float(points + evidence * LOOSE_UNITS)
-        bare = 1.0 - min(support(side, edges, axis, low, high) / max(high - low, 1e-6), 1.0)
+        bare = 1.0 - min(support(side, lines, low, high) / max(high - low, 1e-6), 1.0)
         off = abs(side.at + side.lean * 0.5 * (low + high) - own.at)
         return float(points + evidence * (UNSUPPORTED_UNITS * bare + FAR_UNITS_A_METRE * off))
 
     return min(candidates, key=price)
 
 
-def lines_near(
-    ends: np.ndarray, axis: int, at: float, low: float, high: float, beyond: float
-) -> list[tuple[float, float]]:
-    """(at, lean) of those of the lines through `ends` (2, m, 2) that may be the side x = at from y = low to high."""
-    y, step = ends[:, :, 1 - axis], ends[1] - ends[0]
-    steep = np.abs(step[:, 1 - axis]) < FACING
-    lean = np.where(steep, 1e9, step[:, axis] / np.where(steep, 1.0, step[:, 1 - axis]))
-    start = ends[0, :, axis] - lean * ends[0, :, 1 - axis]
-    near = (np.abs(lean) < LEAN) & (np.hypot(*step.T) > SHORTEST_M)
-    near &= (
-        (y.min(axis=0) > low - beyond) & (y.max(axis=0) < high + beyond)
-        if beyond < BESIDE_M
-        else ((y.max(axis=0) > low - beyond) & (y.min(axis=0) < high + beyond))
-    )
-    for place in (0.5 * (low + high), np.clip(y[0], low, high), np.clip(y[1], low, high)):
-        near &= np.abs(start + lean * place - at) < GAP_M
-    return list(dict.fromkeys(zip(start[near].tolist(), lean[near].tolist(), strict=True)))
+def lines_near(lines: Lines, at: float, low: float, high: float) -> list[tuple[float, float]]:
+    """(at, lean) of those lines that may be the side x = at from y = low to high."""
+    first, last = lines.y.min(axis=0), lines.y.max(axis=0)
+    along = (last > low - BESIDE_M) & (first < high + BESIDE_M)
+    within = (first > low - CHORD_END_M) & (last < high + CHORD_END_M)
+    places = np.stack([np.full(len(first), 0.5 * (low + high)), *np.clip(lines.y, low, high)])
+    near = (np.abs(lines.start + lines.lean * places - at) < GAP_M).all(axis=0) & np.where(lines.is_edge, along, within)
+    return list(dict.fromkeys(zip(lines.start[near].tolist(), lines.lean[near].tolist(), strict=True)))
 
 
-def support(side: Side, edges: np.ndarray, axis: int, low: float, high: float) -> float:
+def support(side: Side, lines: Lines, low: float, high: float) -> float:
     """Length (m) of outline along the side, between `low` and `high`."""
-    x, y = edges[:, :, axis], edges[:, :, 1 - axis]
-    along = (np.abs(x - side.at - side.lean * y) < ALONG_M).all(axis=0)
-    overlap = np.minimum(y.max(axis=0), high) - np.maximum(y.min(axis=0), low)
-    return float(np.clip(overlap[along], 0.0, None).sum())
+    along = (np.abs(lines.x_edges - side.at - side.lean * lines.y_edges) < ALONG_M).all(axis=0)
+    y = lines.y_edges[:, along]
+    return float(np.clip(np.minimum(y.max(axis=0), high) - np.maximum(y.min(axis=0), low), 0.0, None).sum())
 
 
 def shared(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> Side:
