@@ -5,6 +5,7 @@ import errno
 import importlib
 import os
 import pickle
+import platform
 import re
 import subprocess
 import sys
@@ -105,6 +106,23 @@ def test_kept_code_is_loaded_by_the_next_process(town):
     assert ask() == (61, False, 0)
     assert [name.split("-")[0] for name in files_in(town)] == ["inner.number", "middle.doubled", "outer.answer"]
     assert ask() == (61, True, 0)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names a kind of x86-64 processors")
+def test_code_for_a_kind_of_processors_is_loaded_on_each_of_them(town, monkeypatch):
+    """An image is made on one machine and run on others."""
+    monkeypatch.setenv("NUMBA_CPU_NAME", "x86-64-v3")
+    monkeypatch.setenv("NUMBA_CPU_FEATURES", "")
+    script = """
+import llvmlite.binding
+llvmlite.binding.get_host_cpu_name = lambda: {host!r}
+from hiproof.city.warm import mark
+from town.outer import answer
+print(mark("solid", "stamp"), answer(10), bool(answer._cache_hits))
+"""
+    here, there = (run(town, "-c", script.format(host=host)).split() for host in ("here", "there"))
+    assert here[1:] == ["61", "False"] and there[1:] == ["61", "True"]
+    assert here[0] == there[0]
 
 
 def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):

@@ -66,6 +66,11 @@ def cores() -> int:
 
 def mark(piece: str, stamp: str) -> str:
     """The name of a piece's mark: another state of any compiled source, another processor or Python has another."""
+    return f"warm.{piece}.{processor()}-{stamp}-run.{kept.PYTHON}.nbc"
+
+
+def processor() -> str:
+    """What is compiled for: this machine's processor, or the kind that numba's own variables name, which runs on several."""
     from llvmlite.binding import get_host_cpu_name
 
-    return f"warm.{piece}.{get_host_cpu_name()}-{stamp}-run.{kept.PYTHON}.nbc"
+    return os.environ.get("NUMBA_CPU_NAME") or get_host_cpu_name()
