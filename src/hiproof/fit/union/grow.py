@@ -23,6 +23,7 @@ BASE_QUANTILE = 0.02
 MOST_SLOPES = 5
 FINAL_ROUNDS = 3
 STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
+MOST_REGROWN = 16  # of more volumes each is too little of the whole to be worth as much work
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 
@@ -45,7 +46,7 @@ def regrown(
     volume over both. Without it the others take the places that are theirs.
     """
     k = len(volumes) - 1
-    while k > 0 and len(volumes) > 2:
+    while k > 0 and 2 < len(volumes) <= MOST_REGROWN:
         trial = without(volumes, k)
         trial, found = improve(trial, scene, objective(trial, scene, np.inf), slopes, STARTING_ROUNDS)
         trial, found = grown(trial, found, scene, grids, candidates, slopes)
