@@ -10,6 +10,7 @@ from benchmarks.matching import hidden_end, right_types
 
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
+from hiproof.fit.union.larger import put_together
 from hiproof.model import Roof
 from hiproof.primitives import get
 from hiproof.primitives.family import COMPONENTS, NAMES, SHAPES, planes_of
@@ -265,3 +266,19 @@ def test_a_hip_that_may_only_be_a_gable_is_no_hip_of_that_name():
 
 def test_components_and_names_belong_together():
     assert all(get(name).name == name and set(parts) <= set(NAMES) for name, parts in COMPONENTS.items())
+
+
+def test_a_tooth_with_something_more_is_a_tooth():
+    """A corner cut off by some points astray, or a rectangle that runs on beneath the next tooth, ends no saw-tooth."""
+    outline = shapely.box(0, 0, 20, 10)
+    tooth = {"width": 5.0, "length": 10.0, "height": 2.0}
+    centres = [np.array([2.5 + 5.0 * k, 5.0, 6.0]) for k in range(4)]
+    shape = get("monopitch")
+    row = [shape.part(shape.to_theta(tooth, -0.5 * math.pi, centre)) for centre in centres]
+    wide = {"width": 9.0, "length": 10.0, "height": 3.6}
+    row[3] = shape.part(shape.to_theta(wide, -0.5 * math.pi, centres[3] - [2.0, 0.0, 1.6]))
+    (found,) = put_together(row)
+    assert found.type == "shed" and found.parameters["teeth"] == 4
+    xy = strewn(outline.buffer(-0.3), np.random.default_rng(0))
+    before = np.max([part.height_at(xy) for part in row], axis=0)
+    assert np.mean(np.abs(found.height_at(xy) - before) < 0.05) > 0.95

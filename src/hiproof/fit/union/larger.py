@@ -4,7 +4,7 @@ truncated gable's top is a gambrel."""
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -17,6 +17,7 @@ from .regions import GRID_M, polygons_of
 
 SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
 UNEVEN_M = 0.1  # heights of teeth, were they equally wide, that differ by more: they are not
+NEARLY, GRID_STEP_M = 0.8, 0.4  # of a tooth's area, at places so close, that a part must show as
 ON_TOP_M = 0.3  # a gable whose eave is so near another's top stands on it
 
 
@@ -42,9 +43,56 @@ def with_saw_teeth(parts: list[Part]) -> list[Part]:
             if grown:
                 teeth = [part for part in teeth if part is not neighbour]
                 row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
+        if len(row) >= min(TEETH):
+            row, teeth, others = carried_on(row, teeth, others)
         united = saw_tooth(row) if len(row) >= min(TEETH) else None
         others += row if united is None else [united]
     return others
+
+
+def carried_on(row: list[Part], teeth: list[Part], others: list[Part]) -> tuple[list[Part], list[Part], list[Part]]:
+    """The row with parts of the other lists that show as its next tooth although they are more than that, and these lists without them."""
+    found = True
+    while found and len(row) < max(TEETH):
+        found = False
+        for last, step in ((row[-1], 1.0), (row[0], -1.0)):
+            place, rest = next_tooth(row, last, step), [*teeth, *others]
+            part = next((p for p in rest if shows_as(p, place, [*row, *(q for q in rest if q is not p)])), None)
+            if part is not None and not found:
+                outline = shapely.intersection(part.pieces[0].outline, place.pieces[0].outline)
+                tooth = replace(place, pieces=tuple(replace(place.pieces[0], outline=o) for o in polygons_of(outline)))
+                row = [*row, tooth] if step > 0.0 else [tooth, *row]
+                teeth, others = ([p for p in own if p is not part] for own in (teeth, others))
+                found = True
+    return row, teeth, others
+
+
+def next_tooth(row: list[Part], last: Part, step: float) -> Part:
+    """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
+    width = float(np.mean([part.parameters["width"] for part in row]))
+    across = step * width * np.array([-math.sin(last.kappa), math.cos(last.kappa)])
+    piece = last.pieces[0]
+    planes = piece.planes.copy()
+    planes[:, 2] -= planes[:, :2] @ across
+    return replace(
+        last,
+        pieces=(Piece(shapely.affinity.translate(piece.outline, *across), planes),),
+        translation=last.translation + np.array([*across, 0.0]),
+    )
+
+
+def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
+    """Whether what shows of a part under `others` is the `tooth`: there as high nearly everywhere, and nowhere else."""
+    if len(part.pieces) != 1 or not shapely.intersects(part.pieces[0].outline, tooth.pieces[0].outline):
+        return False
+    x0, y0, x1, y1 = part.pieces[0].outline.bounds
+    xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+    z, wanted = part.height_at(xy), tooth.height_at(xy)
+    beneath = np.max([other.height_at(xy) for other in others], axis=0)
+    shows = z > beneath + 1e-6
+    alike = np.abs(z[shows] - wanted[shows]) < HEIGHT_ALIKE_M
+    covered = alike.sum() * GRID_STEP_M**2 > NEARLY * tooth.area
+    return bool(covered and alike.sum() > NEARLY * shows.sum())
 
 
 def is_tooth(part: Part) -> bool:
