@@ -79,25 +79,23 @@ class Desk:
 
     def cloud(self, id: str) -> dict[str, Any]:
         """The points drawn of a building, about the origin of its roof; `missing` says why there are none."""
-        if self.points.missing:
-            return {"places": "", "count": 0, "missing": self.points.missing}
         building = building_of(self.record(id)[0])
         points = self.points.of(building)
-        missing = "" if len(points) else "the run has no points of this building"
-        places = building.roof.frame.to_local(drawn(points))
-        return {"places": packed(places, "<f4"), "count": len(points), "missing": missing}
+        missing = self.points.missing or ("" if len(points) else "the run has no points of this building")
+        places = packed(building.roof.frame.to_local(drawn(points)), "<f4") if len(points) else ""
+        return {"places": places, "count": len(points), "missing": missing}
 
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
         record = self.record(id)[0] | {"parts": list_at(body, "parts")}
-        points = self.points_of(record)
+        points = self.points.of(building_of(record))
         found = edited(record, body.get("asked"), points, self.run.head.compose, not body.get("dragged"))
         return seen(found, drawn(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
         record = self.record(id)[0] | {"parts": list_at(body, "parts")}
-        points, tried = self.points_of(record), []
+        points, tried = self.points.of(building_of(record)), []
         for kind in NAMES:
             asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:
@@ -125,10 +123,6 @@ class Desk:
         """Take an accepted edit back: the building is the run's again."""
         self.run.record(id)
         return {"version": self.edits.put(id, None, text_at(body, "version"))}
-
-    def points_of(self, record: Mapping[str, Any]) -> np.ndarray:
-        """World points (n, 3) of a building; none where the run has none."""
-        return np.zeros((0, 3)) if self.points.missing else self.points.of(building_of(record))
 
 
 @functools.cache

@@ -14,6 +14,7 @@ from .. import stages
 from ..city.plan import PLAN_FILE, Job, Plan
 from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
+from ..errors import HiproofError
 from ..evaluate.run import run_record
 from ..model import Building
 from ..read.pointcloud import is_url
@@ -48,14 +49,18 @@ class RunPoints:
         self.tile_of = {index: tile for tile, members in tiles for index in members}
 
     def of(self, building: Building) -> np.ndarray:
-        """World points (n, 3) inside the building's roof; (0, 3) where the run has none. Raises HiproofError or OSError where
-        its clouds cannot be read."""
+        """World points (n, 3) inside the building's roof; (0, 3) where the run has none, or where its clouds cannot be read,
+        which `missing` then says."""
         job = self.jobs.get(building.id)
-        if job is None or building.roof is None:
+        if job is None or building.roof is None or self.missing:
             return np.zeros((0, 3))
         outline = shapely.transform(building.roof.outline, building.roof.frame.to_world)
-        with self.lock:  # one file is read once, however many windows ask
-            found = self.of_job(job.index)
+        try:
+            with self.lock:  # one file is read once, however many windows ask
+                found = self.of_job(job.index)
+        except (HiproofError, OSError) as error:
+            self.missing = f"the run's points cannot be read: all but refitting works ({error})"
+            return np.zeros((0, 3))
         return stages.usable(found, outline)[0]
 
     def read_job(self, index: int) -> np.ndarray:

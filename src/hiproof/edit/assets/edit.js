@@ -137,7 +137,7 @@ function drawCloud() {
 
 viewer.onpick = (owner, x, y) => { if (owner < 0) return; clicked = viewer.placeUnder(x, y); if (merging) return inTurn(() => mergeWith(owner)); choose(owner); };
 
-function choose(index) { now.part = index; clicked = clicked && viewer.owner.length ? clicked : null; draw(false); showParts(); }
+function choose(index) { now.part = index; draw(false); showParts(); }
 
 // While a hand drags, only the newest place counts; the edit stands when the hand lets go.
 let drag = null;
@@ -198,14 +198,16 @@ const dormer = () => inTurn(async () => {
 });
 
 function merge() {
-  if (now?.model.parts?.length === 2) return inTurn(() => mergeWith(1 - now.part));
+  const count = now?.model.parts?.length || 0;
+  if (count < 2) return say("this building has no other part to merge with");
+  if (count === 2) return inTurn(() => mergeWith(1 - now.part));
   merging = true; say("choose the part to merge with");
 }
 async function mergeWith(other) {
   merging = false;
   if (other < 0 || other === now.part) return say("choose another part");
   const kept = now.part - (other < now.part ? 1 : 0);
-  await edit({ action: "merge", part: now.part, other }, () => { forgetPins(); });
+  await edit({ action: "merge", part: now.part, other }, forgetPins);
   now.part = kept; show(now.model);
 }
 
@@ -327,7 +329,7 @@ function numberRow(title, field, unit = "", sigma = undefined, pinned = null) {
 const next = () => inTurn(() => step(1)), previous = () => inTurn(() => step(-1)), acceptNow = () => inTurn(() => accept());
 const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: () => split("length"), "split-width": () => split("width"), merge, dormer, remove, try: () => inTurn(tryTypes) };
 for (const [id, action] of Object.entries(BUTTONS)) $(id).addEventListener("click", event => { event.currentTarget.blur(); action(); });
-const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: () => split("length"), m: merge, d: dormer, Delete: remove, t: () => inTurn(tryTypes) };
+const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: () => split("length"), m: merge, d: dormer, Delete: remove, t: () => inTurn(tryTypes), Escape: () => { merging = false; say(""); } };
 document.addEventListener("keydown", event => {
   if ((event.ctrlKey || event.metaKey) && event.key === "z") { event.preventDefault(); undo(); return; }
   if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) { if (event.key === "Escape" || (event.key === "Enter" && event.target.id === "note")) event.target.blur(); return; }

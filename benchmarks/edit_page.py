@@ -1,0 +1,225 @@
+"""The page of `hiproof edit` on Delft: how long an edit takes, and the most doubtful buildings mended through what the page asks.
+
+usage: python -m benchmarks.edit_page RUN [--buildings 60] [--mend 12] [--rounds 3] [--browser]
+
+RUN is the folder of a finished run whose clouds are still there; edits.jsonl in it is replaced. Prints the median and the 95th percentile
+of an edit (a ridge raised, measured) and of a refit, from the request's bytes to the answer's, and with --browser from the
+key to the model shown in Chromium (needs playwright). Then each of the most doubtful buildings is mended by a script
+that does what a person does, without eyes: other types, cuts, parts left out, each refitted; the first that raises the share of points
+within 0.2 m by a hundredth is kept, else the best, round by round. What comes of it is accepted, and the run done again with it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shutil
+import statistics
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.compose import check_solid
+from hiproof.edit.desk import Desk
+from hiproof.edit.edits import FILE
+from hiproof.edit.server import Server, Service
+from hiproof.evaluate.run import run_record
+from hiproof.parametric.file import read_parameters
+from hiproof.read.solids import read_solids
+from hiproof.settings import Settings
+
+TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "side_hip", "asymmetric_gable", "mansard")
+SHARES = (0.35, 0.5, 0.65)
+PARTS = 3  # of a building, the largest, that the script tries to change
+ENOUGH = 0.01  # gain of share at which the script stops looking for a better one
+
+
+class Window:
+    """A window on the page, without a browser: it asks what the page's script asks."""
+
+    def __init__(self, folder: Path) -> None:
+        self.service = Service(Desk(folder, "benchmark"))
+        self.service.port = 8000
+        self.headers = {"Host": "127.0.0.1:8000", "Content-Type": "application/json"}
+
+    def ask(self, method: str, name: str, body: dict[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
+        text = b"" if body is None else json.dumps(body).encode()
+        answer = self.service.answer(method, f"/{self.service.token}/{name}", self.headers, text)
+        return answer.code, json.loads(answer.body)
+
+    def change(self, id: str, parts: list, **asked: Any) -> dict[str, Any] | None:
+        """The model after an edit, None where it makes none."""
+        code, found = self.ask("POST", "change", {"id": id, "parts": parts, "asked": asked})
+        return found if code == 200 else None
+
+
+def times(window: Window, ids: list[str]) -> None:
+    """Milliseconds of an edit and of a refit, both composed, checked and measured."""
+    wall, cpu = {"ridge raised": [], "refit": []}, {"ridge raised": [], "refit": []}
+    for id in ids:
+        model = window.ask("GET", f"building?id={id}")[1]
+        window.ask("GET", f"points?id={id}")
+        window.change(id, model["parts"], action="show")
+        height = model["origin"][2] + model["handles"][0]["ridge"] + 0.3
+        for name, asked in {
+            "ridge raised": {"action": "change", "part": 0, "change": {"ridge_height": height}},
+            "refit": {"action": "refit"},
+        }.items():
+            start, used = time.perf_counter(), time.process_time()
+            window.change(id, model["parts"], **asked)
+            wall[name].append(1e3 * (time.perf_counter() - start))
+            cpu[name].append(1e3 * (time.process_time() - used))
+    for name, taken in wall.items():
+        print(
+            f"{name}: median {statistics.median(taken):.0f} ms, 95 % {np.percentile(taken, 95):.0f} ms over {len(taken)} buildings "
+            f"(CPU {statistics.median(cpu[name]):.0f} and {np.percentile(cpu[name], 95):.0f} ms; load {os.getloadavg()[0]:.0f})",
+            flush=True,
+        )
+
+
+def in_browser(window: Window, ids: list[str]) -> None:
+    """Milliseconds from the key r to the model shown, in Chromium."""
+    from playwright.sync_api import sync_playwright
+
+    flags = ["--no-sandbox", "--disable-quic", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+    taken = []
+    with Server(window.service) as server, sync_playwright() as driver:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=flags)
+        page = browser.new_page(viewport={"width": 1500, "height": 900})
+        page.goto(window.service.address)
+        page.evaluate("() => queue")
+        for id in ids:
+            page.evaluate("id => inTurn(() => open(id))", id)
+            for _ in range(2):  # the first also composes what the second starts from
+                page.keyboard.press("r")
+                page.evaluate("() => queue")
+            taken.append(float(page.evaluate("Number($('say').dataset.ms)")))
+        browser.close()
+        server.shutdown()
+    window.service.port = 8000
+    print(
+        f"refit in the page: median {statistics.median(taken):.0f} ms, 95 % {np.percentile(taken, 95):.0f} ms, {len(taken)} buildings"
+    )
+
+
+def tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Edits that a person might try on the largest parts."""
+    areas = [h.get("width", 0.0) * h.get("length", 0.0) for h in model["handles"]]
+    for part in sorted(range(len(areas)), key=lambda k: -areas[k])[:PARTS]:
+        kinds = [kind for kind in TYPES if kind != model["parts"][part]["type"]]
+        yield from ({"action": "change", "part": part, "change": {"type": kind}} for kind in kinds)
+        for side in ("length", "width"):
+            yield from ({"action": "split", "part": part, "side": side, "share": share} for share in SHARES)
+        if len(areas) > 1:
+            yield {"action": "remove", "part": part}
+
+
+def tried(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """The models that the tries make, refitted where that can be."""
+    for asked in tries(model):
+        made = window.change(id, model["parts"], **asked)
+        if made is not None:
+            yield window.change(id, made["parts"], action="refit") or made
+
+
+def share_of(model: dict[str, Any] | None) -> float:
+    return -1.0 if model is None else model["figures"]["share_within_20cm"] or 0.0
+
+
+def enough_better(models: Iterator[dict[str, Any]], best: dict[str, Any]) -> dict[str, Any]:
+    """The first model whose share is higher by ENOUGH, else the best of all, `best` among them."""
+    found = best
+    for model in models:
+        found = max(found, model, key=share_of)
+        if share_of(found) >= share_of(best) + ENOUGH:
+            break
+    return found
+
+
+def mended(window: Window, id: str, rounds: int) -> tuple[float, float, int, int]:
+    """Share before and after, parts before and after, of a building mended and accepted."""
+    start = window.ask("GET", f"building?id={id}")[1]
+    first = best = window.change(id, start["parts"], action="show")
+    refitted = window.change(id, start["parts"], action="refit")
+    best = max(best, refitted or best, key=share_of)
+    for _ in range(rounds):
+        better = enough_better(tried(window, id, best), best)
+        if better is best:
+            break
+        best = better
+    note = f"share {share_of(first):.3f} to {share_of(best):.3f}"
+    code, answer = window.ask(
+        "POST", "accept", {"id": id, "parts": best["parts"], "version": start["version"], "note": note}
+    )
+    assert code == 200, answer
+    return share_of(first), share_of(best), len(start["parts"]), len(best["parts"])
+
+
+def run_again(folder: Path) -> None:
+    """The run of the folder with the edits accepted in it."""
+    record = run_record(folder)
+    inputs, settings = record["inputs"], Settings.from_dict(record["settings"])
+    again = Request(
+        tuple(inputs["clouds"]),
+        folder,
+        inputs["footprints"],
+        inputs["terrain"],
+        settings=settings,
+        overrides=str(folder / FILE),
+    )
+    reconstruct_area(again)
+
+
+def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
+    """The most doubtful buildings, mended one after the other; then the run done again."""
+    ids = [row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None][:count]
+    before = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
+    for id in ids:
+        start = time.perf_counter()
+        was, now, parts_was, parts_now = mended(window, id, rounds)
+        told = f"{id}: share {was:.3f} -> {now:.3f}, parts {parts_was} -> {parts_now}"
+        print(f"{told} ({time.perf_counter() - start:.0f} s)", flush=True)
+    run_again(folder)
+    after = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
+    up = sum(share_in(after[id]) > share_in(before[id]) for id in ids)
+    solids = dict(read_solids(folder / "buildings.gml"))
+    valid = sum(not check_solid(solids[id], planarity_m=0.01) for id in ids)
+    others = [id for id in before if id not in ids]
+    same = sum(after[id] == before[id] for id in others)
+    print(
+        f"after the next run: share up of {up} of {len(ids)}, {valid} valid, {same} of {len(others)} others unchanged"
+    )
+
+
+def share_in(record: dict[str, Any]) -> float:
+    return record["residuals"]["share_within_20cm"] or 0.0
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("run", type=Path)
+    parser.add_argument("--buildings", type=int, default=60)
+    parser.add_argument("--mend", type=int, default=12)
+    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--browser", action="store_true")
+    asked = parser.parse_args()
+    (asked.run / FILE).unlink(missing_ok=True)
+    window = Window(asked.run)
+    rows = [row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None]
+    ids = rows[:: max(1, len(rows) // asked.buildings)][: asked.buildings]
+    times(window, ids)
+    if asked.browser:
+        in_browser(window, ids)
+    if asked.mend:
+        mend(window, asked.run, asked.mend, asked.rounds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,121 @@
+"""The parameters are the model: runs built again from their own parameters, and a city done again with overrides.
+
+usage: python -m benchmarks.rebuild [--work FOLDER] [--buildings 1000] [--lines 1000000] [--data ../shared/data] [--only NAME ...]
+
+Prints for the demo, Delft, ctview and a simulated city whether `hiproof build` gives the run's own bytes in every file; then how
+many buildings the city redoes for 50 overrides, how long that takes, whether all others keep their bytes, and how long a
+file of a million overrides takes to be read.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+import time
+from dataclasses import replace
+from pathlib import Path
+
+from hiproof.city import solve
+from hiproof.city.overrides import read_overrides
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.parametric.file import read_parameters
+from hiproof.parametric.run import build_file
+from hiproof.read.pointcloud import expand_paths
+from hiproof.settings import Settings
+from hiproof.simulate import demo_files
+
+from .city import city_files
+
+FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
+OVERRIDES = 50
+
+
+def requests(work: Path, data: Path, buildings: int) -> dict[str, Request]:
+    """What is run, by name; real data only where they are."""
+    demo = {name: str(path) for name, path in demo_files().items()}
+    found = {"demo": Request((demo["cloud"],), work / "demo", demo["footprints"], demo["terrain"])}
+    if (data / "delft").is_dir():
+        delft = data / "delft"
+        clouds = tuple(map(str, expand_paths((str(delft),))))
+        found["delft"] = Request(clouds, work / "delft", str(delft / "footprints.gpkg"))
+    if (data / "ctview").is_dir():
+        clouds = tuple(map(str, expand_paths((str(data / "ctview"),))))
+        settings = Settings.from_dict({"read": {"building_classes": [6, 67]}})
+        found["ctview"] = Request(clouds, work / "ctview", settings=settings)
+    clouds, footprints = city_files(work, buildings)
+    found[f"city of {buildings}"] = Request(tuple(clouds), work / "city", footprints, settings=Settings())
+    return found
+
+
+def rebuilt(name: str, request: Request, work: Path) -> str:
+    """Run, build again, compare byte by byte."""
+    reconstruct_area(request)
+    again = work / f"{request.out.name}-again"
+    built = build_file(request.out / "parameters.jsonl", again)
+    other = [file for file in FILES if (again / file).read_bytes() != (request.out / file).read_bytes()]
+    return f"{name}: {built.buildings} buildings, " + (f"DIFFERENT: {', '.join(other)}" if other else "byte-identical")
+
+
+def overridden(request: Request, work: Path) -> str:
+    """The city done again with overrides of every so-many-th building."""
+    before = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
+    chosen = list(before)[:: max(1, len(before) // OVERRIDES)][:OVERRIDES]
+    path = work / "known.jsonl"
+    path.write_text("".join(json.dumps({"id": id, "block_height": 7.5}) + "\n" for id in chosen))
+    solved, original = [], solve.solve_one
+
+    def counting(plan, job, *rest):
+        solved.append(job.id)
+        return original(plan, job, *rest)
+
+    solve.solve_one = counting
+    start = time.perf_counter()
+    try:
+        reconstruct_area(replace(request, overrides=str(path)))
+    finally:
+        solve.solve_one = original
+    seconds = time.perf_counter() - start
+    after = {row["id"]: row for row in read_parameters(request.out / "parameters.jsonl")}
+    same = sum(after[id] == before[id] for id in before if id not in chosen)
+    obeyed = sum("overridden: block_height" in after[id]["detail"] for id in chosen)
+    return (
+        f"{len(chosen)} overrides: {len(solved)} buildings solved in a run of {seconds:.1f} s, {obeyed} obeyed, "
+        f"{same} of {len(before) - len(chosen)} others unchanged"
+    )
+
+
+def many_lines(work: Path, lines: int) -> str:
+    """A file of as many overrides, read and checked."""
+    path = work / "many.jsonl"
+    with path.open("w") as file:
+        file.writelines(f'{{"id": "building-{k}", "ridge_height": {8.0 + k % 7}}}\n' for k in range(lines))
+    start, cpu = time.perf_counter(), time.process_time()
+    found = sum(1 for _ in read_overrides(str(path)))
+    took, cpu = time.perf_counter() - start, time.process_time() - cpu
+    return f"{found} lines of overrides, {path.stat().st_size / 1e6:.0f} MB: read in {took:.1f} s ({cpu:.1f} s of CPU)"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--work", type=Path)
+    parser.add_argument("--buildings", type=int, default=1000)
+    parser.add_argument("--lines", type=int, default=1_000_000)
+    parser.add_argument("--data", type=Path, default=Path("../shared/data"))
+    parser.add_argument("--only", nargs="*", help="demo, delft, ctview, city, lines [default: all]")
+    asked = parser.parse_args()
+    work = asked.work or Path(tempfile.mkdtemp(prefix="hiproof-rebuild-"))
+    work.mkdir(parents=True, exist_ok=True)
+    wanted = asked.only or ["demo", "delft", "ctview", "city", "lines"]
+    for name, request in requests(work, asked.data, asked.buildings).items():
+        if name.split()[0] in wanted:
+            start = time.perf_counter()
+            print(f"{rebuilt(name, request, work)} ({time.perf_counter() - start:.0f} s)", flush=True)
+            if name.startswith("city"):
+                print(overridden(request, work), flush=True)
+    if "lines" in wanted:
+        print(many_lines(work, asked.lines), flush=True)
+
+
+if __name__ == "__main__":
+    main()
