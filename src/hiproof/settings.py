@@ -63,6 +63,10 @@ class ReadSettings:
     split_gap_m: float = setting(
         0.0, "without footprints: clear space that separates buildings; 0 adapts it to the density", "m", 0.0, 20.0
     )
+    split_houses: bool = setting(
+        True,
+        "without footprints: tell touching houses apart where a step or another ridge or eave runs across the block",
+    )
     split_min_points: int = setting(30, "without footprints: groups of fewer points are no building", "", 3, 100000)
 
 

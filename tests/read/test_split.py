@@ -16,6 +16,9 @@ CTVIEW = Path(__file__).parents[3] / "shared" / "data" / "ctview"
 L_SHAPE = shapely.Polygon([(0, 0), (20, 0), (20, 8), (9, 8), (9, 18), (0, 18)])
 
 
+BLOCKS = Settings.from_dict({"read": {"split_houses": False}})
+
+
 def turned(polygon, degrees, at=(85000.0, 446000.0)):
     return shapely.affinity.translate(shapely.affinity.rotate(polygon, degrees, origin=(0, 0)), *at)
 
@@ -42,9 +45,9 @@ def street(density=8.0):
 
 
 @pytest.mark.parametrize("density", [4.0, 8.0, 25.0])
-def test_houses_apart_are_told_apart_and_houses_that_touch_stay_together(density):
+def test_houses_apart_are_told_apart_and_blocks_stay_together_where_asked(density):
     cloud, houses = street(density)
-    found = sorted(split_buildings(cloud), key=lambda building: building.index[0])
+    found = sorted(split_buildings(cloud, BLOCKS), key=lambda building: building.index[0])
     wanted = [houses[0], houses[1].union(houses[2]), houses[3], houses[4]]
     assert len(found) == 4
     for building, house in zip(found, wanted, strict=True):
@@ -86,7 +89,7 @@ def test_a_small_cloud_without_classes_is_one_building(classes):
     points = points_in(turned(L_SHAPE, 30), 5)
     classification = None if classes is None else np.full(len(points), classes, np.uint8)
     (building,) = split_buildings(PointCloud(points, classification))
-    assert len(building.index) == len(points) and building.area.area > 200
+    assert building.is_alone and len(building.index) == len(points) and building.area.area > 200
 
 
 def test_noise_is_no_part_of_the_one_building():
@@ -105,10 +108,23 @@ def test_larger_clouds_without_building_class_are_refused(what):
     classification = None if what == "without classes" else np.ones(len(points), np.uint8)
     if what == "without classes":
         points = np.concatenate([points, points + [30, 0, 0]])
+    by_class = Settings.from_dict({"read": {"roofs": "class"}})
     with pytest.raises(
         InputError, match="without classes" if classification is None else r"got classes 1 \(\d+ points\)"
     ):
-        split_buildings(PointCloud(points, classification))
+        split_buildings(PointCloud(points, classification), by_class)
+
+
+def test_roofs_are_found_by_shape_where_no_class_tells_them():
+    cloud, _ = street()
+    with pytest.warns(InputWarning, match="no building class"):
+        found = split_buildings(PointCloud(cloud.xyz, np.ones(len(cloud), np.uint8)), BLOCKS)
+    assert len(found) == 4
+    roofs = np.sort(np.concatenate([building.index for building in found]))
+    assert np.isin(roofs, np.flatnonzero(cloud.classification == 6)).mean() > 0.99
+    only_ground = cloud.xyz[cloud.classification == 2]
+    with pytest.raises(InputError, match="none of which lies on a smooth surface"):
+        split_buildings(PointCloud(np.concatenate([only_ground, only_ground + [0, 70, 0]])))
 
 
 def test_the_classes_there_are_named_and_another_may_be_chosen():
@@ -117,8 +133,9 @@ def test_the_classes_there_are_named_and_another_may_be_chosen():
     with pytest.raises(
         InputError, match=r"class 6 .*got classes 2 \(\d+ points\), 67 \(\d+ points\).*--building-class"
     ):
-        split_buildings(other)
-    assert len(split_buildings(other, Settings.from_dict({"read": {"building_classes": [67]}}))) == 4
+        split_buildings(other, Settings.from_dict({"read": {"roofs": "class"}}))
+    chosen = Settings.from_dict({"read": {"building_classes": [67], "split_houses": False}})
+    assert len(split_buildings(other, chosen)) == 4
 
 
 def test_groups_too_small_are_left_out_with_a_warning():
@@ -126,7 +143,7 @@ def test_groups_too_small_are_left_out_with_a_warning():
     crumbs = np.array([[86000.0, 446000.0, 5.0], [86000.1, 446000.0, 5.0]])
     cloud = PointCloud(np.concatenate([cloud.xyz, crumbs]), np.append(cloud.classification, [6, 6]).astype(np.uint8))
     with pytest.warns(InputWarning, match="1 groups of building points were left out"):
-        assert len(split_buildings(cloud)) == 4
+        assert len(split_buildings(cloud, BLOCKS)) == 4
 
 
 def test_density_is_that_of_the_roof_not_of_its_box():
@@ -144,7 +161,7 @@ def test_every_exported_name_exists():
 @pytest.mark.skipif(not CTVIEW.is_dir(), reason="needs the shared data folder ctview")
 def test_the_ign_tiles_split_into_their_buildings():
     cloud = hiproof.read.read_points(CTVIEW)
-    found = split_buildings(cloud)
+    found = split_buildings(cloud, BLOCKS)
     assert cloud.crs.to_epsg() == 2154 and 9 <= len(found) <= 12
     large = [b for b in found if b.area.area > 300]
     assert len(large) == 5 and all(b.area.is_valid for b in found)

@@ -8,11 +8,11 @@ from collections import Counter
 
 import numpy as np
 
+from ..classify.scene import NO_ROOFS
 from ..errors import InputError, InputWarning
 from ..read.pointcloud import iter_points
 from ..settings import ReadSettings, Settings
 
-NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noise"}
 PEEK_POINTS = 100_000
 
 

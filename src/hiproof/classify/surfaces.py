@@ -20,13 +20,17 @@ class Surfaces:
     """Points thinned to one a voxel, (v, ...), and what each lies on; `voxel` (n,) is the one of each point given.
 
     `neighbours` (v, k) are the nearest voxels, itself first; `roughness_m` (v,) is the residual of the smoothest plane
-    among those through a neighbour's neighbours, `extent_m2` (v,) the size of the surface that this plane belongs to.
+    among those through a neighbour's neighbours, `normal` (v, 3) that plane's, `is_smooth` (v,) whether the voxel lies on
+    it, and `extent_m2` (v,) the size of the surface that it belongs to.
     """
 
     voxel: np.ndarray
     xyz: np.ndarray
     neighbours: np.ndarray
     roughness_m: np.ndarray
+    normal: np.ndarray
+    is_smooth: np.ndarray
+    own_m2: np.ndarray
     extent_m2: np.ndarray
 
     def around(self, values: np.ndarray) -> np.ndarray:
@@ -56,7 +60,7 @@ def surfaces_of(xyz: np.ndarray) -> Surfaces:
     smooth = (residual < SMOOTH_M) & (beside < SMOOTH_M)
     surface = connected(middles, normal, smooth, neighbours)
     extent = np.minimum(np.bincount(surface, own_m2)[surface], LARGEST_M2)
-    return Surfaces(voxel, xyz[chosen], neighbours, residual, extent)
+    return Surfaces(voxel, xyz[chosen], neighbours, residual, normal, smooth, own_m2, extent)
 
 
 def one_a_voxel(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -1,7 +1,8 @@
-"""A cloud without footprints becomes buildings: roof points connected in plan."""
+"""A cloud without footprints becomes buildings: roof points connected in plan, and touching houses told apart."""
 
 from __future__ import annotations
 
+import dataclasses
 import warnings
 from collections import Counter
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ import shapely
 
 from ..errors import InputError, InputWarning
 from ..model import PointCloud
-from ..settings import Settings
+from ..settings import ReadSettings, Settings
 
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
 SPACINGS_PER_GAP = 2.5
@@ -26,29 +27,31 @@ SPACINGS_BEYOND = 0.35  # a roof ends about so far beyond its outermost points
 class FoundBuilding:
     """A group of points taken for one building: ascending `index` (n,) into the cloud.
 
-    `area` is the union of the cells that hold the group's points, in world metres: all of them lie in it, and none of
-    another group. The roof's outline is the fit's business.
+    `area` is the union of the cells that hold the group's points, in world metres, less what lies beyond a wall between
+    touching houses: all of them lie in it, and none of another group. The roof's outline is the fit's business. `is_alone`:
+    all points but noise are one roof, cut out beforehand.
     """
 
     id: str
     index: np.ndarray
     area: shapely.Geometry
+    is_alone: bool = False
 
 
 def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
-    """The buildings of `cloud`, from its building-class points; a small file without classes is one building.
+    """The buildings of `cloud`, from the points of its building class, or where it has none from roofs found by shape.
 
-    Groups with fewer than `settings.read.split_min_points` points or less than 4 m2 are left out with an InputWarning.
-    Buildings that touch stay together. Ids name the metre that holds the group's middle, not its number, so that they
-    do not depend on what else was read. Raises InputError when no point has the building classes.
+    A small file that holds one roof alone is one building. Houses that touch are told apart where their roofs say so
+    (`settings.read.split_houses`), else they stay together. Groups with fewer than `settings.read.split_min_points` points or
+    less than 4 m2 are left out with an InputWarning. Ids name the metre that holds the group's middle, not its number, so
+    that they do not depend on what else was read. Raises InputError where no point may be a building's.
     """
     read = (settings or Settings()).read
-    roof = building_points(cloud, read.building_classes)
-    if roof is None:
-        roof = single_building(cloud)
-        if roof is None:
-            raise InputError(without_building_class(cloud, read.building_classes))
-        return named([roof], cloud.xyz, adapted_gap(cloud.xyz[roof]))
+    roof, is_alone = roof_points_of(cloud, read)
+    if is_alone:
+        return [
+            dataclasses.replace(one, is_alone=True) for one in named([roof], cloud.xyz, adapted_gap(cloud.xyz[roof]))
+        ]
     xy = cloud.xyz[roof, :2]
     gap_m = read.split_gap_m or adapted_gap(xy)
     groups = [roof[group] for group in connected_groups(xy, gap_m)]
@@ -57,15 +60,37 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
         for group in groups
         if len(group) >= read.split_min_points and hull_area(cloud.xyz[group, :2]) >= MIN_AREA_M2
     ]
-    found = named(large, cloud.xyz, gap_m)
-    left_out = len(groups) - len(found)
+    left_out = len(groups) - len(large)
     if left_out:
         warnings.warn(
             f"{left_out} groups of building points were left out as too small (fewer than {read.split_min_points} points "
             f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
             InputWarning,
         )
-    return found
+    return named(large, cloud.xyz, gap_m, read.split_houses)
+
+
+def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool]:
+    """Ascending indices of the points that may be roofs, and whether they are one roof cut out beforehand."""
+    index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
+    if index is not None:
+        return index, False
+    alone, is_chosen = single_building(cloud), read.building_classes != ReadSettings().building_classes
+    if read.roofs == "class" or (read.roofs == "auto" and is_chosen):
+        if alone is None:
+            raise InputError(without_building_class(cloud, read.building_classes))
+        return alone, True
+    from ..classify.scene import roofs_by_shape
+
+    roofs, is_alone = roofs_by_shape(cloud, read.ground_classes, alone is not None)
+    if read.roofs == "auto" and not is_alone:
+        said = f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs were found by shape"
+        warnings.warn(said, InputWarning)
+    return roofs, is_alone
+
+
+def classes_text(classes: tuple[int, ...]) -> str:
+    return " or ".join(map(str, classes))
 
 
 def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray | None:
@@ -95,14 +120,13 @@ def single_building(cloud: PointCloud) -> np.ndarray | None:
 
 
 def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
-    wanted_text = " or ".join(map(str, wanted))
     if cloud.classification is None:
         got = f"{len(cloud)} points without classes, too many or too scattered for a single building"
     else:
         counts = sorted(Counter(cloud.classification.tolist()).items())
         got = "classes " + ", ".join(f"{number} ({count} points)" for number, count in counts)
     return (
-        f"expected points of class {wanted_text} (building), got {got}; name the class that holds the roofs with "
+        f"expected points of class {classes_text(wanted)} (building), got {got}; name the class that holds the roofs with "
         "--building-class, give --footprints, or classify the cloud first"
     )
 
@@ -153,18 +177,35 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     return np.split(order, np.cumsum(np.bincount(group_of, minlength=count))[:-1])
 
 
-def named(groups: list[np.ndarray], xyz: np.ndarray, gap_m: float) -> list[FoundBuilding]:
-    """Give each group its geometry and the id B_<x>_<y> of the metre that holds the middle of its box."""
+def named(groups: list[np.ndarray], xyz: np.ndarray, gap_m: float, split_houses: bool = False) -> list[FoundBuilding]:
+    """Give each group, or each of its houses, its geometry and the id B_<x>_<y> of the metre that holds the middle of its box."""
     used: Counter[str] = Counter()
     found = []
-    for index in groups:
+    for index, area in (house for group in groups for house in houses_of(group, xyz, gap_m, split_houses)):
         xy = xyz[index, :2]
         x, y = np.floor((xy.min(axis=0) + xy.max(axis=0)) / 2).astype(int)
         id = f"B_{x}_{y}"
         used[id] += 1
         id = id if used[id] == 1 else f"{id}_{used[id]}"
-        found.append(FoundBuilding(id, index, cell_area(xy, gap_m / 2)))
+        found.append(FoundBuilding(id, index, area))
     return found
+
+
+def houses_of(
+    group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
+) -> list[tuple[np.ndarray, shapely.Geometry]]:
+    """Points (indices) and area of each house of a group of points, or of the whole group."""
+    area = cell_area(xyz[group, :2], gap_m / 2)
+    if not split_houses:
+        return [(group, area)]
+    from ..classify.houses import told_apart
+
+    houses, left = [], np.ones(len(group), bool)
+    for house in told_apart(xyz[group], area, gap_m):
+        inside = left & shapely.intersects_xy(house, *xyz[group, :2].T)
+        left &= ~inside
+        houses.append((group[inside], house))
+    return [(index, house) for index, house in houses if len(index)]
 
 
 def hull_area(xy: np.ndarray) -> float:

@@ -1,0 +1,334 @@
+"""Houses that touch, told apart where their roofs say so: a step, another ridge or another eave all along a straight line.
+
+A bond joins two neighbouring points in plan; it holds where one surface goes on from one to the other. A line is crossed by
+bonds in runs; it may cut the block in those runs across which hardly any holds, from border to border, where that leaves roof
+enough for a house on either side. The best cut is made, then both sides are looked at again. A row of equal houses stays one.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ..compiled import compiled
+from .surfaces import Surfaces, surfaces_of
+
+REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
+STEP_M = 0.2  # surfaces that miss each other by less go on
+ROUGH_STEP_M = 0.5  # so much higher or lower than what is no surface
+UPRIGHT = 0.25  # cosine of the slope from which a surface is a wall
+HOLD = 3.0  # what a bond that holds counts against one that does not
+AWAY_M = 0.5  # of a line: nearer to it is its own border
+SHORT_M = 0.3  # bonds count by their shortness down to this
+LINE_M, FINE_LINE_M, STRETCH_M = 0.25, 0.1, 0.5
+NEXT_M = 2.0  # what lies so far from a line tells what is on its sides
+FINE_TURNS_DEG, FINE_SHIFT_M = (-4.0, -2.0, 0.0, 2.0, 4.0), 0.6
+LEAST_APART, LEAST_GAIN, LEAST_LENGTH_M = (
+    0.7,
+    0.35,
+    3.0,
+)  # of a run: share of stretches that nothing holds; gain a metre
+COARSE = 0.5  # of these two for lines that are not yet in their place
+LEAST_HOUSE_M2, LEAST_DEPTH_M = 25.0, 4.0  # of roof on either side, and by the metre of the cut
+TRIES = 20
+LIKE_DEG, LIKE_M = 12.0, 1.0
+DIRECTION_DEG, APART_DEG, MOST_DIRECTIONS, LEAST_SUPPORT = 3.0, 8.0, 6, 0.05
+STRAIGHT_M = 0.7  # corners of the block's border that are none
+
+
+@dataclass(frozen=True)
+class Bonds:
+    """Pairs of points: their places `ends` (b, 2, 2) in plan, and `state` (b,): HELD, LOOSE, or UNKNOWN between leaves."""
+
+    ends: np.ndarray
+    state: np.ndarray
+
+    def among(self, chosen: np.ndarray) -> Bonds:
+        return Bonds(self.ends[chosen], self.state[chosen])
+
+    def inside(self, area: shapely.Geometry) -> Bonds:
+        return self.among(shapely.intersects_xy(area, *self.ends.mean(axis=1).T))
+
+
+HELD, LOOSE, UNKNOWN = 0, 1, 2
+
+
+@dataclass(frozen=True)
+class Cut:
+    """The line at `offset` (m) along `normal` (2,), which bonds cross in `runs` (r, 4): low, high (m along it), whether it may
+    be cut there, and what speaks for that (m)."""
+
+    normal: np.ndarray
+    offset: float
+    runs: np.ndarray
+
+    @property
+    def along(self) -> np.ndarray:
+        return np.array([-self.normal[1], self.normal[0]])
+
+    @property
+    def gain(self) -> float:
+        return float(self.runs[self.runs[:, 2] > 0, 3].sum())
+
+    @property
+    def longest(self) -> np.ndarray:
+        """The longest run (4,) in which it may be cut."""
+        runs = self.runs[self.runs[:, 2] > 0]
+        return runs[(runs[:, 1] - runs[:, 0]).argmax()]
+
+    @property
+    def length(self) -> float:
+        return float(self.longest[1] - self.longest[0])
+
+    @property
+    def middle(self) -> np.ndarray:
+        return self.at(self.longest[:2].mean())
+
+    def at(self, u: float, v: float = 0.0) -> np.ndarray:
+        """The place (2,) `u` along the line and `v` before it."""
+        return (self.offset + v) * self.normal + u * self.along
+
+    def is_like(self, other: Cut) -> bool:
+        """Whether both run nearly the same way in nearly the same place."""
+        turn, away = abs(self.normal @ other.normal), abs(self.middle @ other.normal - other.offset)
+        low, high = other.longest[:2]
+        beside = low < self.middle @ other.along < high
+        return bool(beside and away < LIKE_M and turn > math.cos(math.radians(LIKE_DEG)))
+
+
+def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[shapely.Geometry]:
+    """The areas of the single houses among roof points (n, 3) in `area`, all in world metres: they share it without a rest.
+
+    Parts of the area within `gap_m` of each other are one block.
+
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 16, 0.4), np.arange(0.2, 9, 0.4)))
+    >>> pair = np.column_stack([x, y, np.where(x < 8, 6.0, 7.0) - 0.6 * abs(y - 4.5)])
+    >>> [bool(abs(house.area - 72) < 1.5) for house in told_apart(pair, shapely.box(0, 0, 16, 9), 1.0)]
+    [True, True]
+    """
+    origin = np.floor(xyz.min(axis=0))
+    surfaces = surfaces_of(xyz - origin)
+    local = shapely.transform(area, lambda xy: xy - origin[:2])
+    houses = houses_in(shapely.buffer(local, gap_m, join_style="mitre"), surfaces, bonds_of(surfaces))
+    if len(houses) == 1:
+        return [area]
+    return [shapely.transform(shapely.intersection(house, local), lambda xy: xy + origin[:2]) for house in houses]
+
+
+def houses_in(area: shapely.Geometry, surfaces: Surfaces, bonds: Bonds) -> list[shapely.Geometry]:
+    """`area` cut at the best cut that leaves a house on either side, and the sides again."""
+    if roof_m2(area, surfaces) < 2 * LEAST_HOUSE_M2:
+        return [area]
+    bonds = bonds.inside(area)
+    for rough in best_cuts(bonds, directions_of(area, surfaces)):
+        cut = refined(rough, bonds)
+        sides = [area] if cut is None else with_crumbs(sides_of(area, cut), surfaces)
+        if len(sides) > 1 and all(depth_m(side, cut, surfaces) > LEAST_DEPTH_M for side in sides):
+            return [house for side in sides for house in houses_in(side, surfaces, bonds)]
+    return [area]
+
+
+def is_roof(surfaces: Surfaces) -> np.ndarray:
+    return surfaces.is_smooth & (np.abs(surfaces.normal[:, 2]) > UPRIGHT)
+
+
+def roof_m2(area: shapely.Geometry, surfaces: Surfaces) -> float:
+    """How much of `area` lies under smooth surfaces that are no walls, in plan."""
+    roof = is_roof(surfaces)
+    shapely.prepare(area)
+    inside = shapely.intersects_xy(area, *surfaces.xyz[roof, :2].T)
+    return float((surfaces.own_m2[roof] * np.abs(surfaces.normal[roof, 2]))[inside].sum())
+
+
+def depth_m(side: shapely.Geometry, cut: Cut, surfaces: Surfaces) -> float:
+    """How far a `side` of the cut reaches away from it: twice what half of its roof does."""
+    xy = surfaces.xyz[is_roof(surfaces), :2]
+    inside = shapely.intersects_xy(side, *xy.T)
+    return 2.0 * float(np.median(np.abs(xy[inside] @ cut.normal - cut.offset)))
+
+
+def bonds_of(surfaces: Surfaces) -> Bonds:
+    """All pairs of neighbours in plan, walls left out.
+
+    A surface holds both where the plane of one goes through the other, or where their planes meet between them (a ridge, a valley).
+    """
+    from scipy.spatial import cKDTree
+
+    kept = is_roof(surfaces) | ~surfaces.is_smooth
+    xyz, normal, smooth = (values[kept] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth))
+    if len(xyz) < 2:
+        return Bonds(np.empty((0, 2, 2)), np.empty(0, np.int64))
+    tree = cKDTree(xyz[:, :2])
+    spacing = np.median(tree.query(xyz[:, :2], k=2)[0][:, 1])
+    one, other = tree.query_pairs(max(REACH_M, REACH_SPACINGS * spacing), output_type="ndarray").T
+    slope = -normal[:, :2] / np.where(np.abs(normal[:, 2]) < UPRIGHT, 1.0, normal[:, 2])[:, None]
+    between = xyz[other] - xyz[one]
+    above = between[:, 2] - (slope[one] * between[:, :2]).sum(axis=1)
+    below = -between[:, 2] + (slope[other] * between[:, :2]).sum(axis=1)
+    goes_on = (np.minimum(np.abs(above), np.abs(below)) < STEP_M) | (above * below > 0)
+    rough = np.where(np.abs(between[:, 2]) > ROUGH_STEP_M, LOOSE, UNKNOWN)
+    state = np.where(smooth[one] & smooth[other], np.where(goes_on, HELD, LOOSE), rough)
+    return Bonds(np.stack([xyz[one, :2], xyz[other, :2]], axis=1), state)
+
+
+def directions_of(area: shapely.Geometry, surfaces: Surfaces) -> np.ndarray:
+    """Azimuths (d,) in which cuts are looked for: those of slopes and of the block's border, and across them."""
+    shapely.prepare(area)
+    roof = is_roof(surfaces) & shapely.intersects_xy(area, *surfaces.xyz[:, :2].T)
+    normal = surfaces.normal[roof]
+    rings = [
+        np.diff(shapely.get_coordinates(p.exterior), axis=0)
+        for p in shapely.get_parts(area.simplify(STRAIGHT_M))
+        if not p.is_empty
+    ]
+    edges = np.concatenate(rings)
+    steep = np.hypot(*normal[:, :2].T)
+    angle = np.r_[np.arctan2(normal[:, 1], normal[:, 0]), np.arctan2(edges[:, 1], edges[:, 0])]
+    weight = np.r_[steep / max(steep.sum(), 1e-9), np.hypot(*edges.T) / np.hypot(*edges.T).sum()]
+    tried = np.radians(np.arange(0.0, 90.0, 1.0))
+    gap = np.angle(np.exp(4j * (angle[None, :] - tried[:, None]))) / 4.0
+    support = (weight * np.exp(-0.5 * (gap / math.radians(DIRECTION_DEG)) ** 2)).sum(axis=1)
+    found: list[float] = []
+    for k in np.argsort(-support):
+        far = all(abs(np.angle(np.exp(4j * (tried[k] - other)))) / 4.0 > math.radians(APART_DEG) for other in found)
+        if far and support[k] > LEAST_SUPPORT * weight.sum() and len(found) < MOST_DIRECTIONS:
+            found.append(tried[k])
+    return np.array([turned for angle in found for turned in (angle, angle + 0.5 * math.pi)])
+
+
+def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
+    """Cuts in all `directions`, none near a better one, the best first."""
+    cuts = [cut for angle in directions for cut in cuts_along(angle, bonds, LINE_M, COARSE)]
+    best: list[Cut] = []
+    for cut in sorted(cuts, key=lambda cut: -cut.gain):
+        if len(best) < TRIES and not any(cut.is_like(other) for other in best):
+            best.append(cut)
+    return best
+
+
+def refined(cut: Cut, bonds: Bonds) -> Cut | None:
+    """The best of the lines near `cut`, turned a little and at a tenth of a metre; None where it is none to cut at."""
+    near = bonds.among(np.hypot(*(bonds.ends.mean(axis=1) - cut.middle).T) < 0.5 * cut.length + 2.0)
+    angle = math.atan2(cut.normal[1], cut.normal[0])
+    tried = [other for turn in np.radians(FINE_TURNS_DEG) for other in cuts_along(angle + turn, near, FINE_LINE_M)]
+    like = [
+        other
+        for other in tried
+        if abs(other.normal @ cut.middle - other.offset) < FINE_SHIFT_M and other.length > 0.7 * cut.length
+    ]
+    if not like:
+        return None
+    best = max(like, key=lambda other: other.gain)
+    across = bonds.ends @ best.normal - best.offset
+    crossing = bonds.among((across.min(axis=1) < NEXT_M) & (across.max(axis=1) > -NEXT_M))
+    whole = cuts_along(math.atan2(best.normal[1], best.normal[0]), crossing, FINE_LINE_M)
+    return next((other for other in whole if abs(other.offset - best.offset) < 0.5 * FINE_LINE_M), None)
+
+
+def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1.0) -> list[Cut]:
+    """Cuts along lines, `lines_m` apart, whose normal has the azimuth `angle`."""
+    if not len(bonds.state):
+        return []
+    normal = np.array([math.cos(angle), math.sin(angle)])
+    crossed, first, start = crossings(bonds.ends, bonds.state, normal, lines_m, STRETCH_M)
+    crossed *= is_between(bonds.ends, normal, lines_m, first, start, crossed[0])
+    line, runs = runs_of(crossed, start, strictness * LEAST_APART)
+    length = runs[:, 1] - runs[:, 0]
+    is_long = (runs[:, 2] > 0) & (runs[:, 3] > strictness * LEAST_GAIN * length) & (length >= LEAST_LENGTH_M)
+    return [Cut(normal, (first + k) * lines_m, runs[line == k]) for k in np.unique(line[is_long])]
+
+
+@compiled
+def crossings(ends, state, normal, lines_m, stretch_m):
+    """How many bonds of each state cross each line in each stretch (3, lines, stretches), short ones counting more; the
+    first line's number, and where the first stretch begins along it."""
+    v, u = np.empty((len(ends), 2)), np.empty((len(ends), 2))
+    for b in range(len(ends)):
+        for e in range(2):
+            v[b, e] = (ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]) / lines_m
+            u[b, e] = (ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1]) / stretch_m
+    first, start = math.floor(v.min()), math.floor(u.min())
+    crossed = np.zeros((3, int(math.floor(v.max()) - first) + 1, int(math.floor(u.max()) - start) + 1))
+    for b in range(len(ends)):
+        low, high = (0, 1) if v[b, 0] < v[b, 1] else (1, 0)
+        length = math.hypot(ends[b, 1, 0] - ends[b, 0, 0], ends[b, 1, 1] - ends[b, 0, 1])
+        for line in range(math.ceil(v[b, low]), math.floor(v[b, high]) + 1):
+            share = (line - v[b, low]) / max(v[b, high] - v[b, low], 1e-9)
+            place = u[b, low] + share * (u[b, high] - u[b, low])
+            crossed[state[b], int(line - first), int(place - start)] += 1.0 / max(length, SHORT_M)
+    return crossed, first, start * stretch_m
+
+
+@compiled
+def is_between(ends, normal, lines_m, first, start, like):
+    """Whether something lies on both sides of each line, away from it, in each stretch, as a table (lines, stretches) `like` this:
+    along the border of a block there is nothing to be cut."""
+    beside = np.zeros((2, *like.shape))
+    for b in range(len(ends)):
+        for e in range(2):
+            v = ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]
+            stretch = int((ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1] - start) / STRETCH_M)
+            for side in range(2):
+                low = v - AWAY_M - REACH_M if side else v + AWAY_M
+                for line in range(math.ceil(low / lines_m) - first, math.floor((low + REACH_M) / lines_m) - first + 1):
+                    if 0 <= line < like.shape[0]:
+                        beside[side, int(line), stretch] = 1.0
+    return beside[0] * beside[1]
+
+
+@compiled
+def runs_of(crossed, start, least_apart):
+    """Line (m,) and low, high, whether hardly any bond holds, and gain (m, 4) of each run of stretches that bonds cross; a run
+    goes on beyond a single stretch that none crosses."""
+    line, runs, m = np.empty(crossed[0].size, np.int64), np.empty((crossed[0].size, 4)), 0
+    for k in range(crossed.shape[1]):
+        low, high, count, apart, gain = -1, -1, 0, 0, 0.0
+        for stretch in range(crossed.shape[2] + 2):
+            if stretch < crossed.shape[2] and crossed[:, k, stretch].sum() > 0.0:
+                held, loose, unknown = crossed[:, k, stretch]
+                low, high, count = stretch if count == 0 else low, stretch + 1, count + 1
+                gain += STRETCH_M * (loose - HOLD * held) / (held + loose + unknown)
+                apart += loose > HOLD * held
+            elif count > 0 and stretch > high:
+                line[m], runs[m, 2], runs[m, 3] = k, apart >= least_apart * count, gain
+                runs[m, 0], runs[m, 1] = start + low * STRETCH_M, start + high * STRETCH_M
+                low, high, count, apart, gain, m = -1, -1, 0, 0, 0.0, m + 1
+    return line[:m], runs[:m]
+
+
+def sides_of(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
+    """What `area` falls into where it is cut: all that goes on around its ends, or across it elsewhere, stays together."""
+    far = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
+    low, high = cut.middle @ cut.along - far, cut.middle @ cut.along + far
+    halves = [[cut.at(low), cut.at(high), cut.at(high, side * far), cut.at(low, side * far)] for side in (-1, 1)]
+    halves = [shapely.intersection(area, shapely.Polygon(half)) for half in halves]
+    parts = [part for half in halves for part in shapely.get_parts(half) if part.area > 0.0]
+    group, held = list(range(len(parts))), cut.runs[cut.runs[:, 2] == 0]
+    for segment in shapely.get_parts(shapely.intersection(area, shapely.LineString([cut.at(low), cut.at(high)]))):
+        u = shapely.get_coordinates(segment) @ cut.along
+        if not segment.length or not ((held[:, 0] < u.max()) & (held[:, 1] > u.min())).any():
+            continue
+        across = [shapely.Point(cut.at(u.mean(), side * 0.01)) for side in (-1, 1)]
+        one, other = (group[int(np.argmin(shapely.distance(parts, point)))] for point in across)
+        group = [one if number == other else number for number in group]
+    return [joined([p for p, g in zip(parts, group, strict=True) if g == number]) for number in sorted(set(group))]
+
+
+def with_crumbs(sides: list[shapely.Geometry], surfaces: Surfaces) -> list[shapely.Geometry]:
+    """The sides as large as a house, each with the smaller ones nearest to it."""
+    is_large = [roof_m2(side, surfaces) >= LEAST_HOUSE_M2 for side in sides]
+    houses = [[side] for side, large in zip(sides, is_large, strict=True) if large]
+    if len(houses) < 2:
+        return [joined(sides)]
+    for side, large in zip(sides, is_large, strict=True):
+        if not large:
+            houses[int(np.argmin([side.distance(house[0]) for house in houses]))].append(side)
+    return [joined(house) for house in houses]
+
+
+def joined(areas: list[shapely.Geometry]) -> shapely.Geometry:
+    """The union of polygons that share nothing but border."""
+    return shapely.union_all(areas) if len(areas) > 1 else areas[0]

@@ -1,0 +1,86 @@
+"""Touching houses are told apart where their roofs say so, and a single house is never cut."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.classify.houses import told_apart
+from hiproof.model import PointCloud
+from hiproof.read.split import split_buildings
+from hiproof.settings import Settings
+
+RNG = np.random.default_rng(3)
+PLACE = np.array([85000.0, 446000.0])
+WIDTH, DEPTH = 16.0, 9.0
+
+
+def block(height, density=6.0, width=WIDTH, depth=DEPTH, seed=0, turn=0.4):
+    """Points of a roof of `height(x, y)` over a rectangle, its area, and what takes its plan into the world."""
+    rng = np.random.default_rng(seed)
+    xy = rng.uniform([0, 0], [width, depth], (int(density * width * depth), 2))
+    z = height(*xy.T) + rng.normal(0.0, 0.03, len(xy))
+    cosine, sine = np.cos(turn), np.sin(turn)
+
+    def world(plan):
+        return plan @ np.array([[cosine, sine], [-sine, cosine]]) + PLACE
+
+    return np.column_stack([world(xy), z]), shapely.transform(shapely.box(0, 0, width, depth), world), world
+
+
+def gable(x, y):
+    return 8.0 - 0.7 * abs(y - DEPTH / 2)
+
+
+TWO_HOUSES = {
+    "a step": lambda x, y: gable(x, y) + np.where(x < 8.6, 0.0, 0.8),
+    "another ridge": lambda x, y: np.where(x < 8.6, gable(x, y), 8.0 - 0.7 * abs(y - 7.0)),
+    "another direction": lambda x, y: np.where(x < 8.6, gable(x, y), 12.0 - 0.7 * abs(x - 12.3)),
+    "a flat one beside": lambda x, y: np.where(x < 8.6, gable(x, y), 4.0),
+}
+ONE_HOUSE = {
+    "gable": gable,
+    "hip": lambda x, y: 8.0 - 0.7 * np.maximum(abs(y - DEPTH / 2), abs(x - 8.0) - 3.5),
+    "flat": lambda x, y: np.full_like(x, 5.0),
+    "valley": lambda x, y: 6.0 + 0.6 * abs(x - 8.0),
+    "a chimney's breadth higher": lambda x, y: gable(x, y) + np.where((abs(x - 8) < 1) & (abs(y - 4) < 1), 1.5, 0.0),
+    "a shallow extension": lambda x, y: np.where(y > 3.0, gable(x, y), 3.0),
+    "a row of equal houses": gable,
+}
+
+
+@pytest.mark.parametrize("height", TWO_HOUSES.values(), ids=TWO_HOUSES)
+def test_houses_that_differ_are_told_apart_at_their_wall(height):
+    points, area, world = block(height)
+    houses = told_apart(points, area, 1.0)
+    assert len(houses) == 2
+    for own in (shapely.box(0, 0, 8.6, DEPTH), shapely.box(8.6, 0, WIDTH, DEPTH)):
+        own = shapely.transform(own, world)
+        assert max(shapely.intersection(own, h).area / shapely.union(own, h).area for h in houses) > 0.93
+    assert sum(house.area for house in houses) == pytest.approx(area.area)
+
+
+@pytest.mark.parametrize("height", ONE_HOUSE.values(), ids=ONE_HOUSE)
+def test_one_house_stays_one(height):
+    points, area, _ = block(height)
+    assert told_apart(points, area, 1.0) == [area]
+
+
+def test_houses_with_bushes_between_them_are_told_apart_in_any_order_of_points():
+    def height(x, y):
+        return np.where(abs(x - 8.0) < 1.5, np.random.default_rng(1).uniform(1.0, 4.0, len(x)), 6.0)
+
+    points, area, _ = block(height, density=15.0)
+    houses = told_apart(points, area, 1.0)
+    shuffled = told_apart(RNG.permutation(points), area, 1.0)
+    assert len(houses) == 2
+    assert all(any(one.equals_exact(other, 1e-6) for other in shuffled) for one in houses)
+
+
+def test_every_point_of_a_split_cloud_is_one_house_s():
+    points, _, _ = block(TWO_HOUSES["a step"])
+    cloud = PointCloud(points, np.full(len(points), 6, np.uint8))
+    houses = split_buildings(cloud)
+    assert len(houses) == 2
+    assert np.array_equal(np.sort(np.concatenate([house.index for house in houses])), np.arange(len(points)))
+    assert all(shapely.intersects_xy(house.area, *points[house.index, :2].T).all() for house in houses)
+    assert len(split_buildings(cloud, Settings.from_dict({"read": {"split_houses": False}}))) == 1
