@@ -1,15 +1,17 @@
-"""What a user waits for: `import hiproof`, `hiproof --help`, and a whole Delft run in a fresh process, compiled before.
+"""What a user waits for: `import hiproof`, `hiproof --help`, a town of one building and a whole Delft run in a fresh process,
+compiled before.
 
     python -m benchmarks.startup [--quick]
 
-Each line is the median wall time of several fresh processes, and its ratio to starting Python with NumPy in between. The
-Delft run needs `../shared/data/delft` and is left out where that is missing.
+Each line is the median of several fresh processes: CPU and wall time, and the ratio of the wall time to starting Python with NumPy in
+between. The Delft run needs `../shared/data/delft` and is left out where that is missing.
 """
 
 from __future__ import annotations
 
 import argparse
 import os
+import resource
 import statistics
 import subprocess
 import sys
@@ -17,25 +19,30 @@ import tempfile
 import time
 from pathlib import Path
 
+from hiproof.simulate.city import City, write_city
+
 ROOT = Path(__file__).parents[1]
 DELFT = ROOT.parent / "shared" / "data" / "delft"
 REFERENCE = ["-c", "import numpy"]
 
 
-def wall(arguments: list[str]) -> float:
+def cost(arguments: list[str]) -> tuple[float, float]:
+    """CPU and wall seconds of a process and of those that it starts."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    start = time.perf_counter()
+    start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, *arguments], check=True, env=environment, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - start
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
+    return cpu, time.perf_counter() - start
 
 
 def compare(name: str, arguments: list[str], runs: int) -> None:
     """Print the median of `runs` fresh processes after one warm-up, in turn with the reference."""
-    wall(arguments)
-    pairs = [(wall(arguments), wall(REFERENCE)) for _ in range(runs)]
-    mine = statistics.median(a for a, _ in pairs)
-    ratio = statistics.median(a / b for a, b in pairs)
-    print(f"{name:42s} {mine:7.2f} s   {ratio:6.1f} times starting Python with NumPy")
+    cost(arguments)
+    pairs = [(cost(arguments), cost(REFERENCE)) for _ in range(runs)]
+    cpu, wall = (statistics.median(mine[k] for mine, _ in pairs) for k in (0, 1))
+    ratio = statistics.median(mine[1] / reference[1] for mine, reference in pairs)
+    print(f"{name:42s} CPU {cpu:6.2f} s, wall {wall:6.2f} s   {ratio:6.1f} times starting Python with NumPy")
 
 
 def main() -> None:
@@ -44,6 +51,11 @@ def main() -> None:
     runs = 3 if parser.parse_args().quick else 7
     compare("import hiproof", ["-c", "import hiproof"], runs)
     compare("hiproof --help", ["-m", "hiproof", "--help"], runs)
+    with tempfile.TemporaryDirectory() as work:
+        list(write_city(Path(work), City(1)))
+        files = [*map(str, Path(work).glob("tiles/*.laz")), "--footprints", f"{work}/footprints.gpkg"]
+        run = ["-m", "hiproof", "reconstruct", *files, "--out", f"{work}/models", "--restart"]
+        compare("a town of one building", run, runs)
     if not DELFT.is_dir():
         print(f"whole Delft run: left out, {DELFT} is missing")
         return

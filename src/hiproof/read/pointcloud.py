@@ -26,7 +26,7 @@ TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
 POINT_SUFFIXES = (*LAS_SUFFIXES, *TEXT_SUFFIXES, ".ply")
 FORMATS = "LAS, LAZ, COPC, PLY or text (" + " ".join(TEXT_SUFFIXES) + ")"
 PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
-CHUNK_POINTS = 1_000_000
+CHUNK_POINTS = 250_000  # five of LASzip's own chunks, and 30 MB while they are sorted
 
 Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
 
