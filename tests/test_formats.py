@@ -9,9 +9,10 @@ import pytest
 
 from handmade import gable_house, modelled, unmodelled
 from hiproof import formats
-from hiproof.formats import FORMATS, Format, asked_files, asked_fragments, module_of
+from hiproof.formats import FORMATS, Format, asked_files, asked_fragments, asked_tile_files, module_of
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import files_text
+from hiproof.write.citygml3 import write_citygml3
 from hiproof.write.fragments import Fragment
 from hiproof.write.head import FileHead
 from hiproof.write.run_files import fragments, join_fragments, write_all
@@ -68,3 +69,27 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
         if name != "parameters.jsonl":  # its head tells an offset that is settled beforehand
             assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
     assert "| `names.txt` | names alone | `hiproof reconstruct` |" in files_text()
+
+
+@pytest.mark.parametrize(
+    ("version", "files"),
+    [
+        ("2.0", ["buildings.gml"]),
+        ("3.0", ["buildings.citygml3.gml"]),
+        ("both", ["buildings.gml", "buildings.citygml3.gml"]),
+    ],
+)
+def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
+    settings = Settings.from_dict({"city": {"citygml": version, "models": "both"}})
+    asked = asked_files(settings, tmp_path)
+    assert [file.name for file in asked.values() if file.suffix == ".gml"] == files
+    by_tile = asked_tile_files(settings, tmp_path, "0_0_0").values()
+    assert [file.name for file in by_tile if file.suffix == ".gml"] == [
+        name.replace("buildings", "0_0_0") for name in files
+    ]
+    head = FileHead("EPSG:7415", offset=np.array([85000.0, 446000.0, 0.0]))
+    building = modelled(gable_house(), "a")
+    join_fragments(asked, [fragments(building, ("a", "a"), head, settings)[1]], head)
+    if version == "both":
+        write_citygml3(tmp_path / "alone.gml", [building], "EPSG:7415")
+        assert (tmp_path / "alone.gml").read_bytes() == asked["gml3"].read_bytes()

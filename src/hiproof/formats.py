@@ -29,8 +29,12 @@ def always(settings: Settings) -> bool:
     return True
 
 
-def merged(settings: Settings) -> bool:
-    return settings.city.models != "tiles"
+def citygml2(settings: Settings) -> bool:
+    return settings.city.citygml != "3.0"
+
+
+def citygml3(settings: Settings) -> bool:
+    return settings.city.citygml != "2.0"
 
 
 def parquet(settings: Settings) -> bool:
@@ -60,15 +64,22 @@ FORMATS = {
         what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection curves, roofType",
         module="citygml",
         fragment="citygml",
-        asked=merged,
+        asked=citygml2,
         tile_ending=".gml",
+    ),
+    "gml3": Format(
+        file="buildings.citygml3.gml",
+        what="CityGML 3.0 with the same content (`--citygml 3.0` or `both`)",
+        module="citygml3",
+        fragment="citygml3",
+        asked=citygml3,
+        tile_ending=".citygml3.gml",
     ),
     "cityjson": Format(
         file="buildings.city.jsonl",
         what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG use (`rf_...`)",
         module="cityjson",
         fragment="cityjson",
-        asked=merged,
         tile_ending=".city.jsonl",
     ),
     "parameters": Format(
@@ -123,15 +134,26 @@ def asked_files(settings: Settings, folder: Path) -> dict[str, Path]:
     >>> [path.name for path in asked_files(Settings(), Path("models")).values()]
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
     """
-    formats = FORMATS.items()
-    return {name: folder / format.file for name, format in formats if format.fragment and format.asked(settings)}
+    by_tile_alone = settings.city.models == "tiles"
+    written = {n: format for n, format in asked_formats(settings).items() if not (by_tile_alone and format.tile_ending)}
+    return {name: folder / format.file for name, format in written.items()}
+
+
+def asked_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
+    """Paths in `folder` of the files of a work tile's own, by format; none where such a run writes none."""
+    by_tile = settings.city.models != "merged"
+    asked = {name: format for name, format in asked_formats(settings).items() if by_tile and format.tile_ending}
+    return {name: folder / f"{tile}{format.tile_ending}" for name, format in asked.items()}
 
 
 def asked_fragments(settings: Settings) -> list[str]:
     """The modules that make a building's parts of all files of such a run, those of its work tiles included."""
-    by_tile = settings.city.models != "merged"
-    formats = [format for format in FORMATS.values() if format.asked(settings) or (by_tile and format.tile_ending)]
-    return list(dict.fromkeys(format.fragment for format in formats if format.fragment))
+    return list(dict.fromkeys(format.fragment for format in asked_formats(settings).values()))
+
+
+def asked_formats(settings: Settings) -> dict[str, Format]:
+    """What a run of these settings writes, as whole files or by work tile."""
+    return {name: format for name, format in FORMATS.items() if format.fragment and format.asked(settings)}
 
 
 def module_of(name: str) -> ModuleType:

@@ -159,6 +159,13 @@ class CitySettings:
         choices=("merged", "tiles", "both"),
         option="--models",
     )
+    citygml: str = setting("2.0", "version of CityGML, or both", choices=("2.0", "3.0", "both"), option="--citygml")
+    osm_tags: bool = setting(
+        False,
+        "write OpenStreetMap's Simple 3D tags as attributes too: roof:shape, roof:height, roof:direction, roof:angle, height; they "
+        "replace the input's own of these names",
+        option="--osm-tags",
+    )
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..formats import FORMATS, OF_TILES, asked_files
+from ..formats import FORMATS, OF_TILES, asked_files, asked_tile_files
 from ..write.fragments import Fragments, load_fragments
 from ..write.run_files import join_fragments
 from .plan import Plan
@@ -38,8 +38,10 @@ def tile_parts(state: Path, tile: str) -> Path:
 
 def output_files(plan: Plan, out: Path) -> list[Path]:
     """All files that a run of this plan says it has written, the record of the run aside."""
-    tiles = plan.tiles if plan.settings.city.models != "merged" else ()
-    return [*whole_files(plan, out).values(), *(file for tile in tiles for file in tile_files(out, tile).values())]
+    return [
+        *whole_files(plan, out).values(),
+        *(file for tile in plan.tiles for file in tile_files(plan, out, tile).values()),
+    ]
 
 
 def whole_files(plan: Plan, out: Path) -> dict[str, Path]:
@@ -47,15 +49,14 @@ def whole_files(plan: Plan, out: Path) -> dict[str, Path]:
     return asked_files(plan.settings, out)
 
 
-def tile_files(out: Path, tile: str) -> dict[str, Path]:
-    """Files of one work tile's models by format."""
-    return {name: out / TILE_FOLDER / f"{tile}{format.tile_ending}" for name, format in OF_TILES.items()}
+def tile_files(plan: Plan, out: Path, tile: str) -> dict[str, Path]:
+    """Files of one work tile's models by format, where the settings ask for them."""
+    return asked_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
 def write_tile(plan: Plan, out: Path, tile: str, parts: list[Fragments]) -> None:
     """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
-    if plan.settings.city.models != "merged":
-        join_fragments(tile_files(out, tile), parts, plan.head)
+    join_fragments(tile_files(plan, out, tile), parts, plan.head)
 
 
 def remove_tiles(out: Path, pattern: str = "*") -> None:

@@ -78,6 +78,16 @@ HIPROOF = (
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
 )
 
+OSM = (
+    Attribute("roof:shape", "text", "", "of the largest part, as OpenStreetMap names it"),
+    Attribute("roof:height", "number", "m", "from the lowest edge of that part's roof to the top of the building"),
+    Attribute(
+        "roof:direction", "number", "deg", "compass direction that its largest face, or its hipped end, looks in"
+    ),
+    Attribute("roof:angle", "number", "deg", "slope of its largest face"),
+    Attribute("height", "number", "m", "from the ground to the top"),
+)
+
 ROOF_SURFACE = (
     Attribute("rf_slope", "number", "deg", "slope of the face (in CityGML: slope)"),
     Attribute(
@@ -236,6 +246,7 @@ EVERY_FORMAT = "`buildings.gml`, `buildings.city.jsonl`, the layer `buildings` o
 TABLES = (
     Table("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
     Table("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
+    Table("Buildings, as OpenStreetMap tags them (`--osm-tags`)", EVERY_FORMAT, OSM),
     Table("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
     Table("Parameters: the first line", "`parameters.jsonl`; its schema: `hiproof build --schema`", HEAD),
     Table("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),

@@ -18,7 +18,7 @@ import numpy as np
 from ..errors import OutputError
 from ..frames import Units
 from ..model import Building
-from .attribute_list import HIPROOF, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
+from .attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
 from .building_attributes import building_attributes, figures_of
 from .files import atomic, scratch
 from .fragments import Fragment, Sheet
@@ -68,7 +68,9 @@ class WaitingRows:
 
     def kinds(self, prefix: str) -> dict[str, type]:
         """The one type of every column."""
-        declared = {prefix + a.name: a.kind for a in ROOFER} | {OWN + a.name: a.kind for a in HIPROOF}
+        declared = {
+            start + a.name: a.kind for start, table in ((prefix, ROOFER), (OWN, HIPROOF), ("", OSM)) for a in table
+        }
         declared = {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
         kinds = {name: column_kind(found, declared.get(name, "text")) for name, found in self.found.items()}
         return kinds or {"id": str}

@@ -23,9 +23,13 @@ def figures_of(building: Building) -> RoofFigures | None:
 
 
 def building_attributes(
-    building: Building, figures: RoofFigures | None = None, prefix: str = PREFIX, units: Units = METRES
+    building: Building,
+    figures: RoofFigures | None = None,
+    prefix: str = PREFIX,
+    units: Units = METRES,
+    osm: bool = False,
 ) -> dict[str, Any]:
-    """Attributes by name, in a fixed order: the input's own, then roofer's (`prefix`), then ours (`hiproof_`).
+    """Attributes by name, in a fixed order: the input's own, roofer's (`prefix`), ours (`hiproof_`), with `osm` the tags of OpenStreetMap.
 
     Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what we computed wins.
     Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose coordinates are in other `units`, which
@@ -34,6 +38,10 @@ def building_attributes(
     own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
     computed |= {OWN + name: value for name, value in hiproof_attributes(building).items()}
+    if osm:
+        from .osm_tags import osm_tags
+
+        computed |= osm_tags(building, figures)
     if not units.are_metres:
         computed[OWN + "units"] = f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
     return own | {name: plain(value) for name, value in computed.items()}

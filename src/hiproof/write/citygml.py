@@ -61,6 +61,8 @@ def write_citygml(
 class CityGMLWriter(BuildingWriter):
     """Incremental form of `write_citygml`."""
 
+    namespaces, root_id = NAMESPACES, ""
+
     def __init__(
         self,
         path: str | os.PathLike,
@@ -76,8 +78,8 @@ class CityGMLWriter(BuildingWriter):
         self.names = UniqueNames()
 
     def begin(self, stack: ExitStack) -> None:
-        declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
-        self.file.write(f"<?xml version='1.0' encoding='utf-8'?>\n<core:CityModel {declared}>\n".encode())
+        declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in self.namespaces.items())
+        self.file.write(f"<?xml version='1.0' encoding='utf-8'?>\n<core:CityModel {declared}{self.root_id}>\n".encode())
         self.envelope_at = self.file.tell()
         self.envelope_length = len(self.envelope(np.full(3, WIDEST), np.full(3, WIDEST)))
         self.file.write(b" " * self.envelope_length)
@@ -86,7 +88,11 @@ class CityGMLWriter(BuildingWriter):
         figures = figures or figures_of(building)
         attributes = building_attributes(building, figures, self.prefix, self.units)
         name = self.names.take(gml_name(building.id))
-        self.put(gml_member(building, figures, attributes, name, self.units, self.creation_date))
+        self.add_member(gml_member(building, figures, attributes, name, self.units, self.creation_date))
+
+    def add_member(self, member: Fragment) -> None:
+        """Write a building, told in CityGML 2.0."""
+        self.put(member)
 
     def put(self, fragment: Fragment) -> None:
         if fragment.extent is not None:

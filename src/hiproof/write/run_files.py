@@ -62,9 +62,10 @@ def fragments(
     included. A solid that cannot be measured is left out, as in `write_all`.
     """
     building, figures = measured(asked)
-    attributes = building_attributes(building, figures, units=head.units.gml)
+    settings = settings or Settings()
+    attributes = building_attributes(building, figures, units=head.units.gml, osm=settings.city.osm_tags)
     sheet = Sheet(building, figures, attributes, *names, head)
-    kinds = asked_fragments(settings or Settings())
+    kinds = asked_fragments(settings)
     return building, {kind: module_of(kind).fragment(sheet) for kind in kinds}
 
 

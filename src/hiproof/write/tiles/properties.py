@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..attribute_list import HIPROOF, OWN, PREFIX, ROOFER
+from ..attribute_list import HIPROOF, OSM, OWN, PREFIX, ROOFER
 from ..glb import GlbDocument
 from ..naming import UniqueNames
 
@@ -26,7 +26,7 @@ TOLD = {
     "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see docs/parameters.md)",
 } | {
     prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
-    for prefix, table in ((PREFIX, ROOFER), (OWN, HIPROOF))
+    for prefix, table in ((PREFIX, ROOFER), (OWN, HIPROOF), ("", OSM))
     for a in table
 }
 

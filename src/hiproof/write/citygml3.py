@@ -1,0 +1,169 @@
+"""CityGML 3.0, made of what stands in CityGML 2.0: other names, another order, an id for every geometry.
+
+What 3.0 tells otherwise: surfaces are boundaries of a space and belong to constructions, heights say from where to where
+they were measured, generic attributes are elements of their own, footprint and roof edge are boundaries of level 0, and a
+solid has a shell. So everything that the writer of 2.0 knows stands in 3.0 too.
+"""
+
+from __future__ import annotations
+
+import datetime
+import os
+from collections.abc import Iterable
+from typing import Any
+
+from lxml import etree
+
+from ..model import Building
+from . import citygml
+from .building_attributes import PREFIX
+from .citygml import CityGMLWriter
+from .fragments import Fragment, Sheet
+from .head import FileHead
+
+NAMESPACES = {
+    "bldg": "http://www.opengis.net/citygml/building/3.0",
+    "con": "http://www.opengis.net/citygml/construction/3.0",
+    "core": "http://www.opengis.net/citygml/3.0",
+    "gen": "http://www.opengis.net/citygml/generics/3.0",
+    "gml": "http://www.opengis.net/gml/3.2",
+    "xlink": "http://www.w3.org/1999/xlink",
+}
+ID, OLD_ID = f"{{{NAMESPACES['gml']}}}id", f"{{{citygml.NAMESPACES['gml']}}}id"
+ORDER = (
+    *("name", "creationDate", "genericAttribute", "boundary", "lod0MultiSurface", "lod1MultiSurface", "lod1Solid"),
+    *("lod2Solid", "lod2MultiSurface", "lod1TerrainIntersectionCurve", "lod2TerrainIntersectionCurve", "height"),
+    *("roofType", "buildingPart"),
+)
+"""The order of what we write of buildings and their surfaces, as the schemas inherit it: core, construction, building."""
+
+GENERIC = {"intAttribute": "IntAttribute", "doubleAttribute": "DoubleAttribute", "stringAttribute": "StringAttribute"}
+SET = "genericAttributeSet"
+LEVEL_0 = {"lod0FootPrint": "GroundSurface", "lod0RoofEdge": "RoofSurface"}
+WITH_ID = ("MultiSurface", "CompositeSurface", "Solid", "Polygon", "MultiCurve", "LineString")
+
+
+def write_citygml3(
+    path: str | os.PathLike,
+    buildings: Iterable[Building],
+    crs: Any = None,
+    prefix: str = PREFIX,
+    creation_date: datetime.date | None = None,
+) -> None:
+    """Write `buildings` to `path` as CityGML 3.0; all else as `write_citygml`."""
+    with CityGML3Writer(path, crs, prefix, creation_date) as writer:
+        for building in buildings:
+            writer.add(building)
+
+
+class CityGML3Writer(CityGMLWriter):
+    """Incremental form of `write_citygml3`."""
+
+    namespaces, root_id = NAMESPACES, ' gml:id="city"'
+
+    def add_member(self, member: Fragment) -> None:
+        self.put(upgraded(member))
+
+
+def writer(path: str | os.PathLike, head: FileHead) -> CityGML3Writer:
+    """The writer of a run's file."""
+    return CityGML3Writer(path, head.crs)
+
+
+def fragment(sheet: Sheet) -> Fragment:
+    """A building's part of a run's file."""
+    return upgraded(citygml.fragment(sheet))
+
+
+def upgraded(member: Fragment) -> Fragment:
+    """The cityObjectMember of CityGML 2.0 as one of 3.0; the root's namespaces are taken as declared in both."""
+    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in citygml.NAMESPACES.items())
+    (old,) = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
+    root = etree.Element("root", nsmap=NAMESPACES)
+    root.append(made("core:cityObjectMember", building_of(old[0])))
+    text = etree.tostring(root, encoding="utf-8")
+    return Fragment(text[text.index(b">") + 1 : text.rindex(b"<")], member.extent)
+
+
+HUGE = etree.XMLParser(huge_tree=True, resolve_entities=False)
+
+
+def building_of(old: Any) -> Any:
+    """A Building or BuildingPart with all that is in it, in the order of the schemas."""
+    new = made(f"bldg:{local(old)}", **{ID: old.get(OLD_ID)})
+    owner = new.get(ID)
+    new.extend(sorted((property_of(child, owner) for child in old), key=lambda child: ORDER.index(local(child))))
+    for number, geometry in enumerate(new.iter(*(named(f"gml:{kind}") for kind in WITH_ID)), 1):
+        if geometry.get(ID) is None:
+            geometry.set(ID, f"geom-{number}-{owner}")
+    return new
+
+
+def property_of(old: Any, owner: str) -> Any:
+    """What 3.0 makes of a property of a building or surface in 2.0; `owner` ends the ids that are new."""
+    name = local(old)
+    if name in (*GENERIC, SET):
+        return made("core:genericAttribute", generic_of(old))
+    if name == "boundedBy":
+        return made("core:boundary", surface_of(old[0], owner))
+    if name in LEVEL_0:
+        surfaces = made("core:lod0MultiSurface", geometry_of(old[0]))
+        return made("core:boundary", made(f"con:{LEVEL_0[name]}", surfaces, **{ID: f"{name}-{owner}"}))
+    if name == "measuredHeight":
+        return made("con:height", height_of(old))
+    if name == "consistsOfBuildingPart":
+        return made("bldg:buildingPart", building_of(old[0]))
+    if name == "creationDate":
+        return made("core:creationDate", text=f"{old.text}T00:00:00")
+    if name.startswith("lod"):
+        renamed = name.replace("TerrainIntersection", "TerrainIntersectionCurve")
+        return made(f"core:{renamed}", *map(geometry_of, old))
+    return made(f"{'gml' if name == 'name' else 'bldg'}:{name}", text=old.text, **old.attrib)
+
+
+def generic_of(old: Any) -> Any:
+    """A generic attribute, or a named set of them."""
+    name = made("gen:name", text=old.get("name"))
+    if local(old) == SET:
+        return made("gen:GenericAttributeSet", name, *(made("gen:genericAttribute", generic_of(one)) for one in old))
+    return made(f"gen:{GENERIC[local(old)]}", name, made("gen:value", text=old[0].text))
+
+
+def surface_of(old: Any, owner: str) -> Any:
+    """A RoofSurface, WallSurface or GroundSurface."""
+    properties = sorted((property_of(child, owner) for child in old), key=lambda child: ORDER.index(local(child)))
+    return made(f"con:{local(old)}", *properties, **{ID: old.get(OLD_ID)})
+
+
+def height_of(old: Any) -> Any:
+    """A measuredHeight, which says from where to where it was measured."""
+    told = {"highReference": "highestRoofEdge", "lowReference": "lowestGroundPoint", "status": "measured"}
+    told = [made(f"con:{name}", text=value) for name, value in told.items()]
+    return made("con:Height", *told, made("con:value", text=old.text, uom=old.get("uom")))
+
+
+def geometry_of(old: Any) -> Any:
+    """A geometry of GML 3.1 as one of 3.2, where a solid's boundary is a shell."""
+    is_shell = local(old) == "CompositeSurface" and local(old.getparent().getparent()) == "Solid"
+    new = made(f"gml:{'Shell' if is_shell else local(old)}", *map(geometry_of, old), text=old.text)
+    for name, value in old.attrib.items():
+        new.set(ID if name == OLD_ID else name, value)
+    return new
+
+
+def made(tag: str, *children: Any, text: str | None = None, **attributes: str) -> Any:
+    """An element `prefix:name`."""
+    element = etree.Element(named(tag), attributes, nsmap=NAMESPACES)
+    element.text = text
+    element.extend(children)
+    return element
+
+
+def named(tag: str) -> str:
+    """The name in lxml's form of `prefix:name`."""
+    prefix, _, name = tag.partition(":")
+    return f"{{{NAMESPACES[prefix]}}}{name}"
+
+
+def local(element: Any) -> str:
+    return etree.QName(element).localname

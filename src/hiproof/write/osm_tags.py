@@ -1,0 +1,78 @@
+"""A building's roof as OpenStreetMap's Simple 3D Buildings tags it, by its largest part."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ..model import ROOF, Building
+from .attribute_list import OSM
+from .building_attributes import ground_height, rounded
+from .roof_figures import RoofFigures
+
+SHAPES = {
+    "flat": "flat",
+    "monopitch": "skillion",
+    "gable": "gabled",
+    "asymmetric_gable": "gabled_height_moved",
+    "hip": "hipped",
+    "half_hip": "half-hipped",
+    "side_hip": "side_hipped",
+    "side_half_hip": "side_half-hipped",
+    "corner": "hipped",
+    "pyramid": "pyramidal",
+    "mansard": "quadruple_saltbox",
+    "truncated_gable": "double_saltbox",
+    "half_mansard": "saltbox",
+    "side_mansard": "mansard",
+    "corner_mansard": "mansard",
+    "gambrel": "gambrel",
+    "shed": "sawtooth",
+}
+"""The value of roof:shape by roof type; of those that the tags do not know, the nearest."""
+
+ONE_ENDED = ("side_hip", "side_half_hip")
+
+
+def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
+    """The tags by name, in the order of OSM; None what cannot be told or, of a flat roof, has no meaning.
+
+    >>> import hiproof
+    >>> from hiproof.write.roof_figures import roof_figures
+    >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
+    >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)]))
+    >>> tags = osm_tags(house, roof_figures(house.solid))
+    >>> tags["roof:shape"], round(tags["roof:angle"])
+    ('gabled', 27)
+    """
+    if figures is None or not building.parts:
+        return {tag.name: None for tag in OSM}
+    main = max(range(len(building.parts)), key=lambda k: building.parts[k].area)
+    roof = [i for i, face in enumerate(building.solid.faces) if face.kind == ROOF]
+    shown = [i for i in roof if building.solid.faces[i].part == main] or roof
+    largest = max(shown, key=lambda i: figures.face_area_m2[i])
+    lowest = min(building.solid.vertices[list(ring), 2].min() for i in shown for ring in building.solid.faces[i].rings)
+    ground = min(ground_height(building, figures), figures.h_base)
+    values = (
+        SHAPES.get(building.parts[main].type),
+        figures.h_max - lowest,
+        direction_of(building, main, figures.face_azimuth_deg[largest]),
+        figures.face_slope_deg[largest],
+        figures.h_max - ground,
+    )
+    return {tag.name: told(value) for tag, value in zip(OSM, values, strict=True)}
+
+
+def direction_of(building: Building, main: int, azimuth_deg: float) -> float:
+    """The direction that the hipped end of part `main` looks in, else that of its largest face."""
+    part = building.parts[main]
+    return math.degrees(0.5 * math.pi - part.kappa) % 360.0 if part.type in ONE_ENDED else azimuth_deg
+
+
+def told(value: Any) -> Any:
+    """A number to the centimetre or hundredth of a degree, None where it is none."""
+    if isinstance(value, (float, np.floating)):
+        return rounded(value, 2) if math.isfinite(value) else None
+    return value

@@ -1,0 +1,90 @@
+"""Simple 3D tags against roofs whose angles and heights are known, whichever way they are turned."""
+
+import math
+
+import pytest
+import shapely
+
+import hiproof
+from handmade import box, modelled, unmodelled
+from hiproof.model import ROOF
+from hiproof.primitives.family import NAMES
+from hiproof.write.attribute_list import Attribute
+from hiproof.write.building_attributes import building_attributes
+from hiproof.write.osm_tags import ONE_ENDED, OSM, SHAPES, osm_tags
+from hiproof.write.roof_figures import roof_figures
+
+# The values that OpenStreetMap's page of roof:shape documents for roofs of planes.
+DOCUMENTED = {
+    *("flat", "skillion", "gabled", "gabled_height_moved", "hipped", "half-hipped", "side_hipped", "side_half-hipped"),
+    *("pyramidal", "mansard", "gambrel", "sawtooth", "saltbox", "double_saltbox", "quadruple_saltbox"),
+}
+NO_TAGS = dict.fromkeys((tag.name for tag in OSM), None)
+
+
+def tags_of(building):
+    return osm_tags(building, roof_figures(building.solid))
+
+
+def turned_house(degrees, type="gable"):
+    """A house of 12 by 8 m whose length lies `degrees` from east."""
+    ring = shapely.affinity.rotate(shapely.box(-6, -4, 6, 4), degrees, origin=(0, 0)).exterior
+    part = {"type": "gable", "parameters": {"width": 8, "length": 12, "height": 3}, "position": [0, 0, 5]}
+    place = {"origin": [85000, 446000, 2], "outline": [shapely.get_coordinates(ring).tolist()], "z_ground": 2}
+    house = hiproof.build({"id": "a", **place, "parts": [{**part, "rotation": degrees}]})
+    return house if type == "gable" else house.with_part(0, type=type)
+
+
+def apart(first, second):
+    """The angle between two compass directions."""
+    return abs((first - second + 180) % 360 - 180)
+
+
+def test_every_roof_type_has_a_documented_shape():
+    assert set(SHAPES) == set(NAMES) and set(SHAPES.values()) == DOCUMENTED
+    assert all(isinstance(tag, Attribute) for tag in OSM)
+
+
+@pytest.mark.parametrize("degrees", [0, 35, 90, 200])
+def test_a_gable_is_told_in_degrees_and_metres(degrees):
+    tags = tags_of(turned_house(degrees))
+    assert tags["roof:shape"] == "gabled" and tags["roof:angle"] == pytest.approx(
+        math.degrees(math.atan(0.75)), abs=0.01
+    )
+    assert tags["roof:height"] == pytest.approx(3, abs=0.01) and tags["height"] == pytest.approx(8, abs=0.01)
+    across = 0 - degrees  # the compass direction across a ridge that lies `degrees` from east
+    assert min(apart(tags["roof:direction"], across), apart(tags["roof:direction"], across + 180)) < 0.01
+
+
+@pytest.mark.parametrize("name", ONE_ENDED)
+@pytest.mark.parametrize("degrees", [0, 35, 200])
+def test_a_roof_with_one_hipped_end_looks_that_way(name, degrees):
+    house = turned_house(degrees, name)
+    figures = roof_figures(house.solid)
+    roofs = [i for i, face in enumerate(house.solid.faces) if face.kind == ROOF]
+    end = min(roofs, key=lambda i: figures.face_area_m2[i])
+    assert apart(tags_of(house)["roof:direction"], figures.face_azimuth_deg[end]) < 0.01
+
+
+def test_a_flat_roof_looks_nowhere():
+    tags = tags_of(modelled(box(), kinds=("flat",)))
+    assert tags == {"roof:shape": "flat", "roof:height": 0.0, "roof:direction": None, "roof:angle": 0.0, "height": 3.0}
+
+
+def test_of_several_parts_the_largest_counts():
+    lean_to = {"width": 3, "length": 3, "height": 1}
+    house = turned_house(0).with_part(1, type="monopitch", position=[-4.5, 2.5, 2], **lean_to)
+    assert tags_of(house)["roof:shape"] == "gabled"
+
+
+def test_without_a_model_there_are_no_tags():
+    assert osm_tags(unmodelled(), None) == NO_TAGS
+    assert tags_of(modelled(box(), kinds=("free",)))["roof:shape"] is None
+
+
+def test_tags_stand_among_the_attributes_only_where_asked_for():
+    house = modelled(box(), kinds=("flat",), attributes={"height": "tall", "name": "x"})
+    figures = roof_figures(house.solid)
+    assert building_attributes(house, figures)["height"] == "tall"
+    tagged = building_attributes(house, figures, osm=True)
+    assert tagged["height"] == 3.0 and tagged["roof:shape"] == "flat" and tagged["name"] == "x"
