@@ -43,6 +43,19 @@ def test_a_gable_over_walls_that_run_together_is_one_part(skew, pitch):
     assert np.abs(roof.height_at(points[inner, :2]) - z[inner]).max() < 0.15
 
 
+def test_slopes_that_face_neither_wall_nor_each_other_are_one_gable():
+    outline = shapely.Polygon([(-6, -7), (6, -6), (7.5, 7.5), (-6.8, 6.5)])
+    rng = np.random.default_rng(2)
+    xy = rng.uniform(-8, 8, (2000, 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    facing = [np.radians(5.0), np.radians(180.0 - 2.5)]
+    z = 9.0 - 0.5 * np.max([xy @ (math.cos(angle), math.sin(angle)) for angle in facing], axis=0)
+    fit = fit_building(np.column_stack([xy, z + rng.normal(0.0, 0.02, len(xy))]), outline)
+    assert len(fit.roof_parts) == 1
+    inner = shapely.contains_xy(outline.buffer(-0.3), *xy.T)
+    assert np.abs(Roof(fit.roof_parts, outline, FRAME).height_at(xy[inner]) - z[inner]).max() < 0.15
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_facing_walls_never_costs(seed):
     rng = np.random.default_rng(seed)

@@ -51,6 +51,7 @@ MOST_SLOPES, SLOPES_APART = 9, 0.02
 END_SEEDS = 16  # points through which a new plane is tried
 MERGE_REACH_M = 2.0
 ALMOST_LEVEL = 0.15
+TURNS, MOST_TURN, FREE_UNITS = 4, 0.45, 1.5
 
 
 @compiled
@@ -176,7 +177,10 @@ def change_ties(volumes, scene, value, k):
 
 @compiled
 def face_walls(volumes, scene, value, k):
-    """The two planes along each axis of volume k face along it or square to walls, each to one of `scene.leans`."""
+    """The two planes along each axis of volume k face along it or square to walls, each to one of `scene.leans`, or freely.
+
+    Where all walls are along the axes no other way is looked for.
+    """
     for axis in range(2):
         walls = scene.leans[int(volumes[k, DIRECTION]), axis]
         low, high = 2 * axis, 2 * axis + 1
@@ -194,12 +198,51 @@ def face_walls(volumes, scene, value, k):
                 found = objective(trial, scene, best_value)
                 if found < best_value:
                     best, best_value = trial, found
+        best, best_value = face_freely(best, scene, best_value, k, axis)
         if best_value < value - LEAST_GAIN:
             volumes, value = best, best_value
             trial, found = settled(volumes.copy(), scene, k, value, EVERYWHERE)
             if found < np.inf:
                 volumes, value = trial, found
     return volumes, value
+
+
+@compiled
+def face_freely(volumes, scene, value, k, axis):
+    """The two planes along an axis of volume k face as their points say, where that is clearly better than any wall."""
+    trial, limit = volumes.copy(), value - FREE_UNITS * scene.evidence
+    for _ in range(TURNS):
+        turns, middles = turns_of_planes(trial, scene, k)
+        for plane in (2 * axis, 2 * axis + 1):
+            lean = trial[k, LEAN + plane] + turns[plane]
+            turn_plane(trial[k], plane, min(max(lean, -MOST_TURN), MOST_TURN), middles[plane])
+        refit(trial, scene, k)
+        found = objective(trial, scene, limit)
+        if found < limit:
+            volumes, value, limit = trial.copy(), found, found
+    return volumes, value
+
+
+@compiled
+def turns_of_planes(volumes, scene, k):
+    """By how much the lean of each inclined plane (4,) of volume k has to change for the points that it explains, and their middles."""
+    direction, n = int(volumes[k, DIRECTION]), scene.n
+    u, v, c = scene.U[direction], scene.V[direction], coefficients(volumes, k)
+    middles = middles_of_planes(volumes, scene, k)
+    _, top = roof_heights(volumes, scene.U[:, :n], scene.V[:, :n])
+    sums = np.zeros((SIDES, 2))
+    for i in range(n):
+        h, plane = lowest_plane(c, u[i], v[i])
+        left = scene.z[i] - h
+        if top[i] == k and plane < LEVEL and abs(left) < scene.dead + scene.width:
+            across = v[i] - middles[plane, 1] if plane < 2 else u[i] - middles[plane, 0]
+            sums[plane, 0] += left * across
+            sums[plane, 1] += across * across
+    turns = np.zeros(SIDES)
+    for plane in range(SIDES):
+        if sums[plane, 1] > 0.0 and volumes[k, SLOPE + plane] > 0.0:
+            turns[plane] = sums[plane, 0] / sums[plane, 1] / volumes[k, SLOPE + plane]
+    return turns, middles
 
 
 @compiled
