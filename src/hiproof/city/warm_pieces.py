@@ -94,7 +94,8 @@ def single() -> None:
 
 
 def points() -> None:
-    """Sorting points into work tiles, those of one building, the ground around it."""
+    """Sorting points into work tiles, those of one building, the ground around it, whether its footprint lies off."""
+    from ..fit.outline.settle import normal_share
     from ..read.assign import PointGrid
     from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
     from .sort import Reach
@@ -104,6 +105,7 @@ def points() -> None:
     PointGrid(xyz).inside(OUTLINE)
     GroundAround(ground_cells(xyz), boxes[0]).height_at(xyz[:, :2])
     LowestAround(Cells(lowest_in_cells(xyz)), boxes[0]).height_at(xyz[:, :2])
+    normal_share(np.linspace(-1.0, 1.0, 5))
 
 
 PIECES: dict[str, Callable[[], None]] = {
