@@ -59,9 +59,10 @@ def test_houses_that_differ_are_told_apart_at_their_wall(height):
     assert sum(house.area for house in houses) == pytest.approx(area.area)
 
 
+@pytest.mark.parametrize("density", [0.5, 6.0, 300.0])
 @pytest.mark.parametrize("height", ONE_HOUSE.values(), ids=ONE_HOUSE)
-def test_one_house_stays_one(height):
-    points, area, _ = block(height)
+def test_one_house_stays_one(height, density):
+    points, area, _ = block(height, density)
     assert told_apart(points, area, 1.0) == [area]
 
 
