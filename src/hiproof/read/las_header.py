@@ -8,7 +8,7 @@ table (Isenburg 2013), and of the COPC specification 1.0.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from typing import BinaryIO
 
@@ -293,5 +293,5 @@ SHORT = 1.0
 """How far the points may fall short of the header's bounds, in the file's unit: some producers write those of the tile."""
 
 
-def listed(values: np.ndarray) -> str:
+def listed(values: Iterable[float]) -> str:
     return ", ".join(f"{value:.10g}" for value in values)

@@ -95,7 +95,7 @@ def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, fl
             middle = (low[axis] + high[axis]) / np.float32(2)
             (low if index >> 2 * step & 1 + axis else high)[axis] = middle
     blur = 2 * float(np.spacing(np.abs(np.array(root)).max()))
-    return (*(float(v) - blur for v in low), *(float(v) + blur for v in high))
+    return float(low[0]) - blur, float(low[1]) - blur, float(high[0]) + blur, float(high[1]) + blur
 
 
 def joined(runs: np.ndarray) -> np.ndarray:

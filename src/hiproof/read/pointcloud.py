@@ -86,9 +86,9 @@ def iter_points(
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)
-        keep = np.isfinite(xyz)
-        if not keep.all():
-            keep = keep.all(axis=1)
+        finite = np.isfinite(xyz)
+        if not finite.all():
+            keep = finite.all(axis=1)
             dropped += len(xyz) - int(keep.sum())
             xyz, classes = chosen(xyz, classes, keep)
         xyz = xyz if units.are_metres else units.to_metres(xyz)
@@ -216,11 +216,11 @@ def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
                 InputWarning,
             )
         return given
-    first = next(iter(named), None)
+    first = next(iter(named), "")
     for path, crs in named.items():
         refuse_two(named[first], first, crs, path)
     unnamed = [path for path in crs_of if path not in named]
-    if first is not None and unnamed:
+    if named and unnamed:
         warnings.warn(
             f"{unnamed[0]}{and_others(unnamed)}: names no CRS; taken in {described(named[first])} as {first} is",
             InputWarning,
@@ -266,8 +266,8 @@ def box_in_file(box: Box, units: Units) -> Box:
     """A box in the file's unit that holds all of `box`: a trifle wider where rounding could cut its border off."""
     if units.are_metres:
         return box
-    low, high = units.from_metres(box[:2]) - 0.01, units.from_metres(box[2:]) + 0.01
-    return (*low.tolist(), *high.tolist())
+    (xmin, ymin), (xmax, ymax) = units.from_metres(np.reshape(box, (2, 2))) + [[-0.01], [0.01]]
+    return float(xmin), float(ymin), float(xmax), float(ymax)
 
 
 def in_box(xyz: np.ndarray, box: Box) -> np.ndarray:

@@ -241,7 +241,8 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], path: Path) -> list[
 def polygons_solid(polygons: list[Any], path: Path, inward: bool = False) -> Solid:
     """One shell of gml:Polygons; equal coordinates become one vertex. A ring that is not closed is noted as defect 103."""
     number: dict[tuple[float, ...], int] = {}
-    faces, defects = [], []
+    faces: list[Face] = []
+    defects: list[tuple[int, int]] = []
     for polygon in polygons:
         rings = []
         for ring in polygon.iter():
@@ -254,7 +255,7 @@ def polygons_solid(polygons: list[Any], path: Path, inward: bool = False) -> Sol
                 defects.append((103, len(faces)))
             indices = tuple(number.setdefault(point, len(number)) for point in points)
             rings.append(indices[::-1] if inward else indices)
-        faces.append(Face(tuple(rings), surface_kind(polygon, WALL)))
+        faces.append(Face(tuple(rings), surface_kind(polygon, WALL) or WALL))
     return Solid(np.array(list(number), float).reshape(-1, 3), tuple(faces), tuple(defects))
 
 

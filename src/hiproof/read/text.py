@@ -79,9 +79,8 @@ def sniff(path: str | Path) -> TextLayout:
             continue
         if not line.lstrip().startswith(COMMENTS) and all(is_number(field) for field in fields[:3]):
             return TextLayout(number, delimiter, find_columns(names) or (0, 1, 2))
-        if find_columns(fields):
+        if columns := find_columns(fields):
             names = fields
-            columns = find_columns(names)
             following = next((rest for rest in lines[number + 1 :] if rest.strip()), None)
             if following and not line.lstrip().startswith(COMMENTS):
                 return TextLayout(number + 1, find_delimiter(following), columns)

@@ -1,0 +1,119 @@
+"""The QGIS plugin: the commands it makes are ones that hiproof takes, it hands on what they say, and QGIS itself runs it."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+
+from hiproof.cli.app import app
+from hiproof.simulate import demo_files
+
+PLUGINS = Path(__file__).parents[1] / "qgis"
+COMMANDS = typer.main.get_command(app).commands
+# Debian's script around the program adds an option that the program of QGIS 3.22 does not know
+QGIS = shutil.which("qgis_process.bin") or shutil.which("qgis_process")
+
+
+@pytest.fixture
+def plugin(monkeypatch):
+    """The modules of the plugin that need no QGIS."""
+    monkeypatch.syspath_prepend(str(PLUGINS))
+    kept = {name: module for name, module in sys.modules.items() if name.split(".")[0] == "hiproof"}
+    for name in kept:
+        del sys.modules[name]
+    from hiproof import commands, process  # the plugin's folder has the package's name, as QGIS shows it
+
+    yield commands, process
+    for name in [name for name in sys.modules if name.split(".")[0] == "hiproof"]:
+        del sys.modules[name]
+    sys.modules.update(kept)
+
+
+def takes(command):
+    """Whether hiproof's own parser takes a command line, without running it."""
+    _, name, *arguments = command
+    return COMMANDS[name].make_context(name, list(arguments), resilient_parsing=False).params
+
+
+def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
+    commands, _ = plugin
+    everything = commands.reconstruct(
+        "hiproof",
+        ["a.laz", "b.laz"],
+        "out",
+        "f.gpkg",
+        "pand",
+        "year < 1950",
+        (-1.5, 2, 3, 4),
+        "t.tif",
+        "EPSG:7415",
+        4,
+        "--types 'gable,hip'",
+    )
+    taken = takes(everything)
+    assert taken["clouds"] == ["a.laz", "b.laz"] and taken["jobs"] == 4 and taken["types"] == "gable,hip"
+    assert taken["bbox"] == "-1.5,2,3,4" and taken["where"] == "year < 1950" and taken["layer"] == "pand"
+    assert takes(commands.reconstruct("hiproof", ["a.laz"], "out"))["footprints"] is None
+    assert takes(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))["footprints"] == "f.gpkg"
+    assert takes(commands.convert("hiproof", "out", "obj"))["format"] == "obj"
+    assert takes(commands.status("hiproof", str(tmp_path)))["folder"] == tmp_path
+
+
+def test_what_a_command_says_is_handed_on_and_its_end_told(plugin):
+    _, process = plugin
+    said = []
+    code = "import sys; print('first'); print('second', file=sys.stderr); sys.exit(int(sys.argv[1]))"
+    assert process.run([sys.executable, "-c", code, "1"], said.append, lambda: False) == 1
+    assert sorted(said) == ["first", "second"]
+    with pytest.raises(process.Failed, match="second"):
+        process.run([sys.executable, "-c", code, "2"], said.append, lambda: False)
+    with pytest.raises(process.Failed, match=r"expected the program hiproof.*pip install"):
+        process.run(["no-such-program"], said.append, lambda: False)
+
+
+def test_a_cancelled_command_ends(plugin):
+    _, process = plugin
+    said = []
+    slow = [sys.executable, "-c", "import time; print('begun', flush=True); time.sleep(600)"]
+    with pytest.raises(process.Failed, match=r"stopped; .*goes on from there"):
+        process.run(slow, said.append, lambda: bool(said))
+
+
+def test_the_share_done_is_that_of_the_run(plugin, undisturbed, tmp_path):
+    _, process = plugin
+    program = Path(sys.executable).with_name("hiproof")
+    if not program.exists():
+        pytest.skip("the command is not beside this Python")
+    assert process.share_done(str(program), str(undisturbed)) == 100.0
+    assert process.share_done(str(program), str(tmp_path)) is None
+
+
+@pytest.mark.skipif(QGIS is None, reason="no qgis_process here: QGIS is not installed")
+def test_qgis_runs_it(tmp_path):
+    """Headless, as a person would from the toolbox: two houses of the demo, chosen by a box."""
+    profile = tmp_path / ".local/share/QGIS/QGIS3/profiles/default/QGIS"
+    profile.mkdir(parents=True)
+    (profile / "QGIS3.ini").write_text("[PythonPlugins]\nhiproof=true\n", encoding="utf-8")
+    files, out = demo_files(), tmp_path / "out"
+    given = {
+        "CLOUDS": files["cloud"],
+        "FOOTPRINTS": files["footprints"],
+        "TERRAIN": files["terrain"],
+        "EXTENT": "91990,92034,451000,451018",
+        "OUTPUT": out,
+        "PROGRAM": Path(sys.executable).with_name("hiproof"),
+    }
+    command = [QGIS, "run", "hiproof:reconstruct", "--", *(f"{name}={value}" for name, value in given.items())]
+    surroundings = {
+        "HOME": str(tmp_path),
+        "QT_QPA_PLATFORM": "offscreen",
+        "QGIS_PLUGINPATH": str(PLUGINS),
+        "XDG_RUNTIME_DIR": str(tmp_path),
+    }
+    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **surroundings}, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert (out / "buildings.gml").exists() and "buildings" in done.stdout.partition("Results")[2]
