@@ -45,6 +45,7 @@ lint: $(VENV)/lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff check --preview --select PLW1514 .  # a text file without a named encoding is another one on Windows
 	$(BIN)/ruff format --check .
+	$(BIN)/mypy
 
 docs: $(VENV)/docs
 	$(BIN)/mkdocs build --strict --quiet

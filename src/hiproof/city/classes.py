@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections import Counter
+from typing import Any
 
 import numpy as np
 
@@ -45,7 +46,7 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     return with_read(settings, roofs="shape", building_classes=others)
 
 
-def with_read(settings: Settings, **changes: object) -> Settings:
+def with_read(settings: Settings, **changes: Any) -> Settings:
     return dataclasses.replace(settings, read=dataclasses.replace(settings.read, **changes))
 
 

@@ -78,7 +78,8 @@ class Processes:
             raise
 
     def outcomes(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        waiting, running = iter(tasks), {}
+        waiting = iter(tasks)
+        running: dict[Future, tuple] = {}
         while True:
             # two tasks a worker in the queue: enough to keep it busy, few enough to lose little when one dies
             while len(running) < 2 * self.jobs and (task := next(waiting, None)) is not None:
@@ -90,7 +91,7 @@ class Processes:
                 yield from self.bury(running)
                 continue
             for future in finished:
-                error = future.exception()
+                error: Any = future.exception()
                 yield running.pop(future), None if error else future.result(), error
 
     def submit(self, function: Callable, task: tuple) -> Future:
@@ -111,7 +112,7 @@ class Processes:
         wait(running)
         self.close()
         for future, task in list(running.items()):
-            error = future.exception()
+            error: Any = future.exception()
             lost = isinstance(error, BrokenProcessPool)
             yield task, None if error else future.result(), WorkerLost("a worker process died") if lost else error
         running.clear()
@@ -181,7 +182,8 @@ class Dask:
             patience.cancel()
 
     def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        waiting, running = iter(tasks), {}
+        waiting = iter(tasks)
+        running: dict[Any, tuple] = {}
         ends: SimpleQueue = SimpleQueue()
         while True:
             threads = sum(self.client.nthreads().values())

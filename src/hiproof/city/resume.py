@@ -63,7 +63,7 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
     footprints changed since, a new one that takes over what is known of the others."""
     fresh = False
     plan = None if request.restart else plan_to_go_on(request, state, ledger)
-    if plan is None or ledger.get("choice") != mark_of(choice_of(request), ledger.get("salt")):
+    if plan is None or ledger.get("choice") != mark_of(choice_of(request), ledger.get("salt") or ""):
         old, plan = plan, make_plan(request)
         fresh = old is None or not take_over(plan, old, state, ledger)
         if fresh:
@@ -112,9 +112,9 @@ def enter(request: Request, ledger: Ledger) -> None:
 
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     """Raise OutputError, naming what differs, where the folder holds a run of another request."""
-    if ledger.get("mark") == mark_of(inputs, ledger.get("salt")):
+    if ledger.get("mark") == mark_of(inputs, ledger.get("salt") or ""):
         return
-    known, told = json.loads(ledger.get("inputs")), json.loads(json.dumps(masked_values(inputs), default=str))
+    known, told = json.loads(ledger.get("inputs") or "{}"), json.loads(json.dumps(masked_values(inputs), default=str))
     other = [name for name in told | known if told.get(name) != known.get(name)]
     raise OutputError(
         f"expected {out} to be new or to hold a run of the same inputs, settings and version, got a run that differs in "

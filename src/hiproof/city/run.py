@@ -121,7 +121,8 @@ class Clock:
     """Seconds by step."""
 
     def __init__(self) -> None:
-        self.start, self.seconds = time.perf_counter(), {}
+        self.start = time.perf_counter()
+        self.seconds: dict[str, float] = {}
 
     def lap(self, step: str) -> None:
         now = time.perf_counter()

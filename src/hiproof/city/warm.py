@@ -11,6 +11,7 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from typing import Any
 
 from ..compiled import kept, news
 from ..compiled.stamp import PACKAGE, stamp_of_all
@@ -41,10 +42,10 @@ def make_ready(pieces: Sequence[str] = ALL) -> None:
 def compile_piece(piece: str) -> bool:
     """Have a piece compiled by a process of its own, whose functions count as ready here too; whether it came to its end."""
     command = [sys.executable, "-m", "hiproof.city.warm_pieces", piece]
-    silent = {"stdin": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    silent: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     try:
         with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), **silent) as at_work:
-            for line in at_work.stdout:
+            for line in at_work.stdout or ():
                 news.ready.add(line.strip())
                 news.tell()
     except OSError as error:

@@ -79,9 +79,9 @@ def reconstruct(
     from .reconstruct import run
 
     start(log_level, log_file)
-    inputs = {"footprints": footprints, "layer": layer, "where": where, "id_attribute": id_attribute}
+    inputs: dict[str, Any] = {"footprints": footprints, "layer": layer, "where": where, "id_attribute": id_attribute}
     inputs |= {"bbox": None if bbox is None else box_of(bbox), "terrain": terrain, "overrides": overrides}
-    raise typer.Exit(run(clouds, out, inputs, changes, config, jobs, scheduler, restart))
+    raise typer.Exit(run(clouds, out, inputs, changes or {}, config, jobs, scheduler, restart))
 
 
 @app.command()

@@ -11,7 +11,7 @@ import typer
 from ..errors import InputError
 from ..formats import OF_MODELS, module_of
 
-Made = StrEnum("Made", {name: name for name in OF_MODELS})
+Made = StrEnum("Made", {name: name for name in OF_MODELS})  # type: ignore[misc]
 KINDS = ", ".join(f"{name} ({format.what})" for name, format in OF_MODELS.items())
 
 

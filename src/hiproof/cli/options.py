@@ -65,7 +65,7 @@ def parameter_of(name: str, same: list[Declared]) -> inspect.Parameter:
     option = typer.Option(
         help="; ".join(help_of(one.field) for one in same), metavar=metavar, rich_help_panel=same[0].heading
     )
-    kind: Any = Annotated[KINDS[same[0].field.type] | None, option]  # type: ignore[valid-type]
+    kind: Any = Annotated[KINDS[same[0].field.type] | None, option]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
 
 

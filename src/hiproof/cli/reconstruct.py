@@ -94,7 +94,7 @@ class Bar:
         news.listener = self.lines
         self.bar.stop()
 
-    def update(self, step: str, done: int, total: int) -> None:
+    def update(self, step: str, done: int, total: int | None) -> None:
         if step not in self.tasks:
             self.tasks[step] = self.bar.add_task(self.STEPS.get(step, step), total=total)
         self.bar.update(self.tasks[step], completed=done, total=total)
