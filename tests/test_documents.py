@@ -24,7 +24,7 @@ OPTIONS = {
 }
 OPTIONS |= {"--help", "--version"}
 PLACES = [ROOT, ROOT / "src/hiproof", ROOT / "src/hiproof/primitives", ROOT / "tests"]
-OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ", "projsync ")
+OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ", "projsync ", "docker ")
 
 ATTRIBUTES = {table.prefix + attribute.name for table in TABLES for attribute in table.attributes}
 ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}  # tables of a database, by the prefix that is the default

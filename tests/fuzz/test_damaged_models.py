@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 
 from fuzz.damaged_models import RECORDS, damaged_models, invalid_models, odd_models, sound_lines
 from hiproof.cli import check
-from hiproof.cli.convert import Format, convert
+from hiproof.cli.convert import Made, convert
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
 from hiproof.evaluate.models import read_models
@@ -15,8 +15,8 @@ from sample_models import SOLIDS, write_sample_run
 
 MODELS = "buildings.city.jsonl"
 COMMANDS = {
-    "convert to glb": lambda folder: convert(folder, Format.glb, None),
-    "convert to obj": lambda folder: convert(folder, Format.obj, None),
+    "convert to glb": lambda folder: convert(folder, None, Made.glb),
+    "convert to obj": lambda folder: convert(folder, None, Made.obj),
     "report": lambda folder: report(folder, None, None, None, None),
 }
 

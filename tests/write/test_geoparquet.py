@@ -51,6 +51,6 @@ def test_the_file_describes_its_geometry(tmp_path):
 
 def test_without_pyarrow_one_sentence_says_what_to_install(tmp_path, monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "pyarrow", None)
-    with pytest.raises(InputError, match=r"hiproof\[city\]"):
+    with pytest.raises(InputError, match=r"hiproof\[parquet\]"):
         GeoParquetWriter(tmp_path / "b.parquet")
     assert not list(tmp_path.iterdir())

@@ -32,6 +32,8 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     when no valid solid comes out, even with coarser snapping.
 
     >>> import numpy as np, shapely
+    >>> from hiproof.frames import LocalFrame
+    >>> from hiproof.model import Part, Piece, Roof
     >>> house = shapely.box(0, 0, 10, 8)
     >>> gable = Piece(house, np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]]))
     >>> solid = compose(Roof((Part("gable", (gable,)),), house, LocalFrame(np.zeros(3))), 0.0)

@@ -49,7 +49,7 @@ class Globe:
 
         >>> globe = Globe.of("EPSG:7415", geoid_height_m=43.2)
         >>> globe.geographic(np.array([[85000.0, 446000.0, 2.0]]))[0].round(3).tolist()
-        [4.363, 51.998, 45.2]
+        [4.368, 51.998, 45.2]
         """
         from pyproj import Transformer
 
