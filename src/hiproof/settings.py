@@ -169,6 +169,37 @@ class CitySettings:
 
 
 @dataclass(frozen=True)
+class WriteSettings:
+    """[write] what of a building stands in the models."""
+
+    lods: tuple[str, ...] = setting(
+        ("2.2",),
+        "levels of detail: 0 footprint and roof edge, 1.2 one block, 1.3 a block for each building part, 2.2 roofs; CityJSON "
+        "always has the footprint, CityGML one LoD1, the finer",
+        choices=("0", "1.2", "1.3", "2.2"),
+        fewest=1,
+        option="--lods",
+    )
+    parts_as: str = setting(
+        "one",
+        "buildingparts: roofs that meet at walls alone become building parts, each with a solid of its own; one: a solid a building",
+        choices=("one", "buildingparts"),
+        option="--parts-as",
+    )
+    roof_codes: str = setting(
+        "sig3d", "code list of CityGML's roofType: SIG3D's or AdV's", choices=("sig3d", "adv"), option="--roof-codes"
+    )
+    terrain_intersection: bool = setting(
+        True, "write into CityGML the line along which walls meet the terrain", option="--terrain-intersection"
+    )
+    gml_surfaces: bool = setting(
+        True,
+        "write a solid's surfaces into CityGML by value too, last of all geometry, for GDAL and QGIS, which follow no links",
+        option="--gml-surfaces",
+    )
+
+
+@dataclass(frozen=True)
 class Settings:
     """All settings by section; immutable, comparable, and written beside every run.
 
@@ -185,6 +216,7 @@ class Settings:
     compose: ComposeSettings = field(default_factory=ComposeSettings)
     reconstruct: ReconstructSettings = field(default_factory=ReconstructSettings)
     city: CitySettings = field(default_factory=CitySettings)
+    write: WriteSettings = field(default_factory=WriteSettings)
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:

@@ -22,6 +22,7 @@ BUILDING_ORDER = (
     (CORE + "creationDate", CORE + "terminationDate", CORE + "externalReference"),
     GENERIC,
     *((BLDG + name,) for name in ("class", "function", "usage", "yearOfConstruction", "roofType", "measuredHeight")),
+    *((BLDG + name,) for name in ("lod1Solid", "lod1TerrainIntersection")),
     *((BLDG + name,) for name in ("lod2Solid", "lod2MultiSurface", "lod2MultiCurve", "lod2TerrainIntersection")),
     (BLDG + "boundedBy",),
 )
@@ -72,7 +73,7 @@ def test_citygml_ids_are_names_unique_and_all_references_lead_to_one(gml):
     assert len(set(ids)) == len(ids) and all(NAME.match(id) for id in ids)
     targets = [element.get(XLINK + "href") for element in gml.iter() if element.get(XLINK + "href")]
     assert targets and {target[0] for target in targets} == {"#"} and {target[1:] for target in targets} <= set(ids)
-    assert all(element.get(GML + "id") for element in gml.iter(BLDG + "Building", GML + "Solid", GML + "Polygon"))
+    assert all(element.get(GML + "id") for element in gml.iter(BLDG + "Building", GML + "Solid", *SURFACES))
 
 
 def test_citygml_has_its_required_members(gml):

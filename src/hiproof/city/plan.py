@@ -84,7 +84,7 @@ class Plan:
     @functools.cached_property
     def head(self) -> FileHead:
         """What the files written have in common."""
-        return FileHead(self.crs(), self.settings.read.unit, self.translate, self.settings.compose)
+        return FileHead(self.crs(), self.settings.read.unit, self.translate, self.settings.compose, self.settings.write)
 
     def save(self, path: Path) -> None:
         whole = {

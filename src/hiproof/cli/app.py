@@ -47,7 +47,7 @@ def common(
 
 
 @app.command()
-@with_settings
+@with_settings()
 def reconstruct(
     clouds: Clouds,
     out: Annotated[Path, typer.Option(help="folder for the results")],

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+from .options import with_settings
 
 
 def print_shapes(wanted: bool) -> None:
@@ -25,6 +27,7 @@ def print_schema(wanted: bool) -> None:
         raise typer.Exit
 
 
+@with_settings("write")
 def build(
     parameters: Annotated[Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")],
     out: Annotated[Path, typer.Option(help="folder for the results")],
@@ -37,8 +40,9 @@ def build(
     schema: Annotated[
         bool, typer.Option("--schema", callback=print_schema, is_eager=True, help="print the JSON schema of the file")
     ] = False,
+    changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
-    """Build the models of a parameters.jsonl again, or of what a person made of it.
+    """Build the models of a parameters.jsonl again, or of what a person made of it, drawn as the file says or as options do.
 
     Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid solid, or unusable input.
     """
@@ -46,7 +50,7 @@ def build(
     from .reconstruct import Bar
 
     with Bar() as bar:
-        built = build_file(parameters, out, parquet, lambda done: bar.update("build", done, None))
+        built = build_file(parameters, out, parquet, lambda done: bar.update("build", done, None), changes)
     for id, why in built.not_built:
         typer.echo(f"not built: building {id}: {why}", err=True)
     typer.echo(f"{built.buildings} buildings: " + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common()))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
 from collections.abc import Callable
 from typing import Annotated, Any, NamedTuple
@@ -26,12 +27,18 @@ class Declared(NamedTuple):
         return str(self.field.metadata["option"]).lstrip("-").replace("-", "_")
 
 
-def with_settings(command: Callable[..., None]) -> Callable[..., None]:
-    """`command(..., changes)` with an option for each setting that declares one; what is given of them comes as `changes`.
+def with_settings(*sections: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
+    """Make of `command(..., changes)` one with an option for each setting that declares one, of all sections or those named.
 
-    The options follow the command's own, a panel of its help a section.
+    What is given of them comes as `changes`. The options follow the command's own, a panel of its help a section.
     """
-    declared = [one for one in declared_settings() if one.field.metadata["option"]]
+    return functools.partial(with_options, sections=sections)
+
+
+def with_options(command: Callable[..., None], sections: tuple[str, ...]) -> Callable[..., None]:
+    """`command` with the options of the settings in `sections`, of all where none is named; see `with_settings`."""
+    chosen = [one for one in declared_settings() if not sections or one.section in sections]
+    declared = [one for one in chosen if one.field.metadata["option"]]
     by_name: dict[str, list[Declared]] = {}
     for one in declared:
         by_name.setdefault(one.parameter, []).append(one)

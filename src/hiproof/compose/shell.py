@@ -72,7 +72,7 @@ def raise_shell(
     skip = {rises[h][0] for run in runs for h in run[1:]}
     faces += [Face((tuple([v for v in wall_ring(run, rises) if v not in skip]),), WALL) for run in runs]
     faces.append(ground_face(follow, level, label, skip, xyz))
-    return compacted(levels.vertices, faces)
+    return compacted(np.round(levels.vertices * GRID_M, 4), faces)
 
 
 def lowest_roof(xy: np.ndarray, edges: np.ndarray, side: np.ndarray, planes: np.ndarray) -> float:
@@ -213,13 +213,13 @@ def wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> li
 
 
 def compacted(vertices: np.ndarray, faces: list[Face]) -> Solid:
-    """Solid with the vertices that faces use, in metres."""
+    """Solid with those of the `vertices` (n, 3) that faces use."""
     used = sorted({v for face in faces for ring in face.rings for v in ring})
     number = {vertex: index for index, vertex in enumerate(used)}
     faces = [
         Face(tuple([tuple([number[v] for v in ring]) for ring in face.rings]), face.kind, face.part) for face in faces
     ]
-    return Solid(np.round(vertices[used] * GRID_M, 4), tuple(faces))
+    return Solid(vertices[used], tuple(faces))
 
 
 @dataclass(frozen=True)

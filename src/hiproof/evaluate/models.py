@@ -12,9 +12,10 @@ import numpy as np
 from ..errors import InputError
 from ..formats import FORMATS
 from ..frames import METRES, Units
-from ..model import ROOF, WALL, Face, Solid
+from ..model import GROUND, ROOF, WALL, Face, Solid
 from ..read.cityjson_text import UNUSABLE, documents, reference_system
 from ..read.plausible import is_plausible
+from ..write.attribute_list import OWN
 from ..write.naming import units_named
 
 RUN_MODELS = FORMATS["cityjson"].file
@@ -55,7 +56,7 @@ def run_models(folder: Path) -> Path:
 def read_models(path: str | Path, otherwise: Units = METRES) -> Iterator[BuildingModel]:
     """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts joined, in metres.
 
-    Of several solids of one object that with the highest level of detail counts. `otherwise` are the units of a file
+    Solids of the highest level of detail count, and building parts that hiproof cut come as the whole that they were. `otherwise` are the units of a file
     that names no CRS. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
     """
     transform, units = {"scale": [1, 1, 1], "translate": [0, 0, 0]}, otherwise
@@ -80,18 +81,33 @@ def _buildings(document: dict[str, Any], transform: dict[str, Any], units: Units
         if city_object["type"] != "Building":
             continue
         family = [city_object, *(objects[child] for child in city_object.get("children", ()) if child in objects)]
-        faces = tuple(face for member in family for face in _faces(member))
+        level = max((_level_of_detail(solid) for member in family for solid in _solids(member)), default=0.0)
+        faces = tuple(face for member in family for face in _faces(member, level))
         attributes = city_object.get("attributes") or {}
         if not isinstance(attributes, dict):
             raise TypeError(f"attributes of {id!r} that are no object")
-        yield BuildingModel(id, attributes, _compact(vertices, faces) if faces else None)
+        solid = _compact(vertices, faces) if faces else None
+        yield BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
 
 
-def _faces(city_object: dict[str, Any]) -> Iterator[Face]:
-    solids = [geometry for geometry in city_object.get("geometry") or () if geometry["type"] == "Solid"]
-    if not solids:
+def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
+    """`solid` as one shell where it is several, those of building parts that hiproof cut: without the walls between them."""
+    own = [member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})]
+    if not own or len(solid.of_kind(GROUND)) < 2:
+        return solid
+    from ..compose.building_parts import whole_of
+
+    return whole_of(solid)
+
+
+def _solids(city_object: dict[str, Any]) -> list[dict[str, Any]]:
+    return [geometry for geometry in city_object.get("geometry") or () if geometry["type"] == "Solid"]
+
+
+def _faces(city_object: dict[str, Any], level: float) -> Iterator[Face]:
+    solid = next((solid for solid in _solids(city_object) if _level_of_detail(solid) == level), None)
+    if solid is None:
         return
-    solid = max(solids, key=_level_of_detail)
     semantics = solid.get("semantics") or {"surfaces": [], "values": None}
     kinds = semantics["values"][0] if semantics["values"] else [None] * len(solid["boundaries"][0])
     for rings, kind in zip(solid["boundaries"][0], kinds, strict=True):

@@ -82,10 +82,11 @@ def head_of(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
     if offset is not None and not is_place(offset):
         raise InputError(f"expected three numbers as cityjson_offset of {where}, got {offset!r}; write null for none")
     try:
-        settings = Settings.from_dict({"compose": record.get("compose") or {}})
+        settings = Settings.from_dict({name: record.get(name) or {} for name in ("compose", "write")})
     except SettingsError as error:
         raise InputError(f"{where}, in its head: {error}") from error
-    return FileHead(parse_crs(record.get("crs")), unit, None if offset is None else np.array(offset), settings.compose)
+    offset = None if offset is None else np.array(offset)
+    return FileHead(parse_crs(record.get("crs")), unit, offset, settings.compose, settings.write)
 
 
 def is_place(value: Any) -> bool:

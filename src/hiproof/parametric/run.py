@@ -68,17 +68,18 @@ def build_file(
     out: str | os.PathLike,
     parquet: bool = False,
     progress: Callable[[int], None] = lambda done: None,
+    changes: dict[str, dict[str, Any]] | None = None,
 ) -> Built:
     """Write the files of a run into the folder `out` from the parameters.jsonl at `path`; `parquet` adds GeoParquet.
 
-    A building that cannot be built is written without a model, with a sentence, and keeps its parameters. Raises InputError
+    What is written of buildings is as the file's head says, but for `changes` of the settings [write]. A building that cannot be built is written without a model, with a sentence, and keeps its parameters. Raises InputError
     for a file that cannot be read and OutputError for a folder that cannot be written; then nothing is written.
     """
     path, out, built = Path(path), Path(out), Built()
     refuse_folder_of_a_run(out)
     with opened_parameters(path) as (head, records):
-        settings = Settings.from_dict({"city": {"parquet": parquet}})
-        maker = Maker(head, settings)
+        settings = Settings(write=head.write).replace({"city": {"parquet": parquet}} | (changes or {}))
+        maker = Maker(dataclasses.replace(head, write=settings.write), settings)
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
         maker.settle_offset(first)

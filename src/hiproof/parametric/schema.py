@@ -27,6 +27,7 @@ HEAD_KINDS = {
     "unit": {"enum": list(NAMED_UNITS)},
     "cityjson_offset": {"anyOf": [PLACE, {"type": "null"}]},
     "compose": NUMBERS,
+    "write": {"type": "object"},
 }
 BUILDING_KINDS = {
     "id": TEXT,

@@ -48,6 +48,18 @@ ROOFER = (
     Attribute("extrusion_mode", "text", "", "standard, lod11_fallback (a flat block) or skip (no model)"),
 )
 
+OF_PARTS = (
+    "h_roof_min",
+    "h_roof_50p",
+    "h_roof_70p",
+    "h_roof_max",
+    "h_roof_ridge",
+    "volume_lod22",
+    "roof_type",
+    "roof_n_surfaces",
+)
+"""Those that building parts have of their own."""
+
 HIPROOF = (
     Attribute("status", "text", "", "what came of the building: modelled, poor_fit, simplified, ..."),
     Attribute("detail", "text", "", "the status as a sentence about this building"),
@@ -55,6 +67,7 @@ HIPROOF = (
     Attribute("roof_type_probability", "number", "", "probability of that type after the fits"),
     Attribute("network_type", "text", "", "type that the network names, where it was asked"),
     Attribute("network_type_probability", "number", "", "probability that the network gives it"),
+    Attribute("h_eave", "number", "m", "height that half of the length of the roof's eaves lies below"),
     Attribute("parts", "count", "", "roof parts"),
     Attribute("points", "count", "", "points that the building was judged by"),
     Attribute("psd_mean", "number", "m", "mean distance of the points from the roof, facade points included"),
@@ -95,6 +108,19 @@ ROOF_SURFACE = (
     ),
     Attribute("hiproof_part", "count", "", "number of its roof part, from 0"),
     Attribute("hiproof_part_type", "text", "", "type of its roof part"),
+)
+
+BUILDING_PART = (
+    *(Attribute(PREFIX + a.name, *a[1:]) for a in ROOFER if a.name in OF_PARTS),
+    Attribute(f"{OWN}h_eave", "number", "m", "as of a building"),
+    Attribute(f"{OWN}roof_type", "text", "", "type of the largest roof part"),
+    Attribute(
+        f"{OWN}primitives",
+        "list",
+        "m, deg",
+        "its roof parts, each with part, type, area_m2, z_eave, rotation, parameters and deviations as in the table Parts"
+        " (in CityGML: attribute sets hiproof_primitive_0, ...)",
+    ),
 )
 
 PARAMETERS = (
@@ -196,6 +222,7 @@ HEAD = (
     Attribute("unit", "text", "", "unit of their coordinates where there is no CRS, as read.unit"),
     Attribute("cityjson_offset", "list", "of the CRS", "offset of the CityJSON file"),
     Attribute("compose", "object", "", "the settings [compose]"),
+    Attribute("write", "object", "", "the settings [write]"),
 )
 
 EVALUATION = (
@@ -247,6 +274,7 @@ TABLES = (
     Table("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
     Table("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
     Table("Buildings, as OpenStreetMap tags them (`--osm-tags`)", EVERY_FORMAT, OSM),
+    Table("Building parts (`--parts-as buildingparts`)", "`buildings.gml`, `buildings.city.jsonl`", BUILDING_PART),
     Table("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
     Table("Parameters: the first line", "`parameters.jsonl`; its schema: `hiproof build --schema`", HEAD),
     Table("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),

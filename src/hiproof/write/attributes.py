@@ -25,6 +25,7 @@ from .fragments import Fragment, Sheet
 from .head import FileHead
 from .naming import FileUnits, plan_wkt
 from .roof_figures import RoofFigures
+from .styles import TABLE, style_rows
 from .table_rows import Row, Rows, table_rows
 from .writer import BuildingWriter
 
@@ -36,6 +37,7 @@ DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
 ROWS_AT_ONCE = 1000
 RESERVED = ("fid", "geom")
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
+GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
 
@@ -121,26 +123,52 @@ class AttributesWriter(BuildingWriter):
             kinds = waiting.kinds(self.prefix)
             for number, rows in enumerate(waiting.batches()):
                 self.write_rows(waiting.layer, rows, kinds, append=number > 0)
+        self.write_styles()
 
     def write_rows(self, layer: str, rows: list[Row], kinds: dict[str, type], append: bool) -> None:
+        self.write_table(
+            layer,
+            [row for _, row in rows],
+            kinds,
+            objects([wkb for wkb, _ in rows]),
+            geometry_type=LAYERS[layer],
+            promote_to_multi=LAYERS[layer] == "MultiPolygon",
+            crs=self.plan_wkt,
+            append=append,
+        )
+
+    def write_styles(self) -> None:
+        """The table by which QGIS draws the layers."""
+        rows = style_rows()
+        kinds: dict[str, type] = {name: bool if name == "useAsDefault" else str for name in rows[0]}
+        self.write_table(TABLE, rows, kinds, None, layer_options={"FID": "id"})
+
+    def write_table(
+        self,
+        layer: str,
+        rows: list[dict[str, Any]],
+        kinds: dict[str, type],
+        geometry: np.ndarray | None,
+        **options: Any,
+    ) -> None:
+        """Write `rows` by columns of `kinds`, with `geometry` (n,) as WKB or without any."""
         import pyogrio
         from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
 
-        columns = [column([row.get(name) for _, row in rows], kind) for name, kind in kinds.items()]
+        columns = [column([row.get(name) for row in rows], kind) for name, kind in kinds.items()]
+        version = {} if self.hidden.exists() else {"dataset_options": {"VERSION": GPKG_VERSION}}
         try:
             with fixed_date():
                 pyogrio.raw.write(
                     self.hidden,
-                    objects([wkb for wkb, _ in rows]),
+                    geometry,
                     [values for values, _ in columns],
                     column_names(kinds),
                     [mask for _, mask in columns],
                     layer=layer,
                     driver="GPKG",
-                    geometry_type=LAYERS[layer],
-                    promote_to_multi=LAYERS[layer] == "MultiPolygon",
-                    crs=self.plan_wkt,
-                    append=append,
+                    **version,
+                    **options,
                 )
         except (DataSourceError, DataLayerError, FeatureError, RuntimeError, OSError) as error:
             raise OutputError(

@@ -37,7 +37,7 @@ def building_attributes(
     """
     own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
-    computed |= {OWN + name: value for name, value in hiproof_attributes(building).items()}
+    computed |= {OWN + name: value for name, value in hiproof_attributes(building, figures).items()}
     if osm:
         from .osm_tags import osm_tags
 
@@ -54,14 +54,7 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
         shape = dict.fromkeys(("h_roof_min", "h_roof_50p", "h_roof_70p", "h_roof_max", "h_roof_ridge", "volume_lod22"))
         roof_type, mode = "no points" if building.status is Status.NO_POINTS else "unknown", "skip"
     else:
-        shape = {
-            "h_roof_min": metres(figures.h_min),
-            "h_roof_50p": metres(figures.h_50p),
-            "h_roof_70p": metres(figures.h_70p),
-            "h_roof_max": metres(figures.h_max),
-            "h_roof_ridge": metres(figures.h_ridge),
-            "volume_lod22": metres(figures.volume_m3),
-        }
+        shape = shape_attributes(figures)
         roof_type = figures.roofer_type
         mode = "lod11_fallback" if building.status in FALLBACKS else "standard"
     return {
@@ -78,7 +71,19 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
     }
 
 
-def hiproof_attributes(building: Building) -> dict[str, Any]:
+def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
+    """Heights and volume, without prefix."""
+    return {
+        "h_roof_min": metres(figures.h_min),
+        "h_roof_50p": metres(figures.h_50p),
+        "h_roof_70p": metres(figures.h_70p),
+        "h_roof_max": metres(figures.h_max),
+        "h_roof_ridge": metres(figures.h_ridge),
+        "volume_lod22": metres(figures.volume_m3),
+    }
+
+
+def hiproof_attributes(building: Building, figures: RoofFigures | None = None) -> dict[str, Any]:
     """Our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
@@ -90,6 +95,7 @@ def hiproof_attributes(building: Building) -> dict[str, Any]:
         "roof_type_probability": None if probability is None else rounded(probability),
         "network_type": recognised,
         "network_type_probability": None if recognised is None else rounded(building.recognised[recognised]),
+        "h_eave": None if figures is None else metres(figures.h_eave),
         "parts": len(building.parts),
         "points": int(quality.points),
         "psd_mean": rounded(quality.psd_mean),

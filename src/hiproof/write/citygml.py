@@ -8,24 +8,36 @@ All ids in the text are names by XML's rules already; what comes from outside is
 from __future__ import annotations
 
 import datetime
-import math
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from ..frames import METRES, Units
-from ..model import GROUND, ROOF, WALL, Building, Face
-from .building_attributes import PREFIX, building_attributes, figures_of, ground_height, rounded
+from ..model import GROUND, Building, Face, Solid
+from ..settings import WriteSettings
+from .building_attributes import OWN, PREFIX, building_attributes, figures_of, ground_height
+from .citygml_geometry import (
+    boundary_surfaces,
+    lod1_solid,
+    lod2_solid,
+    lod2_surfaces,
+    multi_surface,
+    positions,
+    surface_ids,
+    terrain_element,
+)
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .naming import FileUnits, UniqueNames, gml_name, srs_name
-from .roof_codes import roof_type_code
+from .roof_codes import CODE_SPACES, roof_type_code
 from .roof_figures import RoofFigures
+from .shapes import PartShape, Shapes, shapes_of
 from .writer import BuildingWriter
-from .xml_text import xml_attribute, xml_text
+from .xml_text import attribute_set, generic_attribute, xml_attribute, xml_text
 
 NAMESPACES = {
     "bldg": "http://www.opengis.net/citygml/building/2.0",
@@ -34,9 +46,6 @@ NAMESPACES = {
     "gml": "http://www.opengis.net/gml",
     "xlink": "http://www.w3.org/1999/xlink",
 }
-ROOF_TYPE_CODES = "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml"
-GENERIC = {int: "gen:intAttribute", float: "gen:doubleAttribute", str: "gen:stringAttribute"}
-ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 WIDEST = -123456789.1234
 
 
@@ -46,14 +55,15 @@ def write_citygml(
     crs: Any = None,
     prefix: str = PREFIX,
     creation_date: datetime.date | None = None,
+    write: WriteSettings | None = None,
 ) -> None:
     """Write `buildings` (solids in world metres) to `path` as CityGML 2.0, LoD 2.
 
     `crs` is anything pyproj understands or None; `prefix` goes before roofer's attribute names; `creation_date` is
-    written on every building if given (never taken from a clock, so that the same input gives the same file). A
-    building without a solid is written without geometry. Coordinates are written in the unit of `crs`. Raises OutputError when the file cannot be written.
+    written on every building if given (never taken from a clock, so that the same input gives the same file); `write` says
+    what is drawn of a building. A building without a solid is written without geometry. Coordinates are written in the unit of `crs`. Raises OutputError when the file cannot be written.
     """
-    with CityGMLWriter(path, crs, prefix, creation_date) as writer:
+    with CityGMLWriter(path, crs, prefix, creation_date, write=write) as writer:
         for building in buildings:
             writer.add(building)
 
@@ -70,8 +80,10 @@ class CityGMLWriter(BuildingWriter):
         prefix: str = PREFIX,
         creation_date: datetime.date | None = None,
         units: Units | None = None,
+        write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
+        self.write = write or WriteSettings()
         self.srs_name, self.units = srs_name(crs), FileUnits.of(crs, units).gml
         self.prefix, self.creation_date = prefix, creation_date
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
@@ -88,7 +100,10 @@ class CityGMLWriter(BuildingWriter):
         figures = figures or figures_of(building)
         attributes = building_attributes(building, figures, self.prefix, self.units)
         name = self.names.take(gml_name(building.id))
-        self.add_member(gml_member(building, figures, attributes, name, self.units, self.creation_date))
+        shapes = shapes_of(building, figures, self.write, self.prefix)
+        date = self.creation_date
+        written = GmlBuilding(building, figures, shapes, attributes, name, self.units, self.write, date)
+        self.add_member(gml_member(written))
 
     def add_member(self, member: Fragment) -> None:
         """Write a building, told in CityGML 2.0."""
@@ -119,141 +134,126 @@ class CityGMLWriter(BuildingWriter):
 
 def writer(path: str | os.PathLike, head: FileHead) -> CityGMLWriter:
     """The writer of a run's file."""
-    return CityGMLWriter(path, head.crs)
+    return CityGMLWriter(path, head.crs, write=head.write)
 
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's part of a run's file."""
-    return gml_member(sheet.building, sheet.figures, sheet.attributes, sheet.gml_name, sheet.head.units.gml)
+    units, write = sheet.head.units.gml, sheet.head.write
+    return gml_member(
+        GmlBuilding(sheet.building, sheet.figures, sheet.shapes, sheet.attributes, sheet.gml_name, units, write)
+    )
 
 
-def gml_member(
-    building: Building,
-    figures: RoofFigures | None,
-    attributes: dict[str, Any],
-    name: str,
-    units: Units = METRES,
-    creation_date: datetime.date | None = None,
-) -> Fragment:
-    """The cityObjectMember of `building`, whose gml:ids end in `name`; the root's namespaces are taken as declared."""
-    text = city_object_member(building, figures, attributes, name, units, creation_date)
-    lines = terrain_lines(building, units)
-    if figures is not None:
-        lines = [*lines, units.from_metres(building.solid.vertices)]
+@dataclass(frozen=True)
+class GmlBuilding:
+    """A building with what is drawn and said of it, its `name` unique in the file, and how it is written."""
+
+    building: Building
+    figures: RoofFigures | None
+    shapes: Shapes
+    attributes: dict[str, Any]
+    name: str
+    units: Units = METRES
+    write: WriteSettings = field(default_factory=WriteSettings)
+    creation_date: datetime.date | None = None
+
+    @property
+    def solid(self) -> Solid | None:
+        """The solid that is the building's own: none where its parts have solids, or where none is asked for."""
+        is_own = "2.2" in self.write.lods and self.figures is not None and not self.shapes.parts
+        return self.building.solid if is_own else None
+
+
+def gml_member(drawn: GmlBuilding) -> Fragment:
+    """The cityObjectMember of a building, whose gml:ids end in its name; the root's namespaces are taken as declared."""
+    text = f"<core:cityObjectMember>{building_element(drawn)}</core:cityObjectMember>".encode()
+    lines = terrain_lines(drawn)
+    if drawn.figures is not None:
+        lines = [*lines, drawn.units.from_metres(drawn.building.solid.vertices)]
     if not lines:
-        return Fragment(text.encode())
+        return Fragment(text)
     xyz = np.concatenate(lines)
-    return Fragment(text.encode(), (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
+    return Fragment(text, (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
 
 
-def city_object_member(
-    building: Building,
-    figures: RoofFigures | None,
-    attributes: dict[str, Any],
-    name: str,
-    units: Units,
-    creation_date: datetime.date | None = None,
-) -> str:
-    """One bldg:Building, its children in the schema's order; all its gml:ids end in `name`, unique in the file."""
-    text = [f'<core:cityObjectMember><bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
-    if creation_date is not None:
-        text.append(f"<core:creationDate>{creation_date.isoformat()}</core:creationDate>")
-    text += [generic_attribute(key, value) for key, value in attributes.items()]
-    code = roof_type_code(building)
-    if code is not None:
-        text.append(f'<bldg:roofType codeSpace="{ROOF_TYPE_CODES}">{code}</bldg:roofType>')
-    polygon_ids = [] if figures is None else surface_ids(building.solid.faces, name)
+def building_element(drawn: GmlBuilding) -> str:
+    """One bldg:Building, its children in the schema's order; all its gml:ids end in its name."""
+    building, figures, name, write = drawn.building, drawn.figures, drawn.name, drawn.write
+    text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
+    if drawn.creation_date is not None:
+        text.append(f"<core:creationDate>{drawn.creation_date.isoformat()}</core:creationDate>")
+    text += [generic_attribute(key, value) for key, value in drawn.attributes.items()]
     if figures is not None:
-        height = figures.h_max - min(ground_height(building, figures), figures.h_base)
-        text.append(f'<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>')
-        text.append(solid_text(polygon_ids, name))
-    text.append(terrain_intersection(terrain_lines(building, units)))
-    if figures is not None:
-        text += boundary_surfaces(building, figures, polygon_ids, units)
-    text.append("</bldg:Building></core:cityObjectMember>")
-    return "".join(text)
-
-
-def generic_attribute(name: str, value: Any) -> str:
-    """A gen:*Attribute of the value's kind; None is left out."""
-    if value is None:
-        return ""
-    tag = GENERIC.get(type(value), GENERIC[str])
-    text = str(value).lower() if isinstance(value, bool) else xml_text(value)
-    return f'<{tag} name="{xml_attribute(name)}"><gen:value>{text}</gen:value></{tag}>'
-
-
-def surface_ids(faces: tuple[Face, ...], name: str) -> list[str]:
-    """Each face's polygon named by kind and number; the building's name comes last, so that no two names meet."""
-    counts = dict.fromkeys(ROLES, 0)
-    ids = []
-    for face in faces:
-        counts[face.kind] += 1
-        ids.append(f"{ROLES[face.kind]}-{counts[face.kind]}-{name}")
-    return ids
-
-
-def solid_text(polygon_ids: list[str], name: str) -> str:
-    """The closed shell, made of the boundary surfaces' own polygons."""
-    members = "".join(f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids)
-    return (
-        f'<bldg:lod2Solid><gml:Solid gml:id="solid-{name}"><gml:exterior><gml:CompositeSurface>{members}'
-        "</gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod2Solid>"
-    )
-
-
-def terrain_lines(building: Building, units: Units) -> list[np.ndarray]:
-    """The terrain intersection's lines (m, 3) in `units` that are lines: two points at least, all known."""
-    lines = (line for line in building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
-    return [units.from_metres(line) for line in lines]
-
-
-def terrain_intersection(lines: list[np.ndarray]) -> str:
-    """The lines (m, 3) along which the building meets the terrain."""
-    if not lines:
-        return ""
-    members = "".join(
-        f"<gml:curveMember><gml:LineString>{position_list(positions(line))}</gml:LineString></gml:curveMember>"
-        for line in lines
-    )
-    return f"<bldg:lod2TerrainIntersection><gml:MultiCurve>{members}</gml:MultiCurve></bldg:lod2TerrainIntersection>"
-
-
-def boundary_surfaces(building: Building, figures: RoofFigures, polygon_ids: list[str], units: Units) -> list[str]:
-    """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth in degrees."""
-    place = positions(units.from_metres(building.solid.vertices))
-    surfaces = []
-    for index, (face, polygon_id) in enumerate(zip(building.solid.faces, polygon_ids, strict=True)):
-        tag = f"bldg:{face.kind}"
-        angles = angle_attributes(figures, index) if face.kind == ROOF else ""
-        surfaces.append(
-            f'<bldg:boundedBy><{tag} gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
-            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{polygon_rings(face, place)}</gml:Polygon>'
-            f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
+        text.append(
+            roof_and_height([part.type for part in building.parts], figures, ground_height(building, figures), write)
         )
-    return surfaces
+        text.append(level_surfaces(drawn))
+        text.append(lod1_solid(drawn.shapes.lod13 or drawn.shapes.lod12, drawn.units))
+    text.append(with_terrain(drawn))
+    if drawn.solid is not None:
+        text += boundary_surfaces(drawn.solid, figures, surface_ids(drawn.solid.faces, name), drawn.units)
+    text += [part_element(drawn, number, part) for number, part in enumerate(drawn.shapes.parts, 1)]
+    return "".join([*text, "</bldg:Building>"])
 
 
-def angle_attributes(figures: RoofFigures, index: int) -> str:
-    """Slope and azimuth of roof face `index`, as far as they are known."""
-    angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
-    return "".join(generic_attribute(key, rounded(angle, 3)) for key, angle in angles.items() if math.isfinite(angle))
+def part_element(drawn: GmlBuilding, number: int, part: PartShape) -> str:
+    """One bldg:BuildingPart with its solid; its gml:ids have the part's number before the building's name."""
+    name, ground = f"{number}-{drawn.name}", ground_height(drawn.building, drawn.figures)
+    sets = part.attributes.get(f"{OWN}primitives", [])
+    text = [f'<bldg:consistsOfBuildingPart><bldg:BuildingPart gml:id="part-{name}">']
+    text += [generic_attribute(key, value) for key, value in part.attributes.items() if not isinstance(value, list)]
+    text += [attribute_set(f"{OWN}primitive_{k}", values) for k, values in enumerate(sets)]
+    text.append(roof_and_height(part.types, part.figures, ground, drawn.write))
+    text.append(lod1_solid(part.block, drawn.units))
+    if "2.2" in drawn.write.lods:
+        ids = surface_ids(part.solid.faces, drawn.name, f"{number}.")
+        text.append(lod2_solid(ids, f"shell-{name}"))
+        text += [lod2_surfaces(part.solid, drawn.units)] if drawn.write.gml_surfaces else []
+        text += boundary_surfaces(part.solid, part.figures, ids, drawn.units)
+    return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
 
 
-def polygon_rings(face: Face, place: list[str]) -> str:
-    """The rings of a face, `place` being the vertices' coordinates as text."""
-    text = ""
-    for number, ring in enumerate(face.rings):
-        bound = "gml:interior" if number else "gml:exterior"
-        closed = position_list([place[vertex] for vertex in (*ring, ring[0])])
-        text += f"<{bound}><gml:LinearRing>{closed}</gml:LinearRing></{bound}>"
-    return text
+def roof_and_height(types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings) -> str:
+    """roofType of roof parts of `types`, where there are any, and measuredHeight, over the ground."""
+    code = roof_type_code(types, write.roof_codes) if types else None
+    roof = "" if code is None else f'<bldg:roofType codeSpace="{CODE_SPACES[write.roof_codes]}">{code}</bldg:roofType>'
+    height = figures.h_max - min(z_ground, figures.h_base)
+    return f'{roof}<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>'
 
 
-def position_list(place: list[str]) -> str:
-    return f'<gml:posList srsDimension="3">{" ".join(place)}</gml:posList>'
+def level_surfaces(drawn: GmlBuilding) -> str:
+    """LoD0, where asked for: footprint and roof edge."""
+    shapes, solid = drawn.shapes, drawn.building.solid
+    if shapes.outline is None:
+        return ""
+    upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
+    unmoved = solid.vertices - np.array([*drawn.building.shift, 0.0])
+    low = multi_surface((upward,), positions(drawn.units.from_metres(unmoved)))
+    edge = multi_surface((upward,), positions(drawn.units.from_metres(shapes.edge_vertices(solid))))
+    return f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint><bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
 
 
-def positions(xyz: np.ndarray) -> list[str]:
-    """Each of the coordinates (n, 3) as text, to a ten-thousandth of their unit."""
-    return ["%.4f %.4f %.4f" % (x, y, z) for x, y, z in (np.round(xyz, 4) + 0.0).tolist()]  # noqa: UP031
+def with_terrain(drawn: GmlBuilding) -> str:
+    """The building's own solid of LoD2, its surfaces and the line along which it meets the terrain, as far as asked for.
+
+    GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line, which is the same at all levels,
+    stands before them as LoD1's; without LoD2 it would be the last, and is left out.
+    """
+    lines, is_last = terrain_lines(drawn), not drawn.write.gml_surfaces
+    has_lod2 = "2.2" in drawn.write.lods
+    first = terrain_element(lines, 1) if lines and not is_last and has_lod2 else ""
+    last = terrain_element(lines, 2 if has_lod2 else 1) if lines and is_last else ""
+    if drawn.solid is None:
+        return first + last
+    solid = lod2_solid(surface_ids(drawn.solid.faces, drawn.name), f"solid-{drawn.name}")
+    surfaces = lod2_surfaces(drawn.solid, drawn.units) if drawn.write.gml_surfaces else ""
+    return f"{first}{solid}{surfaces}{last}"
+
+
+def terrain_lines(drawn: GmlBuilding) -> list[np.ndarray]:
+    """The terrain intersection's lines (m, 3) in the file's unit that are lines: two points at least, all known."""
+    if not drawn.write.terrain_intersection:
+        return []
+    lines = (line for line in drawn.building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
+    return [drawn.units.from_metres(line) for line in lines]

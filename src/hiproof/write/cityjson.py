@@ -11,20 +11,23 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..frames import Units
 from ..model import Building
+from ..settings import WriteSettings
 from .building_attributes import PREFIX, building_attributes, figures_of, metres, plain_text
-from .cityjson_geometry import Vertices, building_geometry, first_corner
+from .cityjson_geometry import Vertices, building_geometry, first_corner, part_geometry
 from .files import scratch
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
 from .naming import FileUnits, UniqueNames, reference_system
 from .roof_figures import RoofFigures
+from .shapes import PartShape, Shapes, shapes_of
 from .writer import BuildingWriter
 
 SCALE = 0.0001
@@ -38,14 +41,15 @@ def write_cityjson(
     crs: Any = None,
     prefix: str = PREFIX,
     scale: float = SCALE,
+    write: WriteSettings | None = None,
 ) -> None:
     """Write `buildings` (solids in world metres) to `path`: CityJSONSeq 2.0, or one document if it ends in `.json`.
 
     `crs` is anything pyproj understands or None; coordinates are written in its unit. `prefix` goes before roofer's
-    attribute names; `scale` is the grid that coordinates are rounded to, in the file's unit. Raises OutputError when the
+    attribute names; `scale` is the grid that coordinates are rounded to, in the file's unit; `write` says what is drawn of a building. Raises OutputError when the
     file cannot be written; an older file then stays.
     """
-    with CityJSONWriter(path, crs, prefix, scale) as writer:
+    with CityJSONWriter(path, crs, prefix, scale, write=write) as writer:
         for building in buildings:
             writer.add(building)
 
@@ -61,8 +65,10 @@ class CityJSONWriter(BuildingWriter):
         scale: float = SCALE,
         translate: np.ndarray | None = None,
         units: Units | None = None,
+        write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
+        self.write = write or WriteSettings()
         self.units = FileUnits.of(crs, units).cityjson
         self.is_document = str(path).endswith(".json")
         self.reference_system = reference_system(crs)
@@ -70,7 +76,7 @@ class CityJSONWriter(BuildingWriter):
         self.translate = translate
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.ids = UniqueNames()
-        self.vertex_count = 0
+        self.vertex_count = self.object_count = 0
 
     def begin(self, stack: ExitStack) -> None:
         self.header_length = len(self.header(np.full(3, WIDEST), [WIDEST] * 6))
@@ -83,12 +89,12 @@ class CityJSONWriter(BuildingWriter):
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale, self.units)
         attributes = building_attributes(building, figures, self.prefix, self.units)
+        shapes = shapes_of(building, figures, self.write, self.prefix)
+        drawn = Drawn(building, figures, shapes, attributes, self.prefix, self.write.lods)
         if self.is_document:
-            city_object, extent = city_object_of(building, figures, attributes, vertices, self.prefix)
-            self.widen(extent)
-            self.add_to_document(name, city_object, vertices)
+            self.add_to_document(drawn.objects(name, vertices), vertices)
         else:
-            self.put(feature_line(building, figures, attributes, name, vertices, self.prefix))
+            self.put(feature_line(drawn, name, vertices))
 
     def put(self, fragment: Fragment) -> None:
         """Write a building whose line is about this file's `translate`."""
@@ -108,11 +114,13 @@ class CityJSONWriter(BuildingWriter):
             self.translate = offset_of(self.units.from_metres(corner[:2]))
         return self.translate
 
-    def add_to_document(self, name: str, city_object: dict[str, Any], vertices: Vertices) -> None:
-        for geometry in city_object.get("geometry", ()):
-            geometry["boundaries"] = shifted(geometry["boundaries"], self.vertex_count)
-        comma = b",\n" if len(self.ids.taken) > 1 else b""
-        self.file.write(comma + dump(name) + b":" + dump(city_object))
+    def add_to_document(self, objects: dict[str, dict[str, Any]], vertices: Vertices) -> None:
+        self.widen(next(iter(objects.values())).get("geographicalExtent"))
+        for name, city_object in objects.items():
+            for geometry in city_object.get("geometry", ()):
+                geometry["boundaries"] = shifted(geometry["boundaries"], self.vertex_count)
+            self.file.write((b",\n" if self.object_count else b"") + dump(name) + b":" + dump(city_object))
+            self.object_count += 1
         if vertices.grid:
             self.waiting.write((b",\n" if self.vertex_count else b"") + dump(vertices.grid)[1:-1])
         self.vertex_count += len(vertices.grid)
@@ -148,13 +156,14 @@ class CityJSONWriter(BuildingWriter):
 
 def writer(path: str | os.PathLike, head: FileHead) -> CityJSONWriter:
     """The writer of a run's file."""
-    return CityJSONWriter(path, head.crs, translate=head.offset)
+    return CityJSONWriter(path, head.crs, translate=head.offset, write=head.write)
 
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's line in a run's file."""
     vertices = Vertices(sheet.head.offset, SCALE, sheet.head.units.cityjson)
-    return feature_line(sheet.building, sheet.figures, sheet.attributes, sheet.name, vertices)
+    drawn = Drawn(sheet.building, sheet.figures, sheet.shapes, sheet.attributes, PREFIX, sheet.head.write.lods)
+    return feature_line(drawn, sheet.name, vertices)
 
 
 def offset_of(corner_xy: np.ndarray) -> np.ndarray:
@@ -162,31 +171,47 @@ def offset_of(corner_xy: np.ndarray) -> np.ndarray:
     return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
-def feature_line(
-    building: Building,
-    figures: RoofFigures | None,
-    attributes: dict[str, Any],
-    name: str,
-    vertices: Vertices,
-    prefix: str = PREFIX,
-) -> Fragment:
-    """The CityJSONFeature of `building` under the id `name`; `vertices` are empty, about the file's offset."""
-    city_object, extent = city_object_of(building, figures, attributes, vertices, prefix)
-    feature = {"type": "CityJSONFeature", "id": name, "CityObjects": {name: city_object}, "vertices": vertices.grid}
-    return Fragment(dump(feature) + b"\n", extent)
+@dataclass(frozen=True)
+class Drawn:
+    """A building with what is drawn and said of it."""
+
+    building: Building
+    figures: RoofFigures | None
+    shapes: Shapes
+    attributes: dict[str, Any]
+    prefix: str
+    lods: tuple[str, ...]
+
+    def objects(self, name: str, vertices: Vertices) -> dict[str, dict[str, Any]]:
+        """CityObjects by id: the building, under `name`, and its parts; their vertices go to `vertices`."""
+        geometry = building_geometry(self.building, self.figures, self.shapes, vertices, self.prefix, self.lods)
+        whole: dict[str, Any] = {"type": "Building", "attributes": self.attributes}
+        parts = {f"{name}-part{k}": self.part(name, part, vertices) for k, part in enumerate(self.shapes.parts, 1)}
+        if geometry:
+            whole = {"type": "Building", "geographicalExtent": list(extent_of(vertices)), "attributes": self.attributes}
+            whole["geometry"] = geometry
+        if parts:
+            whole["children"] = list(parts)
+        return {name: whole, **parts}
+
+    def part(self, name: str, part: PartShape, vertices: Vertices) -> dict[str, Any]:
+        """The CityObject of a building part of the building `name`."""
+        geometry = part_geometry(self.building, part, vertices, self.prefix, self.lods)
+        return {"type": "BuildingPart", "parents": [name], "attributes": part.attributes, "geometry": geometry}
 
 
-def city_object_of(
-    building: Building, figures: RoofFigures | None, attributes: dict[str, Any], vertices: Vertices, prefix: str
-) -> tuple[dict[str, Any], tuple[float, ...] | None]:
-    """The CityObject and its extent, None where it has no geometry; its vertices go to `vertices`."""
-    geometry = building_geometry(building, figures, vertices, prefix)
-    if not geometry:
-        return {"type": "Building", "attributes": attributes}, None
+def extent_of(vertices: Vertices) -> tuple[float, ...]:
+    """Low x y z and high x y z of all vertices."""
     grid = np.array(vertices.grid)
     low, high = (edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0)))
-    extent = tuple(metres(v) for v in (*low, *high))
-    return {"type": "Building", "geographicalExtent": extent, "attributes": attributes, "geometry": geometry}, extent
+    return tuple(metres(v) for v in (*low, *high))
+
+
+def feature_line(drawn: Drawn, name: str, vertices: Vertices) -> Fragment:
+    """The CityJSONFeature of a building under the id `name`; `vertices` are empty, about the file's offset."""
+    objects = drawn.objects(name, vertices)
+    feature = {"type": "CityJSONFeature", "id": name, "CityObjects": objects, "vertices": vertices.grid}
+    return Fragment(dump(feature) + b"\n", extent_of(vertices) if vertices.grid else None)
 
 
 def shifted(boundaries: Any, count: int) -> Any:

@@ -1,7 +1,8 @@
-"""The geometry of one building in CityJSON: a Solid with semantics, and its footprint."""
+"""The geometry of one building in CityJSON: footprint and roof edge, blocks, Solids with semantics."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from typing import Any
 
@@ -9,9 +10,10 @@ import numpy as np
 import shapely
 
 from ..frames import METRES, Units
-from ..model import GROUND, ROOF, Building, Face
+from ..model import GROUND, ROOF, Building, Face, Solid
 from .building_attributes import OWN, plain, rounded
 from .roof_figures import RoofFigures
+from .shapes import PartShape, Shapes
 
 LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 
@@ -37,69 +39,102 @@ class Vertices:
 
 
 def building_geometry(
-    building: Building, figures: RoofFigures | None, vertices: Vertices, prefix: str
+    building: Building,
+    figures: RoofFigures | None,
+    shapes: Shapes,
+    vertices: Vertices,
+    prefix: str,
+    lods: tuple[str, ...],
 ) -> list[dict[str, Any]]:
-    """LoD 0 footprint and LoD 2.2 solid of `building`, as far as it has them; their vertices go to `vertices`."""
-    if figures is not None:
-        number = vertices.add(building.solid.vertices)
-        boundaries = [numbered(face, number) for face in building.solid.faces]
-        footprint = [
-            [ring[::-1] for ring in rings]
-            for face, rings in zip(building.solid.faces, boundaries, strict=True)
-            if face.kind == GROUND
-        ]
-        footprint = unmoved_footprint(building, vertices) if any(building.shift) else footprint
-        return [multi_surface(footprint), solid_geometry(building, figures, boundaries, prefix)]
-    if has_level_footprint(building):
-        return [multi_surface(footprint_boundaries(building, vertices))]
-    return []
+    """What is drawn of the building itself, as far as it has it and `lods` ask: the footprint always, roof edge, blocks, solid.
+
+    Vertices go to `vertices`. A building in parts has no solid of its own.
+    """
+    if figures is None:
+        has_footprint = has_level_footprint(building)
+        return [multi_surface(footprint_boundaries(building, vertices))] if has_footprint else []
+    solids = []
+    if "2.2" in lods and not shapes.parts:
+        solids = [solid_geometry(building.solid, vertices, LOD_SOLID, roof_surfaces(building, figures, prefix))]
+    blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
+    return [
+        *level_surfaces(building, shapes, vertices),
+        *(solid_geometry(block, vertices, lod) for block, lod in blocks if block is not None),
+        *solids,
+    ]
 
 
-def unmoved_footprint(building: Building, vertices: Vertices) -> list[list[list[int]]]:
-    """The ground surfaces of a solid whose footprint was moved, where the footprint lay."""
-    corners = building.solid.vertices - np.array([*building.shift, 0.0])
-    grounds = building.solid.of_kind(GROUND)
+def part_geometry(
+    building: Building, part: PartShape, vertices: Vertices, prefix: str, lods: tuple[str, ...]
+) -> list[dict[str, Any]]:
+    """The block and the solid of a building part, as far as `lods` ask for them."""
+    block = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
+    if "2.2" not in lods:
+        return block
+    surfaces = roof_surfaces(dataclasses.replace(building, solid=part.solid), part.figures, prefix)
+    return [*block, solid_geometry(part.solid, vertices, LOD_SOLID, surfaces)]
+
+
+def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
+    """LoD0: the footprint where it lay before it was moved, and the roof's edge, with semantics to tell them apart by."""
+    corners, grounds = building.solid.vertices, building.solid.of_kind(GROUND)
+    unmoved = corners - np.array([*building.shift, 0.0]) if any(building.shift) else corners
+    footprint = multi_surface(ground_boundaries(grounds, unmoved, vertices))
+    if shapes.outline is None:
+        return [footprint]
+    edge = multi_surface(ground_boundaries((shapes.outline,), shapes.edge_vertices(building.solid), vertices))
+    return [named_surfaces(footprint, GROUND), named_surfaces(edge, ROOF)]
+
+
+def ground_boundaries(grounds: tuple[Face, ...], corners: np.ndarray, vertices: Vertices) -> list[list[list[int]]]:
+    """Ground faces with their vertices at `corners` (n, 3), turned to look up."""
     return [[vertices.add(corners[list(ring)])[::-1] for ring in face.rings] for face in grounds]
-
-
-def numbered(face: Face, number: list[int]) -> list[list[int]]:
-    """Rings of `face` by the feature's vertex numbers."""
-    return [[number[index] for index in ring] for ring in face.rings]
 
 
 def multi_surface(boundaries: list) -> dict[str, Any]:
     return {"type": "MultiSurface", "lod": LOD_FOOTPRINT, "boundaries": boundaries}
 
 
-def solid_geometry(building: Building, figures: RoofFigures, boundaries: list, prefix: str) -> dict[str, Any]:
-    """The Solid: every roof face is a semantic surface of its own, walls share one and so does the ground."""
+def named_surfaces(surface: dict[str, Any], kind: str) -> dict[str, Any]:
+    return {**surface, "semantics": {"surfaces": [{"type": kind}], "values": [0] * len(surface["boundaries"])}}
+
+
+def solid_geometry(
+    solid: Solid, vertices: Vertices, lod: str, roofs: dict[int, dict[str, Any]] | None = None
+) -> dict[str, Any]:
+    """The Solid: a roof face in `roofs` is a semantic surface of its own, all others of a kind share one."""
+    number = vertices.add(solid.vertices)
     surfaces: list[dict[str, Any]] = []
     shared: dict[str, int] = {}
     values = []
-    for index, face in enumerate(building.solid.faces):
-        if face.kind == ROOF:
+    for index, face in enumerate(solid.faces):
+        if roofs and index in roofs:
             values.append(len(surfaces))
-            surfaces.append(roof_surface(building, face, index, figures, prefix))
+            surfaces.append(roofs[index])
         else:
             if face.kind not in shared:
                 shared[face.kind] = len(surfaces)
                 surfaces.append({"type": face.kind})
             values.append(shared[face.kind])
+    boundaries = [[[number[vertex] for vertex in ring] for ring in face.rings] for face in solid.faces]
     semantics = {"surfaces": surfaces, "values": [values]}
-    return {"type": "Solid", "lod": LOD_SOLID, "boundaries": [boundaries], "semantics": semantics}
+    return {"type": "Solid", "lod": lod, "boundaries": [boundaries], "semantics": semantics}
 
 
-def roof_surface(building: Building, face: Face, index: int, figures: RoofFigures, prefix: str) -> dict[str, Any]:
-    """Semantics of one roof face: slope, azimuth (degrees) and the roof part it belongs to."""
-    surface: dict[str, Any] = {
-        "type": ROOF,
-        f"{prefix}slope": plain(rounded(figures.face_slope_deg[index], 3)),
-        f"{prefix}azimuth": plain(rounded(figures.face_azimuth_deg[index], 3)),
-    }
-    if 0 <= face.part < len(building.parts):
-        surface[f"{OWN}part"] = int(face.part)
-        surface[f"{OWN}part_type"] = building.parts[face.part].type
-    return surface
+def roof_surfaces(building: Building, figures: RoofFigures, prefix: str) -> dict[int, dict[str, Any]]:
+    """Semantics of the solid's roof faces by their index: slope, azimuth (degrees) and the roof part they belong to."""
+    found = {}
+    for index, face in enumerate(building.solid.faces):
+        if face.kind != ROOF:
+            continue
+        found[index] = {
+            "type": ROOF,
+            f"{prefix}slope": plain(rounded(figures.face_slope_deg[index], 3)),
+            f"{prefix}azimuth": plain(rounded(figures.face_azimuth_deg[index], 3)),
+        }
+        if 0 <= face.part < len(building.parts):
+            found[index] |= {f"{OWN}part": int(face.part), f"{OWN}part_type": building.parts[face.part].type}
+    return found
 
 
 def has_level_footprint(building: Building) -> bool:

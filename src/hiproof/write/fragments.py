@@ -6,6 +6,7 @@ file that somebody else could have written is only ever read as data.
 
 from __future__ import annotations
 
+import functools
 import itertools
 import zipfile
 from collections.abc import Iterator, Sequence
@@ -19,6 +20,7 @@ from ..errors import OutputError
 from ..model import Building
 from .head import FileHead
 from .roof_figures import RoofFigures
+from .shapes import Shapes, shapes_of
 
 NOTHING = (np.nan,) * 6
 EXTENT, ENDS = ".extent", ".ends"
@@ -35,6 +37,11 @@ class Sheet:
     name: str
     gml_name: str
     head: FileHead
+
+    @functools.cached_property
+    def shapes(self) -> Shapes:
+        """What is drawn of the building beside its own solid."""
+        return shapes_of(self.building, self.figures, self.head.write)
 
 
 @dataclass(frozen=True)

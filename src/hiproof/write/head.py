@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..settings import ComposeSettings
+from ..settings import ComposeSettings, WriteSettings
 from .naming import FileUnits
 
 
@@ -16,12 +16,13 @@ from .naming import FileUnits
 class FileHead:
     """What the files of a run have in common: the CRS (anything pyproj understands, or None), the unit of coordinates
     without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
-    settles it, and how solids are composed."""
+    settles it, how solids are composed and what is written of buildings."""
 
     crs: Any = None
     unit: str = "auto"
     offset: np.ndarray | None = None
     compose: ComposeSettings = field(default_factory=ComposeSettings)
+    write: WriteSettings = field(default_factory=WriteSettings)
 
     @functools.cached_property
     def units(self) -> FileUnits:

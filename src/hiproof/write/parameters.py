@@ -75,6 +75,7 @@ def head_record(head: FileHead) -> dict[str, Any]:
         "unit": head.unit,
         "cityjson_offset": None if head.offset is None else [float(value) for value in head.offset],
         "compose": dataclasses.asdict(head.compose),
+        "write": dataclasses.asdict(head.write),
     }
 
 

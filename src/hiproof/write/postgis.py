@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
-from ..model import ROOF, Face
+from ..model import ROOF, Face, Solid
 from ..read.database import import_psycopg, refuse_half_a_password
 from .attribute_list import OWN, PARTS_LAYER
 from .naming import units_named
@@ -128,15 +128,29 @@ def building_row(transform: dict, feature: dict, units: Units = METRES) -> Row:
     """The building of a CityJSON feature whose coordinates are integers by `transform`."""
     vertices = np.asarray(feature["vertices"], float).reshape(-1, 3) * transform["scale"] + transform["translate"]
     city_object = feature["CityObjects"][feature["id"]]
+    solids = [g for o in feature["CityObjects"].values() for g in o.get("geometry", []) if g["type"] == "Solid"]
+    level = max((geometry["lod"] for geometry in solids), default="")
     faces, semantics = [], []
-    for geometry in city_object.get("geometry", []):
-        if geometry["type"] != "Solid":
-            continue
+    for geometry in (solid for solid in solids if solid["lod"] == level):
         surfaces, values = geometry["semantics"]["surfaces"], geometry["semantics"]["values"][0]
         for rings, index in zip(geometry["boundaries"][0], values, strict=True):
             semantics.append(surfaces[index])
             faces.append(Face(tuple(map(tuple, rings)), surfaces[index]["type"]))
+    if len(feature["CityObjects"]) > 1:
+        vertices, faces, semantics = in_one_shell(vertices, faces, semantics, units)
     return Row(feature["id"], city_object.get("attributes", {}), vertices, tuple(faces), tuple(semantics), units)
+
+
+def in_one_shell(
+    vertices: np.ndarray, faces: list[Face], semantics: list[dict[str, Any]], units: Units
+) -> tuple[np.ndarray, list[Face], list[dict[str, Any]]]:
+    """Vertices, faces and semantics of a building in parts, without the walls between them."""
+    from ..compose.building_parts import whole_of
+
+    whole = whole_of(Solid(units.to_metres(vertices), tuple(faces)))
+    roofs = [said for face, said in zip(faces, semantics, strict=True) if face.kind == ROOF]
+    others = [{"type": face.kind} for face in whole.faces if face.kind != ROOF]
+    return units.from_metres(whole.vertices), list(whole.faces), [*roofs, *others]
 
 
 def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> int:

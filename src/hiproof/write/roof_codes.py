@@ -1,16 +1,33 @@
-"""The roof type of a building as CityGML's code list names it."""
+"""The roof type of a building or a part as code lists of CityGML name it: SIG3D's, or that of the German surveys (AdV)."""
 
 from __future__ import annotations
 
-from ..model import Building
-from ..primitives.family import citygml_code
+from collections.abc import Iterable
 
-COMBINATION = "1130"
+from ..primitives.catalogue import CATALOGUE
+from ..primitives.family import CODES
+
+CODE_SPACES = {
+    "sig3d": "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml",
+    "adv": "https://repository.gdi-de.org/schemas/adv/citygml/Codelisten/RoofTypeTypeAdV.xml",
+}
+MIXED = {"sig3d": "1130", "adv": "5000"}
+"""Roofs of several forms, and of a form that the list does not know."""
 
 
-def roof_type_code(building: Building) -> str | None:
-    """SIG3D code of the roof: its parts' own if all have one, else "combination of roof forms"; None without a model."""
-    if building.solid is None or not building.parts:
-        return None
-    codes = {citygml_code(part.type) or COMBINATION for part in building.parts}
-    return codes.pop() if len(codes) == 1 else COMBINATION
+def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
+    """The code of roof parts of `types`: their own where all have the same, else that of a mixed roof.
+
+    >>> roof_type_code(["gable", "asymmetric_gable"]), roof_type_code(["gable", "hip"]), roof_type_code(["hip"], "adv")
+    ('1030', '1130', '3200')
+    """
+    codes = {own_code(name, code_list) for name in types}
+    return codes.pop() if len(codes) == 1 else MIXED[code_list]
+
+
+def own_code(name: str, code_list: str) -> str:
+    """The code of one roof type."""
+    if name in CATALOGUE:
+        shape = CATALOGUE[name]
+        return shape.citygml_code if code_list == "sig3d" else shape.adv_code
+    return CODES[name][code_list != "sig3d"] if name in CODES else MIXED[code_list]

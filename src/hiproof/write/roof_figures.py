@@ -22,7 +22,7 @@ class RoofFigures:
     """Figures of one solid; heights in world metres, angles in degrees, NaN where there is nothing to measure.
 
     `h_50p` and `h_70p` are the levels that 50 and 70 % of the roof's plan area lie below; `h_ridge` the height of the
-    longest level edge from which two faces fall away. `slope_deg` and `azimuth_deg` (clockwise from north, the way
+    longest level edge from which two faces fall away, `h_eave` that which half of the length of the eaves lies below. `slope_deg` and `azimuth_deg` (clockwise from north, the way
     water runs) are those of the largest roof face, `face_slope_deg` and `face_azimuth_deg` (faces,) those of every
     face, `face_area_m2` (faces,) the true area of roof faces, 0 of others.
     """
@@ -32,6 +32,7 @@ class RoofFigures:
     h_70p: float
     h_max: float
     h_ridge: float
+    h_eave: float
     h_base: float
     volume_m3: float
     plan_area_m2: float
@@ -90,6 +91,7 @@ def roof_figures(solid: Solid) -> RoofFigures:
         h_70p=float(h_70p),
         h_max=float(z[:, 2].max() + origin[2]),
         h_ridge=ridge_height(corners[:, 1:][roof], fan[roof, 1:], area[face_of[roof]]) + float(origin[2]),
+        h_eave=eave_height(corners[:, 1:][roof], fan[roof, 1:], area[face_of[roof]]) + float(origin[2]),
         h_base=base_height(solid),
         volume_m3=float((o * normal).sum() / 6),
         plan_area_m2=float(plan.sum()),
@@ -147,10 +149,8 @@ def ridge_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float
     edge when that direction points left.
     """
     along = edges[:, 1] - edges[:, 0]
-    falls = area[:, 1] * along[:, 0] - area[:, 0] * along[:, 1] > 1e-9
-    sloped = np.hypot(area[:, 0], area[:, 1]) > np.tan(np.radians(FLAT_SLOPE_DEG)) * area[:, 2]
-    usable = np.flatnonzero(falls & sloped & (np.abs(along[:, 2]) < LEVEL_RIDGE_M))
-    key = ends[usable].min(axis=1) * (int(ends.max()) + 1) + ends[usable].max(axis=1)
+    usable = np.flatnonzero(falls_away(along, area) & (np.abs(along[:, 2]) < LEVEL_RIDGE_M))
+    key = undirected(ends)[usable]
     order = np.argsort(key, kind="stable")
     twice = order[:-1][key[order[1:]] == key[order[:-1]]]
     if not len(twice):
@@ -160,3 +160,30 @@ def ridge_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float
     length = np.round(np.hypot(along[ridges, 0], along[ridges, 1]), 3)
     height = edges[ridges, :, 2].mean(axis=1)
     return float(height[np.lexsort((height, length))[-1]])
+
+
+def falls_away(along: np.ndarray, area: np.ndarray) -> np.ndarray:
+    """Whether (m,) the face left of each edge `along` (m, 3) slopes and falls away from it."""
+    falls = area[:, 1] * along[:, 0] - area[:, 0] * along[:, 1] > 1e-9
+    return falls & (np.hypot(area[:, 0], area[:, 1]) > np.tan(np.radians(FLAT_SLOPE_DEG)) * area[:, 2])
+
+
+def undirected(ends: np.ndarray) -> np.ndarray:
+    """A number (m,) for each edge (m, 2), the same for both of its directions."""
+    return ends.min(axis=1) * (int(ends.max()) + 1) + ends.max(axis=1)
+
+
+def eave_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float:
+    """Height that half of the length of the eaves lies below; arguments as of `ridge_height`.
+
+    Eaves are level edges of one roof face alone that does not fall away from them; of a roof without one, all its outer edges.
+    """
+    along = edges[:, 1] - edges[:, 0]
+    _, inverse, count = np.unique(undirected(ends), return_inverse=True, return_counts=True)
+    outer = count[inverse.ravel()] == 1
+    eaves = outer & (np.abs(along[:, 2]) < LEVEL_RIDGE_M) & ~falls_away(along, area)
+    chosen = eaves if eaves.any() else outer
+    # Rounding as for ridges: neither the order nor the half hangs on the last bit.
+    height, length = np.round(edges[chosen, :, 2].mean(axis=1), 4), np.round(np.hypot(*along[chosen, :2].T), 3)
+    order = np.argsort(height, kind="stable")
+    return float(height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)])

@@ -69,19 +69,24 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     rows = []
     for number, part in enumerate(building.parts):
         corners = rectangle_of(part)
-        known = {
-            "building_id": plain_text(building.id),
-            "part": number,
-            "type": part.type,
-            "area_m2": metres(part.area),
-            "z_eave": metres(part.translation[2] + origin[2]),
-            "rotation": rounded(math.degrees(part.kappa)),
-            **{name: rounded(value) for name, value in part.parameters.items()},
-            **sigmas_of(part),
-        }
+        known = {"building_id": plain_text(building.id), **part_values(building, number)}
         values = {a.name: known.pop(a.name, None) for a in PARTS_LAYER} | known
         rows.append((wkb_of(shapely.Polygon(corners + origin[:2]), units), values))
     return tuple(rows)
+
+
+def part_values(building: Building, number: int) -> dict[str, Any]:
+    """What is known of a roof part by column: its type, place, parameters and their standard deviations."""
+    part, origin = building.parts[number], building.roof.frame.origin
+    return {
+        "part": number,
+        "type": part.type,
+        "area_m2": metres(part.area),
+        "z_eave": metres(part.translation[2] + origin[2]),
+        "rotation": rounded(math.degrees(part.kappa)),
+        **{name: rounded(value) for name, value in part.parameters.items()},
+        **sigmas_of(part),
+    }
 
 
 def sigmas_of(part: Part) -> dict[str, float]:

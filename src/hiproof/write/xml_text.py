@@ -8,6 +8,7 @@ from typing import Any
 PLAIN = re.compile(r"[ !#-%'-;=?-~]*")  # printable ASCII without what must be escaped
 NOT_IN_XML = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 ESCAPES = str.maketrans({"&": "&amp;", "<": "&lt;", ">": "&gt;", "\r": "&#13;"})
+GENERIC = {int: "gen:intAttribute", float: "gen:doubleAttribute", str: "gen:stringAttribute"}
 QUOTED = ESCAPES | str.maketrans({'"': "&quot;", "\n": "&#10;", "\t": "&#9;"})
 
 
@@ -25,3 +26,18 @@ def xml_attribute(value: Any) -> str:
     """`value` as an attribute's value, to stand between double quotes."""
     text = str(value)
     return text if PLAIN.fullmatch(text) else NOT_IN_XML.sub("\ufffd", text).translate(QUOTED)
+
+
+def generic_attribute(name: str, value: Any) -> str:
+    """A gen:*Attribute of the value's kind; None is left out."""
+    if value is None:
+        return ""
+    tag = GENERIC.get(type(value), GENERIC[str])
+    text = str(value).lower() if isinstance(value, bool) else xml_text(value)
+    return f'<{tag} name="{xml_attribute(name)}"><gen:value>{text}</gen:value></{tag}>'
+
+
+def attribute_set(name: str, values: dict[str, Any]) -> str:
+    """A gen:genericAttributeSet of `values` by name."""
+    inside = "".join(generic_attribute(key, value) for key, value in values.items())
+    return f'<gen:genericAttributeSet name="{xml_attribute(name)}">{inside}</gen:genericAttributeSet>'

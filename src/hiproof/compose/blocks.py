@@ -1,0 +1,55 @@
+"""Blocks: a building of LoD1, one prism over its outline or several of different heights."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from ..errors import CompositionError
+from ..frames import LocalFrame
+from ..model import GROUND, ROOF, WALL, Face, Part, Piece, Roof, Solid
+from .solid import compose
+
+
+def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
+    """The prism over `outline` (m, any frame) between two heights; its walls are the outline's edges.
+
+    >>> from hiproof.compose import check_solid, volume
+    >>> yard = shapely.box(0, 0, 10, 10).difference(shapely.box(3, 3, 7, 7))
+    >>> check_solid(block(yard, 0.0, 5.0)), volume(block(yard, 0.0, 5.0))
+    ((), 420.0)
+    """
+    outline = shapely.geometry.polygon.orient(outline)
+    rings = [shapely.get_coordinates(ring)[:-1] for ring in (outline.exterior, *outline.interiors)]
+    plan = np.concatenate(rings)
+    count, starts = len(plan), np.cumsum([0, *map(len, rings)])
+    numbers = [tuple(range(start, end)) for start, end in pairwise(starts.tolist())]
+    walls = [
+        Face(((a, b, b + count, a + count),), WALL)
+        for ring in numbers
+        for a, b in zip(ring, (*ring[1:], ring[0]), strict=True)
+    ]
+    top = Face(tuple(tuple(index + count for index in ring) for ring in numbers), ROOF, 0)
+    bottom = Face(tuple(ring[::-1] for ring in numbers), GROUND)
+    low, high = (np.column_stack([plan, np.full(count, z)]) for z in (z_low, z_high))
+    return Solid(np.concatenate([low, high]), (top, *walls, bottom))
+
+
+def blocks(outlines: Sequence[shapely.Polygon], heights: Sequence[float], z_low: float) -> Solid | None:
+    """One solid of blocks that stand side by side over `outlines`, each of its own height; None where they make no valid one."""
+    whole = shapely.union_all(outlines)
+    if whole.geom_type != "Polygon":
+        return None
+    origin = np.array([*np.floor(whole.bounds[:2]), 0.0])
+    flat = [
+        Part("flat", (Piece(shapely.transform(outline, lambda xy: xy - origin[:2]), np.array([[0.0, 0.0, height]])),))
+        for outline, height in zip(outlines, heights, strict=True)
+    ]
+    roof = Roof(tuple(flat), shapely.transform(whole, lambda xy: xy - origin[:2]), LocalFrame(origin))
+    try:
+        return compose(roof, z_low).moved(origin)
+    except CompositionError:
+        return None

@@ -1,0 +1,205 @@
+"""Building parts: a solid cut along the walls at which its roofs meet, so that each part has a solid of its own.
+
+Roof faces that share an edge belong to one part: wings that run into each other, a dormer on its slope. Where roofs meet at a wall
+alone, or one stands out of another, parts end. They stand side by side over the plan, on its own vertices, so they cannot
+overlap and their volumes are the whole's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from ..model import GROUND, ROOF, WALL, Face, Solid
+from .arrangement import GRID_M
+from .check import check_solid
+from .shell import compacted
+
+LEAST_PART_M2 = 4.0
+"""Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders most."""
+
+
+@dataclass(frozen=True)
+class BuildingPart:
+    """A part's `solid`, in the frame of the whole, the plan polygon `outline` that it stands over, and its roof parts `members`
+    (indices into `Roof.parts`), the largest first."""
+
+    solid: Solid
+    outline: shapely.Polygon
+    members: tuple[int, ...]
+
+
+class Border(NamedTuple):
+    """A plan edge of a roof face, which lies left of it: the `face` and its vertices at the edge's ends."""
+
+    face: int
+    start: int
+    end: int
+
+
+Place = tuple[int, int]
+"""A plan vertex, in tenths of a millimetre."""
+
+Borders = dict[tuple[Place, Place], Border]
+"""By directed plan edge."""
+
+
+def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPart, ...]:
+    """The parts of a valid `solid` whose roof faces name their roof parts, the lowest member first; none where it is one alone.
+
+    There are none either where a part would not be valid by itself, as where it touches itself at a corner.
+
+    >>> from hiproof.frames import LocalFrame
+    >>> from hiproof.model import Part, Piece, Roof
+    >>> from hiproof.compose import compose, volume
+    >>> low, high = (Piece(shapely.box(x, 0, x + 5, 4), np.array([[0.0, 0.0, z]])) for x, z in ((0, 3.0), (5, 6.0)))
+    >>> roof = Roof((Part("flat", (low,)), Part("flat", (high,))), shapely.box(0, 0, 10, 4), LocalFrame(np.zeros(3)))
+    >>> [(part.members, volume(part.solid)) for part in building_parts(compose(roof, 0.0))]
+    [((0,), 60.0), ((1,), 120.0)]
+    """
+    place_of = places_of(solid)
+    roofs = [index for index, face in enumerate(solid.faces) if face.kind == ROOF]
+    borders = plan_borders(solid, roofs, place_of)
+    groups = without_small(joined_at_edges(roofs, borders), solid, borders)
+    if len(groups) < 2:
+        return ()
+    parts = sorted((part_of(solid, group, borders, place_of) for group in groups), key=lambda part: min(part.members))
+    return () if any(check_solid(part.solid, planarity_m) for part in parts) else tuple(parts)
+
+
+def whole_of(parts: Solid) -> Solid:
+    """The one solid of which `parts`, the shells of building parts over common vertices, were cut.
+
+    Its roof faces come first, in the order in which they stand in `parts`; its walls are not joined along straight stretches.
+    """
+    place_of = places_of(parts)
+    roofs = [index for index, face in enumerate(parts.faces) if face.kind == ROOF]
+    return part_of(parts, set(roofs), plan_borders(parts, roofs, place_of), place_of).solid
+
+
+def places_of(solid: Solid) -> list[Place]:
+    """The place of every vertex."""
+    return [(round(x / GRID_M), round(y / GRID_M)) for x, y in solid.vertices[:, :2].tolist()]
+
+
+def plan_borders(solid: Solid, roofs: list[int], place_of: list[Place]) -> Borders:
+    """The border over each directed plan edge; its neighbour lies over the edge turned round."""
+    return {
+        (place_of[start], place_of[end]): Border(index, start, end)
+        for index in roofs
+        for ring in solid.faces[index].rings
+        for start, end in edges_of(ring)
+    }
+
+
+def edges_of(ring: tuple[int, ...]) -> Iterable[tuple[int, int]]:
+    return zip(ring, (*ring[1:], ring[0]), strict=True)
+
+
+def joined_at_edges(roofs: list[int], borders: Borders) -> list[set[int]]:
+    """Roof faces in groups: those of one share edges in space, one after the other."""
+    group_of = {index: {index} for index in roofs}
+    for (a, b), here in borders.items():
+        there = borders.get((b, a))
+        if there and (here.start, here.end) == (there.end, there.start):
+            unite(group_of, here.face, there.face)
+    return distinct(group_of)
+
+
+def unite(group_of: dict[int, set[int]], one: int, other: int) -> None:
+    """Make the groups of two faces one."""
+    if group_of[one] is not group_of[other]:
+        group_of[one] |= group_of[other]
+        for index in group_of[other]:
+            group_of[index] = group_of[one]
+
+
+def distinct(group_of: dict[int, set[int]]) -> list[set[int]]:
+    return list({id(group): group for group in group_of.values()}.values())
+
+
+def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> list[set[int]]:
+    """The groups, each smaller than LEAST_PART_M2 taken in by the neighbour with which it shares the longest border, smallest first."""
+    area = {index: plan_area(solid, solid.faces[index]) for group in groups for index in group}
+    group_of = {index: group for group in groups for index in group}
+    while len(groups := distinct(group_of)) > 1:
+        smallest = min(groups, key=lambda group: (sum(area[index] for index in group), min(group)))
+        shared: dict[int, float] = {}
+        for (a, b), here in borders.items():
+            there = borders.get((b, a))
+            if here.face in smallest and there and there.face not in smallest:
+                key = min(group_of[there.face])
+                shared[key] = shared.get(key, 0.0) + float(np.hypot(b[0] - a[0], b[1] - a[1]))
+        if sum(area[index] for index in smallest) >= LEAST_PART_M2 or not shared:
+            break
+        unite(group_of, max(shared, key=lambda key: (shared[key], -key)), min(smallest))
+    return groups
+
+
+def plan_area(solid: Solid, face: Face) -> float:
+    """Plan area [m2] of a roof face."""
+    outer, *holes = (solid.vertices[list(ring), :2] for ring in face.rings)
+    return float(shapely.Polygon(outer, holes).area)
+
+
+def part_of(solid: Solid, group: set[int], borders: Borders, place_of: list[Place]) -> BuildingPart:
+    """The part under the roof faces `group`: these, the steps between them, walls down to the ground around them, and the ground."""
+    own = {edge: border for edge, border in borders.items() if border.face in group}
+    vertices, levels = with_base(solid, {border.start for border in own.values()}, place_of)
+    rings = closed_rings([(b, a) for a, b in own if (b, a) not in own])
+    walls = [Face((ring,), WALL) for edge in own if (ring := wall_ring(edge, own, levels))]
+    ground = Face(tuple(tuple(levels[place][0] for place in ring) for ring in rings), GROUND)
+    faces = [*(solid.faces[index] for index in sorted(group)), *walls, ground]
+    outer, *holes = (np.array(ring) * GRID_M for ring in rings)
+    return BuildingPart(compacted(vertices, faces), shapely.Polygon(outer, holes), members_of(solid, group))
+
+
+def with_base(solid: Solid, used: set[int], place_of: list[Place]) -> tuple[np.ndarray, dict[Place, list[int]]]:
+    """The solid's vertices (n, 3) and new ones on the ground below those `used`, and all of them over each place, from below."""
+    z_base = min(solid.vertices[index, 2] for face in solid.of_kind(GROUND) for ring in face.rings for index in ring)
+    levels: dict[Place, list[int]] = {}
+    for vertex in sorted(used, key=lambda vertex: solid.vertices[vertex, 2]):
+        levels.setdefault(place_of[vertex], []).append(vertex)
+    below = [[*solid.vertices[over[0], :2], z_base] for over in levels.values()]
+    for number, over in enumerate(levels.values(), len(solid.vertices)):
+        over.insert(0, number)
+    return np.concatenate([solid.vertices, np.array(below)]), levels
+
+
+def wall_ring(edge: tuple[Place, Place], own: Borders, levels: dict[Place, list[int]]) -> tuple[int, ...]:
+    """The wall below a border, down to its neighbour or to the ground, through every level on its way; none where it lies lower."""
+    a, b = edge
+    here, there = own[edge], own.get((b, a))
+    low_a, low_b = (levels[a][0], levels[b][0]) if there is None else (there.end, there.start)
+    at_a, at_b = between(levels[a], low_a, here.start), between(levels[b], low_b, here.end)
+    return (*at_b, *reversed(at_a)) if len(at_a) + len(at_b) > 2 and at_a and at_b else ()
+
+
+def between(levels: list[int], low: int, high: int) -> list[int]:
+    """The vertices of a place from one to another that lies no lower."""
+    return levels[levels.index(low) : levels.index(high) + 1]
+
+
+def closed_rings(edges: list[tuple[Place, Place]]) -> list[list[Place]]:
+    """Directed plan edges as closed rings, that around all others first."""
+    follow = dict(edges)
+    rings = []
+    while follow:
+        ring = [next(iter(follow))]
+        while (place := follow.pop(ring[-1])) != ring[0]:
+            ring.append(place)
+        rings.append(ring)
+    return sorted(rings, key=lambda ring: -shapely.Polygon(ring).area if len(ring) > 2 else 0.0)
+
+
+def members_of(solid: Solid, group: set[int]) -> tuple[int, ...]:
+    """Roof parts of the faces `group`, that of the largest area in plan first."""
+    area: dict[int, float] = {}
+    for index in sorted(group):
+        face = solid.faces[index]
+        area[face.part] = area.get(face.part, 0.0) + plan_area(solid, face)
+    return tuple(sorted(area, key=lambda part: (-area[part], part)))

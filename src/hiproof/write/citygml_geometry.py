@@ -1,0 +1,114 @@
+"""The geometry of one building in CityGML, each function one property or surface; `place` is each vertex' coordinates as text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+import numpy as np
+
+from ..frames import Units
+from ..model import GROUND, ROOF, WALL, Face, Solid
+from .building_attributes import rounded
+from .roof_figures import RoofFigures
+from .xml_text import generic_attribute
+
+ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
+
+
+def surface_ids(faces: tuple[Face, ...], name: str, part: str = "") -> list[str]:
+    """Each face's polygon named by kind and number, that of a building part before it; the building's name comes last, so that no
+    two names meet."""
+    counts = dict.fromkeys(ROLES, 0)
+    ids = []
+    for face in faces:
+        counts[face.kind] += 1
+        ids.append(f"{ROLES[face.kind]}-{part}{counts[face.kind]}-{name}")
+    return ids
+
+
+def lod1_solid(solid: Solid | None, units: Units) -> str:
+    """A block; nothing for None."""
+    if solid is None:
+        return ""
+    members = surface_members(solid.faces, positions(units.from_metres(solid.vertices)))
+    return (
+        f"<bldg:lod1Solid><gml:Solid><gml:exterior><gml:CompositeSurface>{members}</gml:CompositeSurface></gml:exterior>"
+        "</gml:Solid></bldg:lod1Solid>"
+    )
+
+
+def lod2_solid(polygon_ids: list[str], id: str) -> str:
+    """The closed shell under its gml:id, made of the boundary surfaces' own polygons."""
+    members = "".join(f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids)
+    return (
+        f'<bldg:lod2Solid><gml:Solid gml:id="{id}"><gml:exterior><gml:CompositeSurface>{members}'
+        "</gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod2Solid>"
+    )
+
+
+def lod2_surfaces(solid: Solid, units: Units) -> str:
+    """The solid's surfaces by value, for readers that follow no links."""
+    surfaces = multi_surface(solid.faces, positions(units.from_metres(solid.vertices)))
+    return f"<bldg:lod2MultiSurface>{surfaces}</bldg:lod2MultiSurface>"
+
+
+def multi_surface(faces: Iterable[Face], place: list[str]) -> str:
+    return f"<gml:MultiSurface>{surface_members(faces, place)}</gml:MultiSurface>"
+
+
+def surface_members(faces: Iterable[Face], place: list[str]) -> str:
+    return "".join(
+        f"<gml:surfaceMember><gml:Polygon>{polygon_rings(face, place)}</gml:Polygon></gml:surfaceMember>"
+        for face in faces
+    )
+
+
+def terrain_element(lines: list[np.ndarray], level: int) -> str:
+    """The lines (m, 3) along which the building meets the terrain, at that level of detail."""
+    members = "".join(
+        f"<gml:curveMember><gml:LineString>{position_list(positions(line))}</gml:LineString></gml:curveMember>"
+        for line in lines
+    )
+    tag = f"bldg:lod{level}TerrainIntersection"
+    return f"<{tag}><gml:MultiCurve>{members}</gml:MultiCurve></{tag}>"
+
+
+def boundary_surfaces(solid: Solid, figures: RoofFigures, polygon_ids: list[str], units: Units) -> list[str]:
+    """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth in degrees."""
+    place = positions(units.from_metres(solid.vertices))
+    surfaces = []
+    for index, (face, polygon_id) in enumerate(zip(solid.faces, polygon_ids, strict=True)):
+        tag = f"bldg:{face.kind}"
+        angles = angle_attributes(figures, index) if face.kind == ROOF else ""
+        surfaces.append(
+            f'<bldg:boundedBy><{tag} gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
+            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{polygon_rings(face, place)}</gml:Polygon>'
+            f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
+        )
+    return surfaces
+
+
+def angle_attributes(figures: RoofFigures, index: int) -> str:
+    """Slope and azimuth of roof face `index`, as far as they are known."""
+    angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
+    return "".join(generic_attribute(key, rounded(angle, 3)) for key, angle in angles.items() if math.isfinite(angle))
+
+
+def polygon_rings(face: Face, place: list[str]) -> str:
+    """The rings of a face, `place` being the vertices' coordinates as text."""
+    text = ""
+    for number, ring in enumerate(face.rings):
+        bound = "gml:interior" if number else "gml:exterior"
+        closed = position_list([place[vertex] for vertex in (*ring, ring[0])])
+        text += f"<{bound}><gml:LinearRing>{closed}</gml:LinearRing></{bound}>"
+    return text
+
+
+def position_list(place: list[str]) -> str:
+    return f'<gml:posList srsDimension="3">{" ".join(place)}</gml:posList>'
+
+
+def positions(xyz: np.ndarray) -> list[str]:
+    """Each of the coordinates (n, 3) as text, to a ten-thousandth of their unit."""
+    return ["%.4f %.4f %.4f" % (x, y, z) for x, y, z in (np.round(xyz, 4) + 0.0).tolist()]  # noqa: UP031

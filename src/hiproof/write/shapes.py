@@ -1,0 +1,114 @@
+"""What is drawn of a building beside its own solid: footprint and roof edge, blocks, building parts, as far as asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..model import GROUND, Building, Face, Solid
+from ..settings import WriteSettings
+from .attribute_list import OF_PARTS, OWN, PREFIX
+from .building_attributes import metres, plain, shape_attributes
+from .roof_figures import RoofFigures, roof_figures
+from .table_rows import part_values
+
+
+@dataclass(frozen=True)
+class PartShape:
+    """A building part: its `solid` with `figures`, its LoD1.3 `block` if asked for, the roof types of its roof parts, the largest
+    first, and its attributes."""
+
+    solid: Solid
+    figures: RoofFigures
+    block: Solid | None
+    types: tuple[str, ...]
+    attributes: dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """A building's further geometry, None or empty where it is not asked for or there is none.
+
+    `roof_edge` is the outline of LoD0 at the height of the eaves, as a solid's ground is (`outline`, whose face it shares);
+    `lod12` and `lod13` are blocks; `parts` are two or more, and `lod13` then theirs.
+    """
+
+    outline: Face | None = None
+    z_edge: float = float("nan")
+    lod12: Solid | None = None
+    lod13: Solid | None = None
+    parts: tuple[PartShape, ...] = ()
+
+    def edge_vertices(self, solid: Solid) -> np.ndarray:
+        """The vertices (n, 3) of `solid` at the height of the roof's edge."""
+        return np.column_stack([solid.vertices[:, :2], np.full(len(solid.vertices), self.z_edge)])
+
+
+NO_SHAPES = Shapes()
+
+
+def shapes_of(building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX) -> Shapes:
+    """The shapes of `building` that `write` asks for; `figures` are those of its solid, None without one."""
+    asked = set(write.lods)
+    solid = building.solid
+    if solid is None or figures is None or (asked == {"2.2"} and write.parts_as == "one"):
+        return NO_SHAPES
+    ground = solid.of_kind(GROUND)[0]
+    cut = cut_into_parts(solid) if write.parts_as == "buildingparts" or "1.3" in asked else ()
+    as_parts = cut if write.parts_as == "buildingparts" else ()
+    parts = tuple(part_shape(building, part, asked, prefix) for part in as_parts)
+    lod12 = whole_block(solid, ground, figures) if asked & {"1.2", "1.3"} else None
+    return Shapes(
+        outline=ground if "0" in asked else None,
+        z_edge=metres(figures.h_eave),
+        lod12=lod12 if "1.2" in asked else None,
+        lod13=None if parts or "1.3" not in asked else stepped(cut, figures) or lod12,
+        parts=parts,
+    )
+
+
+def cut_into_parts(solid: Solid) -> tuple:
+    from ..compose.building_parts import building_parts
+
+    return building_parts(solid)
+
+
+def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
+    """LoD1.2: one block over the outline, as high as seven tenths of the roof lie below (as 3DBAG has it)."""
+    from ..compose.blocks import block
+
+    outer, *holes = (solid.vertices[list(ring), :2] for ring in ground.rings)
+    return block(shapely.Polygon(outer, holes), figures.h_base, metres(figures.h_70p))
+
+
+def stepped(cut: tuple, figures: RoofFigures) -> Solid | None:
+    """LoD1.3 as one solid: a block for each building part, as high as seven tenths of its own roof lie below."""
+    from ..compose.blocks import blocks
+
+    heights = [metres(roof_figures(part.solid).h_70p) for part in cut]
+    return blocks([part.outline for part in cut], heights, figures.h_base) if cut else None
+
+
+def part_shape(building: Building, part: Any, asked: set[str], prefix: str) -> PartShape:
+    """A building part with its figures, block and attributes."""
+    from ..compose.blocks import block
+
+    figures = roof_figures(part.solid)
+    types = tuple(building.parts[member].type for member in part.members if member < len(building.parts))
+    lod13 = block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in asked else None
+    return PartShape(part.solid, figures, lod13, types, part_attributes(building, part.members, figures, prefix))
+
+
+def part_attributes(building: Building, members: tuple[int, ...], figures: RoofFigures, prefix: str) -> dict[str, Any]:
+    """Attributes of a building part by name."""
+    found = {**shape_attributes(figures), "roof_type": figures.roofer_type, "roof_n_surfaces": figures.roof_faces}
+    primitives = [part_values(building, member) for member in members if member < len(building.parts)]
+    return {
+        **{prefix + name: plain(found[name]) for name in OF_PARTS},
+        f"{OWN}h_eave": plain(metres(figures.h_eave)),
+        f"{OWN}roof_type": primitives[0]["type"] if primitives else None,
+        f"{OWN}primitives": [{name: plain(value) for name, value in values.items()} for values in primitives],
+    }

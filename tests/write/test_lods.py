@@ -1,0 +1,197 @@
+"""Levels of detail, building parts and what GIS programs see of the files."""
+
+import json
+import sqlite3
+from pathlib import Path
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from lxml import etree
+
+from handmade import RD_ORIGIN, gable_house, modelled, unmodelled
+from hiproof.compose import check_solid, compose, volume
+from hiproof.evaluate.models import read_models
+from hiproof.frames import LocalFrame
+from hiproof.model import Building, Part, Piece, Quality, Roof
+from hiproof.parametric.run import build_file
+from hiproof.read.solids import read_solids
+from hiproof.settings import WriteSettings
+from hiproof.status import Status
+from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
+from hiproof.write.citygml import NAMESPACES
+from hiproof.write.colours import TYPE_COLOURS
+from hiproof.write.roof_codes import CODE_SPACES
+from hiproof.write.styles import TABLE, TYPE_COLUMN
+
+ALL = ("0", "1.2", "1.3", "2.2")
+WHOLE = WriteSettings(lods=ALL)
+IN_PARTS = WriteSettings(lods=ALL, parts_as="buildingparts", roof_codes="adv")
+SCHEMA = Path(__file__).parents[2].parent / "shared/schemas/citygml2/CityGML.xsd"
+
+
+def terrace(id="terrace"):
+    """A gable beside a lower flat roof, which meet at a wall."""
+    planes = np.array([[0.0, 0.5, 4.0], [0.0, -0.5, 8.0]])
+    gable = Part(
+        *("gable", (Piece(shapely.box(0, 0, 6, 8), planes),)),
+        *({"width": 8.0, "length": 6.0, "height": 2.0}, 0.0, np.array([3.0, 4.0, 4.0])),
+    )
+    flat = Part("flat", (Piece(shapely.box(6, 0, 10, 8), np.array([[0.0, 0.0, 3.0]])),), {}, 0.0, np.array([8, 4, 3.0]))
+    roof = Roof((gable, flat), shapely.box(0, 0, 10, 8), LocalFrame(RD_ORIGIN))
+    line = np.array([[0, 0, 0.2], [10, 0, 0.0], [10, 8, 0.1], [0, 0, 0.2]]) + RD_ORIGIN
+    solid = compose(roof, 0.0).moved(RD_ORIGIN)
+    return Building(id, Status.MODELLED, "", roof, solid, Quality(points=99), 0.0, "ground class", (line,))
+
+
+def gml(tmp_path, buildings, write):
+    write_citygml(tmp_path / "a.gml", buildings, "EPSG:7415", write=write)
+    return etree.parse(tmp_path / "a.gml").getroot()
+
+
+def found(root, path):
+    return root.xpath(path, namespaces=NAMESPACES)
+
+
+def objects(tmp_path, buildings, write, name="a.city.jsonl"):
+    """CityObjects of all features by id."""
+    write_cityjson(tmp_path / name, buildings, "EPSG:7415", write=write)
+    features = map(json.loads, (tmp_path / name).read_text().splitlines()[1:])
+    return {id: value for feature in features for id, value in feature["CityObjects"].items()}
+
+
+def lods(city_object):
+    return [geometry["lod"] for geometry in city_object.get("geometry", [])]
+
+
+@pytest.mark.parametrize("write", [WriteSettings(), WHOLE, IN_PARTS], ids=["default", "whole", "parts"])
+def test_all_that_is_written_is_valid(tmp_path, write):
+    buildings = [terrace(), modelled(gable_house(), "house"), unmodelled()]
+    gml(tmp_path, buildings, write)
+    for name in ("a.city.jsonl", "a.city.json"):
+        write_cityjson(tmp_path / name, buildings, "EPSG:7415", write=write)
+    for name in ("a.gml", "a.city.jsonl", "a.city.json"):
+        solids = list(read_solids(tmp_path / name))
+        assert len(solids) >= 2 and all(check_solid(solid, 0.01) == () for _, solid in solids)
+
+
+@pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])
+def test_citygml_stays_within_its_schema(tmp_path, write):
+    if not SCHEMA.exists():
+        pytest.skip("needs the schemas of CityGML 2.0 in ../shared/schemas")
+    root = gml(tmp_path, [terrace(), unmodelled()], write)
+    etree.XMLSchema(etree.parse(SCHEMA)).assertValid(root.getroottree())
+
+
+def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):
+    building = terrace()
+    figures, city_object = roof_figures(building.solid), objects(tmp_path, [building], WHOLE)["terrace"]
+    assert lods(city_object) == ["0", "0", "1.2", "1.3", "2.2"]
+    kinds = [geometry["semantics"]["surfaces"][0]["type"] for geometry in city_object["geometry"][:2]]
+    assert kinds == ["GroundSurface", "RoofSurface"]
+    block, steps, roof = (solid for _, solid in read_solids(tmp_path / "a.city.jsonl"))
+    assert volume(block) == pytest.approx(80 * figures.h_70p, rel=1e-4)
+    gable_70p = 6.0 - 2.0 * 0.3  # of a gable's heights over the plan, which are spread evenly from eave to ridge
+    assert volume(steps) == pytest.approx(48 * gable_70p + 32 * 3.0, rel=1e-3)
+    assert volume(roof) == pytest.approx(48 * 5.0 + 32 * 3.0, rel=1e-4)
+
+
+def test_citygml_has_each_level_in_its_property(tmp_path):
+    root = gml(tmp_path, [terrace()], WHOLE)
+    for name in ("lod0FootPrint", "lod0RoofEdge", "lod1Solid", "lod2Solid"):
+        assert len(found(root, f"//bldg:Building/bldg:{name}")) == 1
+    heights = [
+        found(root, f"//bldg:{name}//gml:posList/text()")[0].split()[2::3] for name in ("lod0FootPrint", "lod0RoofEdge")
+    ]
+    assert set(heights[0]) == {"0.0000"} and set(heights[1]) == {f"{roof_figures(terrace().solid).h_eave:.4f}"}
+    z = [float(z) for text in found(root, "//bldg:lod1Solid//gml:posList/text()") for z in text.split()[2::3]]
+    assert sorted(set(z)) == pytest.approx([0.0, 3.0, 5.4], abs=0.01)  # the finer LoD1: the two blocks' tops
+
+
+def test_eaves_are_where_roofs_end():
+    assert roof_figures(gable_house(eave=3.0, ridge=7.0)).h_eave == pytest.approx(3.0, abs=1e-3)
+    # a quantile by length:
+    assert roof_figures(terrace().solid).h_eave == pytest.approx(
+        3.0, abs=1e-3
+    )  # 16 m of the flat roof's edge, 12 m of the gable's, at 4 m
+
+
+def test_building_parts_have_solids_types_heights_and_parameters(tmp_path):
+    by_id = objects(tmp_path, [terrace()], IN_PARTS)
+    whole, gable, flat = by_id["terrace"], by_id["terrace-part1"], by_id["terrace-part2"]
+    assert whole["children"] == ["terrace-part1", "terrace-part2"] and gable["parents"] == flat["parents"] == [
+        "terrace"
+    ]
+    assert lods(whole) == ["0", "0", "1.2"] and lods(gable) == lods(flat) == ["1.3", "2.2"]
+    assert gable["attributes"]["rf_volume_lod22"] == pytest.approx(240.0) and flat["attributes"]["rf_h_roof_max"] == 3.0
+    (primitive,) = gable["attributes"]["hiproof_primitives"]
+    assert (primitive["type"], primitive["width"], primitive["height"], primitive["z_eave"]) == ("gable", 8.0, 2.0, 4.0)
+    root = gml(tmp_path, [terrace()], IN_PARTS)
+    parts = found(root, "//bldg:consistsOfBuildingPart/bldg:BuildingPart")
+    assert [part.xpath("bldg:roofType/text()", namespaces=NAMESPACES) for part in parts] == [["3100"], ["1000"]]
+    assert [part.xpath("bldg:measuredHeight/text()", namespaces=NAMESPACES) for part in parts] == [
+        ["6.0000"],
+        ["3.0000"],
+    ]
+    assert set(found(root, "//bldg:roofType/@codeSpace")) == {CODE_SPACES["adv"]}
+    assert found(parts[0], "gen:genericAttributeSet/gen:doubleAttribute[@name='width']/gen:value/text()") == ["8.0"]
+    ids = found(root, "//@gml:id")
+    assert len(set(ids)) == len(ids)
+
+
+@pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])
+def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, write):
+    building = terrace()
+    objects(tmp_path, [building, modelled(gable_house(), "house")], write)
+    model, house = read_models(tmp_path / "a.city.jsonl")
+    assert (model.id, house.id) == ("terrace", "house")
+    assert check_solid(model.solid, 0.01) == () and volume(model.solid) == pytest.approx(
+        volume(building.solid), rel=1e-4
+    )
+
+
+def test_a_files_head_says_how_it_is_drawn_and_a_build_obeys_it_or_options(tmp_path):
+    write_parameters(tmp_path / "p.jsonl", [terrace()], head=FileHead("EPSG:7415", write=IN_PARTS))
+    build_file(tmp_path / "p.jsonl", tmp_path / "one")
+    build_file(tmp_path / "one/parameters.jsonl", tmp_path / "two")
+    for name in ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg"):
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+    assert b"BuildingPart" in (tmp_path / "two/buildings.city.jsonl").read_bytes()
+    build_file(tmp_path / "p.jsonl", tmp_path / "three", changes={"write": {"parts_as": "one", "lods": ["1.2"]}})
+    (feature,) = (tmp_path / "three/buildings.city.jsonl").read_text().splitlines()[1:]
+    (city_object,) = json.loads(feature)["CityObjects"].values()
+    assert lods(city_object) == ["0", "1.2"]
+
+
+@pytest.mark.parametrize("write", [WriteSettings(), WHOLE], ids=["default", "all levels"])
+def test_gdal_reads_a_building_as_its_surfaces(tmp_path, write):
+    building = terrace()
+    root = gml(tmp_path, [building, modelled(gable_house(), "house")], write)
+    assert len(found(root, "//bldg:lod1TerrainIntersection")) == 2
+    assert pyogrio.read_info(tmp_path / "a.gml")["geometry_type"] == "MultiPolygon Z"
+    _, _, shapes, _ = pyogrio.raw.read(tmp_path / "a.gml")
+    faces = shapely.get_parts(shapely.from_wkb(shapes[0]))
+    assert len(faces) == len(building.solid.faces)
+    assert max(shapely.get_coordinates(faces, include_z=True)[:, 2]) == building.solid.vertices[:, 2].max()
+
+
+def test_without_surfaces_by_value_the_line_is_that_of_the_solids_level(tmp_path):
+    root = gml(tmp_path, [terrace()], WriteSettings(gml_surfaces=False))
+    assert len(found(root, "//bldg:lod2TerrainIntersection")) == 1
+    assert found(root, "//bldg:Building/bldg:lod2MultiSurface | //bldg:lod1TerrainIntersection") == []
+    bare = gml(tmp_path, [terrace()], WriteSettings(terrain_intersection=False))
+    assert found(bare, "//bldg:lod1TerrainIntersection | //bldg:lod2TerrainIntersection") == []
+
+
+def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp_path):
+    write_attributes(tmp_path / "a.gpkg", [terrace(), unmodelled()], "EPSG:7415")
+    with sqlite3.connect(tmp_path / "a.gpkg") as file:
+        assert file.execute("pragma user_version").fetchone() == (10200,)
+        styles = file.execute(f"select f_table_name, f_geometry_column, useAsDefault, styleQML from {TABLE}").fetchall()
+    layers = {name: geometry for name, geometry in pyogrio.list_layers(tmp_path / "a.gpkg") if name != TABLE}
+    assert [row[:3] for row in styles] == [(name, "geom", 1) for name in layers] and list(layers) == list(TYPE_COLUMN)
+    for name, _, _, qml in styles:
+        renderer = etree.fromstring(qml.encode()).find("renderer-v2")
+        assert renderer.get("attr") in pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"]
+        assert len(renderer.findall("symbols/symbol")) == len(TYPE_COLOURS)
