@@ -30,7 +30,7 @@ UNTOUCHED = "run"  # the version of a building that the file does not name
 class OtherVersion(HiproofError):
     """A building that was changed since; `version` is the present one."""
 
-    def __init__(self, version: str, told: str) -> None:
+    def __init__(self, told: str, version: str = "") -> None:
         super().__init__(told)
         self.version = version
 
@@ -77,7 +77,7 @@ class Edits:
             self.refresh()
             known = self.records.get(id)
             if version_of(known) != version:
-                raise OtherVersion(version_of(known), told_of(id, known))
+                raise OtherVersion(told_of(id, known), version_of(known))
             records = {key: value for key, value in self.records.items() if key != id}
             if record is not None:
                 records[id] = record
