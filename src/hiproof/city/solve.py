@@ -32,6 +32,8 @@ from .overrides import load_overrides, load_redo
 from .plan import Job, Plan, load_plan, neighbourhood
 from .sort import load_points
 
+NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
+
 
 class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
@@ -63,7 +65,7 @@ class Surroundings:
     def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
         """Whether anything beside the building is known: else the lowest points are the roof's own."""
         beside = self.low.inside(box)
-        outline = shapely.buffer(job.area, BESIDE_M)
+        outline = shapely.buffer(shapely.simplify(job.area, NEEDLESS_M), BESIDE_M)
         return int((~shapely.intersects_xy(outline, beside[:, 0], beside[:, 1])).sum()) >= FEWEST_BESIDE
 
     def terrain_of(self, job: Job) -> TerrainChain | None:
