@@ -23,7 +23,7 @@ BASE_QUANTILE = 0.02
 MOST_SLOPES = 5
 FINAL_ROUNDS = 3
 STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
-MOST_REGROWN = 16  # of more volumes each is too little of the whole to be worth as much work
+MOST_REGROWN = 8  # of more volumes each is too little of the whole to be worth as much work
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 
