@@ -9,8 +9,6 @@ import typer
 
 from ..formats import FORMATS
 
-TILESET = "tileset.json"
-
 
 def view(
     folder: Annotated[Path, typer.Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote")],
@@ -38,6 +36,7 @@ def view(
 def tiles_of(folder: Path) -> Path:
     """The folder's own tiles, or those of the run in it, made where they are missing or older than the models."""
     from ..evaluate.models import run_models
+    from ..write.tiles.tileset import TILESET
     from .convert import convert
 
     if (folder / TILESET).is_file():

@@ -58,12 +58,13 @@ def carried_on(row: list[Part], teeth: list[Part], others: list[Part]) -> tuple[
         for last, step in ((row[-1], 1.0), (row[0], -1.0)):
             place, rest = next_tooth(row, last, step), [*teeth, *others]
             part = next((p for p in rest if shows_as(p, place, [*row, *(q for q in rest if q is not p)])), None)
-            if part is not None and not found:
+            if part is not None:
                 outline = shapely.intersection(part.pieces[0].outline, place.pieces[0].outline)
                 tooth = replace(place, pieces=tuple(replace(place.pieces[0], outline=o) for o in polygons_of(outline)))
                 row = [*row, tooth] if step > 0.0 else [tooth, *row]
                 teeth, others = ([p for p in own if p is not part] for own in (teeth, others))
                 found = True
+                break
     return row, teeth, others
 
 

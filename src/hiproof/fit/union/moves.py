@@ -186,7 +186,7 @@ def face_walls(volumes, scene, value, k):
         low, high = 2 * axis, 2 * axis + 1
         if walls[0] == np.inf or (volumes[k, OFFSET + low] == np.inf and volumes[k, OFFSET + high] == np.inf):
             continue
-        middles = middles_of_planes(volumes, scene, k)
+        _, middles = turns_of_planes(volumes, scene, k)
         best, best_value = volumes, value - LEAST_GAIN
         for a in range(-1, len(walls)):
             for b in range(-1, len(walls)):
@@ -225,45 +225,31 @@ def face_freely(volumes, scene, value, k, axis):
 
 @compiled
 def turns_of_planes(volumes, scene, k):
-    """By how much the lean of each inclined plane (4,) of volume k has to change for the points that it explains, and their middles."""
+    """By how much the lean of each inclined plane (4,) of volume k has to change for the points that it explains, and u, v (4, 2)
+    in the middle of these; in that of its rectangle where there are none."""
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v, c = scene.U[direction], scene.V[direction], coefficients(volumes, k)
-    middles = middles_of_planes(volumes, scene, k)
     _, top = roof_heights(volumes, scene.U[:, :n], scene.V[:, :n])
-    sums = np.zeros((SIDES, 2))
+    sums = np.zeros(
+        (SIDES, 6)
+    )  # of 1, u, v, what is left, and of y^2 and what is left times y, y along the plane's eave
     for i in range(n):
         h, plane = lowest_plane(c, u[i], v[i])
         left = scene.z[i] - h
         if top[i] == k and plane < LEVEL and abs(left) < scene.dead + scene.width:
-            across = v[i] - middles[plane, 1] if plane < 2 else u[i] - middles[plane, 0]
-            sums[plane, 0] += left * across
-            sums[plane, 1] += across * across
-    turns = np.zeros(SIDES)
-    for plane in range(SIDES):
-        if sums[plane, 1] > 0.0 and volumes[k, SLOPE + plane] > 0.0:
-            turns[plane] = sums[plane, 0] / sums[plane, 1] / volumes[k, SLOPE + plane]
-    return turns, middles
-
-
-@compiled
-def middles_of_planes(volumes, scene, k):
-    """u, v (4, 2) in the middle of the points that each inclined plane of volume k explains; of its rectangle where none."""
-    direction, n = int(volumes[k, DIRECTION]), scene.n
-    u, v, c = scene.U[direction], scene.V[direction], coefficients(volumes, k)
-    _, top = roof_heights(volumes, scene.U[:, :n], scene.V[:, :n])
-    sums = np.zeros((SIDES, 3))
-    for i in range(n):
-        h, plane = lowest_plane(c, u[i], v[i])
-        if top[i] == k and plane < LEVEL and abs(scene.z[i] - h) < scene.dead + scene.width:
-            sums[plane, 0] += 1.0
-            sums[plane, 1] += u[i]
-            sums[plane, 2] += v[i]
-    middles = np.empty((SIDES, 2))
+            y = v[i] if plane < 2 else u[i]
+            for q, term in enumerate((1.0, u[i], v[i], left, y * y, left * y)):
+                sums[plane, q] += term
+    turns, middles = np.zeros(SIDES), np.empty((SIDES, 2))
     for plane in range(SIDES):
         for axis in range(2):
             middle = 0.5 * (volumes[k, U0 + 2 * axis] + volumes[k, U1 + 2 * axis])
             middles[plane, axis] = sums[plane, 1 + axis] / sums[plane, 0] if sums[plane, 0] > 0.0 else middle
-    return middles
+        y = middles[plane, 1] if plane < 2 else middles[plane, 0]
+        spread = sums[plane, 4] - sums[plane, 0] * y * y
+        if spread > 1e-9 and volumes[k, SLOPE + plane] > 0.0:
+            turns[plane] = (sums[plane, 5] - sums[plane, 3] * y) / spread / volumes[k, SLOPE + plane]
+    return turns, middles
 
 
 @compiled
