@@ -29,7 +29,7 @@ import shapely
 from hiproof.compose import check_solid, compose
 from hiproof.errors import HiproofError
 from hiproof.frames import LocalFrame
-from hiproof.model import ROOF, Building, Footprint, Roof
+from hiproof.model import ROOF, Building, Footprint, Model, Roof
 from hiproof.read import read_footprints, read_points
 from hiproof.read.assign import points_of_footprints
 from hiproof.settings import Settings
@@ -74,7 +74,7 @@ def model(points: np.ndarray, footprint: Footprint, settings: Settings) -> tuple
     figures["faces"] = len(solid.of_kind(ROOF))
     figures["beyond"] = max(z.max() - local[:, 2].max(), local[:, 2].min() - z.min())
     figures["bad"] = float(len(check_solid(solid)) > 0)
-    return Building(footprint.id, Status.MODELLED, roof=roof, solid=solid.moved(frame.origin)), figures
+    return Building(footprint.id, Status.MODELLED, built=Model(roof, solid.moved(frame.origin))), figures
 
 
 def asked_footprints(path: Path, parity: str | None) -> list[Footprint]:

@@ -14,7 +14,7 @@ import numpy as np
 from hiproof.compose import check_solid
 from hiproof.errors import HiproofError
 from hiproof.model import Building
-from hiproof.parametric.building import solid_of
+from hiproof.parametric.building import with_model
 from hiproof.parametric.settle import settled_roof
 from hiproof.simulate import random_building, random_compound
 from hiproof.simulate.edits import KINDS, random_edit
@@ -26,7 +26,7 @@ def generated(count: int, seed: int = 0) -> list[Building]:
     rng = np.random.default_rng(seed)
     roofs = [(random_building if k % 2 else random_compound)(rng).roof for k in range(count)]
     return [
-        solid_of(Building(f"house-{k}", Status.MODELLED, roof=settled_roof(roof), z_ground=0.0))
+        with_model(Building(f"house-{k}", Status.MODELLED, z_ground=0.0), settled_roof(roof))
         for k, roof in enumerate(roofs)
     ]
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from hiproof.fit.single import fit_roof
 from hiproof.primitives import CATALOGUE
+from hiproof.settings import Settings
 
 from .roofs import DENSITY, random_roof, scan
 
@@ -34,7 +35,7 @@ def main() -> None:
     ours = np.median([[cpu_ms(cloud, "likelihood") for cloud in clouds] for _ in range(repetitions)], axis=0)
     print(f"likelihood: median {np.median(ours):.2f}, mean {ours.mean():.2f} ms a roof of {POINTS} points, all types")
     asked = slice(0, len(clouds), 10 if quick else 4)
-    fit_roof(clouds[0], types=("flat",), objective="paper")
+    fit_roof(clouds[0], settings=Settings.from_dict({"fit": {"types": ["flat"], "objective": "paper"}}))
     papers = np.array([cpu_ms(cloud, "paper") for cloud in clouds[asked]])
     print(f"paper:      median {np.median(papers):.0f}, mean {papers.mean():.0f} ms on {len(papers)} of these roofs")
     print(f"ratio of the means on the same roofs: {papers.mean() / ours[asked].mean():.0f}")
@@ -42,8 +43,9 @@ def main() -> None:
 
 def cpu_ms(cloud: np.ndarray, objective: str) -> float:
     """CPU time (ms) of one fit."""
+    settings = Settings.from_dict({"fit": {"objective": objective}})
     start = time.process_time()
-    fit_roof(cloud, objective=objective)
+    fit_roof(cloud, settings=settings)
     return 1e3 * (time.process_time() - start)
 
 

@@ -62,7 +62,7 @@ def visible_areas(roof: Roof) -> np.ndarray:
 def area_by_type(buildings: Iterable[Building]) -> Counter[str]:
     """Roof area in plan (m2) that each type of part has in all `buildings`, the largest first."""
     areas: Counter[str] = Counter()
-    for roof in (building.roof for building in buildings if building.roof is not None):
+    for roof in (building.roof for building in buildings if building.built is not None):
         for part, area in zip(roof.parts, visible_areas(roof), strict=True):
             areas[part.type] += float(area)
     return Counter(dict(areas.most_common()))

@@ -81,7 +81,7 @@ def opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
 
 def fitted(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
     try:
-        return fit_roof(points, types=types, weights=weights)
+        return fit_roof(points, settings=Settings.from_dict({"fit": {"types": types}}), weights=weights)
     except FitError:
         return None
 

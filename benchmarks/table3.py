@@ -7,6 +7,7 @@ import argparse
 import numpy as np
 
 from hiproof.fit.single import fit_roof
+from hiproof.settings import Settings
 
 from .roofs import DENSITY, NOISE_RMSE_M, TrueRoof, paper_noise, random_roof, scan
 
@@ -38,11 +39,11 @@ def main() -> None:
 
 def errors_of(name: str, roofs: int, trials: int, objective: str, density: float):
     """One row a fit: mean square of dimension errors, of relative ones, of the translation's, of errors over sigma."""
-    rng = np.random.default_rng(20)
+    rng, settings = np.random.default_rng(20), Settings.from_dict({"fit": {"types": [name], "objective": objective}})
     for _ in range(roofs):
         roof = random_roof(name, rng)
         for _ in range(trials):
-            yield squared_errors(roof, fit_roof(scan(roof, density, rng), types=(name,), objective=objective))
+            yield squared_errors(roof, fit_roof(scan(roof, density, rng), settings=settings))
 
 
 def squared_errors(roof: TrueRoof, fit) -> np.ndarray:
@@ -57,7 +58,7 @@ def squared_errors(roof: TrueRoof, fit) -> np.ndarray:
 
 def against_cramer_rao(roofs: int, trials: int, density: float) -> tuple[float, float]:
     """RMSE of a gable's ridge height and slope over their Cramer-Rao bound, for normal noise of the same variance."""
-    rng = np.random.default_rng(23)
+    rng, only_gables = np.random.default_rng(23), Settings.from_dict({"fit": {"types": ["gable"]}})
     sigma = NOISE_RMSE_M * np.std(paper_noise(100_000, rng))
     scores = []
     for _ in range(roofs):
@@ -65,7 +66,7 @@ def against_cramer_rao(roofs: int, trials: int, density: float) -> tuple[float, 
         slope, ridge = 2 * roof.theta_p["height"] / roof.theta_p["width"], roof.translation[2] + roof.theta_p["height"]
         for _ in range(trials):
             points = scan(roof, density, rng)
-            fit = fit_roof(points, types=("gable",))
+            fit = fit_roof(points, settings=only_gables)
             c, s = np.cos(roof.kappa), np.sin(roof.kappa)
             u, v = ((points[:, :2] - roof.translation[:2]) @ np.array([[c, -s], [s, c]])).T
             design = np.column_stack([np.ones(len(u)), -np.abs(v), slope * np.sign(v), slope * np.sign(v) * u])

@@ -32,7 +32,7 @@ import shapely
 from hiproof import reconstruct
 from hiproof.compose import compose
 from hiproof.frames import LocalFrame
-from hiproof.model import GROUND, ROOF, Building, Part, Piece, Roof, Solid
+from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Roof, Solid
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
@@ -159,7 +159,7 @@ def composed(building: TrueBuilding) -> Building:
     parts = tuple(Part("free", (piece,)) for solid in solids for piece in roof_pieces(solid))
     roof = Roof(parts, shapely.transform(building.footprint, frame.to_local), frame)
     solid = compose(roof, min(float(solid.vertices[:, 2].min()) for solid in solids))
-    return Building(building.id, Status.MODELLED, roof=roof, solid=solid.moved(frame.origin))
+    return Building(building.id, Status.MODELLED, built=Model(roof, solid.moved(frame.origin)))
 
 
 def roof_pieces(solid: Solid) -> Iterator[Piece]:

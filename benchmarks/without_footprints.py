@@ -42,7 +42,7 @@ def row(building: Building) -> str:
 
 
 def report(name: str, outcomes: list[tuple[Building, float]]) -> str:
-    buildings = [building for building, _ in outcomes if building.solid is not None]
+    buildings = [building for building, _ in outcomes if building.built is not None]
     ms, areas = 1e3 * np.array([seconds for _, seconds in outcomes]), area_by_type(buildings)
     return (
         f"{name}: {len(buildings)} of {len(outcomes)} buildings modelled"

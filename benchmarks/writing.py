@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 
 from hiproof.compose import compose
-from hiproof.model import Building, Quality
+from hiproof.model import Building, Model, Quality
 from hiproof.simulate import ROOF_TYPES, random_building
 from hiproof.status import Status
 from hiproof.write import AttributesWriter, CityGMLWriter, CityJSONWriter, ParametersWriter, roof_figures, write_all
@@ -40,7 +40,7 @@ def generated(seed=0):
         origin = made.roof.frame.origin
         solid = compose(made.roof, 0.0).moved(origin)
         quality = Quality(300, 5.0, 0.05, 0.04, 0.06, 0.1, 0.99, 0.95, 0.02, 0.0)
-        yield Building(type, Status.MODELLED, "", made.roof, solid, quality, float(origin[2]), "simulated")
+        yield Building(type, Status.MODELLED, "", Model(made.roof, solid), quality, float(origin[2]), "simulated")
 
 
 def street(buildings, count):

@@ -110,7 +110,7 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
             f"expected the clouds of the run in {folder} where run.json says, got none; make the run again"
         )
     run = evaluate_run(folder, clouds, footprints, layer=layer)
-    roofs = {r["id"]: building_of(r).roof for r in read_parameters(folder / "parameters.jsonl")}
+    roofs = {r["id"]: building_of(r)[1] for r in read_parameters(folder / "parameters.jsonl")}
     true_solids = {model.id: model.solid for model in read_models(truth)} if truth else {}
     found = []
     for model, points, footprint in zip(run.models, run.points, run.footprints, strict=True):

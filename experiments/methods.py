@@ -14,6 +14,7 @@ from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou, plan_outline, psd
 from hiproof.fit.paper import fit_paper
 from hiproof.model import Fit
+from hiproof.settings import Settings
 
 OBJECTIVES = ("paper", "likelihood")
 
@@ -47,7 +48,7 @@ def fit_model(
         else:
             from hiproof.fit import fit_roof
 
-            fit = fit_roof(points, types, outline)
+            fit = fit_roof(points, outline, Settings.from_dict({"fit": {"types": types or ()}}))
     except FitError:
         return Model()
     return Model([fit.vertices[list(face)] for face in fit.faces], fit)

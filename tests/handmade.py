@@ -6,7 +6,7 @@ import numpy as np
 import shapely
 
 from hiproof.frames import LocalFrame
-from hiproof.model import GROUND, ROOF, WALL, Building, Face, Part, Piece, Quality, Roof, Solid
+from hiproof.model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Quality, Roof, Solid
 from hiproof.status import Status
 
 RD_ORIGIN = np.array([85000.0, 446000.0, 0.0])
@@ -76,7 +76,7 @@ def modelled(
         "attributes": {"bouwjaar": 1930, "naam": "Café <&>"},
     }
     roof = Roof(parts, outline, LocalFrame(np.asarray(origin, float)))
-    return Building(id, Status.MODELLED, "", roof, solid.moved(origin), **(values | changes))
+    return Building(id, Status.MODELLED, "", Model(roof, solid.moved(origin)), **(values | changes))
 
 
 def unmodelled(id: str = "lost", **changes) -> Building:

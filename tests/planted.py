@@ -22,7 +22,7 @@ def counted(points, footprint, terrain, settings, id):
     corner = np.array([footprint.polygon.bounds[:2]])
     ground = float(terrain.height_at(corner)[0])
     quality = Quality(points=len(points), rmse=float(points.sum()) if len(points) else float("nan"))
-    return Building(id, Status.NO_POINTS, f"{len(points)} points", None, None, quality, ground, terrain.source)
+    return Building(id, Status.NO_POINTS, f"{len(points)} points", None, quality, ground, terrain.source)
 
 
 def solve_with(reconstruct, folder, tile, terrain, avoid):

@@ -72,6 +72,13 @@ def test_every_public_name_is_there_and_documented(name):
     assert name == "__version__" or value.__doc__
 
 
+def test_the_page_of_python_tells_of_every_public_name():
+    page = (ROOT / "docs/api.md").read_text()
+    told = set(re.findall(r"^::: hiproof\.(?:[\w.]+\.)?(\w+)$", page, re.MULTILINE))
+    kinds = {name for name in hiproof.__all__ if hasattr(hiproof.errors, name)}
+    assert "errors" in told and told - {"errors"} == set(hiproof.__all__) - kinds - {"__version__"}
+
+
 @pytest.mark.parametrize("example", ["one_building.py", "one_tile.py", "new_primitive.py"])
 def test_examples_run(example, tmp_path):
     command = [sys.executable, ROOT / "examples" / example, str(tmp_path / "out")]

@@ -60,7 +60,7 @@ def test_ground_block_and_leaving_out(scanned):
     block = obeyed(scanned, block_height=6.0, z_ground=1.0)
     assert block.type == "flat" and np.ptp(block.solid.vertices[:, 2]) == pytest.approx(6.0)
     left = obeyed(scanned, leave_out=True, note="torn down")
-    assert left.status is Status.LEFT_OUT and left.solid is None and "torn down" in left.detail
+    assert left.status is Status.LEFT_OUT and left.built is None and "torn down" in left.detail
 
 
 def test_parts_given_are_the_parts(scanned):

@@ -189,7 +189,7 @@ def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_
         connection.execute("create extension if not exists postgis_sfcgal")
         sql = "select id, ST_Volume(ST_MakeSolid(geom)) from volumes_buildings where geom is not null"
         volumes = dict(connection.execute(sql).fetchall())
-    assert volumes == pytest.approx({b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.solid}, abs=0.0005)
+    assert volumes == pytest.approx({b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.built}, abs=0.0005)
 
 
 def test_loading_again_replaces_the_run_whatever_its_reference_system(database, run_of_two):

@@ -6,7 +6,7 @@ import shapely
 import shapely.affinity
 
 import hiproof
-from hiproof import Status
+from hiproof import NoModelError, Status
 from hiproof.compose import check_solid, volume
 from hiproof.settings import Settings
 from hiproof.stages import candidates
@@ -99,7 +99,7 @@ def test_terrain_above_the_eaves_still_gives_a_valid_solid():
             return np.full(len(xy), 50.0)
 
     building = hiproof.reconstruct(gable_points(), FOOTPRINT, Above(), PLAIN)
-    assert building.solid is not None
+    assert building.built is not None
     assert check_solid(building.solid) == ()
 
 
@@ -120,7 +120,9 @@ def test_terrain_above_the_eaves_still_gives_a_valid_solid():
 def test_points_that_are_no_roof_get_a_status(points, footprint, status):
     building = hiproof.reconstruct(points, footprint, settings=PLAIN)
     assert building.status is status
-    assert building.solid is None
+    assert building.built is None
+    with pytest.raises(NoModelError, match="without one"):
+        _ = building.solid
     assert building.detail
 
 

@@ -61,4 +61,4 @@ def test_files_are_synced_through_descriptors_that_may_write(tmp_path, monkeypat
 
 def test_no_more_processes_are_started_than_windows_can_wait_for(monkeypatch):
     monkeypatch.setattr(executors.sys, "platform", "win32")
-    assert executors.Processes(100).jobs == 61 and executors.Processes(4).jobs == 4
+    assert executors.Processes(100).count == 61 and executors.Processes(4).count == 4

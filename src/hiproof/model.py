@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 
+from .errors import NoModelError
 from .frames import METRES, LocalFrame, Units
 from .status import Status
 
@@ -191,11 +192,19 @@ class Fit:
 
 
 @dataclass(frozen=True)
+class Model:
+    """What was built of a building: its `roof` in a local frame and the `solid` that it closes, in world coordinates."""
+
+    roof: Roof
+    solid: Solid
+
+
+@dataclass(frozen=True)
 class Building:
     """Everything known of one building after reconstruction; `solid` and `terrain_intersection` in world coordinates.
 
-    `solid` and `roof` are None when `status.is_model` is false; `detail` is the sentence that explains the status for
-    this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
+    `built` is its model, None when `status.is_model` is false; `model`, `roof` and `solid` are there without asking, or raise
+    NoModelError. `detail` is the sentence that explains the status for this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
     lines. `recognised` are the network's probabilities by roof type, `types` those after the fits, where a choice was made. `footprint` (world) and `attributes`
     are the input's own; `shift` (m) is how far the footprint was moved onto its roof.
     """
@@ -203,8 +212,7 @@ class Building:
     id: str
     status: Status
     detail: str = ""
-    roof: Roof | None = None
-    solid: Solid | None = None
+    built: Model | None = None
     quality: Quality = field(default_factory=Quality)
     z_ground: float = float("nan")
     ground_source: str = ""
@@ -217,13 +225,41 @@ class Building:
     shift: tuple[float, float] = (0.0, 0.0)
 
     @property
+    def model(self) -> Model:
+        """Roof and solid. Raises NoModelError, which says why, for a building that has none.
+
+        >>> from hiproof.status import Status
+        >>> Building("shed", Status.NO_POINTS).model
+        Traceback (most recent call last):
+        hiproof.errors.NoModelError: expected a building with a model, got shed without one (no model: no usable points inside \
+the footprint; add a cloud that covers it); `built` is None there
+        """
+        if self.built is None:
+            raise NoModelError(
+                f"expected a building with a model, got {self.id} without one ({self.detail or self.status.value}); "
+                "`built` is None there"
+            )
+        return self.built
+
+    @property
+    def roof(self) -> Roof:
+        """The model's roof, in its local frame. Raises NoModelError without a model."""
+        return self.model.roof
+
+    @property
+    def solid(self) -> Solid:
+        """The model's solid, in world coordinates. Raises NoModelError without a model."""
+        return self.model.solid
+
+    @property
     def type(self) -> str | None:
         """Roof type of the largest part, None without a model."""
-        return self.roof.type if self.roof is not None else None
+        return None if self.built is None else self.built.roof.type
 
     @property
     def parts(self) -> tuple[Part, ...]:
-        return self.roof.parts if self.roof is not None else ()
+        """The parts of the roof, none without a model."""
+        return () if self.built is None else self.built.roof.parts
 
     def with_part(self, index: int, **change: Any) -> Building:
         """The building with part `index` changed, or with one more part where `index` is the number of parts.

@@ -12,7 +12,7 @@ import shapely
 
 from .errors import CompositionError, FitError
 from .frames import LocalFrame
-from .model import Building, Fit, Footprint, Part, Piece, Roof, Solid
+from .model import Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
 from .settings import Settings
 from .status import Status
 
@@ -224,8 +224,8 @@ def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Rec
     from .segment import most_probable
 
     def fit(types: tuple[str, ...]) -> Fit:
-        types = types or candidates(recognised.types, settings)
-        return fit_roof(points, types or None, outline, settings=settings, weights=recognised.weights)
+        allowed = settings.replace({"fit": {"types": types or candidates(recognised.types, settings)}})
+        return fit_roof(points, outline, allowed, weights=recognised.weights)
 
     found, types = most_probable(fit, recognised.types)
     shift = found.global_translation
@@ -340,8 +340,7 @@ def judge(
         building,
         status=status,
         detail=detail,
-        roof=roof,
-        solid=solid.moved(roof.frame.origin),
+        built=Model(roof, solid.moved(roof.frame.origin)),
         quality=measured,
         z_ground=ground.z,
         ground_source=ground.source,

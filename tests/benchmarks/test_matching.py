@@ -10,8 +10,9 @@ from benchmarks.judging import area_by_type, named_share, raster, visible_areas
 from benchmarks.matching import errors_in_sigmas, hidden_end, matched, right_types, told_apart
 from benchmarks.named_roofs import demo, judged, parts_in
 
+from hiproof.compose import compose
 from hiproof.frames import LocalFrame
-from hiproof.model import Building, Roof
+from hiproof.model import Building, Model, Roof
 from hiproof.simulate import COMPOUND_KINDS, random_building, random_compound
 from hiproof.simulate.shapes import make_part
 from hiproof.status import Status
@@ -100,16 +101,18 @@ def test_no_standard_deviations_are_said_so():
     assert "no part has standard deviations" in sigma_report([])
 
 
+def standing(roof, id="house"):
+    return Building(id, Status.MODELLED, built=Model(roof, compose(roof, 0.0).moved(roof.frame.origin)))
+
+
 def test_areas_that_show_make_up_the_outline():
     for kind in COMPOUND_KINDS:
         roof = random_compound(np.random.default_rng(1), kind).roof
         assert visible_areas(roof).sum() == pytest.approx(roof.outline.area)
     roof = random_building(np.random.default_rng(0), "hip").roof
-    model = Building("hip", Status.MODELLED, roof=roof)
+    model = standing(roof)
     assert named_share([model]) == 1.0 and area_by_type([model])["hip"] == pytest.approx(roof.outline.area)
-    free = dataclasses.replace(
-        model, roof=dataclasses.replace(roof, parts=(dataclasses.replace(roof.parts[0], type="free"),))
-    )
+    free = standing(dataclasses.replace(roof, parts=(dataclasses.replace(roof.parts[0], type="free"),)))
     assert named_share([free]) == 0.0 and named_share([model, free]) == pytest.approx(0.5)
 
 
@@ -126,9 +129,9 @@ def test_a_roof_keeps_its_place_in_another_frame():
 def test_the_demos_truth_is_right_and_a_flat_block_is_not():
     for truth, points, footprint in demo():
         assert len(points) > 50
-        model = Building(footprint.id, Status.MODELLED, roof=truth.roof)
+        model = standing(truth.roof)
         assert judged(truth, model) == (True, True)
         assert truth.footprint.symmetric_difference(footprint.polygon).area < 0.05 * truth.footprint.area
         flat = dataclasses.replace(truth.roof.parts[0], type="flat")
-        block = dataclasses.replace(model, roof=dataclasses.replace(truth.roof, parts=(flat,)))
+        block = standing(dataclasses.replace(truth.roof, parts=(flat,)))
         assert judged(truth, block) == (truth.type == "flat", truth.type == "flat" and truth.kind == "single")

@@ -11,7 +11,7 @@ from benchmarks.towns import TOWNS, chosen, composed, ground_of, read_town, touc
 
 from handmade import box
 from hiproof.compose import compose
-from hiproof.model import Building, Roof
+from hiproof.model import Building, Model, Roof
 from hiproof.simulate import random_compound
 from hiproof.status import Status
 from hiproof.write import write_cityjson
@@ -25,7 +25,7 @@ def simulated(kind, seed):
     """A simulated compound with its solid, as a reconstruction would return it."""
     made = random_compound(np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0))
     solid = compose(made.roof, 0.0).moved(made.roof.frame.origin)
-    return Building(f"{kind}-{seed}", Status.MODELLED, roof=made.roof, solid=solid)
+    return Building(f"{kind}-{seed}", Status.MODELLED, built=Model(made.roof, solid))
 
 
 @pytest.fixture
@@ -85,7 +85,7 @@ def test_a_missing_model_counts_as_missed(tmp_path):
     write_truth(tmp_path / "truth.city.json", TOWNS["essen"], buildings)
     solids = [next(iter(building.solids.values())) for building in buildings]
     models = [
-        Building(b.id, Status.MODELLED, roof=flat_roof(b), solid=s) for b, s in zip(buildings, solids, strict=True)
+        Building(b.id, Status.MODELLED, built=Model(flat_roof(b), s)) for b, s in zip(buildings, solids, strict=True)
     ]
     write_cityjson(tmp_path / "models.city.jsonl", models[1:])
     figures, _ = wireframe_figures(tmp_path / "models.city.jsonl", tmp_path / "truth.city.json")

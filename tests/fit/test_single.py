@@ -8,9 +8,14 @@ from hiproof.errors import FitError, SettingsError
 from hiproof.fit import fit_roof
 from hiproof.fit.single import in_order
 from hiproof.primitives import CATALOGUE
+from hiproof.settings import Settings
 from points_of_roofs import points_on, typical_theta
 
 NAMES = tuple(CATALOGUE)
+
+
+def only(*types):
+    return Settings.from_dict({"fit": {"types": types}})
 
 
 @pytest.fixture(scope="module")
@@ -37,7 +42,7 @@ def test_errors_are_a_few_standard_deviations():
     truth, _, _ = CATALOGUE["hip"].from_theta(theta)
     scores = []
     for seed in range(20):
-        fit = fit_roof(points_on("hip", theta, seed=seed), types=("hip",))
+        fit = fit_roof(points_on("hip", theta, seed=seed), settings=only("hip"))
         scores.append([(fit.parameters[key] - value) / fit.sigma[key] for key, value in truth.items()])
     assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.5)
 
@@ -78,7 +83,7 @@ def test_outline_gives_the_plan_and_only_heights_are_fitted():
     points = points_on("gable", theta, density=4.0)
     plan = CATALOGUE["gable"].part(theta).pieces[0].outline.buffer(0.8, join_style="mitre")
     around = np.random.default_rng(2).uniform(-12, 12, (60, 3))
-    fit = fit_roof(np.vstack([points, around]), types=("gable",), outline=plan)
+    fit = fit_roof(np.vstack([points, around]), plan, only("gable"))
     assert fit.parameters["width"] == pytest.approx(8 + 1.6, abs=0.02)
     assert fit.parameters["length"] == pytest.approx(13 + 1.6, abs=0.02)
     assert fit.parameters["height"] / (fit.parameters["width"] / 2) == pytest.approx(0.75, abs=0.03)
@@ -106,13 +111,13 @@ def test_weights_take_a_tree_out_of_the_roof():
 
 def test_log_prior_decides_between_what_points_cannot():
     level = points_on("flat", typical_theta("flat"), density=1.0)
-    assert fit_roof(level, types=("flat", "gable")).type == "flat"
+    assert fit_roof(level, settings=only("flat", "gable")).type == "flat"
     prior = {"gable": 0.0, "flat": -1e4}
-    assert fit_roof(level, types=("flat", "gable"), type_log_prior=prior).type == "gable"
+    assert fit_roof(level, settings=only("flat", "gable"), type_log_prior=prior).type == "gable"
 
 
 def test_types_narrow_the_choice(gable_points):
-    fit = fit_roof(gable_points, types=("half_hip", "flat"))
+    fit = fit_roof(gable_points, settings=only("half_hip", "flat"))
     assert set(fit.bics) <= {"half_hip", "flat"}
 
 
@@ -154,9 +159,9 @@ def test_wrong_shapes_names_and_weights_are_refused(gable_points):
     with pytest.raises(FitError, match="weights between 0 and 1"):
         fit_roof(gable_points, weights=np.full(len(gable_points), 2.0))
     with pytest.raises(SettingsError, match="expected a roof type"):
-        fit_roof(gable_points, types=("onion",))
-    with pytest.raises(SettingsError, match="likelihood or paper"):
-        fit_roof(gable_points, objective="magic")
+        fit_roof(gable_points, settings=only("onion"))
+    with pytest.raises(SettingsError, match="one of likelihood, paper"):
+        fit_roof(gable_points, settings=Settings.from_dict({"fit": {"objective": "magic"}}))
 
 
 def test_an_outline_without_points_is_refused(gable_points):

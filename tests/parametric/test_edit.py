@@ -8,7 +8,7 @@ from benchmarks.edits import main as random_edits
 import hiproof
 from hiproof.compose import check_solid
 from hiproof.errors import FitError, InputError
-from hiproof.parametric.building import solid_of
+from hiproof.parametric.building import with_model
 from hiproof.parametric.settle import settled_roof
 from hiproof.primitives.family import NAMES
 from hiproof.simulate import random_building
@@ -22,7 +22,7 @@ RECOVERED = ("gable", "hip", "monopitch", "pyramid", "half_hip", "mansard", "asy
 
 
 def built(roof, id="house"):
-    return solid_of(hiproof.Building(id, Status.MODELLED, roof=settled_roof(roof), z_ground=0.0))
+    return with_model(hiproof.Building(id, Status.MODELLED, z_ground=0.0), settled_roof(roof))
 
 
 @pytest.fixture(scope="module")

@@ -101,7 +101,9 @@ def test_labelled_real_roofs_with_the_fits_evidence():
         points = np.loadtxt(path)[:, :3]
         found = segment(points)
         fit = partial(fit_roof, points, weights=found.weights)
-        _, posterior = most_probable(lambda types, fit=fit: fit(types=types or None), found.types)
+        _, posterior = most_probable(
+            lambda types, fit=fit: fit(settings=Settings.from_dict({"fit": {"types": types}})), found.types
+        )
         named = next(iter(posterior))
         right += AS_GABLE.get(named, named) == path.parent.name
     assert right >= 11

@@ -14,7 +14,7 @@ from handmade import RD_ORIGIN, gable_house, modelled, unmodelled
 from hiproof.compose import check_solid, compose, volume
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
-from hiproof.model import Building, Part, Piece, Quality, Roof
+from hiproof.model import Building, Model, Part, Piece, Quality, Roof
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
 from hiproof.settings import WriteSettings
@@ -42,7 +42,7 @@ def terrace(id="terrace"):
     roof = Roof((gable, flat), shapely.box(0, 0, 10, 8), LocalFrame(RD_ORIGIN))
     line = np.array([[0, 0, 0.2], [10, 0, 0.0], [10, 8, 0.1], [0, 0, 0.2]]) + RD_ORIGIN
     solid = compose(roof, 0.0).moved(RD_ORIGIN)
-    return Building(id, Status.MODELLED, "", roof, solid, Quality(points=99), 0.0, "ground class", (line,))
+    return Building(id, Status.MODELLED, "", Model(roof, solid), Quality(points=99), 0.0, "ground class", (line,))
 
 
 def gml(tmp_path, buildings, write):

@@ -191,7 +191,7 @@ def test_a_measuring_tool_reads_it(tmp_path):
     spec.loader.exec_module(tool)
     sequence(tmp_path, street())
     roofs = list(tool.read_roofs(tmp_path / "a.city.jsonl"))
-    assert len(roofs) == sum(len(b.solid.of_kind(ROOF)) for b in street() if b.solid is not None)
+    assert len(roofs) == sum(len(b.solid.of_kind(ROOF)) for b in street() if b.built is not None)
     assert sum(polygon.area for polygon, *_ in roofs) == pytest.approx(96 + 84 + 20, rel=1e-6)
 
 

@@ -9,7 +9,7 @@ from lxml import etree
 from hiproof import read_parameters
 from hiproof.compose import check_solid, compose, volume
 from hiproof.evaluate.models import read_models
-from hiproof.model import Building, Quality, Solid
+from hiproof.model import Building, Model, Quality, Solid
 from hiproof.primitives import CATALOGUE
 from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, random_building, random_compound
 from hiproof.status import Status
@@ -26,7 +26,7 @@ def generated(seed):
         origin = sim.roof.frame.origin
         solid = compose(sim.roof, 0.0).moved(origin)
         quality = Quality(points=100 + number, density=4.0, rmse=0.05)
-        yield Building(name, Status.MODELLED, "", sim.roof, solid, quality, float(origin[2]), "simulated")
+        yield Building(name, Status.MODELLED, "", Model(sim.roof, solid), quality, float(origin[2]), "simulated")
 
 
 @pytest.fixture(scope="module")

@@ -51,7 +51,7 @@ def test_parameters_are_strict_json(tmp_path):
         modelled(box()).parts[0], parameters={"width": float("nan")}, translation=np.array([0, -0.0, np.inf])
     )
     building = modelled(box(), objective=float("nan"))
-    building = replace(building, roof=replace(building.roof, parts=(part,)))
+    building = replace(building, built=replace(building.model, roof=replace(building.roof, parts=(part,))))
     write_parameters(tmp_path / "p.jsonl", [building])
     text = (tmp_path / "p.jsonl").read_text()
     _, line = text.splitlines()
@@ -83,11 +83,6 @@ def test_the_table_has_every_building(tmp_path):
     assert outlines[0] is None
     assert [outline.area for outline in outlines[1:]] == [1.0, 96.0, 100.0]
     assert (meta["crs"], meta["geometry_type"]) == ("EPSG:28992", "MultiPolygon")
-
-
-def test_without_a_roof_the_ground_is_the_outline(tmp_path):
-    _, outlines, _ = table(tmp_path, [replace(modelled(courtyard()), roof=None)])
-    assert outlines[0].area == pytest.approx(84)
 
 
 @pytest.mark.parametrize(

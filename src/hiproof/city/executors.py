@@ -59,10 +59,10 @@ class InProcess:
 
 
 class Processes:
-    """`jobs` worker processes. They are spawned, not forked: a fork would copy locks of compiled code mid-flight."""
+    """`count` worker processes. They are spawned, not forked: a fork would copy locks of compiled code mid-flight."""
 
-    def __init__(self, jobs: int):
-        self.jobs = min(jobs, MOST_ON_WINDOWS) if sys.platform == "win32" else jobs
+    def __init__(self, count: int):
+        self.count = min(count, MOST_ON_WINDOWS) if sys.platform == "win32" else count
         self.pool: ProcessPoolExecutor | None = None
         self.word: Connection | None = None
 
@@ -82,7 +82,7 @@ class Processes:
         running: dict[Future, tuple] = {}
         while True:
             # two tasks a worker in the queue: enough to keep it busy, few enough to lose little when one dies
-            while len(running) < 2 * self.jobs and (task := next(waiting, None)) is not None:
+            while len(running) < 2 * self.count and (task := next(waiting, None)) is not None:
                 running[self.submit(function, task)] = task
             if not running:
                 return
@@ -99,7 +99,7 @@ class Processes:
             context = get_context("spawn")
             heard, self.word = context.Pipe(duplex=False)
             given = (os.getpid(), heard, log.started())
-            self.pool = ProcessPoolExecutor(self.jobs, mp_context=context, initializer=begin_worker, initargs=given)
+            self.pool = ProcessPoolExecutor(self.count, mp_context=context, initializer=begin_worker, initargs=given)
         try:
             return self.pool.submit(function, *task)
         except BrokenProcessPool as error:
@@ -233,8 +233,8 @@ class Dask:
         self.client.close()
 
 
-def make_executor(jobs: int, scheduler: str | None) -> InProcess | Processes | Dask:
+def make_executor(processes: int, scheduler: str | None) -> InProcess | Processes | Dask:
     """The executor that the options ask for."""
     if scheduler:
         return Dask(scheduler)
-    return Processes(jobs) if jobs > 1 else InProcess()
+    return Processes(processes) if processes > 1 else InProcess()

@@ -21,7 +21,7 @@ MM = 3
 def html_of(building: Building) -> str:
     """The building as HTML: its view where it has a solid, status, and the parameters of its parts."""
     head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
-    view = view_of(building) if building.solid is not None else ""
+    view = view_of(building) if building.built is not None else ""
     return f'<div style="font-family:sans-serif;font-size:12px">{view}<div>{head}</div>{parts_table(building)}</div>'
 
 

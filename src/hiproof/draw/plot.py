@@ -18,17 +18,16 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     """Draw the building's solid, and `points` (n, 3) world metres coloured by their height over its roof, into matplotlib axes.
 
     ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the roof are blue, others red.
-    Raises InputError for a building without a model, or where matplotlib (extra `report`) is missing.
+    Raises NoModelError for a building without a model, InputError where matplotlib (extra `report`) is missing.
     """
-    if building.solid is None:
-        raise InputError(f"expected a building with a model, got {building.id} without one; its status says why")
+    model = building.model
     ax = ax if ax is not None else new_axes()
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-    origin = building.roof.frame.origin if building.roof is not None else building.solid.vertices.mean(axis=0)
-    vertices = building.solid.vertices - origin
-    faces = building.solid.faces
-    colours = [shaded(c, lightness(building.solid, f)) for c, f in zip(colours_of(building), faces, strict=True)]
+    origin = model.roof.frame.origin
+    vertices = model.solid.vertices - origin
+    faces = model.solid.faces
+    colours = [shaded(c, lightness(model.solid, f)) for c, f in zip(colours_of(building), faces, strict=True)]
     polygons = [vertices[list(face.rings[0])] for face in faces]
     ax.add_collection3d(
         Poly3DCollection(polygons, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.75)
@@ -36,7 +35,7 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     shown = vertices
     if points is not None and len(points):
         local = np.asarray(points, float).reshape(-1, 3)[:: max(1, len(points) // MOST_POINTS)] - origin
-        gap = local[:, 2] - building.roof.height_at(local[:, :2])
+        gap = local[:, 2] - model.roof.height_at(local[:, :2])
         near = np.abs(gap) <= NEAR_M
         for chosen, colour, label in ((near, "#1f5fbf", "within 0.2 m"), (~near, "#c8321e", "further")):
             ax.scatter(*local[chosen].T, s=2, color=colour, label=f"{label}: {chosen.sum()} points", depthshade=False)

@@ -79,23 +79,23 @@ class Desk:
 
     def cloud(self, id: str) -> dict[str, Any]:
         """The points drawn of a building, about the origin of its roof; `missing` says why there are none."""
-        building = building_of(self.record(id)[0])
-        points = self.points.of(building)
+        roof = building_of(self.record(id)[0])[1]
+        points = self.points.of(id, roof)
         missing = self.points.missing or ("" if len(points) else "the run has no points of this building")
-        places = packed(building.roof.frame.to_local(drawn(points)), "<f4") if len(points) else ""
+        places = "" if roof is None or not len(points) else packed(roof.frame.to_local(drawn(points)), "<f4")
         return {"places": places, "count": len(points), "missing": missing}
 
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
         record = self.record(id)[0] | {"parts": list_at(body, "parts")}
-        points = self.points.of(building_of(record))
+        points = self.points.of(id, building_of(record)[1])
         found = edited(record, body.get("asked"), points, self.run.head.compose, not body.get("dragged"))
         return seen(found, drawn(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
         record = self.record(id)[0] | {"parts": list_at(body, "parts")}
-        points, tried = self.points.of(building_of(record)), []
+        points, tried = self.points.of(id, building_of(record)[1]), []
         for kind in NAMES:
             asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:

@@ -16,7 +16,7 @@ from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
 from ..errors import HiproofError
 from ..evaluate.run import run_record
-from ..model import Building
+from ..model import Roof
 from ..read.pointcloud import is_url
 from ..read.thin import thin_to_count
 
@@ -48,13 +48,13 @@ class RunPoints:
         tiles = self.plan.tiles.items() if self.plan else ()
         self.tile_of = {index: tile for tile, members in tiles for index in members}
 
-    def of(self, building: Building) -> np.ndarray:
-        """World points (n, 3) inside the building's roof; (0, 3) where the run has none, or where its clouds cannot be read,
+    def of(self, id: str, roof: Roof | None) -> np.ndarray:
+        """World points (n, 3) inside the `roof` of building `id`; (0, 3) where the run has none, or where its clouds cannot be read,
         which `missing` then says."""
-        job = self.jobs.get(building.id)
-        if job is None or building.roof is None or self.missing:
+        job = self.jobs.get(id)
+        if job is None or roof is None or self.missing:
             return np.zeros((0, 3))
-        outline = shapely.transform(building.roof.outline, building.roof.frame.to_world)
+        outline = shapely.transform(roof.outline, roof.frame.to_world)
         try:
             with self.lock:  # one file is read once, however many windows ask
                 found = self.of_job(job.index)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import shapely
 
-from ..errors import FitError, SettingsError
+from ..errors import FitError
 from ..frames import LocalFrame
 from ..model import Fit
 from ..primitives import CATALOGUE, get
@@ -21,9 +21,7 @@ THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
 
 def fit_roof(
     points: np.ndarray,
-    types: tuple[str, ...] | None = None,
     outline: shapely.Polygon | None = None,
-    objective: str | None = None,
     settings: Settings | None = None,
     weights: np.ndarray | None = None,
     type_log_prior: dict[str, float] | None = None,
@@ -31,14 +29,15 @@ def fit_roof(
     """The roof primitive that stands best for `points`.
 
     points          (n, 3) metres in any frame; points that are not finite are dropped, and their order does not matter
-    types           names of the catalogue to choose among, all by default (or `settings.fit.types`)
     outline         a given plan, in the frame of `points`: the roof covers its rectangle in the roof's own direction, and
                     only heights, slopes and ridge are fitted, to the points inside it
-    objective       "likelihood" (default; fit/likelihood.py) or "paper" (fit/paper.py, the published method)
+    settings        `fit.types` are the names of the catalogue to choose among, all by default; `fit.objective` is the likelihood
+                    (fit/likelihood.py) or "paper" (fit/paper.py, the published method)
     weights         (n,) probability of each point of being roof, 1 by default
     type_log_prior  natural logarithm of each type's probability before its points are seen, 0 by default
 
     Raises FitError where no roof can be determined: no or fewer than four finite points, all in one place or on a line.
+    SettingsError for types that the catalogue does not hold.
 
     >>> import numpy as np
     >>> x, y = np.meshgrid(np.linspace(-6, 6, 25), np.linspace(-4, 4, 17))
@@ -46,17 +45,16 @@ def fit_roof(
     >>> fit = fit_roof(gable)
     >>> fit.type, round(fit.parameters["height"], 1)
     ('gable', 2.8)
+    >>> fit_roof(gable, settings=Settings.from_dict({"fit": {"types": ["flat", "hip"]}})).type
+    'hip'
     """
     settings = settings or Settings()
-    names = checked_types(types if types is not None else settings.fit.types)
-    objective = objective or settings.fit.objective
+    names = checked_types(settings.fit.types)
     cloud = usable_points(points, weights, outline)
-    if objective == "paper":
+    if settings.fit.objective == "paper":
         from .paper import fit_paper
 
         return fit_paper(cloud[:, :3], names, outline, settings)
-    if objective != "likelihood":
-        raise SettingsError(f"expected the objective likelihood or paper, got {objective!r}; likelihood is the default")
     frame = LocalFrame.around(cloud)
     local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
     outline_local = None if outline is None else shapely.transform(outline, frame.to_local)
@@ -66,8 +64,6 @@ def fit_roof(
 
 def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
     """`types` in the catalogue's order, each known; all of them for an empty tuple."""
-    if isinstance(types, str):
-        types = (types,)
     for name in types:
         get(name)
     return tuple(name for name in CATALOGUE if not types or name in types)

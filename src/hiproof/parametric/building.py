@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..errors import InputError
-from ..model import Building
+from ..model import Building, Model, Roof
 from ..settings import ComposeSettings, Settings
 from .record import building_of, mapping
 
@@ -26,16 +26,14 @@ def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None)
     """
     if "id" not in mapping(parameters, "the building"):
         raise InputError("expected the id of the building, got none; give one")
-    return solid_of(building_of(parameters), compose)
+    building, roof = building_of(parameters)
+    return building if roof is None else with_model(building, roof, compose)
 
 
-def solid_of(building: Building, compose: ComposeSettings | None = None) -> Building:
-    """The building with the solid of its roof; as it is where it has none. Raises CompositionError as `build` does."""
+def with_model(building: Building, roof: Roof, compose: ComposeSettings | None = None) -> Building:
+    """The building with a model of its `roof`. Raises CompositionError as `build` does."""
     from ..compose import compose as composed
 
-    roof = building.roof
-    if roof is None:
-        return building
     settings = dataclasses.replace(Settings(), compose=compose or ComposeSettings())
     solid = composed(roof, building.z_ground - roof.frame.origin[2], settings)
-    return dataclasses.replace(building, solid=solid.moved(roof.frame.origin))
+    return dataclasses.replace(building, built=Model(roof, solid.moved(roof.frame.origin)))

@@ -17,8 +17,8 @@ BY_HAND = "changed by hand"
 
 def with_part(building: Building, index: int, **change: Any) -> Building:
     """The building with part `index` changed, or with one more where `index` is their number; see `Building.with_part`."""
-    record = record_of(building)
-    parts, z_origin = record["parts"], record["origin"][2]
+    z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
+    parts = record["parts"]
     if not 0 <= index <= len(parts):
         raise InputError(f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one")
     if index == len(parts):
@@ -40,20 +40,11 @@ def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
 
 def without_part(building: Building, index: int) -> Building:
     """The building without part `index`; what it roofed alone is roofed by the part beside it."""
-    record = record_of(building)
+    count, record = len(building.roof.parts), building_record(building)
+    if count < 2 or not 0 <= index < count:
+        raise InputError(f"expected one of two or more parts to leave out, got {index} of {count}; keep one at least")
     parts = record["parts"]
-    if len(parts) < 2 or not 0 <= index < len(parts):
-        raise InputError(
-            f"expected one of two or more parts to leave out, got {index} of {len(parts)}; keep one at least"
-        )
     return built(building, {**record, "parts": [*parts[:index], *parts[index + 1 :]]})
-
-
-def record_of(building: Building) -> dict[str, Any]:
-    """What is written of a building that has a model. Raises InputError for one that has none."""
-    if building.roof is None:
-        raise InputError(f"expected a building with a model, got {building.id} without one; its status says why")
-    return building_record(building)
 
 
 def built(building: Building, record: dict[str, Any]) -> Building:

@@ -238,7 +238,7 @@ def fitted_within(
     types = override.types or ((override.type,) if override.type else ())
     changes = {"types": types} if types else {}
     building = reconstruct(points, footprint, terrain, settings.replace({"fit": changes}), id)
-    if building.roof is None:
+    if building.built is None:
         return building
     changed = False
     while override.most_parts is not None and len(building.parts) > override.most_parts:

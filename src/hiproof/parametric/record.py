@@ -26,8 +26,8 @@ FIGURES = ("density", "nodata_share", "unexplained_area_m2")
 RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
 
 
-def building_of(record: Mapping[str, Any]) -> Building:
-    """The building that a JSON object tells of, its roof made of its parts, without its solid.
+def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
+    """The building that a JSON object tells of, without a model yet, and the roof made of its parts, None where it has none.
 
     Raises InputError, one sentence, for an object that makes none.
     """
@@ -39,11 +39,10 @@ def building_of(record: Mapping[str, Any]) -> Building:
     roof = roof_of(parts, outline, origin) if parts else None
     world = outline if roof is None else shapely.transform(roof.outline, roof.frame.to_world)
     ground = figure(record, "z_ground") if roof is None else number(record.get("z_ground"), "z_ground")
-    return Building(
+    building = Building(
         id=str(record["id"]),
         status=status,
         detail=text_at(record, "detail") if status.code == record.get("status") else "",
-        roof=roof,
         quality=quality_of(record),
         z_ground=settled(ground, PLAN_DIGITS),
         ground_source=text_at(record, "ground_source"),
@@ -55,6 +54,7 @@ def building_of(record: Mapping[str, Any]) -> Building:
         attributes=dict(mapping(record.get("attributes") or {}, "attributes")),
         shift=shift_of(record),
     )
+    return building, roof
 
 
 def status_of(record: Mapping[str, Any], has_parts: bool) -> Status:

@@ -16,10 +16,11 @@ import numpy as np
 import shapely
 
 from ..errors import FitError, InputError
-from ..model import Building, Part, Roof
+from ..model import Building, Part
 from ..settings import Settings
 from ..status import Status
-from .edit import built, record_of
+from ..write.parameters import building_record
+from .edit import built
 from .settle import pieces_of
 from .shape import SIDED
 
@@ -53,8 +54,7 @@ def refit(
     settings: Settings | None = None,
 ) -> Building:
     """The building with its parts fitted to `points` again; see `Building.refit`."""
-    record = record_of(building)
-    roof = building.roof
+    roof, record = building.roof, building_record(building)
     local = roof.frame.to_local(np.asarray(points, float).reshape(-1, 3))
     local = local[np.isfinite(local).all(axis=1)]
     local = local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
@@ -246,7 +246,7 @@ def measured(building: Building, points_local: np.ndarray, settings: Settings) -
     from ..evaluate.metrics import quality
     from .settle import settled_building
 
-    roof: Roof = building.roof
+    roof = building.roof
     found = quality(building.solid.moved(-roof.frame.origin), points_local, roof.outline)
     share = found.share_within_20cm
     if math.isfinite(share) and share < settings.reconstruct.poor_share:

@@ -159,7 +159,7 @@ def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
     from .record import building_of
 
     try:
-        outline = building_of(record).footprint if record is not None else None
+        outline = building_of(record)[0].footprint if record is not None else None
     except HiproofError:
         outline = None
     if outline is None:

@@ -19,7 +19,7 @@ FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
 
 def figures_of(building: Building) -> RoofFigures | None:
     """Figures of the building's solid, None without one."""
-    return None if building.solid is None else roof_figures(building.solid)
+    return None if building.built is None else roof_figures(building.solid)
 
 
 def building_attributes(
@@ -107,7 +107,7 @@ def hiproof_attributes(building: Building, figures: RoofFigures | None = None) -
         "ground_source": building.ground_source or None,
         "shift_x": rounded(building.shift[0]),
         "shift_y": rounded(building.shift[1]),
-        "iso19107_lod22": None if building.solid is None else "[]",  # only solids that pass the check get here
+        "iso19107_lod22": None if building.built is None else "[]",  # only solids that pass the check get here
     }
 
 

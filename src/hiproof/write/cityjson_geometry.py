@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from typing import Any
 
@@ -55,7 +54,11 @@ def building_geometry(
         return [multi_surface(footprint_boundaries(building, vertices))] if has_footprint else []
     solids = []
     if "2.2" in lods and not shapes.parts:
-        solids = [solid_geometry(building.solid, vertices, LOD_SOLID, roof_surfaces(building, figures, prefix))]
+        solids = [
+            solid_geometry(
+                building.solid, vertices, LOD_SOLID, roof_surfaces(building, building.solid, figures, prefix)
+            )
+        ]
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
     return [
         *level_surfaces(building, shapes, vertices),
@@ -71,7 +74,7 @@ def part_geometry(
     block = [] if part.block is None else [solid_geometry(part.block, vertices, "1.3")]
     if "2.2" not in lods:
         return block
-    surfaces = roof_surfaces(dataclasses.replace(building, solid=part.solid), part.figures, prefix)
+    surfaces = roof_surfaces(building, part.solid, part.figures, prefix)
     return [*block, solid_geometry(part.solid, vertices, LOD_SOLID, surfaces)]
 
 
@@ -121,10 +124,10 @@ def solid_geometry(
     return {"type": "Solid", "lod": lod, "boundaries": [boundaries], "semantics": semantics}
 
 
-def roof_surfaces(building: Building, figures: RoofFigures, prefix: str) -> dict[int, dict[str, Any]]:
-    """Semantics of the solid's roof faces by their index: slope, azimuth (degrees) and the roof part they belong to."""
+def roof_surfaces(building: Building, solid: Solid, figures: RoofFigures, prefix: str) -> dict[int, dict[str, Any]]:
+    """Semantics of the roof faces of its `solid`, or a part's, by index: slope, azimuth (degrees), the roof part they belong to."""
     found = {}
-    for index, face in enumerate(building.solid.faces):
+    for index, face in enumerate(solid.faces):
         if face.kind != ROOF:
             continue
         found[index] = {
@@ -158,7 +161,7 @@ def footprint_boundaries(building: Building, vertices: Vertices) -> list[list[li
 
 def first_corner(building: Building) -> np.ndarray | None:
     """A corner (3,) of what `building_geometry` would draw, None if that is nothing."""
-    if building.solid is not None:
+    if building.built is not None:
         return building.solid.vertices.min(axis=0)
     if has_level_footprint(building):
         return np.array([*building.footprint.bounds[:2], building.z_ground])

@@ -103,7 +103,7 @@ def parameters_line(building: Building) -> bytes:
 
 def building_record(building: Building) -> dict[str, Any]:
     """The JSON object of one building; see `write_parameters`."""
-    quality, roof = building.quality, building.roof
+    quality, roof = building.quality, None if building.built is None else building.roof
     return {
         "id": plain_text(building.id),
         "status": building.status.code,

@@ -87,11 +87,11 @@ def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: Fil
 def measured(building: Building) -> tuple[Building, RoofFigures | None]:
     """`building` and the figures of its solid; without the solid if that cannot be measured."""
     try:
-        if building.solid is not None and not np.isfinite(building.solid.vertices).all():
+        if building.built is not None and not np.isfinite(building.solid.vertices).all():
             raise ValueError("its solid has coordinates that are not numbers")
         return building, figures_of(building)
     except (ValueError, IndexError) as error:
         detail = f"{Status.INTERNAL_ERROR.value} ({error})"
         return dataclasses.replace(
-            building, status=Status.INTERNAL_ERROR, detail=detail, solid=None, roof=None, terrain_intersection=()
+            building, status=Status.INTERNAL_ERROR, detail=detail, built=None, terrain_intersection=()
         ), None

@@ -53,9 +53,9 @@ NO_SHAPES = Shapes()
 def shapes_of(building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX) -> Shapes:
     """The shapes of `building` that `write` asks for; `figures` are those of its solid, None without one."""
     asked = set(write.lods)
-    solid = building.solid
-    if solid is None or figures is None or (asked == {"2.2"} and write.parts_as == "one"):
+    if building.built is None or figures is None or (asked == {"2.2"} and write.parts_as == "one"):
         return NO_SHAPES
+    solid = building.solid
     ground = solid.of_kind(GROUND)[0]
     cut = cut_into_parts(solid) if write.parts_as == "buildingparts" or "1.3" in asked else ()
     as_parts = cut if write.parts_as == "buildingparts" else ()

@@ -10,7 +10,7 @@ import numpy as np
 import shapely
 
 from ..frames import METRES, Units
-from ..model import GROUND, ROOF, Building, Part
+from ..model import ROOF, Building, Part
 from .attribute_list import PARTS_LAYER, SHAPE
 from .building_attributes import metres, plain_text, rounded
 from .roof_figures import RoofFigures
@@ -53,17 +53,15 @@ def building_row(building: Building, attributes: dict[str, Any], units: Units = 
 
 def plan_outline(building: Building) -> shapely.Geometry | None:
     """The building's outline in world coordinates: the modelled one, else the one asked for, else None."""
-    if building.roof is not None:
-        return shapely.transform(building.roof.outline, building.roof.frame.to_world)
-    if building.solid is not None:
-        rings = [[building.solid.vertices[list(r), :2] for r in f.rings] for f in building.solid.of_kind(GROUND)]
-        return shapely.union_all([shapely.Polygon(outer, inner) for outer, *inner in rings])
-    return building.footprint
+    if building.built is None:
+        return building.footprint
+    roof = building.roof
+    return shapely.transform(roof.outline, roof.frame.to_world)
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     """A row a part: its rectangle, its type, every parameter and its standard deviation."""
-    if building.roof is None:
+    if building.built is None:
         return ()
     origin = building.roof.frame.origin
     rows = []
@@ -113,7 +111,7 @@ def rectangle_of(part: Part) -> np.ndarray:
 
 def surface_rows(building: Building, figures: RoofFigures | None, units: Units = METRES) -> tuple[Row, ...]:
     """A row a roof surface of the solid: its polygon, slope, azimuth, area and part."""
-    if figures is None or building.solid is None:
+    if figures is None:
         return ()
     vertices, rows = units.from_metres(building.solid.vertices), []
     for index, face in enumerate(building.solid.faces):
