@@ -189,6 +189,12 @@ class WriteSettings:
     roof_codes: str = setting(
         "sig3d", "code list of CityGML's roofType: SIG3D's or AdV's", choices=("sig3d", "adv"), option="--roof-codes"
     )
+    out_crs: str = setting(
+        "",
+        'CRS of the coordinates in all files but parameters.jsonl, such as "EPSG:25832"; empty means that of the clouds; heights stay as '
+        "they are where it names none",
+        option="--out-crs",
+    )
     terrain_intersection: bool = setting(
         True, "write into CityGML the line along which walls meet the terrain", option="--terrain-intersection"
     )

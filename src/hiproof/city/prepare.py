@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 import dataclasses
+import warnings
+from typing import Any
 
-from ..errors import InputError
+import numpy as np
+import shapely
+
+from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..settings import Settings
 from ..write.naming import FileUnits
+from ..write.reprojected import crs_of_files
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
@@ -33,14 +39,30 @@ def make_plan(request: Request) -> Plan:
     else:
         jobs, settings = jobs_from_cloud(request.clouds, settings)
         jobs = jobs_in_box(jobs, request, frame.units)
+    units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
+    if settings.write.out_crs:
+        say_where_files_lie(jobs, crs_of_files(frame.crs, settings.write.out_crs), units)
     return Plan(
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
         crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,
         settings=settings,
         names=unusual_names(jobs),
-        translate=offset_of_jobs(jobs, FileUnits.of(frame.crs, frame.units).cityjson),
+        translate=offset_of_jobs(jobs, units.cityjson),
     )
+
+
+def say_where_files_lie(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> None:
+    """One line where the CRS of the files is made for another place than that of the buildings."""
+    from ..read.overlap import doubtful_place
+
+    boxes = shapely.bounds([job.area for job in jobs])
+    corners = units.gml.from_metres(boxes[np.isfinite(boxes).all(axis=1)].reshape(-1, 2))
+    doubt = doubtful_place(crs, corners) if len(corners) else None
+    if doubt:
+        warnings.warn(
+            f"--out-crs: the buildings lie at {doubt}; name the UTM zone or the national grid there", InputWarning
+        )
 
 
 def most_buildings_a_tile(settings: Settings) -> int:

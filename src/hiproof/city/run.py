@@ -243,7 +243,7 @@ def summarise(request: Request, plan: Plan, ledger: Ledger, clock: Clock) -> Sum
         broken_inputs=broken,
         failures=tuple(ledger.failures()),
         seconds=clock.seconds,
-        units=plan.units,
+        units=plan.head.units.gml,
     )
 
 
@@ -277,7 +277,7 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
             "overrides": request.overrides,
         },
         "crs": plan.crs_wkt,
-        "units": {"coordinates": str(plan.units), "attributes": "metre", **metres_in(plan.units)},
+        "units": plan.head.units.told(),
         "processes": request.processes,
         "buildings": summary.buildings,
         "by_status": summary.by_status,
@@ -289,10 +289,6 @@ def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
     }
     with atomic(Path(request.out) / "run.json") as beside:
         Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
-
-
-def metres_in(units: Units) -> dict[str, float]:
-    return {"metres_in_plan_unit": units.plan, "metres_in_height_unit": units.height}
 
 
 def clean(state: Path) -> None:

@@ -120,7 +120,7 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
         share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
         show(f"mean over buildings: {share} lie within 0.2 m of the roof")
     if not summary.units.are_metres:
-        show(f"coordinates are in {summary.units}, as in the input; attributes and parameters in metres")
+        show(f"coordinates are in {summary.units}; attributes and parameters in metres")
     show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
     for name, why in summary.broken_inputs:
         show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))

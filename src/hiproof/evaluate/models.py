@@ -53,17 +53,17 @@ def run_models(folder: Path) -> Path:
     return path
 
 
-def read_models(path: str | Path, otherwise: Units = METRES) -> Iterator[BuildingModel]:
+def read_models(path: str | Path, otherwise: Units = METRES, known: Units | None = None) -> Iterator[BuildingModel]:
     """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts joined, in metres.
 
     Solids of the highest level of detail count, and building parts that hiproof cut come as the whole that they were. `otherwise` are the units of a file
-    that names no CRS. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
+    that names no CRS, `known` those of one of which more is known than it names. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
     """
     transform, units = {"scale": [1, 1, 1], "translate": [0, 0, 0]}, otherwise
     for document, place in documents(Path(path)):
         transform = document.get("transform", transform)
         if name := reference_system(document):
-            units = units_named(name, otherwise)
+            units = known or units_named(name, otherwise)
         try:
             yield from _buildings(document, transform, units)
         except UNUSABLE as error:

@@ -14,6 +14,7 @@ from ..errors import InputError
 from ..frames import Units
 from ..read.cityjson_text import parsed, read_text
 from ..settings import Settings
+from ..write.naming import FileUnits
 from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
@@ -23,6 +24,8 @@ RECORD = {
     ("settings", "read"): dict,
     ("settings", "read", "building_classes"): list,
     ("settings", "read", "unit"): str,
+    ("settings", "write"): dict,
+    ("settings", "write", "out_crs"): str,
     ("inputs",): dict,
     ("inputs", "clouds"): list,
     ("inputs", "footprints"): str,
@@ -65,7 +68,7 @@ def evaluate_run(
     Raises InputError for what cannot be read.
     """
     record = run_record(folder)
-    models = tuple(read_models(run_models(folder), run_units(record)))
+    models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record)))
     outlines = footprint_of_each(models, footprints, layer, record)
     areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
     if clouds:
@@ -153,6 +156,17 @@ def run_units(record: dict[str, Any]) -> Units:
     from ..read.crs import units_of
 
     return units_of(run_crs(record), "the run", run_settings(record).read.unit)
+
+
+def way_to_models(record: dict[str, Any]) -> Units | None:
+    """From the world metres of a run's clouds to its models, where these are in another CRS; None where they are not."""
+    asked = run_out_crs(record)
+    return FileUnits.of(run_crs(record), run_units(record), asked).cityjson if asked else None
+
+
+def run_out_crs(record: dict[str, Any]) -> str:
+    """What the run was asked to write its coordinates in, empty where that is the CRS of its clouds."""
+    return ((record.get("settings") or {}).get("write") or {}).get("out_crs") or ""
 
 
 def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:

@@ -79,12 +79,13 @@ def build_file(
     refuse_folder_of_a_run(out)
     with opened_parameters(path) as (head, records):
         settings = Settings(write=head.write).replace({"city": {"parquet": parquet}} | (changes or {}))
-        maker = Maker(dataclasses.replace(head, write=settings.write), settings)
+        offset = head.offset if settings.write.out_crs == head.write.out_crs else None
+        maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset), settings)
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
         maker.settle_offset(first)
         join_fragments(asked_files(settings, out), made(maker, records, built, progress), maker.head)
-    write_record(path, out, head, built)
+    write_record(path, out, maker.head, built)
     return built
 
 
@@ -171,7 +172,7 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
     """run.json: what was built of which file, and the clouds and footprints of the run that the file came from."""
     record = {
         "hiproof": __version__,
-        **earlier_record(path.parent / "run.json"),
+        **earlier_record(path.parent / "run.json", head),
         "parameters": str(path),
         "crs": None if head.crs is None else head.crs.to_wkt(),
         "buildings": built.buildings,
@@ -183,10 +184,12 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
 
 
-def earlier_record(path: Path) -> dict[str, Any]:
-    """Settings, inputs and units of the run whose record lies at `path`; nothing where there is none."""
+def earlier_record(path: Path, head: FileHead) -> dict[str, Any]:
+    """Settings, inputs and units of the run whose record lies at `path`, written as `head` says; nothing where there is none."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
+        record["settings"] = {**record["settings"], "write": dataclasses.asdict(head.write)}
+        record["units"] = head.units.told()
         return {name: record[name] for name in ("settings", "inputs", "units") if name in record}
-    except (OSError, ValueError, TypeError):
+    except (OSError, ValueError, TypeError, KeyError):
         return {}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 from pyproj import CRS
@@ -137,3 +138,13 @@ def described(crs: CRS | None) -> str:
         return "no CRS"
     code = epsg_code(crs)
     return crs.name if code is None else f"EPSG:{code} ({crs.name})"
+
+
+def best_of(crs: Any, target: Any, **options: Any) -> Any:
+    """pyproj's best transformation from `crs` to `target` that can be carried out here, None where there is none."""
+    from pyproj.transformer import TransformerGroup
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of better ones whose grids are missing
+        group = TransformerGroup(crs, target, always_xy=True, **options)
+    return group.transformers[0] if group.transformers else None

@@ -10,12 +10,13 @@ from typing import Any
 
 from ..errors import InputError
 from ..evaluate.models import read_models, run_models
-from ..evaluate.run import run_crs, run_record, run_units
+from ..evaluate.run import run_crs, run_out_crs, run_record, run_units
 from ..formats import FORMATS
 from ..model import Solid
 from ..parametric.file import opened_parameters
 from ..read.cityjson_text import documents, reference_system
 from ..write.parameters import crs_text
+from ..write.reprojected import crs_of_files
 
 TOLD = ("type", "parameters", "position", "rotation")
 
@@ -23,7 +24,8 @@ TOLD = ("type", "parameters", "position", "rotation")
 def run_crs_text(folder: Path) -> str | None:
     """The CRS of the run in `folder`, heights included where they are known; None where it has none."""
     header, _ = next(documents(run_models(folder)))
-    return crs_text(run_crs(run_record(folder))) or reference_system(header)
+    record = run_record(folder)
+    return crs_text(crs_of_files(run_crs(record), run_out_crs(record))) or reference_system(header)
 
 
 def run_buildings(folder: Path) -> Iterator[tuple[str, str, Solid, dict[str, Any]]]:

@@ -16,14 +16,14 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ..errors import OutputError
-from ..frames import Units
 from ..model import Building
+from ..settings import WriteSettings
 from .attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
 from .building_attributes import building_attributes, figures_of
 from .files import atomic, scratch
 from .fragments import Fragment, Sheet
 from .head import FileHead
-from .naming import FileUnits, plan_wkt
+from .naming import plan_wkt
 from .roof_figures import RoofFigures
 from .styles import TABLE, style_rows
 from .table_rows import Row, Rows, table_rows
@@ -96,10 +96,11 @@ class AttributesWriter(BuildingWriter):
     layers: tuple[str, ...] = tuple(LAYERS)
 
     def __init__(
-        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, units: Units | None = None
+        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, write: WriteSettings | None = None
     ) -> None:
         super().__init__(path)
-        self.plan_wkt, self.prefix, self.units = plan_wkt(crs), prefix, FileUnits.of(crs, units).gml
+        head = FileHead(crs, write=write or WriteSettings())
+        self.plan_wkt, self.prefix, self.units = plan_wkt(head.crs_of_files), prefix, head.units.gml
 
     def open(self, stack: ExitStack) -> None:
         self.hidden = stack.enter_context(atomic(self.path))
@@ -178,7 +179,7 @@ class AttributesWriter(BuildingWriter):
 
 def writer(path: str | os.PathLike, head: FileHead) -> AttributesWriter:
     """The writer of a run's file."""
-    return AttributesWriter(path, head.crs)
+    return AttributesWriter(path, head.crs, write=head.write)
 
 
 def fragment(sheet: Sheet) -> Fragment:

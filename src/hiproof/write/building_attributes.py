@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import datetime
+import json
 import math
 from typing import Any
 
 import numpy as np
 
 from ..frames import METRES, Units
-from ..model import Building
+from ..model import Building, Solid
 from ..status import Status
 from .attribute_list import OWN, PREFIX
+from .reprojected import Reprojected
 from .roof_figures import RoofFigures, roof_figures
 
 FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
@@ -37,7 +39,7 @@ def building_attributes(
     """
     own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
-    computed |= {OWN + name: value for name, value in hiproof_attributes(building, figures).items()}
+    computed |= {OWN + name: value for name, value in hiproof_attributes(building, figures, units).items()}
     if osm:
         from .osm_tags import osm_tags
 
@@ -83,7 +85,7 @@ def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
     }
 
 
-def hiproof_attributes(building: Building, figures: RoofFigures | None = None) -> dict[str, Any]:
+def hiproof_attributes(building: Building, figures: RoofFigures | None = None, units: Units = METRES) -> dict[str, Any]:
     """Our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
@@ -107,8 +109,22 @@ def hiproof_attributes(building: Building, figures: RoofFigures | None = None) -
         "ground_source": building.ground_source or None,
         "shift_x": rounded(building.shift[0]),
         "shift_y": rounded(building.shift[1]),
-        "iso19107_lod22": None if building.built is None else "[]",  # only solids that pass the check get here
+        "iso19107_lod22": None if building.built is None else codes_as_written(building.solid, units),
     }
+
+
+def codes_as_written(solid: Solid, units: Units) -> str:
+    """Codes of ISO 19107 that hold against the solid where it is written, as JSON.
+
+    Only solids that pass the check get here; in another CRS they are checked again.
+    """
+    if not isinstance(units, Reprojected):
+        return "[]"
+    from ..compose import check_solid
+
+    there = Units(units.plan, units.height).to_metres(np.round(units.from_metres(solid.vertices), 4))
+    about_origin = Solid(there, solid.faces).moved(-np.floor(there.min(axis=0)))
+    return json.dumps(sorted({finding.code for finding in check_solid(about_origin)}))
 
 
 def ground_height(building: Building, figures: RoofFigures | None) -> float:

@@ -32,7 +32,7 @@ from .citygml_geometry import (
 )
 from .fragments import Fragment, Sheet
 from .head import FileHead
-from .naming import FileUnits, UniqueNames, gml_name, srs_name
+from .naming import UniqueNames, gml_name, srs_name
 from .roof_codes import CODE_SPACES, roof_type_code
 from .roof_figures import RoofFigures
 from .shapes import PartShape, Shapes, shapes_of
@@ -79,12 +79,12 @@ class CityGMLWriter(BuildingWriter):
         crs: Any = None,
         prefix: str = PREFIX,
         creation_date: datetime.date | None = None,
-        units: Units | None = None,
         write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
         self.write = write or WriteSettings()
-        self.srs_name, self.units = srs_name(crs), FileUnits.of(crs, units).gml
+        head = FileHead(crs, write=self.write)
+        self.srs_name, self.units = srs_name(head.crs_of_files), head.units.gml
         self.prefix, self.creation_date = prefix, creation_date
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.names = UniqueNames()

@@ -67,7 +67,7 @@ class CityGML3Writer(CityGMLWriter):
 
 def writer(path: str | os.PathLike, head: FileHead) -> CityGML3Writer:
     """The writer of a run's file."""
-    return CityGML3Writer(path, head.crs)
+    return CityGML3Writer(path, head.crs, write=head.write)
 
 
 def fragment(sheet: Sheet) -> Fragment:

@@ -16,7 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from ..frames import Units
 from ..model import Building
 from ..settings import WriteSettings
 from .building_attributes import PREFIX, building_attributes, figures_of, metres, plain_text
@@ -25,7 +24,7 @@ from .files import scratch
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
-from .naming import FileUnits, UniqueNames, reference_system
+from .naming import UniqueNames, reference_system
 from .roof_figures import RoofFigures
 from .shapes import PartShape, Shapes, shapes_of
 from .writer import BuildingWriter
@@ -64,14 +63,13 @@ class CityJSONWriter(BuildingWriter):
         prefix: str = PREFIX,
         scale: float = SCALE,
         translate: np.ndarray | None = None,
-        units: Units | None = None,
         write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
         self.write = write or WriteSettings()
-        self.units = FileUnits.of(crs, units).cityjson
+        head = FileHead(crs, write=self.write)
+        self.units, self.reference_system = head.units.cityjson, reference_system(head.crs_of_files)
         self.is_document = str(path).endswith(".json")
-        self.reference_system = reference_system(crs)
         self.prefix, self.scale = prefix, scale
         self.translate = translate
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)

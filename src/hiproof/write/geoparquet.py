@@ -8,7 +8,7 @@ import os
 from typing import Any
 
 from ..errors import InputError
-from ..frames import Units
+from ..settings import WriteSettings
 from .attributes import BUILDINGS, AttributesWriter, column_names
 from .building_attributes import PREFIX
 from .head import FileHead
@@ -26,11 +26,11 @@ class GeoParquetWriter(AttributesWriter):
         path: str | os.PathLike,
         crs: Any = None,
         prefix: str = PREFIX,
-        units: Units | None = None,
+        write: WriteSettings | None = None,
         layer: str = BUILDINGS,
     ) -> None:
         import_pyarrow()
-        super().__init__(path, crs, prefix, units)
+        super().__init__(path, crs, prefix, write)
         self.layers = (layer,)
 
     def finish(self) -> None:
@@ -60,7 +60,7 @@ class GeoParquetWriter(AttributesWriter):
 
 def writer(path: str | os.PathLike, head: FileHead, layer: str = BUILDINGS) -> GeoParquetWriter:
     """The writer of a run's file; buildings' parts of it are those of the GeoPackage."""
-    return GeoParquetWriter(path, head.crs, layer=layer)
+    return GeoParquetWriter(path, head.crs, write=head.write, layer=layer)
 
 
 def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:

@@ -26,7 +26,14 @@ class FileHead:
 
     @functools.cached_property
     def units(self) -> FileUnits:
-        """Units of the coordinates in each file."""
+        """Units of the coordinates in each file, and the way to its CRS."""
         from ..read.crs import parse_crs, units_of
 
-        return FileUnits.of(self.crs, units_of(parse_crs(self.crs), named=self.unit))
+        return FileUnits.of(self.crs, units_of(parse_crs(self.crs), named=self.unit), self.write.out_crs)
+
+    @functools.cached_property
+    def crs_of_files(self) -> Any:
+        """The CRS that files name: the run's, or what `--out-crs` asks for. Parameters stay in the run's."""
+        from .reprojected import crs_of_files
+
+        return crs_of_files(self.crs, self.write.out_crs) if self.write.out_crs else self.crs

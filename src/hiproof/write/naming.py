@@ -94,20 +94,28 @@ class FileUnits:
     cityjson: Units = METRES
 
     @classmethod
-    def of(cls, crs: Any, own: Units | None = None) -> FileUnits:
-        """Units of files in `crs`; `own` are those of coordinates without one, or without a name for it.
+    def of(cls, crs: Any, own: Units | None = None, out_crs: str = "") -> FileUnits:
+        """Units of files of a run in `crs`, written in `out_crs` where that is one; `own` are those of coordinates without a CRS, or
+        without a name for it.
 
         >>> files = FileUnits.of("EPSG:2263+5703")
         >>> str(files.gml), str(files.cityjson)
         ('US survey foot, heights in metre', 'US survey foot')
         """
         from ..read.crs import parse_crs, units_of
+        from .reprojected import crs_of_files, reprojected
 
         own = own or units_of(parse_crs(crs))
-        return cls(units_named(srs_name(crs), own), units_named(reference_system(crs), own))
+        if not out_crs:
+            return cls(units_named(srs_name(crs), own), units_named(reference_system(crs), own))
+        out = crs_of_files(crs, out_crs)
+        named = (units_named(name, units_of(out)) for name in (srs_name(out), reference_system(out)))
+        return cls(*(reprojected(crs, out, own, units) for units in named))
 
-    def __str__(self) -> str:
-        return str(self.gml)
+    def told(self) -> dict[str, Any]:
+        """What the record of a run says of units."""
+        metres = {"metres_in_plan_unit": self.gml.plan, "metres_in_height_unit": self.gml.height}
+        return {"coordinates": str(self.gml), "attributes": "metre", **metres}
 
 
 def units_named(name: str | None, otherwise: Units = METRES) -> Units:

@@ -137,4 +137,4 @@ def wkb_of(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
     """A plan geometry (world metres) in `units` as WKB."""
     if geometry is None:
         return None
-    return shapely.to_wkb(geometry if units.are_metres else shapely.transform(geometry, units.from_metres))
+    return shapely.to_wkb(geometry if units == METRES else shapely.transform(geometry, units.from_metres))

@@ -8,7 +8,6 @@ says what was done.
 from __future__ import annotations
 
 import math
-import warnings
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...frames import Units
-from ...read.crs import described, horizontal_crs, parse_crs, units_of, vertical_crs
+from ...read.crs import best_of, described, horizontal_crs, parse_crs, units_of, vertical_crs
 
 GEOGRAPHIC, GEOCENTRIC = "EPSG:4979", "EPSG:4978"
 SAME_PLACE_M = 0.005
@@ -110,16 +109,6 @@ def with_heights(crs: Any) -> Any:
     """The transformation of plan and heights that is more than a guess; None where heights or a grid are missing."""
     has_heights = vertical_crs(crs) is not None or len(crs.axis_info) == 3
     return best_of(crs, GEOGRAPHIC, allow_ballpark=False) if has_heights else None
-
-
-def best_of(crs: Any, target: str, **options: Any) -> Any:
-    """pyproj's best transformation that can be carried out here, None where there is none."""
-    from pyproj.transformer import TransformerGroup
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of better ones whose grids are missing: Globe.heights tells
-        group = TransformerGroup(crs, target, always_xy=True, **options)
-    return group.transformers[0] if group.transformers else None
 
 
 def heights_told(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[str, bool]:

@@ -1,0 +1,123 @@
+"""Coordinates of files in another CRS than the run's own: what `--out-crs` asks for.
+
+Every vertex goes by itself, so that corners which meet still meet, whatever building or file they are in. A plan goes as a plan
+and a height as a height: what stands upright in one CRS does so in the other, and planes bend by less than coordinates are
+rounded to as long as both projections are true to shape.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError
+from ..frames import METRES, Units
+from ..read.crs import best_of, combine, described, horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
+
+
+@dataclass(frozen=True)
+class Reprojected(Units):
+    """Units of a file, and the way to its CRS from world metres, which are coordinates of another CRS times their units, `own`.
+
+    `plan_way` takes plans, `height_way` places with their heights, in a unit of `height_m` metres; None where heights stay.
+    """
+
+    own: Units = METRES
+    plan_way: Any = None
+    height_way: Any = None
+    height_m: float = 1.0
+
+    def from_metres(self, world: np.ndarray) -> np.ndarray:
+        """The file's coordinates of world metres (..., 2) or (..., 3). Raises InputError for places that have none there."""
+        world = np.asarray(world, float)
+        own = self.own.from_metres(world)
+        found = np.stack(self.plan_way.transform(own[..., 0], own[..., 1]), axis=-1)
+        if world.shape[-1] == 3:
+            found = np.concatenate([found, self.height_from(own, world[..., 2])[..., None]], axis=-1)
+        if not np.isfinite(found).all() and np.isfinite(world).all():
+            raise InputError("expected buildings inside the area of --out-crs, got some that have no place in it")
+        return found
+
+    def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
+        """World metres of the file's coordinates (..., 2) or (..., 3)."""
+        coordinates = np.asarray(coordinates, float)
+        x, y = coordinates[..., 0], coordinates[..., 1]
+        found = self.own.to_metres(np.stack(self.plan_way.transform(x, y, direction="INVERSE"), axis=-1))
+        if coordinates.shape[-1] == 2:
+            return found
+        z = coordinates[..., 2] * self.height
+        if self.height_way is not None:
+            z = self.height_way.transform(x, y, z / self.height_m, direction="INVERSE")[2] * self.own.height
+        return np.concatenate([found, z[..., None]], axis=-1)
+
+    def height_from(self, own: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Heights (...) in the file's unit of heights `z` (...) in metres, at coordinates `own` (..., 3) of the first CRS."""
+        if self.height_way is not None:
+            z = self.height_m * np.asarray(self.height_way.transform(own[..., 0], own[..., 1], own[..., 2])[2])
+        return z / self.height
+
+
+def crs_of_files(crs: Any, asked: str) -> Any:
+    """The CRS in which files of a run in `crs` are written: the one `asked` for, with the run's heights where it names none.
+
+    Raises InputError for one that is no projection, or where the run's is not known.
+
+    >>> described(crs_of_files("EPSG:7415", "EPSG:25831"))
+    'ETRS89 / UTM zone 31N + NAP height'
+    """
+    crs, out = parse_crs(crs), parse_crs(asked)
+    if out is None:
+        return crs
+    if crs is None:
+        raise InputError(f"expected a CRS of the clouds to go to {described(out)} from, got none; say which with --crs")
+    plan = horizontal_crs(out)
+    if not plan.is_projected:
+        raise InputError(
+            f"expected a projected CRS for --out-crs, got {described(out)}, in which no solid has a size; name a UTM zone or a "
+            "national grid (`hiproof convert` to 3D Tiles places models on the globe by itself)"
+        )
+    return combine(out, vertical_crs(crs)) if len(out.axis_info) < 3 else out
+
+
+def reprojected(crs: Any, out: Any, own: Units, units: Units) -> Units:
+    """The way from world metres of `crs` (units `own`) to the coordinates of `out` in a file that counts in `units`.
+
+    Raises InputError where pyproj knows none, of heights without a grid that is at hand.
+    """
+    crs, out = parse_crs(crs), parse_crs(out)
+    heights = has_heights(out) and not same_height_system(crs, out)
+    if same_horizontal(crs, out) and not heights:
+        return units
+    plan = best_of(horizontal_crs(crs), horizontal_crs(out), allow_ballpark=False)
+    if plan is None:
+        raise InputError(f"expected a CRS that pyproj can go to from {described(crs)}, got {described(out)}")
+    way = height_way(crs, out) if heights else None
+    return Reprojected(
+        *(units.plan, units.height, units.plan_name, units.height_name), own, plan, way, units_of(out).height
+    )
+
+
+def height_way(crs: Any, out: Any) -> Any:
+    """pyproj's way from one CRS with heights to another. Raises InputError where heights or a grid are missing."""
+    way = best_of(crs, out, allow_ballpark=False) if has_heights(crs) else None
+    if way is None:
+        missing = (
+            "no grid between them is here (`projsync` gets some)" if has_heights(crs) else "the clouds' names none"
+        )
+        raise InputError(
+            f"expected heights that pyproj can take from {described(crs)} to {described(out)}, but {missing}; "
+            "name the plan alone with --out-crs, heights then stay as they are"
+        )
+    return way
+
+
+def has_heights(crs: Any) -> bool:
+    return vertical_crs(crs) is not None or len(crs.axis_info) == 3
+
+
+def same_height_system(crs: Any, out: Any) -> bool:
+    """Whether both count heights from the same level in the same unit."""
+    ours, theirs = vertical_crs(crs), vertical_crs(out)
+    return ours is not None and theirs is not None and ours.equals(theirs)

@@ -1,0 +1,184 @@
+"""Laws of `--out-crs`: coordinates come back, walls stay upright, solids valid, and all files agree on where a building stands."""
+
+import json
+import warnings
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from lxml import etree
+
+from hiproof.city.plan import jobs_of_footprints
+from hiproof.city.prepare import say_where_files_lie
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.compose import compose
+from hiproof.errors import InputError
+from hiproof.evaluate.models import read_models
+from hiproof.evaluate.run import evaluate_run
+from hiproof.frames import METRES
+from hiproof.model import WALL, Building, Footprint, Model
+from hiproof.parametric.run import build_file
+from hiproof.read.crs import parse_crs, units_of
+from hiproof.settings import Settings, WriteSettings
+from hiproof.simulate import COMPOUND_KINDS, random_compound
+from hiproof.status import Status
+from hiproof.view.run_models import run_crs_text
+from hiproof.write import write_cityjson
+from hiproof.write.building_attributes import building_attributes
+from hiproof.write.naming import FileUnits
+from hiproof.write.reprojected import crs_of_files
+from tiny_town import make_town, write_cloud, write_footprints
+
+DELFT, NEW_YORK, PARIS = (85000.0, 446000.0, 2.0), (300000.0, 60000.0, 12.0), (652000.0, 6862000.0, 35.0)
+WAYS = {
+    "national grid to UTM": ("EPSG:7415", "EPSG:25831", DELFT),
+    "to the next UTM zone": ("EPSG:7415", "EPSG:25832", DELFT),
+    "to the map of the web": ("EPSG:7415", "EPSG:3857", DELFT),
+    "cone to cylinder": ("EPSG:2154+5720", "EPSG:25831", PARIS),
+    "metres to feet, heights too": ("EPSG:32118+5703", "EPSG:2263+6360", NEW_YORK),
+    "metres to feet, heights stay": ("EPSG:32118+5703", "EPSG:2263", NEW_YORK),
+}
+
+
+def buildings_at(origin):
+    for seed, kind in enumerate(COMPOUND_KINDS):
+        sim = random_compound(np.random.default_rng(seed), kind, origin=origin)
+        solid = compose(sim.roof, 0.0).moved(sim.roof.frame.origin)
+        yield Building(kind, Status.MODELLED, built=Model(sim.roof, solid), z_ground=origin[2])
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_coordinates_come_back_within_a_millimetre(way):
+    crs, out, origin = WAYS[way]
+    places = np.array(origin) + np.random.default_rng(0).uniform((-5e3, -5e3, -3), (5e3, 5e3, 90), (500, 3))
+    for units in (FileUnits.of(crs, out_crs=out).gml, FileUnits.of(crs, out_crs=out).cityjson):
+        there = units.from_metres(places)
+        assert np.abs(units.to_metres(there) - places).max() < 1e-3
+        assert np.abs(there[:, :2] - places[:, :2]).max() > 100.0
+        assert np.array_equal(units.from_metres(places[:, :2]), there[:, :2])  # a plan goes as a place does
+        assert units.from_metres(places[0]) == pytest.approx(there[0]) and units.height * there[:, 2] == pytest.approx(
+            places[:, 2], abs=1e-3
+        )
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_solids_stay_valid_and_their_walls_upright(way):
+    crs, out, origin = WAYS[way]
+    units = FileUnits.of(crs, out_crs=out).gml
+    for building in buildings_at(origin):
+        assert building_attributes(building, units=units)["hiproof_iso19107_lod22"] == "[]", building.id
+        before, after = building.solid.vertices, units.from_metres(building.solid.vertices)
+        for face in building.solid.of_kind(WALL):
+            ring = list(face.rings[0])
+            assert len(np.unique(after[ring, :2], axis=0)) == len(np.unique(before[ring, :2], axis=0))
+
+
+def test_a_solid_that_breaks_on_the_way_says_so():
+    (building, *_) = buildings_at(DELFT)
+    squeezed = FileUnits.of("EPSG:7415", out_crs="EPSG:25831").gml
+
+    class Squeezed(type(squeezed)):
+        def from_metres(self, world):
+            return np.round(super().from_metres(world) / 4.0) * 4.0
+
+    units = Squeezed(**vars(squeezed))
+    assert json.loads(building_attributes(building, units=units)["hiproof_iso19107_lod22"])
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """A run of two houses as its clouds are, and one in another CRS."""
+    folder, town = tmp_path_factory.mktemp("town"), make_town(houses=2)
+    cloud = str(write_cloud(folder / "cloud.laz", town.xyz, town.classification, "EPSG:7415"))
+    footprints = str(write_footprints(folder / "footprints.gpkg", town.footprints, "EPSG:28992"))
+    for name, out_crs in (("here", ""), ("there", "EPSG:25831")):
+        settings = Settings.from_dict(
+            {"write": {"out_crs": out_crs, "lods": ["0", "2.2"]}, "city": {"citygml": "both"}}
+        )
+        assert reconstruct_area(Request((cloud,), folder / name, footprints, settings=settings)).exit_code == 0
+    return folder
+
+
+def gml_places(path):
+    """All places (n, 3) of a GML file, and the CRS it names."""
+    root = etree.parse(path)
+    numbers = np.array(" ".join(node.text for node in root.iter("{*}posList")).split(), float).reshape(-1, 3)
+    return numbers, next(root.iter("{*}Envelope")).get("srsName")
+
+
+def test_all_files_stand_in_the_same_place(town):
+    units = FileUnits.of("EPSG:7415", out_crs="EPSG:25831")
+    for name in ("buildings.gml", "buildings.citygml3.gml"):
+        here, there = (gml_places(town / run / name) for run in ("here", "there"))
+        assert np.abs(units.gml.to_metres(there[0]) - here[0]).max() < 1e-3
+        assert there[1] == "urn:ogc:def:crs,crs:EPSG::25831,crs:EPSG::5709"
+    runs = [list(read_models(town / run / "buildings.city.jsonl")) for run in ("here", "there")]
+    for one, other in zip(*runs, strict=True):
+        assert np.abs(units.cityjson.to_metres(other.solid.vertices) - one.solid.vertices).max() < 1e-3
+        assert one.solid.faces == other.solid.faces
+    for layer in ("buildings", "parts", "roof_surfaces"):
+        metas, shapes = zip(*(table(town / run / "buildings.gpkg", layer) for run in ("here", "there")), strict=True)
+        moved = shapely.get_coordinates(shapes[1], include_z=layer == "roof_surfaces")
+        assert (
+            np.abs(units.gml.to_metres(moved) - shapely.get_coordinates(shapes[0], include_z=moved.shape[1] == 3)).max()
+            < 1e-3
+        )
+        assert metas[1]["crs"] == "EPSG:25831"
+
+
+def table(path, layer):
+    meta, _, wkb, _ = pyogrio.raw.read(path, layer=layer)
+    return meta, shapely.from_wkb(wkb)
+
+
+def test_parameters_stay_in_the_clouds_crs_and_build_the_same_bytes(town, tmp_path):
+    here, there = ((town / run / "parameters.jsonl").read_bytes().split(b"\n") for run in ("here", "there"))
+    assert here[1:] == there[1:]
+    build_file(town / "there/parameters.jsonl", tmp_path / "again", changes={"city": {"citygml": "both"}})
+    for name in ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl"):
+        assert (tmp_path / "again" / name).read_bytes() == (town / "there" / name).read_bytes(), name
+    build_file(town / "here/parameters.jsonl", tmp_path / "moved", changes={"write": {"out_crs": "EPSG:25831"}})
+    for name in ("buildings.gml", "buildings.city.jsonl"):
+        assert (tmp_path / "moved" / name).read_bytes() == (town / "there" / name).read_bytes(), name
+
+
+def test_models_elsewhere_are_judged_where_their_points_are(town):
+    cloud = str(town / "cloud.laz")
+    for here, there in zip(*(evaluate_run(town / run, [cloud]).figures for run in ("here", "there")), strict=True):
+        assert there.quality.rmse == pytest.approx(here.quality.rmse, abs=1e-4) and here.quality.points > 50
+    assert run_crs_text(town / "there").startswith("COMPOUNDCRS") and "UTM zone 31N" in run_crs_text(town / "there")
+
+
+def test_the_same_crs_is_no_other(tmp_path):
+    assert FileUnits.of("EPSG:7415", out_crs="EPSG:28992") == FileUnits.of("EPSG:7415")
+    houses = list(buildings_at(DELFT))
+    for name, write in (("a", None), ("b", WriteSettings(out_crs="EPSG:7415"))):
+        write_cityjson(tmp_path / f"{name}.city.jsonl", houses, "EPSG:7415", write=write)
+    assert (tmp_path / "a.city.jsonl").read_bytes() == (tmp_path / "b.city.jsonl").read_bytes()
+
+
+@pytest.mark.parametrize(
+    "crs, out, sentence",
+    [
+        ("EPSG:7415", "EPSG:4326", "a projected CRS for --out-crs, got EPSG:4326"),
+        ("EPSG:7415", "EPSG:5709", "a projected CRS for --out-crs"),
+        ("EPSG:7415", "EPSG:25831+7837", "heights that pyproj can take"),
+        ("EPSG:28992", "EPSG:7415", "the clouds' names none"),
+        (None, "EPSG:25831", "a CRS of the clouds"),
+        ("EPSG:7415", "Atlantis", "a coordinate reference system"),
+    ],
+)
+def test_where_nothing_can_be_written_one_sentence_says_so(crs, out, sentence):
+    with pytest.raises(InputError, match=sentence):
+        FileUnits.of(crs, units_of(parse_crs(crs)) if crs else METRES, out)
+
+
+def test_a_projection_of_another_place_is_doubted():
+    (job,) = jobs_of_footprints((Footprint("house", shapely.box(85000, 446000, 85010, 446010)),))
+    for out, is_told in (("EPSG:25835", True), ("EPSG:25832", False)):
+        units = FileUnits.of("EPSG:7415", out_crs=out)
+        with warnings.catch_warnings(record=True) as said:
+            warnings.simplefilter("always")
+            say_where_files_lie((job,), crs_of_files("EPSG:7415", out), units)
+        assert [str(w.message).count("4.4 E 52.0 N, far from") for w in said] == [1] * is_told
