@@ -242,9 +242,9 @@ class Settings:
 
     def replace(self, values: dict[str, dict[str, Any]]) -> Settings:
         """A copy with `values[section][name]` replaced, each checked."""
-        sections = {}
+        sections: dict[str, Any] = {}
         for section_name, changes in values.items():
-            section = getattr(self, section_name, None)
+            section: Any = getattr(self, section_name, None)
             if section_name not in {f.name for f in fields(self)} or not isinstance(changes, dict):
                 names = ", ".join(f.name for f in fields(self))
                 raise SettingsError(
@@ -291,7 +291,7 @@ def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
     return tuple(checked_one(name, KINDS[declared.type], told, one) for one in values)
 
 
-KINDS = {"tuple[int, ...]": 0, "tuple[float, ...]": 0.0, "tuple[str, ...]": ""}
+KINDS: dict[Any, object] = {"tuple[int, ...]": 0, "tuple[float, ...]": 0.0, "tuple[str, ...]": ""}
 """A value of an element's type, by the declared type of a setting of several values."""
 
 

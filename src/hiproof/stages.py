@@ -149,8 +149,7 @@ def without_needless_vertices(outline: shapely.Polygon | None) -> tuple[shapely.
     """The outline to fit over, and what was left out: of more than MOST_OUTLINE_VERTICES those within 1 cm of the line
     between their neighbours (Douglas and Peucker), or within 2, 4, 8 cm, ... until no more are left, and with them
     courtyards narrower than that."""
-    count = 0 if outline is None else shapely.get_num_coordinates(outline)
-    if count <= MOST_OUTLINE_VERTICES:
+    if outline is None or (count := shapely.get_num_coordinates(outline)) <= MOST_OUTLINE_VERTICES:
         return outline, ""
     simple, tolerance_m = outline, 0.005
     while shapely.get_num_coordinates(simple) > MOST_OUTLINE_VERTICES:

@@ -33,7 +33,7 @@ def test_every_building_is_in_footprints_and_truth_once(folder):
     _, _, geometry, fields = pyogrio.raw.read(path / "footprints.gpkg")
     names = [f"b{k:07d}" for k in range(1, 31)]
     assert sorted(record["id"] for record in truth) == names == sorted(fields[0])
-    assert sum(count["buildings"] for count in counts) == 30
+    assert sum(count.buildings for count in counts) == 30
     outlines = shapely.from_wkb(geometry)
     assert shapely.is_valid(outlines).all()
     assert sum(a.intersection(b).area for k, a in enumerate(outlines) for b in outlines[:k]) < 0.01
@@ -42,13 +42,13 @@ def test_every_building_is_in_footprints_and_truth_once(folder):
 def test_tiles_hold_their_own_points_at_the_density_asked(folder):
     path, counts = folder
     for count in counts:
-        las = laspy.read(path / "tiles" / f"{count['tile']}.laz")
-        x, y = map(float, count["tile"].split("_"))
-        assert len(las.points) == count["points"]
+        las = laspy.read(path / "tiles" / f"{count.tile}.laz")
+        x, y = map(float, count.tile.split("_"))
+        assert len(las.points) == count.points
         # Coordinates are stored to the centimetre, so a point may be rounded onto the upper border.
         assert las.x.min() >= x and las.x.max() <= x + 100 and las.y.min() >= y and las.y.max() <= y + 100
         assert set(np.unique(las.classification)) <= {2, 5, 6}
-    total = sum(count["points"] for count in counts)
+    total = sum(count.points for count in counts)
     assert total / (len(counts) * 100.0**2) == pytest.approx(SMALL.density, rel=0.35)
 
 
@@ -65,7 +65,7 @@ def test_a_tile_is_the_same_without_the_others(folder):
 
 def test_a_building_over_a_tile_border_has_its_points_in_both(folder):
     path, counts = folder
-    points = [laspy.read(path / "tiles" / f"{count['tile']}.laz") for count in counts]
+    points = [laspy.read(path / "tiles" / f"{count.tile}.laz") for count in counts]
     xyz = np.concatenate([np.column_stack([las.x, las.y, las.z])[las.classification == 6] for las in points])
     tiles = np.repeat(np.arange(len(points)), [(las.classification == 6).sum() for las in points])
     crossing = 0

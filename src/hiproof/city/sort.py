@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import shapely
@@ -88,7 +89,7 @@ class Reaches:
         self.bounds = np.array([[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]).reshape(-1, 4)
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
 
-    def near(self, box: Sequence[float]) -> list[str]:
+    def near(self, box: Iterable[float]) -> list[str]:
         """Names, in plan order, of the tiles whose reach meets `box` (xmin, ymin, xmax, ymax)."""
         return [self.names[i] for i in np.sort(self.tree.query(shapely.box(*box)))]
 
@@ -160,7 +161,8 @@ class Gatherer:
         """Write what is held, a file a tile; done again after a kill it writes the same files."""
         for tile, found in sorted(self.found.items()):
             with atomic_file(self.folder / tile / f"{self.number}-{self.flushes}.npz") as file:
-                np.savez(file, **{kind: np.concatenate(arrays) for kind, arrays in found.items()})
+                arrays: dict[str, Any] = {kind: np.concatenate(several) for kind, several in found.items()}
+                np.savez(file, **arrays)
         self.found, self.held, self.flushes = {}, 0, self.flushes + 1
 
     def discard(self) -> None:

@@ -125,7 +125,9 @@ def houses_in(area: shapely.Geometry, surfaces: Surfaces, bonds: Bonds) -> list[
     bonds = bonds.inside(area)
     for rough in best_cuts(bonds, directions_of(area, surfaces)):
         cut = refined(rough, bonds)
-        sides = [area] if cut is None else with_crumbs(sides_of(area, cut), surfaces)
+        if cut is None:
+            continue
+        sides = with_crumbs(sides_of(area, cut), surfaces)
         if len(sides) > 1 and all(depth_m(side, cut, surfaces) > LEAST_DEPTH_M for side in sides):
             return [house for side in sides for house in houses_in(side, surfaces, bonds)]
     return [area]

@@ -77,7 +77,8 @@ def closure(file: Path) -> set[Path]:
 
     How code is kept changes nothing of it, so of this folder only the decorator and the linking count.
     """
-    found, open_ends = set(), [file]
+    found: set[Path] = set()
+    open_ends = [file]
     while open_ends:
         at = open_ends.pop()
         if at not in found and (at.parent != HERE or at.name in DECIDING):
@@ -89,7 +90,7 @@ def closure(file: Path) -> set[Path]:
 @functools.cache
 def imported(file: Path) -> frozenset[Path]:
     """The files of the two packages that import statements at the top of `file` name."""
-    found = set()
+    found: set[Path] = set()
     for statement in IMPORT.finditer(text_of(file).decode()):
         for path in named(file, statement):
             found.update(

@@ -101,7 +101,9 @@ def walks(follow: list[int], chosen: list[bool]) -> list[list[int]]:
 
 def simple_loops(ring: list[int]) -> list[list[int]]:
     """A closed walk over vertices cut into loops that visit none of them twice."""
-    loops, path, position = [], [], {}
+    loops: list[list[int]] = []
+    path: list[int] = []
+    position: dict[int, int] = {}
     for vertex in ring:
         if vertex in position:
             cut = position[vertex]

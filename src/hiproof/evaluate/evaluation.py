@@ -135,7 +135,7 @@ def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
     return {name: {"buildings": len(group), **column_summaries(group)} for name, group in groups.items()}
 
 
-def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, float | None]]:
+def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, float]]:
     rows = [f.row() for f in figures]
     summaries = {}
     for name in figure_names(rows):

@@ -77,9 +77,9 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
         points = points[np.isfinite(points).all(axis=1)]
     polygons = roof_polygons(model)
     outline = _observed_outline(points) if outline is None else outline
-    has_outline = outline is not None and outline.area > 0
+    outline = None if outline is None or outline.area == 0 else outline
     figures = {}
-    if has_outline:
+    if outline is not None:
         figures["outline_iou"] = iou(plan_outline(polygons), outline)
         figures["density"] = len(points) / outline.area
         figures["nodata_share"] = nodata_share(points, outline)
@@ -90,7 +90,7 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
             "psd_std": float(distances.std()),
             "rmse": float(np.sqrt(np.mean(distances**2))),
             "p95": percentile(distances, 0.95),
-            "share_within_20cm": share_near(points, dz, outline if has_outline else plan_outline(polygons)),
+            "share_within_20cm": share_near(points, dz, plan_outline(polygons) if outline is None else outline),
             "unexplained_area_m2": unexplained_area(points, dz),
         }
     return Quality(points=len(points), **figures)

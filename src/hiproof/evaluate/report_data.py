@@ -60,7 +60,7 @@ def building_data(
     """What the map and the panel show of one building; the residual is from the points given, else as the model says."""
     model, figures = run.models[index], run.figures[index]
     status = Status.__members__.get(model.status.upper())
-    residual = figures.quality.psd_mean
+    residual: Any = figures.quality.psd_mean
     if not np.isfinite(residual):
         residual = model.attributes.get("hiproof_psd_mean")
     measured = {name: value for name, value in figures.row().items() if name not in ("id", "type", "status")}

@@ -19,7 +19,7 @@ from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overl
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
 
-RECORD = {
+RECORD: dict[tuple[str, ...], Any] = {
     ("settings",): dict,
     ("settings", "read"): dict,
     ("settings", "read", "building_classes"): list,
@@ -46,13 +46,13 @@ class EvaluatedRun:
     points: tuple[np.ndarray, ...]
     figures: tuple[BuildingFigures, ...]
     record: dict[str, Any]
-    footprints: tuple[shapely.Geometry | None, ...] = ()
+    footprints: tuple[shapely.Geometry | None, ...]
 
     def only(self, indices: Sequence[int]) -> EvaluatedRun:
         """The same run with only these buildings."""
-        columns = (self.models, self.points, self.figures, self.footprints or (None,) * len(self.models))
-        models, points, figures, footprints = (tuple(column[i] for i in indices) for column in columns)
-        return EvaluatedRun(models, points, figures, self.record, footprints)
+        models = tuple(self.models[i] for i in indices)
+        points, figures = tuple(self.points[i] for i in indices), tuple(self.figures[i] for i in indices)
+        return EvaluatedRun(models, points, figures, self.record, tuple(self.footprints[i] for i in indices))
 
 
 def evaluate_run(
@@ -173,9 +173,9 @@ def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list
     """The building of the reference file that stands for each model."""
     if path is None:
         return [None] * len(models)
-    others = [model for model in read_models(path) if model.solid is not None]
-    matches = match_by_id_or_overlap(models, [(other.id, plan_outline(other.solid)) for other in others])
-    return [None if match is None else others[match] for match in matches]
+    others = [(model, outline) for model in read_models(path) if (outline := own_outline(model)) is not None]
+    matches = match_by_id_or_overlap(models, [(other.id, outline) for other, outline in others])
+    return [None if match is None else others[match][0] for match in matches]
 
 
 def own_outline(model: BuildingModel) -> shapely.Geometry | None:

@@ -105,7 +105,7 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     """The shift (2,) at which the footprint holds most of `xy`, the least of those that hold as many: coarse, then fine."""
     low = np.array(footprint.bounds[:2]) - AROUND_M - FARTHEST_M
     count = np.ceil((np.array(footprint.bounds[2:]) + AROUND_M + FARTHEST_M - low) / (2 * PITCH_M)).astype(int)
-    nodes = low + 2 * PITCH_M * np.stack(np.indices(count), axis=-1).reshape(-1, 2)
+    nodes = low + 2 * PITCH_M * np.moveaxis(np.indices(tuple(count)), 0, -1).reshape(-1, 2)
     depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
     costs = -np.log(STRAY + (1.0 - STRAY) * normal_share(depth / BLUR_M)).reshape(count)
     best = np.zeros(2)
@@ -146,8 +146,9 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
             )
     if len(rows) < LEAST_SIDES:
         return None
-    *design, wanted, sigma, told = np.array(rows).T
-    design, weight = np.array(design).T, 1.0 / sigma**2
+    told_of_each = np.array(rows)
+    design, (wanted, sigma, told) = told_of_each[:, :3], told_of_each[:, 3:].T
+    weight = 1.0 / sigma**2
     prior = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
     inverse = np.linalg.inv((design.T * weight) @ design + prior)
     solution = inverse @ (design.T @ (weight * wanted))

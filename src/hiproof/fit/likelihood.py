@@ -122,12 +122,14 @@ class Search:
         """The `count` best of each type that are within `slack` nats of its best, types in the tables' order."""
         families, values = self.family[candidates.kinds].tolist(), candidates.values.tolist()
         ranked = sorted(zip(families, values, range(len(values)), strict=True))
-        kept, rank, best = [], {}, {}
+        kept: list[int] = []
+        rank: dict[int, int] = {}
+        best: dict[int, float] = {}
         for family, value, row in ranked:
             rank[family] = rank.get(family, 0) + 1
             if rank[family] <= count and value <= best.setdefault(family, value) + slack:
                 kept.append(row)
-        return candidates.chosen(kept)
+        return candidates.chosen(np.array(kept, int))
 
 
 def fit_likelihood(

@@ -81,14 +81,16 @@ class PaperFit:
         lengths = np.linalg.norm(side), np.linalg.norm(corners[3] - corners[0])
         starts = []
         for quarter in range(2 if self.shape.half_turn_symmetric else 4):
-            length, width = lengths[quarter % 2], lengths[1 - quarter % 2]
+            length, width = float(lengths[quarter % 2]), float(lengths[1 - quarter % 2])
             theta_p = self.shape.typical(width, length, max(high - low, SMALLEST_M))
             kappa = math.atan2(side[1], side[0]) + quarter * math.pi / 2
             starts.append(np.array([*(theta_p[n] for n in self.names), kappa, *corners.mean(axis=0), low]))
         return starts
 
     def bounds(self) -> list[tuple[float | None, float | None]]:
-        sizes = [(None if name in self.shape.signed else SMALLEST_M, None) for name in self.names]
+        sizes: list[tuple[float | None, float | None]] = [
+            (None if name in self.shape.signed else SMALLEST_M, None) for name in self.names
+        ]
         return sizes + [(None, None)] * 4
 
     def theta_p(self, theta: np.ndarray) -> dict[str, float]:

@@ -35,8 +35,11 @@ class Sample:
 class Source(Protocol):
     """A supply of labelled clouds by role (TRAINING, VALIDATION, TEST) and number: the same whenever asked for."""
 
-    types: tuple[str, ...]
-    description: str
+    @property
+    def types(self) -> tuple[str, ...]: ...
+
+    @property
+    def description(self) -> str: ...
 
     def sample(self, role: int, index: int) -> Sample: ...
 
@@ -61,7 +64,7 @@ class Simulated:
         type = int(rng.integers(len(self.types)))
         while True:
             building = training_house(rng, self.types[type], self.annex_share)
-            cloud = scan(building, rng, random_settings(rng, building, DENSITY, POINTS, None))
+            cloud = scan(building, rng, random_settings(rng, building.outline.area, DENSITY, POINTS, None))
             if usable(cloud):
                 return as_sample(cloud, self.types, type, rng)
 
@@ -94,7 +97,7 @@ class Scanned:
         while True:
             shapes_of_type = [shape for shape in shapes if shape.type == type]
             shape = shapes_of_type[rng.integers(len(shapes_of_type))]
-            settings = random_settings(rng, shape, DENSITY, POINTS, None)
+            settings = random_settings(rng, shape.outline.area, DENSITY, POINTS, None)
             cloud = scan_solids([shape.solid], rng, settings, [shape.type])
             if usable(cloud):
                 return as_sample(cloud, self.types, self.types.index(type), rng)

@@ -11,6 +11,7 @@ import os
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from time import perf_counter
+from typing import Any
 
 import numpy as np
 import torch
@@ -97,7 +98,9 @@ class Trainer:
         self.averaged = RoofNetwork(network).to(self.device).eval()
         self.averaged.load_state_dict(self.network.state_dict())
         self.optimiser = torch.optim.AdamW(self.network.parameters(), settings.rate, weight_decay=settings.decay)
-        self.epoch, self.seconds, self.history, self.best = 0, 0.0, [], None
+        self.epoch, self.seconds = 0, 0.0
+        self.history: list[dict[str, Any]] = []
+        self.best: dict[str, Any] = {"score": -math.inf}
         self.validation = [
             arranged(source.sample(VALIDATION, index), settings.layout) for index in range(settings.validation)
         ]
@@ -160,8 +163,8 @@ class Trainer:
     def tensors(self, clouds):
         """Network inputs, point labels (not-roof last) and types of a batch, on the device."""
         inputs = network_inputs([cloud[0] for cloud in clouds], self.settings.layout)
-        labels = np.concatenate([cloud[1] for cloud in clouds])
-        labels = torch.from_numpy(np.where(labels < 0, len(self.source.types), labels).astype(np.int64))
+        told = np.concatenate([cloud[1] for cloud in clouds])
+        labels = torch.from_numpy(np.where(told < 0, len(self.source.types), told).astype(np.int64))
         types = torch.tensor([cloud[2] for cloud in clouds])
         return tuple(array.to(self.device) for array in inputs), labels.to(self.device), types.to(self.device)
 
@@ -200,7 +203,7 @@ class Trainer:
         record = self.history[-1]
         record |= {"balanced_accuracy": types.balanced_accuracy, "mean_iou": points.mean_iou, "recalls": types.recalls}
         score = types.balanced_accuracy + points.mean_iou
-        if self.best is None or score > self.best["score"]:
+        if score > self.best["score"]:
             weights = {name: value.clone() for name, value in self.averaged.state_dict().items()}
             self.best = {"score": score, "epoch": self.epoch, "weights": weights}
 

@@ -38,10 +38,10 @@ class PointGrid:
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """The box (xmin, ymin, xmax, ymax) of all cells."""
-        x, y = self.origin
-        return tuple(self.cell_m * side for side in (x, y, x + self.columns, y + self.rows))
+        (x, y), cell_m = self.origin, self.cell_m
+        return cell_m * x, cell_m * y, cell_m * (x + self.columns), cell_m * (y + self.rows)
 
-    def candidates(self, bounds: Sequence[float]) -> np.ndarray:
+    def candidates(self, bounds: Sequence[float] | np.ndarray) -> np.ndarray:
         """Indices of the points in the cells that the box (xmin, ymin, xmax, ymax) meets."""
         first, last = self.cell_range(bounds[0], bounds[2], 0), self.cell_range(bounds[1], bounds[3], 1)
         rows = np.arange(max(last[0], 0), min(last[1], self.rows - 1) + 1)
@@ -54,7 +54,8 @@ class PointGrid:
         return np.concatenate([self.order[start:stop] for start, stop in zip(starts, stops, strict=True)])
 
     def cell_range(self, low: float, high: float, axis: int) -> tuple[int, int]:
-        return tuple(math.floor(value / self.cell_m) - self.origin[axis] for value in (low, high))
+        start = self.origin[axis]
+        return math.floor(low / self.cell_m) - start, math.floor(high / self.cell_m) - start
 
     def inside(self, polygon: shapely.Polygon) -> np.ndarray:
         """Ascending indices of the points inside `polygon` or on its border."""

@@ -12,16 +12,16 @@ import lazrs
 import numpy as np
 from laspy.point.record import PackedPointRecord, ScaleAwarePointRecord
 
-from .las_header import LasFacts
+from .las_header import LasFacts, Octree
 from .plausible import Implausible
 
 Box = tuple[float, float, float, float]
 
 
-def copc_record(file: BinaryIO, facts: LasFacts, box: Box, selection: laspy.DecompressionSelection):
+def copc_record(file: BinaryIO, facts: LasFacts, octree: Octree, box: Box, selection: laspy.DecompressionSelection):
     """laspy's record of all points in the nodes that meet `box` (xmin, ymin, xmax, ymax), and the first of each node."""
     header = laspy.LasHeader.read_from(file, read_evlrs=False)
-    nodes = nodes_meeting(facts, box)
+    nodes = nodes_meeting(facts, octree, box)
     chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
     content = np.zeros(sum(points for points, _ in chunks) * facts.point_bytes, np.uint8)
     if len(nodes):
@@ -37,28 +37,28 @@ def bytes_of(file: BinaryIO, node: np.void) -> bytes:
     return file.read(int(node["bytes"]))
 
 
-def nodes_meeting(facts: LasFacts, box: Box) -> np.ndarray:
+def nodes_meeting(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
     """The nodes that hold points and meet `box` in plan, in the order in which they stand in the file."""
-    low, high = cubes(facts, facts.nodes)
+    low, high = cubes(facts, octree, octree.nodes)
     meets = (low[:, :2] <= box[2:]).all(axis=1) & (high[:, :2] >= box[:2]).all(axis=1)
-    found = facts.nodes[meets]
+    found = octree.nodes[meets]
     return found[np.argsort(found["start"], kind="stable")]
 
 
-def cubes(facts: LasFacts, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lower and upper corners (n, 3) of the nodes' cubes, wider by what rounding may move a point."""
     level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
-    side = np.ldexp(2 * facts.octree_half, -level)
-    low = facts.octree_centre - facts.octree_half + place * side
+    side = np.ldexp(2 * octree.half, -level)
+    low = octree.centre - octree.half + place * side
     return low - facts.rounding, low + side + facts.rounding
 
 
-def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts) -> None:
+def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
     """Raise Implausible where a node's points, which follow one another in `xyz` (n, 3), leave its cube."""
     if not len(nodes):
         return
     starts = np.cumsum([0, *nodes["points"][:-1]])
-    low, high = cubes(facts, nodes)
+    low, high = cubes(facts, octree, nodes)
     outside = (np.minimum.reduceat(xyz, starts) < low) | (np.maximum.reduceat(xyz, starts) > high)
     if outside.any():
         level, *place = nodes["key"][np.argmax(outside.any(axis=1))].tolist()

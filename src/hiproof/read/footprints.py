@@ -69,7 +69,7 @@ def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
     """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
     if is_database(path):
-        return parse_crs(table_crs(path))
+        return parse_crs(table_crs(str(path)))
     layer = one_layer(path, layer)
     return parse_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
 
@@ -262,7 +262,9 @@ def split_features(
 def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footprint]:
     """Ids made unique by a suffix `_2`, `_3`; a copy of an earlier polygon names it in its attribute `copy_of`."""
     taken = {footprint.id for footprint in footprints}
-    used, first_by_shape, result, copies, renamed = set(), {}, [], 0, 0
+    used: set[str] = set()
+    first_by_shape: dict[bytes, str] = {}
+    result, copies, renamed = [], 0, 0
     for footprint in footprints:
         id, suffix = footprint.id, 2
         while id in used or (suffix > 2 and id in taken):

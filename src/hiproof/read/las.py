@@ -130,10 +130,12 @@ def is_copc(path: str | Path) -> bool:
 def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chunk:
     facts = facts_of(path)
     with explained(path), opened(path) as file:
-        nodes, record = copc_record(file, facts, box, WANTED)
+        if facts.octree is None:
+            raise Implausible("its first record says that it is COPC, and none tells of an octree; it is damaged")
+        nodes, record = copc_record(file, facts, facts.octree, box, WANTED)
         xyz = coordinates(record)
         check_points(xyz, facts)
-        check_nodes(xyz, nodes, facts)
+        check_nodes(xyz, nodes, facts, facts.octree)
         if 0 < len(xyz) == facts.count:
             check_all_points(xyz.min(axis=0), xyz.max(axis=0), facts)
         return present(xyz, record, path)

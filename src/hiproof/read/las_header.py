@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from typing import BinaryIO
+from typing import BinaryIO, NamedTuple
 
 import lazrs
 import numpy as np
@@ -25,12 +25,20 @@ MOST_CHUNK_POINTS = 10_000_000  # a decoder makes room for a whole chunk; LASzip
 NODES = np.dtype([("key", "<i4", 4), ("start", "<u8"), ("bytes", "<i4"), ("points", "<i4")])
 
 
+class Octree(NamedTuple):
+    """COPC's: the `nodes` (n,) that hold points, of NODES, `centre` (3,) and half the width of the cube around all."""
+
+    nodes: np.ndarray
+    centre: np.ndarray
+    half: float
+
+
 @dataclass(frozen=True)
 class LasFacts:
     """What the public header block says, and the file's `size` in bytes; the arrays are (3,): x, y, z.
 
     `points_end` is the first byte that no point may take: of waveforms, of extended records, or the end. `laszip` is the
-    record that tells how points are compressed, `nodes` are those of COPC's octree that hold points, else None.
+    record that tells how points are compressed; only COPC has an `octree`.
     """
 
     size: int
@@ -50,9 +58,7 @@ class LasFacts:
     maxs: np.ndarray
     far_records: tuple[int, int]
     laszip: bytes = b""
-    nodes: np.ndarray | None = None
-    octree_centre: np.ndarray | None = None
-    octree_half: float = 0.0
+    octree: Octree | None = None
 
     @property
     def rounding(self) -> np.ndarray:
@@ -233,8 +239,7 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
     *centre, half, _, page, page_bytes = struct.unpack_from("<5d2Q", info)
-    facts = replace(facts, octree_centre=np.array(centre), octree_half=half)
-    low, high = facts.octree_centre - half - facts.rounding, facts.octree_centre + half + facts.rounding
+    low, high = np.array(centre) - half - facts.rounding, np.array(centre) + half + facts.rounding
     if facts.count and not ((facts.mins >= low) & (facts.maxs <= high)).all():
         raise Implausible(
             f"its octree of half width {half:g} about ({listed(centre)}) does not hold its header's bounds"
@@ -243,7 +248,7 @@ def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
     points = int(nodes["points"].sum(dtype=np.int64))
     if points != facts.count:
         raise Implausible(f"its header tells of {facts.count} points, the nodes of its octree of {points}")
-    return replace(facts, nodes=nodes)
+    return replace(facts, octree=Octree(nodes, np.array(centre), half))
 
 
 def nodes_of_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) -> np.ndarray:

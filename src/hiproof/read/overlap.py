@@ -79,7 +79,9 @@ def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tupl
 def neighbours(crs: CRS | None) -> Iterator[CRS]:
     """Projected CRSs of the codes next to that of `crs`."""
     code = None if crs is None else epsg_code(horizontal_crs(crs))
-    for step in NEIGHBOURS if code else ():
+    if code is None:
+        return
+    for step in NEIGHBOURS:
         try:
             neighbour = CRS.from_epsg(code + step)
         except CRSError:

@@ -85,7 +85,8 @@ def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Pat
 
 def read_ply_header(file: BinaryIO, path: str | Path) -> PlyLayout:
     """Read up to `end_header`, leaving `file` at the first vertex."""
-    byte_order, count, properties, element = None, None, [], None
+    properties: list[tuple[str, str]] = []
+    byte_order, count, element = None, None, None
     for words in header_lines(file, path):
         if words[0] == "format" and len(words) > 1:
             byte_order = BYTE_ORDERS.get(words[1])

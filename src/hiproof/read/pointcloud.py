@@ -88,7 +88,7 @@ def iter_points(
         refuse_implausible(xyz, path)
         finite = np.isfinite(xyz)
         if not finite.all():
-            keep = finite.all(axis=1)
+            keep = np.all(finite, axis=1)
             dropped += len(xyz) - int(keep.sum())
             xyz, classes = chosen(xyz, classes, keep)
         xyz = xyz if units.are_metres else units.to_metres(xyz)
@@ -125,8 +125,9 @@ def read_header(path: str | Path) -> PointFileHeader:
     """Bounds, count and CRS of one file: from the header of LAS, LAZ and COPC, by one pass over text and PLY."""
     if file_kind(path) == "las":
         header = las.read_las_header(path)
-        bounds = tuple(float(value) for value in (*header.mins, *header.maxs))
+        (xmin, ymin, zmin), (xmax, ymax, zmax) = header.mins.tolist(), header.maxs.tolist()
         crs = las.las_crs(header, path)
+        bounds = (xmin, ymin, zmin, xmax, ymax, zmax)
         return PointFileHeader(str(path), bounds, header.point_count, crs, header.point_format.id)
     count, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
     for cloud in iter_points(path):

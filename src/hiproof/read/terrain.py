@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import warnings
 from collections import OrderedDict
-from collections.abc import Sequence
+from collections.abc import Iterable
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Protocol
@@ -33,7 +33,8 @@ HEIGHT_UNITS = {
 class Terrain(Protocol):
     """Heights of the ground in world coordinates; `source` is the text a building's output names it by."""
 
-    source: str
+    @property
+    def source(self) -> str: ...
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Height (n,) at `xy_world` (n, 2), NaN where unknown."""
@@ -184,7 +185,7 @@ def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndar
 class TerrainChain:
     """Several terrains by preference: each position is answered by the first that knows it."""
 
-    def __init__(self, terrains: Sequence[Terrain]):
+    def __init__(self, terrains: Iterable[Terrain | None]):
         self.terrains = tuple(terrain for terrain in terrains if terrain is not None)
 
     @property

@@ -44,5 +44,7 @@ def arrange(xyz: np.ndarray, layout: Layout) -> Arrangement:
     """Arrange a building's cloud `xyz` (n, 3), metres in any frame, n >= 1 finite points, for the network."""
     thinned = thin_to_grid(xyz, layout.thinned)
     local = np.ascontiguousarray(xyz[thinned] - xyz[thinned].mean(axis=0), dtype=float)
-    order, features, *neighbourhoods = arranged(local, layout.points, *layout.levels, layout.neighbours)
-    return Arrangement(thinned[np.resize(order, layout.points)], features, *neighbourhoods, len(order))
+    order, *described = arranged(local, layout.points, *layout.levels, layout.neighbours)
+    features, groups, radii, up_indices, up_weights = described
+    chosen = thinned[np.resize(order, layout.points)]
+    return Arrangement(chosen, features, groups, radii, up_indices, up_weights, len(order))

@@ -10,6 +10,7 @@ import json
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -62,7 +63,7 @@ class Segmentation:
     @property
     def type(self) -> str:
         """The most probable roof type."""
-        return max(self.types, key=self.types.get)
+        return max(self.types, key=self.types.__getitem__)
 
     @property
     def is_roof(self) -> np.ndarray:
@@ -80,7 +81,7 @@ class Segmentation:
 class Model:
     """A loaded ONNX network with what its file says of itself."""
 
-    session: object
+    session: Any
     types: tuple[str, ...]
     layout: Layout
 
@@ -124,7 +125,8 @@ def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
 
 def run(model: Model, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
     """Point logits (B N, types + 1) and type logits (B, types) of arranged buildings."""
-    return tuple(model.session.run(list(OUTPUT_NAMES), stacked(arrangements, model.layout)))
+    point_logits, type_logits = model.session.run(list(OUTPUT_NAMES), stacked(arrangements, model.layout))
+    return point_logits, type_logits
 
 
 def stacked(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:

@@ -100,7 +100,7 @@ def farthest_points(x, y, z, count):
     order, cover = np.empty(count, np.int64), np.empty(count)
     nearest, reach = np.empty((count, keep), np.int64), np.empty(count)
     away = (x - x.mean()) ** 2 + (y - y.mean()) ** 2 + (z - z.mean()) ** 2
-    current = np.argmax(away)
+    current = int(np.argmax(away))
     uncovered = np.full(n, np.inf)
     bits = uncovered.view(np.int64)  # numbers that are not negative sort like their bits
     shortest = np.empty(keep)

@@ -40,8 +40,8 @@ def city(
     total = 0
     try:
         for counts in write_city(out, City(buildings, seed, density, tile)):
-            total += counts["points"]
-            typer.echo(f"{counts['tile']}: {counts['buildings']} buildings, {counts['points']} points")
+            total += counts.points
+            typer.echo(f"{counts.tile}: {counts.buildings} buildings, {counts.points} points")
     except HiproofError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -167,8 +168,16 @@ class Stock:
                     yield (float(x), float(y), float(x + size), float(y + size))
 
 
-def write_city(folder: Path, city: City) -> Iterator[dict[str, int | str]]:
-    """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`; yields each tile's name and counts.
+class Written(NamedTuple):
+    """A tile of a city that is on the disk."""
+
+    tile: str
+    buildings: int
+    points: int
+
+
+def write_city(folder: Path, city: City) -> Iterator[Written]:
+    """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`; yields what each tile holds.
 
     Each building is in footprints and truth once, with the tile its frame's origin lies in. Raises OutputError where
     the folder cannot be written or already holds a city.
@@ -193,7 +202,7 @@ def write_city(folder: Path, city: City) -> Iterator[dict[str, int | str]]:
             write_footprints(footprints, own, append=footprints.exists())
         with truth.open("a") as file:
             file.writelines(json.dumps({"id": lot.id, "tile": name, **lot.building.truth()}) + "\n" for lot in own)
-        yield {"tile": name, "buildings": len(own), "points": points}
+        yield Written(name, len(own), points)
 
 
 def _holds(bounds: Bounds, lot: Lot) -> bool:

@@ -30,7 +30,7 @@ def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int,
         place = [rng.uniform(x0, x1), rng.uniform(y0, y1), float(part.translation[2]) + rng.uniform(-2.0, 4.0)]
         new = {"type": str(rng.choice(NAMES)), "position": place, "rotation": rng.uniform(-180.0, 180.0)}
         return kind, len(building.parts), new | {"width": width, "length": length}
-    changes = {
+    changes: dict[str, dict[str, Any]] = {
         "type": {"type": str(rng.choice(NAMES))},
         "ridge": {"ridge_height": z + float(part.translation[2]) + rng.uniform(-1.0, 8.0)},
         "eave": {"eave_height": z + float(part.translation[2]) + rng.uniform(-4.0, 4.0)},

@@ -104,13 +104,15 @@ def _lattice(rng: np.random.Generator, swath: Swath, radius: float) -> tuple[np.
     lines = np.arange(int(2 * radius / swath.line_spacing) + 2)
     steps = np.arange(int(2 * radius / swath.point_spacing) + 2)
     if swath.anchor is None:
-        start, phase, across = rng.random() * swath.line_spacing - radius, rng.random(len(lines)), -radius
+        start, across = rng.random() * swath.line_spacing - radius, -radius
+        phase = rng.random(len(lines))
     else:
         along_centre, across_centre = swath.anchor
-        lines += math.floor((along_centre - radius) / swath.line_spacing)
-        steps += math.floor((across_centre - radius) / swath.point_spacing)
+        lines = lines + math.floor((along_centre - radius) / swath.line_spacing)
+        steps = steps + math.floor((across_centre - radius) / swath.point_spacing)
         # Successive multiples of the golden ratio spread phases evenly, and each line finds its own again.
-        start, phase, across = -along_centre, lines * 0.6180339887498949 % 1.0, -across_centre
+        start, across = -along_centre, -across_centre
+        phase = np.asarray(lines * 0.6180339887498949 % 1.0)
     along = (lines + 0.5 * swath.pairing * (lines % 2)) * swath.line_spacing + start
     return along, phase, steps * swath.point_spacing + across
 

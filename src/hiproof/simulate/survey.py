@@ -90,8 +90,8 @@ def survey(
     lot_bounds = np.array([lot.bounds for lot in lots]).reshape(-1, 4)
     for low, high in patches:
         # Shadows and leaning trees of the next patch reach this far.
-        near = (lot_bounds[:, :2] < high + 20.0).all(axis=1) & (lot_bounds[:, 2:] > low - 20.0).all(axis=1)
-        patch_lots = [lot for lot, is_near in zip(lots, near, strict=True) if is_near]
+        near = np.all((lot_bounds[:, :2] < high + 20.0) & (lot_bounds[:, 2:] > low - 20.0), axis=1)
+        patch_lots = [lots[k] for k in np.flatnonzero(near)]
         yield surveyed_patch(low, high, patch_lots, terrain, flight, seed, settings)
 
 
@@ -113,7 +113,7 @@ def surveyed_patch(
     beams = joined([beams_of(rng, swath, np.zeros(2), reach + 8.0, 4.0) for swath in swaths])
     cloud = returns(town_scene(lots, terrain, centre), within(beams, high - xy_centre + 12.0), rng, settings)
     cloud = with_outliers(rng, cloud, OUTLIER_SHARE).moved(centre)
-    inside = ((cloud.points[:, :2] >= low) & (cloud.points[:, :2] < high)).all(axis=1)
+    inside = np.all((cloud.points[:, :2] >= low) & (cloud.points[:, :2] < high), axis=1)
     return cloud.chosen(inside)
 
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
-from .roofs import SimBuilding, random_building
+from .roofs import random_building
 from .scanner import Scan, ScanSettings, scan
 from .scene import SOURCE_ROOF, Defects
 from .shapes import ROOF_TYPES
@@ -41,7 +41,7 @@ def training_sample(
     kind = int(rng.integers(len(types)))
     for _ in range(ATTEMPTS):
         building = random_building(rng, types[kind])
-        settings = random_settings(rng, building, density, n_points, defects)
+        settings = random_settings(rng, building.outline.area, density, n_points, defects)
         cloud = scan(building, rng, settings)
         if len(cloud) >= low and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * low:
             return _as_sample(rng, cloud, types, kind, high)
@@ -53,15 +53,14 @@ def training_sample(
 
 def random_settings(
     rng: np.random.Generator,
-    building: SimBuilding,
+    area_m2: float,
     density: tuple[float, float],
     n_points: tuple[int, int],
     defects: Defects | None,
 ) -> ScanSettings:
-    """A scanner at random whose density, within `density`, gives the building's cloud about `n_points`."""
-    area = building.outline.area
-    low = min(max(density[0], n_points[0] / area), density[1])
-    high = max(min(density[1], 1.2 * n_points[1] / area), low)
+    """A scanner at random whose density, within `density`, gives a building of `area_m2` about `n_points`."""
+    low = min(max(density[0], n_points[0] / area_m2), density[1])
+    high = max(min(density[1], 1.2 * n_points[1] / area_m2), low)
     logarithm, range_noise, horizontal, beam, angle, margin = rng.random(6)
     return replace(
         ScanSettings(),

@@ -89,7 +89,7 @@ def hiproof_attributes(building: Building, figures: RoofFigures | None = None, u
     """Our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
-    recognised = max(building.recognised, key=building.recognised.get, default=None)
+    recognised = max(building.recognised, key=building.recognised.__getitem__, default=None)
     return {
         "status": building.status.code,
         "detail": building.detail or building.status.value,

@@ -191,7 +191,7 @@ def building_element(drawn: GmlBuilding) -> str:
         text.append(level_surfaces(drawn))
         text.append(lod1_solid(drawn.shapes.lod13 or drawn.shapes.lod12, drawn.units))
     text.append(with_terrain(drawn))
-    if drawn.solid is not None:
+    if drawn.solid is not None and figures is not None:
         text += boundary_surfaces(drawn.solid, figures, surface_ids(drawn.solid.faces, name), drawn.units)
     text += [part_element(drawn, number, part) for number, part in enumerate(drawn.shapes.parts, 1)]
     return "".join([*text, "</bldg:Building>"])

@@ -138,8 +138,8 @@ def surface_of(old: Any, owner: str) -> Any:
 def height_of(old: Any) -> Any:
     """A measuredHeight, which says from where to where it was measured."""
     told = {"highReference": "highestRoofEdge", "lowReference": "lowestGroundPoint", "status": "measured"}
-    told = [made(f"con:{name}", text=value) for name, value in told.items()]
-    return made("con:Height", *told, made("con:value", text=old.text, uom=old.get("uom")))
+    how = [made(f"con:{name}", text=value) for name, value in told.items()]
+    return made("con:Height", *how, made("con:value", text=old.text, uom=old.get("uom")))
 
 
 def geometry_of(old: Any) -> Any:

@@ -80,7 +80,8 @@ class CityJSONWriter(BuildingWriter):
         self.header_length = len(self.header(np.full(3, WIDEST), [WIDEST] * 6))
         self.file.write(b" " * self.header_length + b"\n")
         # The vertices of a document stand in one list after all objects: they wait in a second file.
-        self.waiting = stack.enter_context(scratch(self.path)) if self.is_document else None
+        if self.is_document:
+            self.waiting = stack.enter_context(scratch(self.path))
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
@@ -159,7 +160,8 @@ def writer(path: str | os.PathLike, head: FileHead) -> CityJSONWriter:
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's line in a run's file."""
-    vertices = Vertices(sheet.head.offset, SCALE, sheet.head.units.cityjson)
+    offset = np.zeros(3) if sheet.head.offset is None else sheet.head.offset
+    vertices = Vertices(offset, SCALE, sheet.head.units.cityjson)
     drawn = Drawn(sheet.building, sheet.figures, sheet.shapes, sheet.attributes, PREFIX, sheet.head.write.lods)
     return feature_line(drawn, sheet.name, vertices)
 

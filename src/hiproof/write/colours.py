@@ -33,10 +33,11 @@ def linear_rgb(colour: str) -> tuple[float, float, float]:
     >>> linear_rgb("#ff0000")
     (1.0, 0.0, 0.0)
     """
-    parts = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
-    return tuple(c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in srgb(colour))
+    return red, green, blue
 
 
 def srgb(colour: str) -> tuple[float, float, float]:
     """Red, green, blue in 0..1 of a `#rrggbb` colour as displayed."""
-    return tuple(int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    red, green, blue = (int(colour[i : i + 2], 16) / 255 for i in (1, 3, 5))
+    return red, green, blue

@@ -58,7 +58,7 @@ Fragments = dict[str, Fragment]
 
 def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
     """Write the buildings `parts` to `file`, without compression."""
-    arrays = {}
+    arrays: dict[str, Any] = {}
     for kind in parts[0] if parts else ():
         several = [part[kind] for part in parts]
         arrays[kind] = np.frombuffer(b"".join(fragment.text for fragment in several), np.uint8)

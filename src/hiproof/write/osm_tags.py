@@ -74,5 +74,5 @@ def direction_of(building: Building, main: int, azimuth_deg: float) -> float:
 def told(value: Any) -> Any:
     """A number to the centimetre or hundredth of a degree, None where it is none."""
     if isinstance(value, (float, np.floating)):
-        return rounded(value, 2) if math.isfinite(value) else None
+        return rounded(float(value), 2) if math.isfinite(value) else None
     return value

@@ -107,7 +107,10 @@ def roof_figures(solid: Solid) -> RoofFigures:
 
 def face_fans(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
     """Vertex indices (t, 3) of the fan triangles of all faces, (origin, edge start, edge end), and their face (t,)."""
-    origins, starts, ends, face_of = [], [], [], []
+    origins: list[int] = []
+    starts: list[int] = []
+    ends: list[int] = []
+    face_of: list[int] = []
     for index, face in enumerate(solid.faces):
         for ring in face.rings:
             starts.extend(ring)

@@ -113,7 +113,8 @@ def surface_rows(building: Building, figures: RoofFigures | None, units: Units =
     """A row a roof surface of the solid: its polygon, slope, azimuth, area and part."""
     if figures is None:
         return ()
-    vertices, rows = units.from_metres(building.solid.vertices), []
+    vertices = units.from_metres(building.solid.vertices)
+    rows: list[Row] = []
     for index, face in enumerate(building.solid.faces):
         if face.kind != ROOF:
             continue

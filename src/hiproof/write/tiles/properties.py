@@ -43,15 +43,13 @@ class Found:
     """The attributes met so far, and whether all values of each are numbers."""
 
     def __init__(self) -> None:
-        self.are_numbers: dict[str, bool] = {}
+        self.are_numbers: dict[str, bool | None] = {}  # None of what had no value so far
 
     def add(self, values: dict[str, Any]) -> None:
         for name, value in values.items():
-            known = self.are_numbers.get(name)
+            known = self.are_numbers.setdefault(name, None)
             if value is not None:
                 self.are_numbers[name] = known is not False and is_number(value)
-            elif known is None and name not in self.are_numbers:
-                self.are_numbers[name] = None
 
     def properties(self) -> list[Property]:
         """The columns that hold them, named as the extension allows: letters, digits, underscores."""
@@ -71,7 +69,7 @@ def property_id(names: UniqueNames, name: str) -> str:
 
 def schema_of(properties: Iterable[Property]) -> dict[str, Any]:
     """The schema: one class, a property a column."""
-    kinds = {
+    kinds: dict[bool, dict[str, Any]] = {
         True: {"type": "SCALAR", "componentType": "FLOAT64", "noData": NO_NUMBER},
         False: {"type": "STRING", "noData": ""},
     }
