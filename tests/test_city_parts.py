@@ -9,7 +9,7 @@ import shapely
 
 from hiproof.city.executors import InProcess, Processes, WorkerLost
 from hiproof.city.ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
-from hiproof.city.ledger import Ledger, Outcome
+from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
 
@@ -124,11 +124,11 @@ def test_lowest_points_do_not_depend_on_how_they_are_cut():
 def test_the_ledger_remembers_after_being_closed(tmp_path):
     path = tmp_path / "ledger.sqlite"
     ledger = Ledger(path)
-    ledger.add_tasks([("solve:a", "solve", 0, 2), ("solve:b", "solve", 1, 1)])
+    ledger.add_tasks([Task("solve:a", "solve", 2), Task("solve:b", "solve", 1)])
     ledger.finish("solve:a", "done", "", [Outcome(0, "x", "modelled", "gable", "", 0.9, 0.05, 0.01)])
     ledger.close()
     again = Ledger(path)
-    again.add_tasks([("solve:a", "solve", 0, 2)])
+    again.add_tasks([Task("solve:a", "solve", 2)])
     assert again.open_tasks("solve") == ["solve:b"]
     assert again.counts("status") == {"modelled": 1}
     reader = Ledger(path, read_only=True)

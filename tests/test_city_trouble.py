@@ -9,8 +9,9 @@ import pytest
 
 import planted
 from hiproof.city import run as city_run
-from hiproof.city.ledger import Ledger
+from hiproof.city.ledger import Ledger, Task
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.city.sort import Gatherer
 from hiproof.errors import OutputError
 from hiproof.read.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
@@ -111,6 +112,8 @@ def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(town_files, tm
 
 def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    chunks, flush = [], Gatherer.flush
+    monkeypatch.setattr(Gatherer, "flush", lambda self: (chunks.append(self.number), flush(self)))
     monkeypatch.setattr("hiproof.city.sort.HELD_POINTS", 1000)
     monkeypatch.setattr("hiproof.read.pointcloud.CHUNK_POINTS", 3000)
     town, rng = make_town(), np.random.default_rng(5)
@@ -121,6 +124,7 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_pat
         clouds.append(str(write_cloud(tmp_path / f"{name}.laz", town.xyz[members], town.classification[members])))
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
+    assert min(chunks.count(number) for number in (0, 1)) > 1
     assert records(tmp_path / "out") == records(undisturbed)
 
 
@@ -149,7 +153,7 @@ def test_thinning_depends_on_the_set_of_points_alone():
 
 def test_the_ledger_tells_losses_from_orderly_ends(tmp_path):
     ledger = Ledger(tmp_path / "ledger.sqlite")
-    ledger.add_tasks([("solve:a", "solve", 0, 2), ("solve:b", "solve", 1, 1)])
+    ledger.add_tasks([Task("solve:a", "solve", 2), Task("solve:b", "solve", 1)])
     ledger.start("solve:a")
     assert ledger.open_tasks("solve") == ["solve:b"]
     ledger.interrupt()

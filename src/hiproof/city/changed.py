@@ -126,6 +126,6 @@ def sorting(tasks: list[Task], again: bool) -> list[Task]:
 def solving(plan: Plan, redo: dict[str, list[int]]) -> list[Task]:
     """The tasks that solve tiles, open where a building is to be solved."""
     return [
-        Task(f"solve:{tile}", "solve", len(members), "open" if tile in redo else "done", 0, "", None)
+        Task(f"solve:{tile}", "solve", len(members), "open" if tile in redo else "done")
         for tile, members in plan.tiles.items()
     ]

@@ -31,10 +31,10 @@ class Task(NamedTuple):
     name: str
     kind: str
     buildings: int
-    state: str
-    losses: int
-    message: str
-    finished: float | None
+    state: str = "open"
+    losses: int = 0
+    message: str = ""
+    finished: float | None = None
 
 
 class Outcome(NamedTuple):
@@ -48,6 +48,21 @@ class Outcome(NamedTuple):
     share: float | None
     psd: float | None
     seconds: float
+
+
+class Failure(NamedTuple):
+    """A building that hit an internal error, and what it was."""
+
+    id: str
+    detail: str
+
+
+class Claim(NamedTuple):
+    """A file that the run says it has written: its name within the run's folder, its size and its digest."""
+
+    name: str
+    bytes: int
+    digest: str
 
 
 TABLES = ("run", "task", "building", "override", "output")
@@ -77,15 +92,15 @@ class Ledger:
         row = self.database.execute("select value from run where key = ?", (key,)).fetchone()
         return row[0] if row else None
 
-    def claim(self, rows: list[tuple[str, int, str]]) -> None:
-        """Enter the (name, bytes, digest) rows of all files written, and with them that the run is finished."""
+    def claim(self, files: list[Claim]) -> None:
+        """Enter all files written, and with them that the run is finished."""
         self.database.execute("begin")
-        self.database.executemany("insert or replace into output values (?, ?, ?)", rows)
+        self.database.executemany("insert or replace into output values (?, ?, ?)", files)
         self.set(merged="yes")
         self.database.execute("commit")
 
-    def claims(self) -> list[tuple[str, int, str]]:
-        return self.database.execute("select name, bytes, digest from output order by name").fetchall()
+    def claims(self) -> list[Claim]:
+        return list(map(Claim._make, self.database.execute("select name, bytes, digest from output order by name")))
 
     def overrides(self) -> dict[int, str]:
         """Digests of the overrides that buildings were made with, by position."""
@@ -114,11 +129,11 @@ class Ledger:
         for table in TABLES:
             self.database.execute(f"delete from {table}")
 
-    def add_tasks(self, rows: list[tuple[str, str, int, int]]) -> None:
-        """Enter (name, kind, position, buildings) rows that are not there yet."""
+    def add_tasks(self, tasks: list[Task]) -> None:
+        """Enter those open tasks of a kind, in the order of the plan, that are not there yet."""
         self.database.execute("begin")
         sql = "insert or ignore into task (name, kind, position, buildings) values (?, ?, ?, ?)"
-        self.database.executemany(sql, rows)
+        self.database.executemany(sql, [(t.name, t.kind, i, t.buildings) for i, t in enumerate(tasks)])
         self.database.execute("commit")
 
     def open_tasks(self, kind: str) -> list[str]:
@@ -188,7 +203,7 @@ class Ledger:
     def column(self, name: str) -> list:
         return [value for (value,) in self.database.execute(f"select {name} from building order by position")]
 
-    def failures(self, limit: int = 20) -> list[tuple[str, str]]:
-        """(id, detail) of buildings that hit an internal error."""
+    def failures(self, limit: int = 20) -> list[Failure]:
+        """The first buildings that hit an internal error."""
         sql = "select id, detail from building where status = 'internal_error' order by position limit ?"
-        return self.database.execute(sql, (limit,)).fetchall()
+        return list(map(Failure._make, self.database.execute(sql, (limit,))))

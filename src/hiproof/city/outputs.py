@@ -6,25 +6,27 @@ import hashlib
 from collections.abc import Iterable
 from pathlib import Path
 
+from .ledger import Claim
+
 CHUNK_BYTES = 1 << 20
 SQLITE = b"SQLite format 3\0"
 # bytes of an SQLite file's head that change when a viewer opens it: how it is locked, and counters of that
 RESTLESS = ((18, 20), (24, 28), (92, 100))
 
 
-def claims(files: Iterable[Path], out: Path) -> list[tuple[str, int, str]]:
-    """(name within `out`, bytes, digest) of each of `files`."""
-    return [(file.relative_to(out).as_posix(), file.stat().st_size, digest(file)) for file in files]
+def claims(files: Iterable[Path], out: Path) -> list[Claim]:
+    """What a run in `out` says of each of `files`."""
+    return [Claim(file.relative_to(out).as_posix(), file.stat().st_size, digest(file)) for file in files]
 
 
-def broken_claims(known: Iterable[tuple[str, int, str]], out: Path) -> list[str]:
+def broken_claims(known: Iterable[Claim], out: Path) -> list[str]:
     """Names of those files that are gone or not as they were written; sizes are asked before digests."""
-    return [name for name, size, was in known if not stands(out / name, size, was)]
+    return [claim.name for claim in known if not stands(out / claim.name, claim)]
 
 
-def stands(file: Path, size: int, was: str) -> bool:
+def stands(file: Path, claim: Claim) -> bool:
     try:
-        return file.stat().st_size == size and digest(file) == was
+        return file.stat().st_size == claim.bytes and digest(file) == claim.digest
     except OSError:
         return False
 

@@ -16,7 +16,7 @@ from ..log import LOGGER
 from ..masking import masked_values
 from ..write.files import atomic
 from .changed import take_over
-from .ledger import Ledger
+from .ledger import Ledger, Task
 from .marks import choice_of, inputs_of, mark_of
 from .merge import remove_tiles, tile_parts
 from .outputs import broken_claims
@@ -97,9 +97,8 @@ def begin(plan: Plan, request: Request, state: Path, ledger: Ledger) -> None:
     forget(state, ledger)
     with atomic(state / PLAN_FILE) as beside:
         plan.save(Path(beside))
-    ledger.add_tasks([(f"sort:{i}", "sort", i, 0) for i in range(len(request.clouds))])
-    tiles = enumerate(plan.tiles.items())
-    ledger.add_tasks([(f"solve:{tile}", "solve", i, len(members)) for i, (tile, members) in tiles])
+    ledger.add_tasks([Task(f"sort:{i}", "sort", 0) for i in range(len(request.clouds))])
+    ledger.add_tasks([Task(f"solve:{tile}", "solve", len(members)) for tile, members in plan.tiles.items()])
 
 
 def enter(request: Request, ledger: Ledger) -> None:

@@ -24,7 +24,7 @@ from ..status import Status
 from ..write.files import atomic
 from .checks import refuse_unusable
 from .executors import WorkerLost, make_executor
-from .ledger import Ledger
+from .ledger import Failure, Ledger
 from .lock import held
 from .merge import merge, output_files
 from .outputs import claims
@@ -50,7 +50,7 @@ class Summary:
     median_psd: float | None
     mean_share: float | None
     broken_inputs: tuple[tuple[str, str], ...]
-    failures: tuple[tuple[str, str], ...]
+    failures: tuple[Failure, ...]
     seconds: dict[str, float]
     units: Units = METRES
 

@@ -144,6 +144,8 @@ def worst_buildings(run: EvaluatedRun, worst: list[int], shown: list[int]) -> st
 
 def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
     model, points, quality = run.models[index], run.points[index], run.figures[index].quality
+    if model.solid is None:
+        return ""
     origin = model.solid.vertices.min(axis=0)
     pictures = building_pictures(model.solid.moved(-origin), points - origin, psd(model.solid, points), model.roof_type)
     text = (

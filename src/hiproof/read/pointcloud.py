@@ -65,12 +65,12 @@ def read_points(*paths: str | Path, settings: Settings | None = None, box: Box |
 
 def iter_points(
     path: str | Path,
-    chunk_points: int = CHUNK_POINTS,
+    chunk_points: int | None = None,
     box: Box | None = None,
     runs: np.ndarray | None = None,
     units: Units = METRES,
 ) -> Iterator[PointCloud]:
-    """Yield the points of one file, at most `chunk_points` at a time, without their CRS: memory stays bounded.
+    """Yield the points of one file, at most `chunk_points` (CHUNK_POINTS) at a time, without their CRS: memory stays bounded.
 
     `units` are those of the file's coordinates; the points, and `box`, are in world metres.
 
@@ -78,11 +78,11 @@ def iter_points(
     `runs` (k, 2) of points, [first, end), are read where they are given (see lax.py). Raises InputError as
     `read_points` does, an empty file excepted, which yields nothing.
     """
-    kind = file_kind(path)
+    kind, most = file_kind(path), chunk_points or CHUNK_POINTS
     if kind == "las":
-        chunks = las.las_chunks(path, chunk_points, None if box is None else box_in_file(box, units), runs)
+        chunks = las.las_chunks(path, most, None if box is None else box_in_file(box, units), runs)
     else:
-        chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, chunk_points)
+        chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, most)
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)

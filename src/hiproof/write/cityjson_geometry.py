@@ -50,8 +50,8 @@ def building_geometry(
     Vertices go to `vertices`. A building in parts has no solid of its own.
     """
     if figures is None:
-        has_footprint = has_level_footprint(building)
-        return [multi_surface(footprint_boundaries(building, vertices))] if has_footprint else []
+        footprint = level_footprint(building)
+        return [] if footprint is None else [multi_surface(outline_boundaries(footprint, building.z_ground, vertices))]
     solids = []
     if "2.2" in lods and not shapes.parts:
         solids = [
@@ -140,21 +140,23 @@ def roof_surfaces(building: Building, solid: Solid, figures: RoofFigures, prefix
     return found
 
 
-def has_level_footprint(building: Building) -> bool:
-    """Whether a building without a solid still has an outline and a height to draw it at."""
+def level_footprint(building: Building) -> shapely.Polygon | None:
+    """The footprint of a building without a solid, None without one or without a height to draw it at."""
     footprint = building.footprint
-    return footprint is not None and not footprint.is_empty and math.isfinite(building.z_ground)
+    if footprint is None or footprint.is_empty or not math.isfinite(building.z_ground):
+        return None
+    return footprint
 
 
-def footprint_boundaries(building: Building, vertices: Vertices) -> list[list[list[int]]]:
-    """Surfaces of the footprint at ground height, outer rings counter-clockwise seen from above."""
+def outline_boundaries(outline: shapely.Geometry, z: float, vertices: Vertices) -> list[list[list[int]]]:
+    """Surfaces of the polygons of `outline` at height `z`, outer rings counter-clockwise seen from above."""
     surfaces = []
-    for polygon in shapely.get_parts(shapely.normalize(building.footprint)):
+    for polygon in shapely.get_parts(shapely.normalize(outline)):
         polygon = shapely.geometry.polygon.orient(polygon)
         rings = []
         for ring in (polygon.exterior, *polygon.interiors):
             xy = shapely.get_coordinates(ring)[:-1]
-            rings.append(vertices.add(np.column_stack([xy, np.full(len(xy), building.z_ground)])))
+            rings.append(vertices.add(np.column_stack([xy, np.full(len(xy), z)])))
         surfaces.append(rings)
     return surfaces
 
@@ -163,6 +165,5 @@ def first_corner(building: Building) -> np.ndarray | None:
     """A corner (3,) of what `building_geometry` would draw, None if that is nothing."""
     if building.built is not None:
         return building.solid.vertices.min(axis=0)
-    if has_level_footprint(building):
-        return np.array([*building.footprint.bounds[:2], building.z_ground])
-    return None
+    footprint = level_footprint(building)
+    return None if footprint is None else np.array([*footprint.bounds[:2], building.z_ground])
