@@ -39,7 +39,7 @@ def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run()
 def test_models_by_work_tile_need_the_same_parts_of_buildings():
     by_tile = Settings.from_dict({"city": {"models": "tiles"}})
     assert set(asked_files(by_tile, Path())) == {"parameters", "gpkg"}
-    assert asked_fragments(by_tile) == asked_fragments(Settings())
+    assert asked_fragments(by_tile) == asked_fragments(Settings().write)
 
 
 class Names(BuildingWriter):
@@ -80,16 +80,16 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     ],
 )
 def test_citygml_is_written_in_the_versions_asked_for(tmp_path, version, files):
-    settings = Settings.from_dict({"city": {"citygml": version, "models": "both"}})
+    settings = Settings.from_dict({"write": {"citygml": version}, "city": {"models": "both"}})
     asked = asked_files(settings, tmp_path)
     assert [file.name for file in asked.values() if file.suffix == ".gml"] == files
     by_tile = asked_tile_files(settings, tmp_path, "0_0_0").values()
     assert [file.name for file in by_tile if file.suffix == ".gml"] == [
         name.replace("buildings", "0_0_0") for name in files
     ]
-    head = FileHead("EPSG:7415", offset=np.array([85000.0, 446000.0, 0.0]))
+    head = FileHead("EPSG:7415", offset=np.array([85000.0, 446000.0, 0.0]), write=settings.write)
     building = modelled(gable_house(), "a")
-    join_fragments(asked, [fragments(building, ("a", "a"), head, settings)[1]], head)
+    join_fragments(asked, [fragments(building, ("a", "a"), head)[1]], head)
     if version == "both":
         write_citygml3(tmp_path / "alone.gml", [building], "EPSG:7415")
         assert (tmp_path / "alone.gml").read_bytes() == asked["gml3"].read_bytes()

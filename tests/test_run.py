@@ -70,6 +70,28 @@ def test_the_run_record_names_settings_version_inputs_and_counts(finished):
     assert set(record["seconds"]) == {"plan", "prepare", "sort", "solve", "merge"}
 
 
+def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(files, tmp_path):
+    cloud, footprints = map(str, files)
+    asked = ["--citygml", "both", "--osm-tags", "--lods", "0,2.2"]
+    run = CliRunner().invoke(
+        app, ["reconstruct", cloud, "--footprints", footprints, "--out", f"{tmp_path}/run", *asked]
+    )
+    assert run.exit_code == 0, run.output
+    for name, options in (("as told", []), ("asked", ["--citygml", "3.0", "--no-osm-tags"])):
+        made = CliRunner().invoke(
+            app, ["build", f"{tmp_path}/run/parameters.jsonl", "--out", f"{tmp_path}/{name}", *options]
+        )
+        assert made.exit_code == 0, made.output
+    ours = {path.name for path in (tmp_path / "run").iterdir() if path.is_file() and path.name != "run.json"}
+    assert ours == {*RECORDS, "buildings.citygml3.gml", "buildings.gpkg"}
+    for name in ours:
+        text = (tmp_path / "run" / name).read_bytes()
+        assert (tmp_path / "as told" / name).read_bytes() == text, name
+        assert (b"roof:shape" in text) == (name != "parameters.jsonl"), name
+    left = {path.name: path.read_bytes() for path in (tmp_path / "asked").iterdir() if path.is_file()}
+    assert ours - left.keys() == {"buildings.gml"} and not any(b"roof:shape" in text for text in left.values())
+
+
 def test_heights_are_the_towns(finished):
     heights = {id: solid.vertices[:, 2] for id, solid in read_solids(finished[0] / "buildings.city.jsonl")}
     for i in range(3):

@@ -22,23 +22,23 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .settings import Settings
+from .settings import Settings, WriteSettings
 
 
-def always(settings: Settings) -> bool:
+def always(write: WriteSettings) -> bool:
     return True
 
 
-def citygml2(settings: Settings) -> bool:
-    return settings.city.citygml != "3.0"
+def citygml2(write: WriteSettings) -> bool:
+    return write.citygml != "3.0"
 
 
-def citygml3(settings: Settings) -> bool:
-    return settings.city.citygml != "2.0"
+def citygml3(write: WriteSettings) -> bool:
+    return write.citygml != "2.0"
 
 
-def parquet(settings: Settings) -> bool:
-    return settings.city.parquet
+def parquet(write: WriteSettings) -> bool:
+    return write.parquet
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Format:
     what: str
     module: str
     fragment: str = ""
-    asked: Callable[[Settings], bool] = always
+    asked: Callable[[WriteSettings], bool] = always
     tile_ending: str = ""
     given: dict[str, Any] = field(default_factory=dict)
 
@@ -135,25 +135,27 @@ def asked_files(settings: Settings, folder: Path) -> dict[str, Path]:
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
     """
     by_tile_alone = settings.city.models == "tiles"
-    written = {n: format for n, format in asked_formats(settings).items() if not (by_tile_alone and format.tile_ending)}
+    written = {
+        n: format for n, format in asked_formats(settings.write).items() if not (by_tile_alone and format.tile_ending)
+    }
     return {name: folder / format.file for name, format in written.items()}
 
 
 def asked_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
     """Paths in `folder` of the files of a work tile's own, by format; none where such a run writes none."""
     by_tile = settings.city.models != "merged"
-    asked = {name: format for name, format in asked_formats(settings).items() if by_tile and format.tile_ending}
+    asked = {name: format for name, format in asked_formats(settings.write).items() if by_tile and format.tile_ending}
     return {name: folder / f"{tile}{format.tile_ending}" for name, format in asked.items()}
 
 
-def asked_fragments(settings: Settings) -> list[str]:
+def asked_fragments(write: WriteSettings) -> list[str]:
     """The modules that make a building's parts of all files of such a run, those of its work tiles included."""
-    return list(dict.fromkeys(format.fragment for format in asked_formats(settings).values()))
+    return list(dict.fromkeys(format.fragment for format in asked_formats(write).values()))
 
 
-def asked_formats(settings: Settings) -> dict[str, Format]:
+def asked_formats(write: WriteSettings) -> dict[str, Format]:
     """What a run of these settings writes, as whole files or by work tile."""
-    return {name: format for name, format in FORMATS.items() if format.fragment and format.asked(settings)}
+    return {name: format for name, format in FORMATS.items() if format.fragment and format.asked(write)}
 
 
 def module_of(name: str) -> ModuleType:

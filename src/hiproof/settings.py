@@ -152,25 +152,17 @@ class CitySettings:
     max_points_a_building: int = setting(
         20000, "a building with more points is thinned to so many, evenly and by a fixed rule", "", 1000, 10**7
     )
-    parquet: bool = setting(False, "write the attribute table as GeoParquet too (extra `parquet`)", option="--parquet")
     models: str = setting(
         "merged",
         "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or both",
         choices=("merged", "tiles", "both"),
         option="--models",
     )
-    citygml: str = setting("2.0", "version of CityGML, or both", choices=("2.0", "3.0", "both"), option="--citygml")
-    osm_tags: bool = setting(
-        False,
-        "write OpenStreetMap's Simple 3D tags as attributes too: roof:shape, roof:height, roof:direction, roof:angle, height; they "
-        "replace the input's own of these names",
-        option="--osm-tags",
-    )
 
 
 @dataclass(frozen=True)
 class WriteSettings:
-    """[write] what of a building stands in the models."""
+    """[write] what of a building stands in the files, and which files there are."""
 
     lods: tuple[str, ...] = setting(
         ("2.2",),
@@ -189,6 +181,14 @@ class WriteSettings:
     roof_codes: str = setting(
         "sig3d", "code list of CityGML's roofType: SIG3D's or AdV's", choices=("sig3d", "adv"), option="--roof-codes"
     )
+    citygml: str = setting("2.0", "version of CityGML, or both", choices=("2.0", "3.0", "both"), option="--citygml")
+    osm_tags: bool = setting(
+        False,
+        "write OpenStreetMap's Simple 3D tags as attributes too: roof:shape, roof:height, roof:direction, roof:angle, height; they "
+        "replace the input's own of these names",
+        option="--osm-tags",
+    )
+    parquet: bool = setting(False, "write the tables as GeoParquet too (extra `parquet`)", option="--parquet")
     out_crs: str = setting(
         "",
         'CRS of the coordinates in all files but parameters.jsonl, such as "EPSG:25832"; empty means that of the clouds; heights stay as '

@@ -23,7 +23,7 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.family import NAMES
 from hiproof.simulate import demo_files
 
-FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
+FILES = ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
 PARQUET = ("buildings.parquet", "parts.parquet", "roof_surfaces.parquet")
 PUBLISHED = Path(__file__).parents[2] / "docs/parameters.schema.json"
 RING = [[-6.0, -4.0], [6.0, -4.0], [6.0, 4.0], [-6.0, 4.0], [-6.0, -4.0]]
@@ -52,7 +52,8 @@ def demo_run(tmp_path_factory):
     """The bundled neighbourhood, without the network: its types are all in it, and a footprint without points."""
     files, out = demo_files(), tmp_path_factory.mktemp("demo")
     pytest.importorskip("pyarrow", reason="GeoParquet needs pyarrow (extra `city`)")
-    settings = hiproof.Settings.from_dict({"segment": {"enabled": False}, "city": {"parquet": True}})
+    everything = {"parquet": True, "citygml": "both", "osm_tags": True}
+    settings = hiproof.Settings.from_dict({"segment": {"enabled": False}, "write": everything})
     request = hiproof.Request(
         (str(files["cloud"]),), out, str(files["footprints"]), str(files["terrain"]), settings=settings
     )
@@ -61,7 +62,7 @@ def demo_run(tmp_path_factory):
 
 
 def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
-    built = build_file(demo_run / "parameters.jsonl", tmp_path, parquet=True)
+    built = build_file(demo_run / "parameters.jsonl", tmp_path)
     assert built.exit_code == 0 and built.buildings == len(hiproof.read_parameters(demo_run / "parameters.jsonl"))
     for name in (*FILES, *PARQUET):
         assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name

@@ -93,9 +93,7 @@ def town(tmp_path_factory):
     cloud = str(write_cloud(folder / "cloud.laz", town.xyz, town.classification, "EPSG:7415"))
     footprints = str(write_footprints(folder / "footprints.gpkg", town.footprints, "EPSG:28992"))
     for name, out_crs in (("here", ""), ("there", "EPSG:25831")):
-        settings = Settings.from_dict(
-            {"write": {"out_crs": out_crs, "lods": ["0", "2.2"]}, "city": {"citygml": "both"}}
-        )
+        settings = Settings.from_dict({"write": {"out_crs": out_crs, "lods": ["0", "2.2"], "citygml": "both"}})
         assert reconstruct_area(Request((cloud,), folder / name, footprints, settings=settings)).exit_code == 0
     return folder
 
@@ -135,7 +133,7 @@ def table(path, layer):
 def test_parameters_stay_in_the_clouds_crs_and_build_the_same_bytes(town, tmp_path):
     here, there = ((town / run / "parameters.jsonl").read_bytes().split(b"\n") for run in ("here", "there"))
     assert here[1:] == there[1:]
-    build_file(town / "there/parameters.jsonl", tmp_path / "again", changes={"city": {"citygml": "both"}})
+    build_file(town / "there/parameters.jsonl", tmp_path / "again")
     for name in ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl"):
         assert (tmp_path / "again" / name).read_bytes() == (town / "there" / name).read_bytes(), name
     build_file(town / "here/parameters.jsonl", tmp_path / "moved", changes={"write": {"out_crs": "EPSG:25831"}})

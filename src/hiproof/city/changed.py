@@ -114,7 +114,7 @@ def move_texts(plan: Plan, state: Path, kept: dict[int, Place], redo: dict[str, 
 
 def to_do(plan: Plan) -> Fragments:
     """What stands in a tile's file where a building is to be solved."""
-    return dict.fromkeys(asked_fragments(plan.settings), Fragment(b""))
+    return dict.fromkeys(asked_fragments(plan.settings.write), Fragment(b""))
 
 
 def sorting(tasks: list[Task], again: bool) -> list[Task]:

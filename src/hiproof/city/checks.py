@@ -32,7 +32,7 @@ def refuse_settings(settings: Settings) -> None:
         from ..segment.inference import SHIPPED_WEIGHTS, load
 
         load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
-    if settings.city.parquet:
+    if settings.write.parquet:
         from ..write.geoparquet import import_pyarrow
 
         import_pyarrow()

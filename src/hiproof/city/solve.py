@@ -134,7 +134,7 @@ def solve_one(
     try:
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
         if not found.is_seen and override is None:
-            return fragments(not_seen(job, found.remark), plan.names_of(job), plan.head, plan.settings)
+            return fragments(not_seen(job, found.remark), plan.names_of(job), plan.head)
         points = found.points
         used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
         known = used, job.footprint, surroundings.terrain_of(job), plan.settings
@@ -142,7 +142,7 @@ def solve_one(
         if len(used) < len(points) and building.status is Status.MODELLED:
             building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
         building = remarked(building, found.remark)
-        return fragments(building, plan.names_of(job), plan.head, plan.settings)
+        return fragments(building, plan.names_of(job), plan.head)
     except MemoryError:
         raise
     except Exception as error:
@@ -160,7 +160,7 @@ def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:
     """A building that hiproof failed on, with what the input said of it."""
     attributes = job.footprint.attributes if job.footprint else {}
     building = Building(job.id, Status.INTERNAL_ERROR, masked(detail), footprint=job.area, attributes=attributes)
-    return fragments(building, plan.names_of(job), plan.head, plan.settings)
+    return fragments(building, plan.names_of(job), plan.head)
 
 
 def outcome_of(position: int, building: Building, seconds: float) -> Outcome:

@@ -31,9 +31,6 @@ def print_schema(wanted: bool) -> None:
 def build(
     parameters: Annotated[Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")],
     out: Annotated[Path, typer.Option(help="folder for the results")],
-    parquet: Annotated[
-        bool, typer.Option("--parquet", help="write the tables as GeoParquet too (extra `parquet`)")
-    ] = False,
     shapes: Annotated[
         bool, typer.Option("--shapes", callback=print_shapes, is_eager=True, help="print every roof type's parameters")
     ] = False,
@@ -50,7 +47,7 @@ def build(
     from .reconstruct import Bar
 
     with Bar() as bar:
-        built = build_file(parameters, out, parquet, lambda done: bar.update("build", done, None), changes)
+        built = build_file(parameters, out, lambda done: bar.update("build", done, None), changes)
     for id, why in built.not_built:
         typer.echo(f"not built: building {id}: {why}", err=True)
     typer.echo(f"{built.buildings} buildings: " + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common()))

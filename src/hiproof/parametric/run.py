@@ -66,21 +66,20 @@ class Built:
 def build_file(
     path: str | os.PathLike,
     out: str | os.PathLike,
-    parquet: bool = False,
     progress: Callable[[int], None] = lambda done: None,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> Built:
-    """Write the files of a run into the folder `out` from the parameters.jsonl at `path`; `parquet` adds GeoParquet.
+    """Write the files of a run into the folder `out` from the parameters.jsonl at `path`.
 
-    What is written of buildings is as the file's head says, but for `changes` of the settings [write]. A building that cannot be built is written without a model, with a sentence, and keeps its parameters. Raises InputError
+    What is written is as the file's head says, but for `changes` of the settings [write]. A building that cannot be built is written without a model, with a sentence, and keeps its parameters. Raises InputError
     for a file that cannot be read and OutputError for a folder that cannot be written; then nothing is written.
     """
     path, out, built = Path(path), Path(out), Built()
     refuse_folder_of_a_run(out)
     with opened_parameters(path) as (head, records):
-        settings = Settings(write=head.write).replace({"city": {"parquet": parquet}} | (changes or {}))
+        settings = Settings(write=head.write).replace(changes or {})
         offset = head.offset if settings.write.out_crs == head.write.out_crs else None
-        maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset), settings)
+        maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
         maker.settle_offset(first)
@@ -115,8 +114,8 @@ def made(maker: Maker, records: Iterator[dict], built: Built, progress: Callable
 class Maker:
     """Makes the texts of building after building, as the files of one run hold them."""
 
-    def __init__(self, head: FileHead, settings: Settings) -> None:
-        self.head, self.settings = head, settings
+    def __init__(self, head: FileHead) -> None:
+        self.head = head
         self.names = UniqueNames(), UniqueNames()
 
     def settle_offset(self, first: Mapping[str, Any] | None) -> None:
@@ -131,7 +130,7 @@ class Maker:
         try:
             if names[0] != plain_text(id):
                 raise InputError(f"expected buildings of different ids, got {id!r} again; give this one another")
-            return fragments(build(record, self.head.compose), names, self.head, self.settings)
+            return fragments(build(record, self.head.compose), names, self.head)
         except HiproofError as error:
             why, status = str(error), Status.NOT_BUILT
         except MemoryError:
@@ -141,7 +140,7 @@ class Maker:
             why = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
             status = Status.INTERNAL_ERROR
         building = Building(id, status, masked(why))
-        building, texts = fragments(building, names, self.head, self.settings)
+        building, texts = fragments(building, names, self.head)
         kept = finite({**record, "status": status.code, "detail": building.detail})
         return building, texts | {"parameters": Fragment(dump(kept) + b"\n")}
 

@@ -100,6 +100,7 @@ class AttributesWriter(BuildingWriter):
     ) -> None:
         super().__init__(path)
         head = FileHead(crs, write=write or WriteSettings())
+        self.osm_tags = head.write.osm_tags
         self.plan_wkt, self.prefix, self.units = plan_wkt(head.crs_of_files), prefix, head.units.gml
 
     def open(self, stack: ExitStack) -> None:
@@ -108,7 +109,7 @@ class AttributesWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        attributes = building_attributes(building, figures, self.prefix, self.units)
+        attributes = building_attributes(building, figures, self.prefix, self.units, self.osm_tags)
         self.put_rows(table_rows(building, figures, attributes, self.units))
 
     def put(self, fragment: Fragment) -> None:

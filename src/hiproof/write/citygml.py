@@ -98,7 +98,7 @@ class CityGMLWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        attributes = building_attributes(building, figures, self.prefix, self.units)
+        attributes = building_attributes(building, figures, self.prefix, self.units, self.write.osm_tags)
         name = self.names.take(gml_name(building.id))
         shapes = shapes_of(building, figures, self.write, self.prefix)
         date = self.creation_date

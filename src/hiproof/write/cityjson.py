@@ -87,7 +87,7 @@ class CityJSONWriter(BuildingWriter):
         figures = figures or figures_of(building)
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale, self.units)
-        attributes = building_attributes(building, figures, self.prefix, self.units)
+        attributes = building_attributes(building, figures, self.prefix, self.units, self.write.osm_tags)
         shapes = shapes_of(building, figures, self.write, self.prefix)
         drawn = Drawn(building, figures, shapes, attributes, self.prefix, self.write.lods)
         if self.is_document:

@@ -53,19 +53,15 @@ def writer_of(format: Format, path: Path, head: FileHead) -> BuildingWriter:
     return module_of(format.module).writer(path, head, **format.given)
 
 
-def fragments(
-    asked: Building, names: tuple[str, str], head: FileHead, settings: Settings | None = None
-) -> tuple[Building, Fragments]:
+def fragments(asked: Building, names: tuple[str, str], head: FileHead) -> tuple[Building, Fragments]:
     """The texts of one building, `names` being its CityJSON id and its gml:id, and the building they tell of.
 
-    They are those of the files that a run of `settings` writes, `head` what these have in common, the offset of the CityJSON file
-    included. A solid that cannot be measured is left out, as in `write_all`.
+    They are those of the files that a run writes, `head` what these have in common, the offset of the CityJSON file included. A solid that cannot be measured is left out, as in `write_all`.
     """
     building, figures = measured(asked)
-    settings = settings or Settings()
-    attributes = building_attributes(building, figures, units=head.units.gml, osm=settings.city.osm_tags)
+    attributes = building_attributes(building, figures, units=head.units.gml, osm=head.write.osm_tags)
     sheet = Sheet(building, figures, attributes, *names, head)
-    kinds = asked_fragments(settings)
+    kinds = asked_fragments(head.write)
     return building, {kind: module_of(kind).fragment(sheet) for kind in kinds}
 
 
