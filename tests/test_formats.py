@@ -39,7 +39,7 @@ def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run()
 def test_models_by_work_tile_need_the_same_parts_of_buildings():
     by_tile = Settings.from_dict({"city": {"models": "tiles"}})
     assert set(asked_files(by_tile, Path())) == {"parameters", "gpkg"}
-    assert asked_fragments(by_tile) == asked_fragments(Settings().write)
+    assert asked_fragments(by_tile.write) == asked_fragments(Settings().write)
 
 
 class Names(BuildingWriter):
