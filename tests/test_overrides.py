@@ -14,6 +14,7 @@ from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.override import overridden, override_of
 from hiproof.settings import Settings
 from hiproof.status import Status
+from hiproof.write.parameters import building_record
 from run_records import by_id, records
 
 PLAIN = Settings.from_dict({"segment": {"enabled": False}})
@@ -53,6 +54,21 @@ def test_no_more_parts_than_asked_for():
     assert len(hiproof.reconstruct(*scan, settings=PLAIN).parts) == 2
     one = obeyed(scan, parts=1)
     assert len(one.parts) == 1 and not check_solid(one.solid)
+
+
+def test_parts_given_stand_where_the_run_moved_the_footprint():
+    """What a run wrote of a footprint beside its roof is an override that gives the run's own building again, moved and measured."""
+    rng = np.random.default_rng(3)
+    xy = rng.uniform((0, 0), (12, 8), (800, 2))
+    scan = np.column_stack([xy, 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0) + rng.normal(0, 0.02, len(xy))])
+    beside = shapely.box(0.9, -1.1, 12.9, 6.9)
+    house = hiproof.reconstruct(scan, beside, settings=PLAIN, id="a")
+    assert np.hypot(*house.shift) > 1.0
+    again = overridden(override_of(building_record(house)), scan, beside, settings=PLAIN, id="a")
+    assert again.shift == house.shift and np.array_equal(again.solid.vertices, house.solid.vertices)
+    assert again.quality == house.quality and "moved by" in again.detail
+    block = obeyed((scan, beside), block_height=6.0, z_ground=1.0)
+    assert block.shift == house.shift and block.roof.outline.area == pytest.approx(96.0, abs=0.01)
 
 
 def test_ground_block_and_leaving_out(scanned):

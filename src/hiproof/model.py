@@ -8,7 +8,7 @@ A roof is a max of mins of planes: over the plan,
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
@@ -16,6 +16,9 @@ import shapely
 from .errors import NoModelError
 from .frames import METRES, LocalFrame, Units
 from .status import Status
+
+if TYPE_CHECKING:
+    from .settings import ComposeSettings
 
 ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
 
@@ -193,10 +196,14 @@ class Fit:
 
 @dataclass(frozen=True)
 class Model:
-    """What was built of a building: its `roof` in a local frame and the `solid` that it closes, in world coordinates."""
+    """What was built of a building: its `roof` in a local frame and the `solid` that it closes, in world coordinates.
+
+    `compose` says how, None for the defaults: a changed building is composed as it was.
+    """
 
     roof: Roof
     solid: Solid
+    compose: ComposeSettings | None = None
 
 
 @dataclass(frozen=True)
@@ -267,8 +274,8 @@ the footprint; add a cloud that covers it); `built` is None there
         A change names any of `type`, `ridge_height` and `eave_height` (world metres), `position` (x, y of the rectangle's
         centre and z of the lowest eave, about `roof.frame.origin`), `rotation` (degrees, of the length from the x axis),
         `outlines` (rings of the polygons that it roofs) and parameters of the type by name (metres, degrees). Another type
-        keeps rectangle, eave and rise; a part that is moved or resized roofs what its rectangle covers. Figures of the
-        earlier model do not stay. Raises InputError for what makes no roof, CompositionError for what makes no solid.
+        keeps rectangle, eave and rise; a part that is moved or resized roofs what its rectangle covers. Solids are composed as the
+        building's was; figures of the earlier model do not stay. Raises InputError for what makes no roof, CompositionError for what makes no solid.
 
         >>> import hiproof
         >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
@@ -292,7 +299,7 @@ the footprint; add a cloud that covers it); `built` is None there
         """The building with all heights, pitches and inner lengths of its parts fitted to `points` (n, 3) world metres.
 
         Types, rectangles and what `fixed` names (parameters by part, "z" the position's height) stay as they are. The
-        quality is measured on the points. Raises FitError for fewer than three points inside the outline.
+        quality is measured on the points, and poor as `settings` say. Raises FitError for fewer than three points inside the outline.
         """
         from .parametric.refit import refit
 

@@ -339,7 +339,7 @@ def judge(
         building,
         status=status,
         detail=detail,
-        built=Model(roof, solid.moved(roof.frame.origin)),
+        built=Model(roof, solid.moved(roof.frame.origin), settings.compose),
         quality=measured,
         z_ground=ground.z,
         ground_source=ground.source,

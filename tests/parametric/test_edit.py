@@ -11,6 +11,7 @@ from hiproof.errors import FitError, InputError
 from hiproof.parametric.building import with_model
 from hiproof.parametric.settle import settled_roof
 from hiproof.primitives.family import NAMES
+from hiproof.settings import ComposeSettings
 from hiproof.simulate import random_building
 from hiproof.status import Status
 from hiproof.write.parameters import building_record
@@ -28,6 +29,18 @@ def built(roof, id="house"):
 @pytest.fixture(scope="module")
 def gable():
     return gable_house()
+
+
+def test_a_changed_building_is_composed_as_it_was(gable):
+    deep = ComposeSettings(ground_clearance_m=9.0)  # so that it shows in every solid
+    house = hiproof.build(building_record(gable), deep)
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-4, 4, 20), np.linspace(-3, 3, 20)))
+    points = np.column_stack([x, y, 9.0 - 0.5 * np.abs(y)]) + house.roof.frame.origin
+    more = house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0])
+    for changed in (house.with_part(0, type="hip"), more, more.without_part(1), house.refit(points)):
+        record = building_record(changed)
+        assert np.array_equal(changed.solid.vertices, hiproof.build(record, deep).solid.vertices)
+        assert changed.solid.vertices[:, 2].min() < hiproof.build(record).solid.vertices[:, 2].min() - 1.0
 
 
 @pytest.mark.parametrize("kind", NAMES)

@@ -14,32 +14,31 @@ from ..parametric.arrange import dormer_on, merged_parts, split_part
 from ..parametric.building import build
 from ..parametric.change import changed_part
 from ..parametric.edit import BY_HAND
-from ..parametric.record import list_at, mapping, number, place
+from ..parametric.record import building_of, list_at, mapping, number, place
 from ..parametric.refit import measured
-from ..settings import ComposeSettings, Settings
+from ..settings import Settings
 from ..status import Status
 
 Record = Mapping[str, Any]
 
 
-def edited(
-    record: Record, asked: Record, points: np.ndarray, compose: ComposeSettings | None = None, is_measured: bool = True
-) -> Building:
+def edited(record: Record, asked: Record, points: np.ndarray, settings: Settings, is_measured: bool = True) -> Building:
     """The building of `record` (an object of parameters.jsonl) after the edit `asked`: {"action": ..., "part": ..., ...}.
 
-    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). Raises
+    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). settings: those of
+    its run. Raises
     InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
     """
     action = mapping(asked, "an edit").get("action")
     if action == "refit":
-        return build(by_hand(record), compose).refit(points, held_of(asked), Settings())
+        return build(by_hand(record), settings.compose).refit(points, held_of(asked), settings)
     if action not in ACTIONS:
         raise InputError(f"expected an edit ({', '.join(ACTIONS)}, refit), got {action!r:.40}; choose one")
     parts = list_at(record, "parts")
-    found = build(by_hand(record) | {"parts": ACTIONS[action](record, parts, asked)}, compose)
+    found = build(by_hand(record) | {"parts": ACTIONS[action](record, parts, asked)}, settings.compose)
     found = dataclasses.replace(found, quality=Quality())  # no figure of the earlier model stays
     local = found.roof.frame.to_local(points)
-    return measured(found, local, Settings()) if is_measured and len(local) else found
+    return measured(found, local, settings) if is_measured and len(local) else found
 
 
 def by_hand(record: Record) -> dict[str, Any]:
@@ -85,7 +84,8 @@ def dormer(record: Record, parts: list, asked: Record) -> list:
     """A dormer on part `part` at `place`, [x, y, z] about the origin, or half-way up its slope."""
     index = part_at(parts, asked, "part")
     at = None if asked.get("place") is None else tuple(place(asked["place"], "place")[:2])
-    return [*parts, dormer_on(build(record).roof, index, at)]
+    roof = building_of(record)[1]
+    return [*parts, dormer_on(roof, index, at)] if roof is not None else parts
 
 
 ACTIONS: dict[str, Callable[[Record, list, Record], list]] = {

@@ -89,7 +89,7 @@ class Desk:
         """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
         record = self.record(id)[0] | {"parts": list_at(body, "parts")}
         points = self.points.of(id, building_of(record)[1])
-        found = edited(record, body.get("asked"), points, self.run.head.compose, not body.get("dragged"))
+        found = edited(record, body.get("asked"), points, self.run.settings, not body.get("dragged"))
         return seen(found, drawn(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
@@ -99,8 +99,8 @@ class Desk:
         for kind in NAMES:
             asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:
-                changed = building_record(edited(record, asked, points, self.run.head.compose, False))
-                found = edited(changed, {"action": "refit"}, points, self.run.head.compose)
+                changed = building_record(edited(record, asked, points, self.run.settings, False))
+                found = edited(changed, {"action": "refit"}, points, self.run.settings)
             except HiproofError:
                 continue
             tried.append({"type": kind, "share": number_or_none(found.quality.share_within_20cm)})
@@ -109,7 +109,7 @@ class Desk:
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Keep the page's parts as an override of the building, if it is still of the `version` that the page knows."""
         record = self.record(id)[0] | {"parts": list_at(body, "parts")}
-        found = building_record(edited(record, {"action": "show"}, np.zeros((0, 3)), self.run.head.compose))
+        found = building_record(edited(record, {"action": "show"}, np.zeros((0, 3)), self.run.settings))
         override = {"id": id, **{name: found[name] for name in ("origin", "outline", "parts")}}
         known = self.edits.of(id)[0] or {}
         if "z_ground" in known:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
+from ..evaluate.run import run_record
 from ..parametric.file import head_of, objects
+from ..settings import Settings
 from ..write.parameters import FileHead
 from .doubt import Doubt, doubt_of
 from .edits import stamp_of
@@ -47,6 +49,7 @@ class RunFolder:
         if stamp == self.stamp:
             return
         self.head, rows = read_rows(self.path)
+        self.settings = settings_of(self.folder, self.head)
         self.rows = sorted(rows, key=lambda row: -row.doubt.amount)
         self.by_id, self.stamp = {row.id: row for row in rows}, stamp
 
@@ -66,6 +69,13 @@ class RunFolder:
         if not isinstance(record, dict) or record.get("id") != id:
             raise InputError(f"expected {self.path} as it was, got another file; start `hiproof edit` again")
         return record
+
+
+def settings_of(folder: Path, head: FileHead) -> Settings:
+    """How the run composed its solids and what it called poor, as far as its files tell."""
+    judged = (run_record(folder).get("settings") or {}).get("reconstruct") or {}
+    poor = {"poor_share": judged["poor_share"]} if "poor_share" in judged else {}
+    return replace(Settings(), compose=head.compose).replace({"reconstruct": poor})
 
 
 def read_rows(path: Path) -> tuple[FileHead, list[Row]]:

@@ -36,4 +36,4 @@ def with_model(building: Building, roof: Roof, compose: ComposeSettings | None =
 
     settings = dataclasses.replace(Settings(), compose=compose or ComposeSettings())
     solid = composed(roof, building.z_ground - roof.frame.origin[2], settings)
-    return dataclasses.replace(building, built=Model(roof, solid.moved(roof.frame.origin)))
+    return dataclasses.replace(building, built=Model(roof, solid.moved(roof.frame.origin), compose))

@@ -48,8 +48,8 @@ def without_part(building: Building, index: int) -> Building:
 
 
 def built(building: Building, record: dict[str, Any]) -> Building:
-    """The building of a changed record: no figure of the earlier model stays."""
-    found = build({**record, "status": Status.MODELLED.code, "detail": BY_HAND})
+    """The building of a changed record, composed as `building` was: no figure of the earlier model stays."""
+    found = build({**record, "status": Status.MODELLED.code, "detail": BY_HAND}, building.model.compose)
     return dataclasses.replace(
         found,
         quality=Quality(points=building.quality.points, density=building.quality.density),

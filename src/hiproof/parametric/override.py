@@ -172,8 +172,9 @@ def overridden(
 
 
 def as_given(override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings) -> Building:
-    """The building of the parts or the block given, measured on its points where there are any."""
-    points, outline, status = stages.usable(points, building.footprint)
+    """The building of the parts or the block given, measured on its points where there are any; its footprint is moved as a run does."""
+    building, footprint, of_footprint = stages.aligned(building, points, settings)
+    points, outline, status = stages.usable(points, footprint)
     if status is Status.BAD_FOOTPRINT and override.outline is None:
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = LocalFrame(override.origin) if override.origin is not None else frame_of(points, outline)
@@ -195,8 +196,10 @@ def as_given(override: Override, points: np.ndarray, building: Building, terrain
         terrain_intersection=ground.intersection,
         attributes=building.attributes,
         footprint=made.footprint if building.footprint is None else building.footprint,
+        shift=building.shift,
     )
-    return measured(made, local, settings) if len(local) else made
+    made = measured(made, local, settings) if len(local) else made
+    return stages.remarked(made, of_footprint)
 
 
 def frame_of(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
