@@ -12,10 +12,10 @@ from collections import Counter
 import numpy as np
 
 from hiproof.compose import check_solid
+from hiproof.compose.settle import settled_roof
 from hiproof.errors import HiproofError
 from hiproof.model import Building
 from hiproof.parametric.building import with_model
-from hiproof.parametric.settle import settled_roof
 from hiproof.simulate import random_building, random_compound
 from hiproof.simulate.edits import KINDS, random_edit
 from hiproof.status import Status

@@ -19,8 +19,8 @@ import shapely
 
 from hiproof import read_points
 from hiproof.classify.houses import told_apart
+from hiproof.classify.split import split_buildings
 from hiproof.read import read_footprints
-from hiproof.read.split import split_buildings
 from hiproof.simulate import Defects, ScanSettings, SimBuilding, random_building, random_compound, scan
 
 from .delft import SETS

@@ -18,12 +18,12 @@ import numpy as np
 import shapely
 
 from hiproof import read_points
+from hiproof.classify.split import split_buildings
 from hiproof.errors import FitError
 from hiproof.fit.outline import iou
 from hiproof.fit.union.outline import outline_of_points
 from hiproof.frames import LocalFrame
 from hiproof.read import read_footprints
-from hiproof.read.split import split_buildings
 from hiproof.simulate import Defects, ScanSettings, random_building, random_compound, scan
 
 from .delft import SETS

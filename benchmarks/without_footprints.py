@@ -17,8 +17,8 @@ from collections import Counter
 import numpy as np
 
 from hiproof import read_points, reconstruct
+from hiproof.classify.split import split_buildings
 from hiproof.model import ROOF, Building
-from hiproof.read.split import split_buildings
 
 from .judging import SHARED, area_by_type, named_share
 

@@ -8,7 +8,7 @@ import planted
 from hiproof import log
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.warm import make_ready
+from hiproof.city.tasks import ALL, make_ready
 from hiproof.compiled import news
 from tiny_town import write_town
 
@@ -17,7 +17,7 @@ def pytest_configure(config):
     """Compile before several processes test, so that no two compile the same."""
     if getattr(config.option, "numprocesses", None) and not hasattr(config, "workerinput"):
         news.listener = news.Lines(print)
-        make_ready()
+        make_ready(ALL)
 
 
 @pytest.fixture(autouse=True)

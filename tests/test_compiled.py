@@ -274,7 +274,7 @@ def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monk
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "file" / "folder",))
     kept.warn_not_kept.cache_clear()
     with pytest.warns(NotKeptWarning, match="NUMBA_CACHE_DIR"):
-        warm.make_ready()
+        warm.make_ready(["solid"])
 
 
 LONG = """

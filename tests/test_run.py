@@ -18,7 +18,7 @@ import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.warm import make_ready
+from hiproof.city.tasks import ALL, make_ready
 from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
@@ -145,7 +145,7 @@ def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, m
 
 def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
-    make_ready()
+    make_ready(ALL)
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_without_compiling)
     reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), processes=2))
     assert records(tmp_path) == records(finished[0])

@@ -268,7 +268,7 @@ def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: s
 def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Terrain | None) -> Ground:
     """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them."""
     from .compose import terrain_intersection
-    from .parametric.settle import PLAN_DIGITS, settled
+    from .compose.settle import PLAN_DIGITS, settled
 
     lowest_roof = float(points[:, 2].min())
     if terrain is not None:
@@ -297,7 +297,7 @@ def solid_or_simpler(
 ) -> tuple[Roof, Solid | None, Fitted]:
     """The roof as it is written and its checked solid, in the local frame; a flat block where it cannot become a valid one."""
     from .compose import compose
-    from .parametric.settle import settled_roof
+    from .compose.settle import settled_roof
 
     roof, z_ground = settled_roof(roof), ground.z - roof.frame.origin[2]
     try:
@@ -322,8 +322,8 @@ def judge(
     settings: Settings,
 ) -> Building:
     """The finished building: quality measured on its solid, an honest status, everything back in the world's frame."""
+    from .compose.settle import settled_building
     from .evaluate.metrics import quality
-    from .parametric.settle import settled_building
 
     if solid is None:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)

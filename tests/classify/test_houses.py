@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from hiproof.classify.houses import told_apart
+from hiproof.classify.split import split_buildings
 from hiproof.model import PointCloud
-from hiproof.read.split import split_buildings
 from hiproof.settings import Settings
 
 RNG = np.random.default_rng(3)

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from hiproof.errors import InputError
-from hiproof.learn.data import TEST, TRAINING, open_source
+from hiproof.learn.data import open_source
 from hiproof.learn.roofn3d import BUILDINGS, SURFACES, TYPES
+from hiproof.learn.sample import TEST, TRAINING
 from hiproof.segment.inference import NOT_ROOF
 from hiproof.simulate import training_sample
 

@@ -7,9 +7,9 @@ from benchmarks.edits import main as random_edits
 
 import hiproof
 from hiproof.compose import check_solid
+from hiproof.compose.settle import settled_roof
 from hiproof.errors import FitError, InputError
 from hiproof.parametric.building import with_model
-from hiproof.parametric.settle import settled_roof
 from hiproof.primitives.family import NAMES
 from hiproof.settings import ComposeSettings
 from hiproof.simulate import random_building

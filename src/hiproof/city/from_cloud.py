@@ -15,7 +15,7 @@ from .plan import Job
 
 def jobs_from_cloud(clouds: tuple[str, ...], settings: Settings) -> tuple[tuple[Job, ...], Settings]:
     """A job a building found, and the settings by which its points are chosen: all of them in a cloud of one roof alone."""
-    from ..read.split import split_buildings
+    from ..classify.split import split_buildings
 
     cloud = readable_points(clouds, settings)
     found = split_buildings(cloud, settings)

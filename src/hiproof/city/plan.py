@@ -17,11 +17,11 @@ from ..frames import Units
 from ..model import Footprint
 from ..read.crs import parse_crs
 from ..settings import Settings
-from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
 from ..write.parameters import crs_text
+from ..write.values import plain_text
 
 PLAN_FILE = "plan.jsonl"
 AROUND_M = 4.0  # of roof points around a footprint that may be moved: as fit/align.py asks, without its compiler here

@@ -33,7 +33,7 @@ from .plan import Plan
 from .quarantine import run_alone, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
-from .tasks import MAIN_JOB, solve_tile, sort_cloud
+from .tasks import ALL, MAIN_JOB, solve_tile, sort_cloud
 
 MOST_LOSSES = 3
 Progress = Callable[[str, int, int], None]
@@ -114,7 +114,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
 def pieces_of(request: Request) -> tuple[str, ...]:
     """What of the compiled code the run needs: one primitive by itself only where no footprint says what a building is."""
     alone = request.footprints is None or request.settings.fit.parts == "one"
-    return (*MAIN_JOB, "single") if alone else MAIN_JOB
+    return ALL if alone else MAIN_JOB
 
 
 class Clock:

@@ -10,6 +10,9 @@ from .ledger import Outcome
 MAIN_JOB = ("moves", "planes", "solid", "check", "points")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
+ALL = (*MAIN_JOB, "single")
+"""All pieces: those that fit one primitive a building as well."""
+
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:
     """See sort.py."""

@@ -16,12 +16,9 @@ from typing import Any
 from ..compiled import kept, news
 from ..compiled.stamp import PACKAGE, stamp_of_all
 from ..log import LOGGER
-from .tasks import MAIN_JOB
-
-ALL = (*MAIN_JOB, "single")
 
 
-def make_ready(pieces: Sequence[str] = ALL) -> None:
+def make_ready(pieces: Sequence[str]) -> None:
     """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news` tells."""
     places = kept.folders(make_ready, str(PACKAGE / "__init__.py"))
     stamp = stamp_of_all()

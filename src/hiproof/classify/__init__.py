@@ -1,7 +1,13 @@
 """Ground and buildings of clouds that come without these classes, from nothing but where their points lie.
 
-`ground` takes what stands on the ground away (a morphological filter), `surfaces` tells how smooth and how large the
-surface is that a point lies on, `buildings` puts both together; `files` writes what was found into a copy of a file.
+cells       points counted by square cells, and their density
+ground      what stands on the ground is taken away (a morphological filter)
+surfaces    how smooth and how large the surface is that a point lies on
+buildings   ground and buildings, of both
+scene       the roofs of a whole cloud; whether it is one roof alone
+houses      touching houses told apart
+split       a cloud without footprints into buildings
+files       what was found, written into a copy of a file
 """
 
 from .buildings import BUILDING, GROUND, UNKNOWN, classify, roof_points

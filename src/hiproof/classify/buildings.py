@@ -6,8 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..read.assign import PointGrid
-from ..read.split import plan_density
-from .cells import PlanCells
+from .cells import PlanCells, plan_density
 from .ground import ground_grid
 from .surfaces import Surfaces, surfaces_of
 

@@ -1,4 +1,4 @@
-"""Points counted by square cells of the world's own grid."""
+"""Points counted by square cells of the world's own grid, and how dense they lie."""
 
 from __future__ import annotations
 
@@ -36,3 +36,15 @@ class PlanCells:
         size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
         mean = [ndimage.uniform_filter(self.count(c).astype(float), size) for c in (chosen, np.ones(len(chosen), bool))]
         return (mean[0] / np.maximum(mean[1], 1e-9)).ravel()
+
+
+def plan_density(xy: np.ndarray) -> float:
+    """Points a square metre where there are points: the median over occupied cells, large enough for four points."""
+    xy = np.asarray(xy, float)[:, :2]
+    for cell_m in (1.0, 2.0, 4.0, 8.0):
+        cells = np.floor(xy / cell_m).astype(np.int64)
+        cells -= cells.min(axis=0)
+        counts = np.unique(cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0], return_counts=True)[1]
+        if np.median(counts) >= 4:
+            break
+    return float(np.median(counts)) / cell_m**2

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from ..city.tasks import MAIN_JOB, make_ready
+from ..city.tasks import ALL, MAIN_JOB, make_ready
 from .reconstruct import Bar
 
 
 def run(everything: bool) -> int:
-    from ..city.warm import ALL
-
     with Bar():
         make_ready(ALL if everything else MAIN_JOB)
     return 0

@@ -1,8 +1,17 @@
 """From a fitted roof to a valid solid: plan cells -> levels -> closed shell, and the check every solid passes.
 
-`compose` lays out the outline, the pieces and the lines where the active plane changes as one planar arrangement
-(`arrangement`, `cells`), finds the levels that meet over every plan vertex (`levels`), and raises roof, wall and
-ground faces that share them (`shell`). `check_solid` then asks whether the result is valid by ISO 19107.
+settle            the roof made of exactly the numbers that are written of it
+solid             `compose`: the steps below, one after the other; volume, terrain intersection
+cells             outline, pieces and the lines where the active plane changes as one plan of cells
+arrangement       the planar arrangement under them, on an integer grid
+tidy              cells without steps a millimetre long
+levels            which heights meet over every vertex of the plan
+shell             roof, wall and ground faces that share them
+check             whether the result is valid by ISO 19107
+check_kernel      its compiled half
+bends             which faces are bent (val3dity's 204)
+blocks            LoD1: prisms over the outline
+building_parts    a solid cut where its roofs meet, for formats that know building parts
 """
 
 from .check import Finding, check_solid

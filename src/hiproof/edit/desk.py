@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from ..city.overrides import read_overrides
-from ..draw.mesh import packed
 from ..draw.primitives import primitive_svg
 from ..errors import HiproofError, InputError
 from ..evaluate.run import run_record
 from ..parametric.building import build
 from ..parametric.record import building_of, list_at, number, text_at
 from ..primitives.family import NAMES
-from ..write.building_attributes import plain_text
+from ..write.page_mesh import packed
 from ..write.parameters import building_record
+from ..write.values import plain_text
 from .actions import edited
 from .edits import FILE, Edits
 from .folder import Row, RunFolder

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from ..compose import volume
-from ..draw.mesh import packed, solid_mesh
 from ..errors import HiproofError
 from ..model import Building
 from ..parametric.change import rise_of, with_sizes
+from ..write.page_mesh import packed, solid_mesh
 from ..write.parameters import building_record, number
 
 MOST_POINTS = 4000  # drawn

@@ -14,9 +14,9 @@ from ..formats import FORMATS
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, WALL, Face, Solid
 from ..read.cityjson_text import UNUSABLE, documents, reference_system
+from ..read.crs import units_named
 from ..read.plausible import is_plausible
 from ..write.attribute_list import OWN
-from ..write.naming import units_named
 
 RUN_MODELS = FORMATS["cityjson"].file
 

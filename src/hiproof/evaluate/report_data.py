@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..draw.mesh import packed, solid_mesh
 from ..status import Status
 from ..write.colours import TYPE_COLOURS
+from ..write.page_mesh import packed, solid_mesh
 from .metrics import plan_outline, psd
 from .report_pictures import RESIDUAL_STOPS
 from .run import EvaluatedRun

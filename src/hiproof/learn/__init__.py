@@ -1,7 +1,12 @@
 """Training of the network that recognises roofs (extra `train`): network, data sets, training, export.
 
-    data       labelled clouds: simulated, The Hague's shapes scanned, RoofN3D
+    sample     a labelled cloud, and what a source of them is
+    houses     houses made up for training, with annexes
+    shapes     real shapes to be scanned: solids with a roofType
+    roofn3d    RoofN3D's real clouds
+    data       the source that a name stands for
     augment    random scaling, dropping, jittering, and the roof's symmetries
+    batch      arranged clouds as the network's tensors
     network    PointNet++ in PyTorch
     training   the recipe, checkpoints and the best by validation
     export     to the ONNX file that `segment` runs

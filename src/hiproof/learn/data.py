@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -14,34 +13,14 @@ from ..simulate import ROOF_TYPES, Scan, scan, scan_solids
 from ..simulate.scene import SOURCE_ROOF
 from ..simulate.training import random_settings
 from .houses import training_house
+from .roofn3d import RoofN3D
+from .sample import TRAINING, Sample, Source
 from .shapes import Shape, read_shapes
 
 DENSITY = (1.0, 20.0)
 POINTS = (60, 1500)
 ANNEX_SHARE = 0.35
 FIRST_SOURCE_SHARE = 0.7
-TRAINING, VALIDATION, TEST = 1, 2, 3
-
-
-@dataclass(frozen=True)
-class Sample:
-    """One labelled cloud: `xyz` (n, 3) metres, `labels` (n,) index of the roof type or -1 for not-roof, `type` index."""
-
-    xyz: np.ndarray
-    labels: np.ndarray
-    type: int
-
-
-class Source(Protocol):
-    """A supply of labelled clouds by role (TRAINING, VALIDATION, TEST) and number: the same whenever asked for."""
-
-    @property
-    def types(self) -> tuple[str, ...]: ...
-
-    @property
-    def description(self) -> str: ...
-
-    def sample(self, role: int, index: int) -> Sample: ...
 
 
 @dataclass(frozen=True)
@@ -171,7 +150,5 @@ def open_one(name: str, types: tuple[str, ...], seed: int) -> Source:
             raise InputError(f"expected solids with a known roofType in {path}, got too few to train and validate on")
         return Scanned(types, seed, Path(path), shapes)
     if kind == "roofn3d" and path:
-        from .roofn3d import RoofN3D
-
         return RoofN3D.open(Path(path), types, seed)
     raise InputError(f"expected training data as simulated, denhaag:FILE or roofn3d:DIR, got {name!r}")

@@ -12,7 +12,7 @@ from ..errors import InputError
 from ..read.roofn3d import read_roofn3d, read_roofn3d_labels
 from ..segment.inference import NOT_ROOF
 from ..simulate import ROOF_TYPES
-from .data import TRAINING, Sample
+from .sample import TRAINING, Sample
 
 BUILDINGS, SURFACES = "roofn3d_buildings.csv", "roofn3d_surfacegrowing.csv"
 TYPES = tuple(name for name in ROOF_TYPES if name in ("gable", "hip", "pyramid"))

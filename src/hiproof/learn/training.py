@@ -23,9 +23,10 @@ from ..segment.scores import Scores
 from .augment import AugmentSettings, symmetric, varied
 from .batch import network_inputs
 from .card import write_card, write_curve
-from .data import TRAINING, VALIDATION, Sample, Source, open_source
+from .data import open_source
 from .export import export, read_weights
 from .network import NetworkSettings, RoofNetwork
+from .sample import TRAINING, VALIDATION, Sample, Source
 
 
 @dataclass(frozen=True)

@@ -1,10 +1,16 @@
 """The parameters are the model: what is written of a building is enough to build it again, by hand or by program.
 
-settle      a fitted roof made of exactly the numbers that are written of it
 file        parameters.jsonl read line by line, its head and its errors by line and column
+schema      the JSON schema of that file
 record      the JSON object of one building checked, and its parts made
+shape       whether parameters make a shape
 building    the object built: composed, checked, measured, as a run does
 run         a file of parameters into the files of a run
+change      one part changed: another type, a height, a side
+arrange     parts put otherwise: cut in two, joined, a dormer set on a slope
+edit        a building with another part, or without one
+refit       heights and pitches of given parts fitted to points
+override    what a person says of a building, obeyed by the fit
 """
 
 from .building import build

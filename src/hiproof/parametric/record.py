@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..compose.settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, settled, settled_outline, settled_sigma
 from ..errors import InputError
 from ..frames import LocalFrame
 from ..model import Building, Part, Quality, Roof
 from ..status import Status
 from ..write.attribute_list import PARAMETERS, PART
-from .settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, settled, settled_outline, settled_sigma
 from .shape import refuse_no_shape
 
 MOST_PARTS = 1000

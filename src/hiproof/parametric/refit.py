@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..compose.settle import pieces_of
 from ..errors import FitError, InputError
 from ..model import Building, Part
 from ..settings import Settings
 from ..status import Status
 from ..write.parameters import building_record
 from .edit import built
-from .settle import pieces_of
 from .shape import SIDED
 
 HELD = ("width", "length", "teeth")
@@ -243,8 +243,8 @@ def with_values(part: dict[str, Any], values: Mapping[str, float], sigma: dict[s
 
 def measured(building: Building, points_local: np.ndarray, settings: Settings) -> Building:
     """The building with its quality on `points_local` (n, 3), and what that says of it."""
+    from ..compose.settle import settled_building
     from ..evaluate.metrics import quality
-    from .settle import settled_building
 
     roof = building.roof
     found = quality(building.solid.moved(-roof.frame.origin), points_local, roof.outline)

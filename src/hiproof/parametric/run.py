@@ -22,7 +22,6 @@ from ..masking import masked, masked_values
 from ..model import Building
 from ..settings import Settings
 from ..status import Status
-from ..write.building_attributes import plain_text
 from ..write.cityjson import offset_of
 from ..write.files import atomic
 from ..write.fragments import Fragment, Fragments
@@ -30,6 +29,7 @@ from ..write.head import FileHead
 from ..write.json_text import dump
 from ..write.naming import FileUnits, UniqueNames, gml_name
 from ..write.run_files import fragments, join_fragments
+from ..write.values import plain_text
 from .building import build
 from .file import opened_parameters
 

@@ -1,7 +1,7 @@
-"""From files to values: point clouds, footprints, terrain, RoofN3D, and the split of a cloud into buildings.
+"""From files to values: point clouds, footprints, terrain, RoofN3D, models.
 
-`read_points` and `read_footprints` give what a run starts from; `points_of_footprints` brings the two together,
-`split_buildings` stands in for footprints where there are none, a terrain answers how high the ground is. Everything
+`read_points` and `read_footprints` give what a run starts from; `points_of_footprints` brings the two together, a
+terrain answers how high the ground is. Everything
 unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by `errors.InputWarning`.
 The names below are imported when first used: GDAL and laspy cost a third of a second.
 """
@@ -15,7 +15,6 @@ _HOME = {
     "check_overlap": "overlap",
     **dict.fromkeys(("points_of_footprints", "PointGrid"), "assign"),
     **dict.fromkeys(("read_terrain", "Terrain", "TerrainChain"), "terrain"),
-    **dict.fromkeys(("split_buildings", "FoundBuilding", "adapted_gap", "plan_density"), "split"),
     **dict.fromkeys(("read_roofn3d", "read_roofn3d_labels", "RoofN3DRecord"), "roofn3d"),
     **dict.fromkeys(("same_horizontal", "combine", "parse_crs"), "crs"),
 }

@@ -116,6 +116,15 @@ def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "au
     return units
 
 
+def units_named(name: str | None, otherwise: Units = METRES) -> Units:
+    """Units of the CRS that a file names by URN or address, `otherwise` where it names none that is known."""
+    try:
+        crs = parse_crs(name)
+    except InputError:
+        return otherwise
+    return otherwise if crs is None else units_of(crs, "the models")
+
+
 def same_heights(first: CRS, second: CRS) -> bool:
     """Whether heights mean the same in both; a CRS that names none goes with any whose heights are in its unit.
 

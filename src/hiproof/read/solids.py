@@ -17,8 +17,8 @@ import numpy as np
 from ..errors import InputError
 from ..frames import METRES, Units
 from ..model import WALL, Face, Solid
-from ..write.naming import units_named
 from .cityjson_text import UNUSABLE, documents, reference_system
+from .crs import units_named
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import datetime
 import json
-import math
 from typing import Any
 
 import numpy as np
@@ -13,8 +11,10 @@ from ..frames import METRES, Units
 from ..model import Building, Solid
 from ..status import Status
 from .attribute_list import OWN, PREFIX
+from .osm_tags import osm_tags
 from .reprojected import Reprojected
-from .roof_figures import RoofFigures, roof_figures
+from .roof_figures import RoofFigures, ground_height, roof_figures
+from .values import metres, plain, plain_text, rounded
 
 FALLBACKS = (Status.SIMPLIFIED, Status.FLAT_FALLBACK)
 
@@ -41,8 +41,6 @@ def building_attributes(
     computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
     computed |= {OWN + name: value for name, value in hiproof_attributes(building, figures, units).items()}
     if osm:
-        from .osm_tags import osm_tags
-
         computed |= osm_tags(building, figures)
     if not units.are_metres:
         computed[OWN + "units"] = f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
@@ -125,52 +123,3 @@ def codes_as_written(solid: Solid, units: Units) -> str:
     there = Units(units.plan, units.height).to_metres(np.round(units.from_metres(solid.vertices), 4))
     about_origin = Solid(there, solid.faces).moved(-np.floor(there.min(axis=0)))
     return json.dumps(sorted({finding.code for finding in check_solid(about_origin)}))
-
-
-def ground_height(building: Building, figures: RoofFigures | None) -> float:
-    """Height of the building's ground: what reconstruction found, else the base of its solid, else NaN."""
-    if math.isfinite(building.z_ground) or figures is None:
-        return building.z_ground
-    return figures.h_base
-
-
-def rounded(value: float, digits: int = 6) -> float:
-    """`value` rounded, minus zero being zero; NaN and infinities stay."""
-    return round(float(value), digits) + 0.0
-
-
-def metres(value: float) -> float:
-    """Rounded to a tenth of a millimetre, as coordinates are written."""
-    return rounded(value, 4)
-
-
-def plain(value: Any) -> Any:
-    """`value` as str, int, float, bool or None, which every format can hold.
-
-    >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2), b"x", [1, 2])]
-    [3, None, True, '2020-01-02', 'x', '[1, 2]']
-    """
-    if value is None or isinstance(value, (bool, int)):
-        return value
-    if isinstance(value, str):
-        return plain_text(value)
-    if isinstance(value, float):
-        return float(value) if math.isfinite(value) else None
-    if isinstance(value, np.generic) and not isinstance(value, (np.datetime64, np.timedelta64)):
-        return plain(value.item())
-    if isinstance(value, np.datetime64) or type(value).__name__ == "NaTType":
-        return None if str(value) == "NaT" else str(value)
-    if isinstance(value, (datetime.date, datetime.time)):
-        return value.isoformat()
-    if isinstance(value, bytes):
-        return plain_text(value.decode("utf-8", "replace"))
-    return plain_text(value)
-
-
-def plain_text(value: Any) -> str:
-    """`value` as text that every format can hold.
-
-    Halves of surrogate pairs, from files read in a wrong encoding, fit none, and a NUL ends a database's text.
-    """
-    text = str(value)
-    return text if text.isprintable() else text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")

@@ -19,7 +19,7 @@ import numpy as np
 from ..frames import METRES, Units
 from ..model import GROUND, Building, Face, Solid
 from ..settings import WriteSettings
-from .building_attributes import OWN, PREFIX, building_attributes, figures_of, ground_height
+from .building_attributes import OWN, PREFIX, building_attributes, figures_of
 from .citygml_geometry import (
     boundary_surfaces,
     lod1_solid,
@@ -34,7 +34,7 @@ from .fragments import Fragment, Sheet
 from .head import FileHead
 from .naming import UniqueNames, gml_name, srs_name
 from .roof_codes import CODE_SPACES, roof_type_code
-from .roof_figures import RoofFigures
+from .roof_figures import RoofFigures, ground_height
 from .shapes import PartShape, Shapes, shapes_of
 from .writer import BuildingWriter
 from .xml_text import attribute_set, generic_attribute, xml_attribute, xml_text

@@ -9,8 +9,8 @@ import numpy as np
 
 from ..frames import Units
 from ..model import GROUND, ROOF, WALL, Face, Solid
-from .building_attributes import rounded
 from .roof_figures import RoofFigures
+from .values import rounded
 from .xml_text import generic_attribute
 
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}

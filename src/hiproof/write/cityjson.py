@@ -18,7 +18,7 @@ import numpy as np
 
 from ..model import Building
 from ..settings import WriteSettings
-from .building_attributes import PREFIX, building_attributes, figures_of, metres, plain_text
+from .building_attributes import PREFIX, building_attributes, figures_of
 from .cityjson_geometry import Vertices, building_geometry, first_corner, part_geometry
 from .files import scratch
 from .fragments import Fragment, Sheet
@@ -27,6 +27,7 @@ from .json_text import dump
 from .naming import UniqueNames, reference_system
 from .roof_figures import RoofFigures
 from .shapes import PartShape, Shapes, shapes_of
+from .values import metres, plain_text
 from .writer import BuildingWriter
 
 SCALE = 0.0001

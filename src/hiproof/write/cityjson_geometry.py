@@ -10,9 +10,10 @@ import shapely
 
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, Building, Face, Solid
-from .building_attributes import OWN, plain, rounded
+from .building_attributes import OWN
 from .roof_figures import RoofFigures
 from .shapes import PartShape, Shapes
+from .values import plain, rounded
 
 LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 

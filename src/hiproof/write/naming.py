@@ -102,7 +102,7 @@ class FileUnits:
         >>> str(files.gml), str(files.cityjson)
         ('US survey foot, heights in metre', 'US survey foot')
         """
-        from ..read.crs import parse_crs, units_of
+        from ..read.crs import parse_crs, units_named, units_of
         from .reprojected import crs_of_files, reprojected
 
         own = own or units_of(parse_crs(crs))
@@ -116,15 +116,3 @@ class FileUnits:
         """What the record of a run says of units."""
         metres = {"metres_in_plan_unit": self.gml.plan, "metres_in_height_unit": self.gml.height}
         return {"coordinates": str(self.gml), "attributes": "metre", **metres}
-
-
-def units_named(name: str | None, otherwise: Units = METRES) -> Units:
-    """Units of the CRS that a file names by URN or address, `otherwise` where it names none that is known."""
-    from ..errors import InputError
-    from ..read.crs import parse_crs, units_of
-
-    try:
-        crs = parse_crs(name)
-    except InputError:
-        return otherwise
-    return otherwise if crs is None else units_of(crs, "the models")

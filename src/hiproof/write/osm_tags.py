@@ -9,8 +9,8 @@ import numpy as np
 
 from ..model import ROOF, Building
 from .attribute_list import OSM
-from .building_attributes import ground_height, rounded
-from .roof_figures import RoofFigures
+from .roof_figures import RoofFigures, ground_height
+from .values import rounded
 
 SHAPES = {
     "flat": "flat",

@@ -16,11 +16,11 @@ import numpy as np
 import shapely
 
 from ..model import Building, Part
-from .building_attributes import plain, plain_text
 from .fragments import Fragment, Sheet
 from .head import FileHead
 from .json_text import dump
 from .roof_figures import RoofFigures
+from .values import plain, plain_text
 from .writer import BuildingWriter
 
 VERSION = 1

@@ -20,9 +20,9 @@ import numpy as np
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
 from ..model import ROOF, Face, Solid
+from ..read.crs import units_named
 from ..read.database import import_psycopg, refuse_half_a_password
 from .attribute_list import OWN, PARTS_LAYER
-from .naming import units_named
 from .triangles import face_triangles
 
 PARTS_AT_ONCE = 5000

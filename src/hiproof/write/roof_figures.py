@@ -7,11 +7,12 @@ Counted with the sign of their area the triangles of inner rings cancel what hol
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import GROUND, ROOF, Solid
+from ..model import GROUND, ROOF, Building, Solid
 
 LEVEL_RIDGE_M = 0.05  # ends of a ridge differ in height by less
 FLAT_SLOPE_DEG = 3.0  # a face below drains but does not slope to the eye; it has no azimuth worth telling
@@ -51,6 +52,13 @@ class RoofFigures:
         if slopes.size and slopes.max() >= FLAT_SLOPE_DEG:
             return "slanted"
         return "multiple horizontal" if self.h_max - self.h_min > LEVEL_RIDGE_M else "horizontal"
+
+
+def ground_height(building: Building, figures: RoofFigures | None) -> float:
+    """Height of the building's ground: what reconstruction found, else the base of its solid, else NaN."""
+    if math.isfinite(building.z_ground) or figures is None:
+        return building.z_ground
+    return figures.h_base
 
 
 def roof_figures(solid: Solid) -> RoofFigures:

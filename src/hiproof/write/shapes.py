@@ -11,9 +11,10 @@ import shapely
 from ..model import GROUND, Building, Face, Solid
 from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
-from .building_attributes import metres, plain, shape_attributes
+from .building_attributes import shape_attributes
 from .roof_figures import RoofFigures, roof_figures
 from .table_rows import part_values
+from .values import metres, plain
 
 
 @dataclass(frozen=True)

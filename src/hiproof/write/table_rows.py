@@ -12,8 +12,8 @@ import shapely
 from ..frames import METRES, Units
 from ..model import ROOF, Building, Part
 from .attribute_list import PARTS_LAYER, SHAPE
-from .building_attributes import metres, plain_text, rounded
 from .roof_figures import RoofFigures
+from .values import metres, plain_text, rounded
 
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
 

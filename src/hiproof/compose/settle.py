@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
 import shapely
@@ -91,11 +92,11 @@ def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
 
 def settled_building(building: Building) -> Building:
     """The building with its figures and probabilities as written."""
-    values = {f.name: getattr(building.quality, f.name) for f in fields(Quality)}
-    quality = Quality(**{name: v if name == "points" else settled(v) for name, v in values.items()})
+    values: dict[str, Any] = {f.name: getattr(building.quality, f.name) for f in fields(Quality)}
+    values |= {name: settled(value) for name, value in values.items() if name != "points"}
     return replace(
         building,
-        quality=quality,
+        quality=Quality(**values),
         objective=settled(building.objective),
         recognised={name: settled(value) for name, value in building.recognised.items()},
         types={name: settled(value) for name, value in building.types.items()},

@@ -7,9 +7,10 @@ import pytest
 import shapely
 
 import hiproof.read
+from hiproof.classify.cells import plan_density
+from hiproof.classify.split import connected_groups, split_buildings
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import PointCloud
-from hiproof.read.split import connected_groups, plan_density, split_buildings
 from hiproof.settings import Settings
 
 CTVIEW = Path(__file__).parents[3] / "shared" / "data" / "ctview"

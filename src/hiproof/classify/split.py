@@ -13,6 +13,9 @@ import shapely
 from ..errors import InputError, InputWarning
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
+from .cells import plan_density
+from .houses import told_apart
+from .scene import roofs_by_shape
 
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
 SPACINGS_PER_GAP = 2.5
@@ -80,8 +83,6 @@ def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, b
         if alone is None:
             raise InputError(without_building_class(cloud, read.building_classes))
         return alone, True
-    from ..classify.scene import roofs_by_shape
-
     roofs, is_alone = roofs_by_shape(cloud, read.ground_classes, alone is not None)
     if read.roofs == "auto" and not is_alone:
         said = f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs were found by shape"
@@ -129,18 +130,6 @@ def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
         f"expected points of class {classes_text(wanted)} (building), got {got}; name the class that holds the roofs with "
         "--building-class, give --footprints, or classify the cloud first"
     )
-
-
-def plan_density(xy: np.ndarray) -> float:
-    """Points a square metre where there are points: the median over occupied cells, large enough for four points."""
-    xy = np.asarray(xy, float)[:, :2]
-    for cell_m in (1.0, 2.0, 4.0, 8.0):
-        cells = np.floor(xy / cell_m).astype(np.int64)
-        cells -= cells.min(axis=0)
-        counts = np.unique(cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0], return_counts=True)[1]
-        if np.median(counts) >= 4:
-            break
-    return float(np.median(counts)) / cell_m**2
 
 
 def adapted_gap(xy: np.ndarray) -> float:
@@ -198,8 +187,6 @@ def houses_of(
     area = cell_area(xyz[group, :2], gap_m / 2)
     if not split_houses:
         return [(group, area)]
-    from ..classify.houses import told_apart
-
     houses, left = [], np.ones(len(group), bool)
     for house in told_apart(xyz[group], area, gap_m):
         inside = left & shapely.intersects_xy(house, *xyz[group, :2].T)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import ROOF, WALL, Solid
-from ..write.triangles import face_triangles
+from .triangles import face_triangles
 
 
 @dataclass(frozen=True)
