@@ -51,6 +51,28 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
     assert len(solids) == len(was) and not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
 
 
+def test_ground_and_leaving_out_are_kept_in_place_of_each_other(desk):
+    start = desk.building(ID)
+    assert start["said"] == {"z_ground": None, "leave_out": None}
+    raised = desk.change(ID, {"parts": start["parts"], "z_ground": 1.25, "asked": {"action": "show"}})
+    assert raised["figures"]["z_ground"] == 1.25 != edited(desk, start["parts"], action="show")["figures"]["z_ground"]
+    version = desk.accept(ID, {"parts": start["parts"], "z_ground": 1.25, "version": UNTOUCHED})["version"]
+    assert desk.building(ID)["said"]["z_ground"] == 1.25 == desk.building(ID)["figures"]["z_ground"]
+    version = desk.accept(ID, {"parts": start["parts"], "version": version})["version"]  # the run's own ground again
+    assert "z_ground" not in desk.edits.of(ID)[0]
+    desk.accept(ID, {"leave_out": True, "version": version, "note": "torn down"})
+    assert {name: desk.edits.of(ID)[0].get(name) for name in ("leave_out", "parts", "note")} == {
+        "leave_out": True,
+        "parts": None,
+        "note": "torn down",
+    }
+    assert desk.building(ID)["said"]["leave_out"] is True
+    with pytest.raises(InputError, match="z_ground"):
+        desk.change(ID, {"parts": start["parts"], "z_ground": "low", "asked": {"action": "show"}})
+    with pytest.raises(InputError, match="nowhere"):
+        desk.accept("nowhere", {"leave_out": True, "version": UNTOUCHED})
+
+
 def test_the_most_doubtful_come_first(desk):
     rows = desk.buildings()["rows"]
     assert [row["doubt"] for row in rows] == sorted((row["doubt"] for row in rows), reverse=True)

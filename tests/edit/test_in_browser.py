@@ -8,6 +8,7 @@ import pytest
 
 import hiproof
 from flat_town import request_over
+from hiproof.city.overrides import read_overrides
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.edits import FILE
@@ -189,6 +190,77 @@ def test_a_click_on_the_roof_chooses_its_part(page):
         page.evaluate(f"() => choose({1 - index})")
         page.mouse.click(*middles[index])
         assert page.get_attribute(f"[data-part='{index}']", "class") == "part current"
+
+
+def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(town_files, page, folder):
+    choose(page, "house-1")
+    was = figure(page, "volume_m3")
+    page.fill("#ground", "1.25")
+    page.keyboard.press("Enter")
+    until(page, "now.model.figures.z_ground === 1.25")
+    page.evaluate("() => queue")
+    assert figure(page, "volume_m3") > was
+    key(page, "u")
+    assert figure(page, "volume_m3") == was and page.input_value("#ground") != "1.25"
+    page.fill("#ground", "1.25")
+    page.keyboard.press("Enter")
+    key(page, "a")
+    assert page.inner_text("#say") == "accepted"
+    choose(page, "house-2")
+    key(page, "o")
+    assert page.inner_text("#title") == "house-2: left out" and "no model" in page.inner_text("#say")
+    key(page, "r")
+    assert "left out; keep it in first" in page.inner_text("#say")
+    key(page, "u")
+    assert page.inner_text("#title") == "house-2: flat"
+    page.click("#leave-out")
+    key(page, "a")
+    said = dict(read_overrides(str(folder / FILE)))
+    assert (
+        said["house-1"]["z_ground"] == 1.25 and said["house-2"]["leave_out"] is True and "parts" not in said["house-2"]
+    )
+    hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
+    rows = by_id(folder)
+    assert rows["house-1"]["z_ground"] == 1.25 and rows["house-2"]["status"] == "left_out"
+    page.reload()
+    wait_for(page, "house-")
+    page.evaluate("() => inTurn(() => open('house-2'))")
+    page.evaluate("() => queue")
+    assert page.inner_text("#title") == "house-2: left out" and page.inner_text("#leave-out") == "keep in"
+    page.click("#withdraw")
+    page.evaluate("() => queue")
+    assert set(dict(read_overrides(str(folder / FILE)))) == {"house-1"}
+
+
+def test_undo_back_to_what_was_accepted_leaves_nothing_changed(page):
+    choose(page, "house-0")
+    mark = "[data-id=house-0]"
+    page.select_option("#type", "gable")
+    wait_for(page, "house-0: gable")
+    assert "draft" in page.get_attribute(mark, "class").split()
+    key(page, "u")
+    assert page.get_attribute(mark, "class").split() == ["current"]
+    key(page, "a")
+    page.select_option("#type", "gable")
+    wait_for(page, "house-0: gable")
+    key(page, "u")
+    assert page.get_attribute(mark, "class").split() == ["current", "accepted"]
+
+
+def test_a_server_that_is_gone_is_said_and_costs_nothing(page):
+    choose(page, "house-0")
+    page.context.set_offline(True)
+    page.route("**/change", lambda route: route.abort())
+    key(page, "r")
+    assert "the server does not answer" in page.inner_text("#say")
+    page.unroute("**/change")
+    page.context.set_offline(False)
+    page.route("**/change", lambda route: route.fulfill(status=502, body="<html>"))
+    key(page, "r")
+    assert "the server answered 502" in page.inner_text("#say")
+    page.unroute("**/change")
+    key(page, "r")
+    assert page.inner_text("#say") == ""
 
 
 def test_two_windows_and_one_building(browser, served, page):

@@ -29,6 +29,7 @@ from .seen import drawn, seen
 MOST_ROWS = 500  # of the list at once; others are found by their id
 MOST_NOTE = 500
 BELONGS = ("origin", "outline", "z_ground", "parts")  # of an accepted edit, in place of the run's
+SAID = ("z_ground", "leave_out")  # of the building as a whole, by a person
 
 
 class Desk:
@@ -69,6 +70,7 @@ class Desk:
         record, override, version = self.record(id)
         told = {name: (override or {}).get(name) for name in ("who", "when", "note")}
         found = {"id": id, "version": version, "accepted": told if override else None, "parts": record.get("parts")}
+        found["said"] = {name: (override or {}).get(name) for name in SAID}
         found |= {"outcome": record.get("detail") or "", "reasons": self.run.by_id[id].doubt.reasons}
         if not record.get("parts"):
             return found | {"error": record.get("detail") or "no model"}
@@ -85,16 +87,23 @@ class Desk:
         places = "" if roof is None or not len(points) else packed(roof.frame.to_local(drawn(points)), "<f4")
         return {"places": places, "count": len(points), "missing": missing}
 
+    def draft(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """A building's object as the page has it: with its `parts`, and with its `z_ground` where a person said one."""
+        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        if body.get("z_ground") is None:
+            return record | {"z_ground": self.run.record(id).get("z_ground")}
+        return record | {"z_ground": number(body["z_ground"], "z_ground"), "ground_source": "override"}
+
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
-        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        record = self.draft(id, body)
         points = self.points.of(id, building_of(record)[1])
         found = edited(record, body.get("asked"), points, self.run.settings, not body.get("dragged"))
         return seen(found, drawn(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
-        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        record = self.draft(id, body)
         points, tried = self.points.of(id, building_of(record)[1]), []
         for kind in NAMES:
             asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
@@ -107,17 +116,24 @@ class Desk:
         return {"types": sorted(tried, key=lambda row: -(row["share"] or 0.0))}
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Keep the page's parts as an override of the building, if it is still of the `version` that the page knows."""
-        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
-        found = building_record(edited(record, {"action": "show"}, np.zeros((0, 3)), self.run.settings))
-        override = {"id": id, **{name: found[name] for name in ("origin", "outline", "parts")}}
-        known = self.edits.of(id)[0] or {}
-        if "z_ground" in known:
-            override["z_ground"] = number(known["z_ground"], "z_ground")
+        """Keep what the page has as an override of the building, if it is still of the `version` that the page knows."""
+        override = {"id": id, **(self.left_out(id) if body.get("leave_out") is True else self.accepted(id, body))}
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         note = plain_text(text_at(body, "note")).strip()[:MOST_NOTE]
         override |= {"who": self.who, "when": now} | ({"note": note} if note else {})
         return {"version": self.edits.put(id, override, text_at(body, "version")), "when": now}
+
+    def accepted(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
+        """What an override says of a building as the page has it, which must be one that can be built."""
+        nothing = np.zeros((0, 3))
+        found = building_record(edited(self.draft(id, body), {"action": "show"}, nothing, self.run.settings))
+        said = BELONGS if body.get("z_ground") is not None else [name for name in BELONGS if name != "z_ground"]
+        return {name: found[name] for name in said}
+
+    def left_out(self, id: str) -> dict[str, Any]:
+        """What an override says of a building, which must be one of the run, that no model is to be made of."""
+        self.run.record(id)
+        return {"leave_out": True}
 
     def withdraw(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Take an accepted edit back: the building is the run's again."""

@@ -10,7 +10,7 @@ class Refused extends Error { constructor(answer, code) { super(answer.error || 
 
 async function answered(request) {
   const response = await request.catch(() => { throw new Refused({ error: "the server does not answer; is `hiproof edit` still running? Nothing here is lost" }, 0); });
-  const answer = await response.json();
+  const answer = await response.json().catch(() => ({}));
   if (!response.ok) throw new Refused(answer, response.status);
   return answer;
 }
@@ -19,9 +19,9 @@ const tell = (name, body) => answered(fetch(name, { method: "POST", headers: { "
 
 function say(text, wrong = false) { $("say").textContent = text; $("say").classList.toggle("wrong", wrong); }
 
-// What is done waits for what was asked before; a refusal becomes a sentence.
+// What is done waits for what was asked before; a refusal becomes a sentence, and a fault of this script stops nothing that follows.
 function inTurn(action) {
-  queue = queue.then(action).catch(error => { say(error.message, true); if (!(error instanceof Refused)) throw error; });
+  queue = queue.then(action).catch(error => { say(error.message, true); if (!(error instanceof Refused)) reportError(error); });
   return queue;
 }
 
@@ -57,9 +57,9 @@ function step(by) {
 // ---- one building
 
 async function open(id) {
-    const found = await ask("building", { id }), known = drafts.get(id);
+  const found = await ask("building", { id }), known = drafts.get(id);
   const isKnown = known && known.version === found.version && known.dirty;
-  now = isKnown ? known : { id, version: found.version, accepted: found.accepted, model: found, first: found.figures, history: [], dirty: false, held: {}, part: 0, cloud: null };
+  now = isKnown ? known : { id, version: found.version, accepted: found.accepted, model: found, first: found.figures, ground: found.said.z_ground, left: Boolean(found.said.leave_out), history: [], dirty: false, held: {}, part: 0, cloud: null };
   drafts.set(id, now);
   now.reasons = found.reasons; now.outcome = found.outcome;
   clicked = null; merging = false; say(found.error || "", Boolean(found.error)); $("note").value = ""; $("tried").replaceChildren();
@@ -69,8 +69,11 @@ async function open(id) {
   if (!now.model.mesh) return;
   now.cloud = await ask("points", { id });
   if (now.cloud.missing) say(now.cloud.missing);
-  if (now.cloud.count) { const model = await tell("change", { parts: now.model.parts, asked: { action: "show" } }); now.first = isKnown ? now.first : model.figures; show(model); }
+  if (now.cloud.count) { const model = await changed(now.model.parts, { action: "show" }); now.first = isKnown ? now.first : model.figures; show(model); }
 }
+
+// The model of `parts` after an edit, over the ground as it is said to be.
+const changed = (parts, asked, more = {}) => tell("change", { parts, asked, z_ground: now.ground, ...more });
 
 function largest(handles) {
   const areas = handles.map(h => (h.width || 0) * (h.length || 0));
@@ -86,8 +89,17 @@ function show(model, home = false) {
   $("accepted").textContent = accepted ? `accepted by ${accepted.who || "somebody"}, ${accepted.when || "some time ago"}${accepted.note ? `: ${accepted.note}` : ""} ` : "";
   if (accepted) $("accepted").append(takeBack());
   draw(home);
+  showWhole();
   showParts();
   showFigures();
+}
+
+// What is said of the building as a whole: the height of its ground, and whether it is left out.
+function showWhole() {
+  const height = now.ground ?? now.model.figures?.z_ground;
+  $("ground").value = height ?? ""; $("ground").disabled = !now.model.mesh || now.left;
+  $("leave-out").textContent = now.left ? "keep in" : "leave out";
+  if (now.left) $("title").textContent = `${now.id}: left out`;
 }
 
 const FIGURES = [["share_within_20cm", "points within 0.2 m of the roof", v => `${(100 * v).toFixed(1)} %`], ["unexplained_area_m2", "unexplained area", v => `${v.toFixed(0)} m²`],
@@ -114,7 +126,7 @@ if (!viewer.gl) say("this browser offers no WebGL, so there is no 3D view; numbe
 function draw(home) {
   viewer.clearLayers();
   const mesh = now.model.mesh;
-  if (!mesh) { viewer.setMesh(new Float32Array(0), new Int32Array(0)); handles.show([]); viewer.draw(); return; }
+  if (!mesh || now.left) { viewer.setMesh(new Float32Array(0), new Int32Array(0)); handles.show([]); drawCloud(); viewer.draw(); return; }
   const corners = unpacked(mesh.corners, Float32Array), owner = unpacked(mesh.part, Int32Array), edges = unpacked(mesh.edges, Float32Array);
   viewer.setMesh(corners, owner);
   const colours = now.model.parts.map(part => rgb(start.colours[part.type] || "#b5b5b5")), wall = rgb(start.wall);
@@ -151,7 +163,7 @@ async function follow(drag, handle) {
   while (drag.wanted) {
     const change = drag.wanted; drag.wanted = null;
     try {
-      show(await tell("change", { parts: drag.parts, asked: { action: "change", part: now.part, change }, dragged: true }));
+      show(await changed(drag.parts, { action: "change", part: now.part, change }, { dragged: true }));
       drag.change = change; say("");
     } catch (error) { say(error.message, true); }
   }
@@ -163,7 +175,7 @@ handles.ondrop = handle => inTurn(async () => {
   if (!done) return;
   if (done.busy) await new Promise(resolve => { done.idle = resolve; });
   if (!done.change) return;
-  const model = await tell("change", { parts: done.parts, asked: { action: "change", part: now.part, change: done.change } });
+  const model = await changed(done.parts, { action: "change", part: now.part, change: done.change });
   now.history.push(done.before); now.dirty = true;
   if (handle.name === "ridge" || handle.name === "eave") pin(now.part, heightsOf(now.model.parts[now.part]));
   show(model); showList();
@@ -171,11 +183,12 @@ handles.ondrop = handle => inTurn(async () => {
 
 // ---- edits
 
-function snapshot() { return { model: now.model, held: structuredClone(now.held), part: now.part }; }
+function snapshot() { return { model: now.model, held: structuredClone(now.held), part: now.part, ground: now.ground, left: now.left, dirty: now.dirty }; }
 
 async function edit(asked, after = () => {}) {
-  if (!now?.model.parts?.length) return say("this building has no parts to change");
-  const before = snapshot(), began = performance.now(), model = await tell("change", { parts: now.model.parts, asked });
+  if (!now.model.parts?.length) return say("this building has no parts to change");
+  if (now.left) return say("this building is left out; keep it in first");
+  const before = snapshot(), began = performance.now(), model = await changed(now.model.parts, asked);
   now.history.push(before); now.dirty = true; after(); say(""); show(model); showList();
   $("say").dataset.ms = (performance.now() - began).toFixed(1);
 }
@@ -187,7 +200,7 @@ const changePart = (change, names) => inTurn(() => edit({ action: "change", part
 const setType = type => inTurn(() => edit({ action: "change", part: now.part, change: { type } }, () => { delete now.held[now.part]; }));
 const forgetPins = () => { now.held = {}; };
 const refit = () => inTurn(() => {
-  if (!now?.cloud?.count) return say(now?.cloud?.missing || "no points to refit to", true);
+  if (!now.cloud?.count) return say(now.cloud?.missing || "no points to refit to", true);
   return edit({ action: "refit", held: now.held });
 });
 const split = side => inTurn(() => edit({ action: "split", part: now.part, side }, forgetPins));
@@ -198,7 +211,7 @@ const dormer = () => inTurn(async () => {
 });
 
 function merge() {
-  const count = now?.model.parts?.length || 0;
+  const count = now.model.parts?.length || 0;
   if (count < 2) return say("this building has no other part to merge with");
   if (count === 2) return inTurn(() => mergeWith(1 - now.part));
   merging = true; say("choose the part to merge with");
@@ -212,15 +225,29 @@ async function mergeWith(other) {
 }
 
 const undo = () => inTurn(() => {
-  const before = now?.history.pop();
-  if (!before) return say("nothing to undo");
-  now.held = before.held; now.part = before.part; now.dirty = true; say(""); show(before.model); showList();
+  const { model, ...before } = now.history.pop() || {};
+  if (!model) return say("nothing to undo");
+  Object.assign(now, before); say(""); show(model); showList();
+});
+
+const setGround = height => inTurn(async () => {
+  const before = snapshot();
+  now.ground = height;
+  try {
+    const model = await changed(now.model.parts, { action: "show" });
+    now.history.push(before); now.dirty = true; say(""); show(model); showList();
+  } catch (error) { now.ground = before.ground; show(now.model); throw error; }
+});
+
+const leaveOut = () => inTurn(() => {
+  now.history.push(snapshot()); now.left = !now.left; now.dirty = true;
+  say(now.left ? "left out: once accepted, the next run makes no model of it" : ""); show(now.model); showList();
 });
 
 async function tryTypes() {
-  if (!now?.cloud?.count) return say(now?.cloud?.missing || "no points to try types on", true);
+  if (!now.cloud?.count) return say(now.cloud?.missing || "no points to try types on", true);
   say("trying every type ...");
-  const { types } = await tell("alternatives", { parts: now.model.parts, part: now.part });
+  const { types } = await tell("alternatives", { parts: now.model.parts, part: now.part, z_ground: now.ground });
   say("");
   $("tried").replaceChildren(...types.map(row => {
     const button = document.createElement("button");
@@ -231,11 +258,13 @@ async function tryTypes() {
   }));
 }
 
-async function accept(version = now?.version) {
-  if (!now?.model.parts?.length) return say("this building has no parts to accept");
+async function accept(version = now.version) {
+  if (!now.model.parts?.length && !now.left) return say("this building has no parts to accept");
+  const said = now.left ? { leave_out: true } : { parts: now.model.parts, z_ground: now.ground };
   try {
-    const answer = await tell("accept", { parts: now.model.parts, version, note: $("note").value });
+    const answer = await tell("accept", { ...said, version, note: $("note").value });
     now.version = answer.version; now.accepted = { who: start.who, when: answer.when, note: $("note").value }; now.dirty = false;
+    for (const before of now.history) before.dirty = true;
     say("accepted");
   } catch (error) {
     if (error.code !== 409) throw error;
@@ -285,7 +314,7 @@ function showNumbers(part, handle) {
   $("numbers").replaceChildren(); $("part-title").textContent = part ? `Part ${now.part}` : "";
   $("drawing").hidden = !part;
   if (!part) return;
-  if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?type=${part.type}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
+  if ($("drawing").dataset.type !== part.type) { $("drawing").dataset.type = part.type; $("drawing").src = `drawing?${new URLSearchParams({ type: part.type })}`; $("drawing").alt = `a ${part.type} roof with its parameters`; }
   const select = document.createElement("select");
   select.id = "type"; select.append(...start.types.map(type => new Option(type, type, false, type === part.type)));
   select.addEventListener("change", () => { select.blur(); setType(select.value); });
@@ -327,14 +356,17 @@ function numberRow(title, field, unit = "", sigma = undefined, pinned = null) {
 // ---- clicks and keys
 
 const next = () => inTurn(() => step(1)), previous = () => inTurn(() => step(-1)), acceptNow = () => inTurn(() => accept());
-const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: () => split("length"), "split-width": () => split("width"), merge, dormer, remove, try: () => inTurn(tryTypes) };
-for (const [id, action] of Object.entries(BUTTONS)) $(id).addEventListener("click", event => { event.currentTarget.blur(); action(); });
-const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: () => split("length"), m: merge, d: dormer, Delete: remove, t: () => inTurn(tryTypes), Escape: () => { merging = false; say(""); } };
+const tryNow = () => inTurn(tryTypes), across = () => split("length"), along = () => split("width"), leave = () => { merging = false; say(""); };
+const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: across, "split-width": along, merge, dormer, remove, try: tryNow, "leave-out": leaveOut };
+const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: across, m: merge, d: dormer, Delete: remove, t: tryNow, o: leaveOut, Escape: leave };
+const act = action => now || action === next || action === previous ? action() : say("no building is chosen");
+for (const [id, action] of Object.entries(BUTTONS)) $(id).addEventListener("click", event => { event.currentTarget.blur(); act(action); });
+$("ground").addEventListener("change", event => { const height = event.target.valueAsNumber; event.target.blur(); if (Number.isFinite(height)) setGround(height); else showWhole(); });
 document.addEventListener("keydown", event => {
-  if ((event.ctrlKey || event.metaKey) && event.key === "z") { event.preventDefault(); undo(); return; }
+  if ((event.ctrlKey || event.metaKey) && event.key === "z") { event.preventDefault(); act(undo); return; }
   if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) { if (event.key === "Escape" || (event.key === "Enter" && event.target.id === "note")) event.target.blur(); return; }
   if (/^[1-9]$/.test(event.key) && now?.model.parts?.length >= Number(event.key)) choose(Number(event.key) - 1);
-  else if (KEYS[event.key]) { event.preventDefault(); KEYS[event.key](); }
+  else if (KEYS[event.key]) { event.preventDefault(); act(KEYS[event.key]); }
 });
 $("find").addEventListener("change", () => inTurn(list));
 for (const id of ["show-points", "show-roof"]) $(id).addEventListener("change", () => { if (now) draw(false); });
