@@ -20,7 +20,7 @@ import shapely
 from hiproof import read_points
 from hiproof.classify.split import split_buildings
 from hiproof.errors import FitError
-from hiproof.fit.outline import iou
+from hiproof.evaluate.metrics import iou
 from hiproof.fit.union.outline import outline_of_points
 from hiproof.frames import LocalFrame
 from hiproof.read import read_footprints
@@ -105,13 +105,8 @@ def overlaps_of(files: list[Path], footprints: list[shapely.Polygon]) -> list[tu
         held = sum(inside[k] for k in mine)
         if held >= LEAST_POINTS_A_M2 * union.area:
             outside = 1.0 - held / sum(len(xy[k]) for k in mine)
-            overlaps.append((iou_of(shapely.union_all([outlines[k] for k in mine]), union), union.area, outside))
+            overlaps.append((iou(shapely.union_all([outlines[k] for k in mine]), union), union.area, outside))
     return overlaps
-
-
-def iou_of(one: shapely.Geometry, other: shapely.Geometry) -> float:
-    common = shapely.intersection(one, other).area
-    return common / (one.area + other.area - common)
 
 
 def main() -> None:

@@ -22,6 +22,7 @@ from hiproof.learn.data import POINTS, as_sample
 from hiproof.learn.shapes import Shape, read_shapes
 from hiproof.model import ROOF
 from hiproof.primitives.catalogue import CATALOGUE
+from hiproof.rings import ring_normal
 from hiproof.segment import combine, segment
 from hiproof.segment.inference import SHIPPED_WEIGHTS
 from hiproof.segment.scores import Scores
@@ -174,7 +175,7 @@ def is_true_to_code(shape: Shape) -> bool:
     areas, normals = [], []
     for face in shape.solid.of_kind(ROOF):
         ring = shape.solid.vertices[list(face.rings[0])]
-        normal = np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0) / 2
+        normal = ring_normal(ring)
         areas.append(np.linalg.norm(normal))
         normals.append(normal / max(areas[-1], 1e-9))
     share, normals = np.array(areas) / np.sum(areas), np.array(normals)

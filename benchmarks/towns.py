@@ -34,6 +34,7 @@ from hiproof.compose import compose
 from hiproof.frames import LocalFrame
 from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Roof, Solid
 from hiproof.read.solids import read_solids
+from hiproof.rings import ring_normal
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status
@@ -167,7 +168,7 @@ def roof_pieces(solid: Solid) -> Iterator[Piece]:
     for face in solid.of_kind(ROOF):
         ring = solid.vertices[list(face.rings[0])]
         centre = ring.mean(axis=0)
-        normal = np.cross(ring - centre, np.roll(ring - centre, -1, axis=0)).sum(axis=0)
+        normal = ring_normal(ring)
         if normal[2] < STEEPEST * np.linalg.norm(normal):
             continue
         a, b = -normal[:2] / normal[2]

@@ -5,7 +5,8 @@ import pytest
 import shapely
 
 from hiproof.errors import FitError
-from hiproof.fit.outline import estimate_outline, iou
+from hiproof.evaluate.metrics import iou
+from hiproof.fit.outline import estimate_outline
 from hiproof.fit.outline.cost import Border, cost_of_change, drawing_of
 from hiproof.fit.outline.lines import dropped, lines_through, replaced
 

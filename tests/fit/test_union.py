@@ -5,8 +5,8 @@ import pytest
 import shapely
 
 from hiproof.errors import FitError
+from hiproof.evaluate.metrics import iou
 from hiproof.fit import fit_roof
-from hiproof.fit.outline import iou
 from hiproof.fit.union import fit_building
 from hiproof.model import Roof
 from hiproof.settings import Settings

@@ -7,9 +7,10 @@ import typer
 from glb_files import accessor_values, parse_glb
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
+from hiproof.rings import ring_normal
 from hiproof.write.gltf import write_models as write_glb
 from hiproof.write.obj import write_models as write_obj
-from hiproof.write.triangles import face_triangles, ring_normal
+from hiproof.write.triangles import face_triangles
 from sample_models import SOLIDS, courtyard_solid, gable_solid, write_sample_run
 
 BUILDINGS = [(id, kind, solid, {"height": 3.5}) for id, (kind, solid) in SOLIDS.items()]

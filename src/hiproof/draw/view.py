@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import ROOF, Building, Solid
+from ..rings import ring_normal
 from ..write.colours import TYPE_COLOURS
 
 WALL_COLOUR = "#d9d4cb"
@@ -60,9 +61,7 @@ def seen_faces(
 
 def lightness(solid: Solid, face) -> float:
     """How light a face is under a lamp high in the south-west."""
-    corners = solid.vertices[list(face.rings[0])]
-    corners = corners - corners[0]
-    normal = 0.5 * np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
+    normal = ring_normal(solid.vertices[list(face.rings[0])])
     normal /= max(float(np.linalg.norm(normal)), 1e-12)
     return float(0.72 + 0.28 * normal @ np.array([-0.4, -0.5, 0.77]))
 

@@ -13,8 +13,7 @@ from ..errors import InputError
 from ..formats import FORMATS
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, WALL, Face, Solid
-from ..read.cityjson_text import UNUSABLE, documents, reference_system
-from ..read.crs import units_named
+from ..read.cityjson import UNUSABLE, features
 from ..read.plausible import is_plausible
 from ..write.attribute_list import OWN
 
@@ -59,24 +58,16 @@ def read_models(path: str | Path, otherwise: Units = METRES, known: Units | None
     Solids of the highest level of detail count, and building parts that hiproof cut come as the whole that they were. `otherwise` are the units of a file
     that names no CRS, `known` those of one of which more is known than it names. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
     """
-    transform, units = {"scale": [1, 1, 1], "translate": [0, 0, 0]}, otherwise
-    for document, place in documents(Path(path)):
-        transform = document.get("transform", transform)
-        if name := reference_system(document):
-            units = known or units_named(name, otherwise)
+    for feature in features(Path(path), otherwise, known):
         try:
-            yield from _buildings(document, transform, units)
+            yield from _buildings(feature.objects, feature.vertices)
         except UNUSABLE as error:
             raise InputError(
-                f"expected CityJSON whose solids can be used in {place}, got {error!r}; `hiproof check` may tell more"
+                f"expected CityJSON whose solids can be used in {feature.place}, got {error!r}; `hiproof check` may tell more"
             ) from error
 
 
-def _buildings(document: dict[str, Any], transform: dict[str, Any], units: Units) -> Iterator[BuildingModel]:
-    vertices = np.asarray(document["vertices"], float).reshape(-1, 3)
-    with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are refused below
-        vertices = units.to_metres(vertices * transform["scale"] + transform["translate"])
-    objects = document["CityObjects"]
+def _buildings(objects: dict[str, Any], vertices: np.ndarray) -> Iterator[BuildingModel]:
     for id, city_object in objects.items():
         if city_object["type"] != "Building":
             continue

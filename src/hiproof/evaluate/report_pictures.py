@@ -8,6 +8,7 @@ from html import escape
 import numpy as np
 
 from ..model import GROUND, ROOF, Solid
+from ..rings import ring_normal
 from ..write.colours import TYPE_COLOURS, WALL_COLOUR
 
 RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "#fdae61"), (0.4, "#d7191c"))
@@ -73,8 +74,6 @@ def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, r
 
 def slope_direction(solid: Solid) -> np.ndarray:
     """Level unit vector (3,) in which the largest sloped roof face falls; east where all are level."""
-    from ..write.triangles import ring_normal
-
     normals = np.array([ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.of_kind(ROOF)])
     if not len(normals):
         return np.array([1.0, 0.0, 0.0])

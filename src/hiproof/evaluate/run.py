@@ -12,7 +12,7 @@ import shapely
 
 from ..errors import InputError
 from ..frames import Units
-from ..read.cityjson_text import parsed, read_text
+from ..read.cityjson import parsed, read_text
 from ..settings import Settings
 from ..write.naming import FileUnits
 from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline

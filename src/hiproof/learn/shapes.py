@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import zlib
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +12,7 @@ import shapely
 from ..errors import InputError
 from ..model import GROUND, ROOF, Solid
 from ..primitives.catalogue import CATALOGUE
+from ..read.cityjson import features
 from ..read.solids import read_solids
 
 # Types that share a code (both gables) are read as the first, the commoner one; 1120 is a pyramidal broach.
@@ -38,7 +38,7 @@ def read_shapes(path: Path) -> list[Shape]:
     All parts of a building are held out together. Raises InputError for a file that is no CityJSON.
     """
     solids = dict(read_solids(path))
-    objects = json.loads(path.read_text(encoding="utf-8")).get("CityObjects", {})
+    objects = {name: item for feature in features(path) for name, item in feature.objects.items()}
     shapes = []
     for name, solid in solids.items():
         item = objects.get(name, {})

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..frames import METRES, Units
+from ..frames import METRES
 from ..model import WALL, Face, Solid
-from .cityjson_text import UNUSABLE, documents, reference_system
+from .cityjson import UNUSABLE, Feature, features
 from .crs import units_named
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
@@ -64,24 +64,13 @@ def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
 
 def cityjson_solids(path: Path) -> Iterator[tuple[str, Solid]]:
     """Shells of a CityJSON 1.x or 2.0 file, or of a CityJSONSeq file: the transform is that of the line before."""
-    transform, units = None, METRES
-    for document, place in documents(path):
-        if document["type"] == "CityJSON":
-            transform, units = document.get("transform"), units_named(reference_system(document))
-        yield from feature_solids(document, transform, units, place)
+    for feature in features(path):
+        yield from feature_solids(feature)
 
 
-def feature_solids(
-    value: dict[str, Any], transform: dict[str, Any] | None, units: Units, place: str
-) -> Iterator[tuple[str, Solid]]:
+def feature_solids(feature: Feature) -> Iterator[tuple[str, Solid]]:
     """Shells of all city objects of one CityJSON object or feature."""
     try:
-        vertices = np.array(value.get("vertices", []), float).reshape(-1, 3)
-        with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are findings of the check
-            if transform:
-                vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
-            vertices = units.to_metres(vertices)
-        objects = value.get("CityObjects", {}).items()
         found = [
             (
                 name,
@@ -89,15 +78,16 @@ def feature_solids(
                     solid
                     for geometry in city_object.get("geometry") or ()
                     if not str(geometry.get("lod", "")).startswith("0")
-                    for solid in geometry_shells(geometry, vertices)
+                    for solid in geometry_shells(geometry, feature.vertices)
                 ],
             )
-            for name, city_object in objects
+            for name, city_object in feature.objects.items()
             if str(city_object.get("type")).startswith("Building")
         ]
     except UNUSABLE as error:
         raise InputError(
-            f"expected CityJSON with vertices, a transform and boundaries in {place}, got {error!r}; validate the file first"
+            f"expected CityJSON with vertices, a transform and boundaries in {feature.place}, got {error!r}; "
+            "validate the file first"
         ) from error
     for name, solids in found:
         yield from numbered(name, solids)

@@ -11,6 +11,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import ROOF, Piece, Solid
+from ..rings import ring_normal
 from .relief import Plane, Relief
 from .roofs import SimBuilding, random_parameters, turned
 from .shapes import ROOF_TYPES, box, make_part
@@ -258,7 +259,7 @@ def triangulated(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np
     outer = vertices[list(rings[0])]
     if len(rings) == 1 and len(outer) == 3:
         return outer[None]
-    normal = np.cross(outer, np.roll(outer, -1, axis=0)).sum(axis=0)
+    normal = ring_normal(outer)
     drop = int(np.argmax(np.abs(normal)))
     kept = [axis for axis in range(3) if axis != drop]
     flat = shapely.make_valid(shapely.Polygon(outer[:, kept], [vertices[list(ring)][:, kept] for ring in rings[1:]]))

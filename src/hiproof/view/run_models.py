@@ -14,7 +14,7 @@ from ..evaluate.run import run_crs, run_out_crs, run_record, run_units
 from ..formats import FORMATS
 from ..model import Solid
 from ..parametric.file import opened_parameters
-from ..read.cityjson_text import documents, reference_system
+from ..read.cityjson import documents, reference_system
 from ..write.parameters import crs_text
 from ..write.reprojected import crs_of_files
 

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from ..model import GROUND, ROOF, WALL, Solid
+from ..rings import ring_normal
 from .colours import GROUND_COLOUR, TYPE_COLOURS, WALL_COLOUR, linear_rgb
 from .glb import GlbDocument, y_up
-from .triangles import face_triangles, ring_normal
+from .triangles import face_triangles
 
 
 def write_models(

@@ -20,8 +20,10 @@ import numpy as np
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
 from ..model import ROOF, Face, Solid
+from ..read.cityjson import documents
 from ..read.crs import units_named
 from ..read.database import import_psycopg, refuse_half_a_password
+from ..rings import ring_normal
 from .attribute_list import OWN, PARTS_LAYER
 from .triangles import face_triangles
 
@@ -107,8 +109,8 @@ def batched(rows: Iterator[Row], size: int) -> Iterator[list[Row]]:
 
 def open_sequence(path: Path) -> tuple[dict, Iterator[dict]]:
     """The first line of a CityJSONSeq and an iterator over its features."""
-    lines = path.open(encoding="utf-8")
-    return json.loads(next(lines)), (json.loads(line) for line in lines if line.strip())
+    lines = (document for document, _ in documents(path))
+    return next(lines), lines
 
 
 def srid_of(header: dict) -> int:
@@ -214,7 +216,7 @@ def roof_rows(row: Row) -> Iterator[tuple]:
 
 def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
     """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat), true area (m2) of rings in metres."""
-    normal = sum(0.5 * np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0) for ring in rings)
+    normal = np.sum([ring_normal(ring) for ring in rings], axis=0)
     area = float(np.linalg.norm(normal))
     slope = float(np.degrees(np.arctan2(np.hypot(*normal[:2]), abs(normal[2]))))
     azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360) if slope > 0.01 else None

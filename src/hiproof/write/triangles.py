@@ -6,6 +6,7 @@ import numpy as np
 import shapely
 
 from ..model import Face
+from ..rings import ring_normal
 
 
 def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
@@ -37,9 +38,3 @@ def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
     turned = np.cross(b - a, c - a)[:, axis] * normal[axis] < 0
     triangles[turned] = triangles[turned][:, ::-1]
     return triangles
-
-
-def ring_normal(ring: np.ndarray) -> np.ndarray:
-    """Vector area (3,) of a closed ring (m, 3) without its repeated last vertex (Newell)."""
-    centred = ring - ring.mean(axis=0)
-    return np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0) / 2

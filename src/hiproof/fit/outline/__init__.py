@@ -63,11 +63,3 @@ def estimate_outline(xy: np.ndarray, kappa: float | None = None) -> shapely.Poly
     corners = np.empty_like(place)
     find_corners(place, corners)
     return shapely.Polygon(corners)
-
-
-def iou(one: shapely.Polygon, other: shapely.Polygon) -> float:
-    """Intersection over union of two polygons, 0 where one is empty or invalid."""
-    if one.is_empty or other.is_empty or not (one.is_valid and other.is_valid):
-        return 0.0
-    common = shapely.intersection(one, other).area
-    return common / (one.area + other.area - common)

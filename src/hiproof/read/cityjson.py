@@ -1,16 +1,57 @@
-"""The JSON documents of a CityJSON or CityJSONSeq file one by one, or a sentence that says why they cannot be read."""
+"""CityJSON and CityJSONSeq files document by document, with their vertices in place, or a sentence that says why not."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
+
+import numpy as np
 
 from ..errors import InputError
+from ..frames import METRES, Units
+from .crs import units_named
 
 UNUSABLE = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
 """What comes of taking a document apart that is JSON, but not what CityJSON says it is."""
+
+
+class Feature(NamedTuple):
+    """A CityJSON document or a line of CityJSONSeq: its city `objects` by id, their vertices (n, 3) in world metres, its place in
+    the file, and what its coordinates count in."""
+
+    objects: dict[str, Any]
+    vertices: np.ndarray
+    place: str
+    units: Units
+
+
+def features(path: Path, otherwise: Units = METRES, known: Units | None = None) -> Iterator[Feature]:
+    """Every document of a file, each by the transform and the CRS of the line before it that has them.
+
+    `otherwise` are the units where no CRS is named, `known` those of a CRS of which more is known than its name tells. Raises
+    InputError as `documents` does, and for vertices that are none.
+    """
+    transform, units = None, otherwise
+    for document, place in documents(path):
+        transform = document.get("transform", transform)
+        if name := reference_system(document):
+            units = known or units_named(name, otherwise)
+        try:
+            vertices = np.array(document["vertices"], float).reshape(-1, 3)
+            with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are the business of who asks
+                if transform:
+                    vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
+                vertices = units.to_metres(vertices)
+            objects = document["CityObjects"]
+            objects.items()
+        except UNUSABLE as error:
+            raise InputError(
+                f"expected CityJSON with vertices, a transform and boundaries in {place}, got {error!r}; "
+                "validate the file first"
+            ) from error
+        yield Feature(objects, vertices, place, units)
 
 
 def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
