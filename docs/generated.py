@@ -1,14 +1,23 @@
-"""Pages of the site that are made of the code: every command with its options, every setting."""
+"""Pages of the site that are made of the code: every command with its options, every setting, every number with its reason."""
 
 from __future__ import annotations
 
+import ast
 import dataclasses
-from typing import Any
+import io
+import tokenize
+from collections.abc import Iterator
+from itertools import groupby, zip_longest
+from pathlib import Path
+from typing import Any, NamedTuple
 
 import typer
 
+import hiproof
 from hiproof.cli.app import app
 from hiproof.settings import Settings, toml_value
+
+PACKAGE = Path(hiproof.__file__).parent
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -60,9 +69,88 @@ def setting_row(field: dataclasses.Field) -> str:
     return f"| `{field.name}` | `{toml_value(field.default)}` | {told['unit']} | {values} | {cell(told['help'])} | {option} |\n"
 
 
+class Constant(NamedTuple):
+    """A line that names numbers: of which file of the package, its `names`, the `value` as it is written, and why it is so."""
+
+    file: str
+    names: tuple[str, ...]
+    value: str
+    why: str
+
+    @property
+    def room(self) -> str:
+        return self.file.partition("/")[0]
+
+
+def constants() -> list[Constant]:
+    """All numbers that have a name at the top of a module, in the order of files.
+
+    The reason is what is written behind the value, on the lines above it, or in the text below it.
+    """
+    return [constant for file in sorted(PACKAGE.rglob("*.py")) for constant in constants_of(file)]
+
+
+def constants_of(file: Path) -> Iterator[Constant]:
+    text = file.read_text(encoding="utf-8")
+    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    said = {token.start[0]: token.string.lstrip("# ") for token in tokens if token.type == tokenize.COMMENT}
+    whole = {line for line in said if text.splitlines()[line - 1].startswith("#")}
+    statements = ast.parse(text).body
+    for statement, after in zip_longest(statements, statements[1:]):
+        names = names_of(statement)
+        if not names or not is_number(statement.value):  # type: ignore[attr-defined]
+            continue
+        above, first = [], statement.lineno - 1
+        while first in whole:
+            above.insert(0, said[first])
+            first -= 1
+        behind = [said[line] for line in range(statement.lineno, (statement.end_lineno or 0) + 1) if line in said]
+        below = [after.value.value] if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else []
+        place = file.relative_to(PACKAGE).as_posix()
+        why = " ".join(map(str, [*above, *behind, *below]))
+        yield Constant(place, names, ast.unparse(statement.value), why)  # type: ignore[attr-defined]
+
+
+def names_of(statement: ast.stmt) -> tuple[str, ...]:
+    """The names in capitals that a statement gives values to."""
+    if not isinstance(statement, (ast.Assign, ast.AnnAssign)) or statement.value is None:
+        return ()
+    target = statement.targets[0] if isinstance(statement, ast.Assign) else statement.target
+    names = target.elts if isinstance(target, ast.Tuple) else [target]
+    return tuple(name.id for name in names if isinstance(name, ast.Name) and name.id.isupper())
+
+
+def is_number(value: ast.expr | None) -> bool:
+    """Whether an expression is a number, several of them, or made of nothing else by functions and operators."""
+    if isinstance(value, ast.Constant):
+        return isinstance(value.value, (int, float)) and not isinstance(value.value, bool)
+    if isinstance(value, ast.Tuple):
+        return bool(value.elts) and all(map(is_number, value.elts))
+    if isinstance(value, ast.Call):
+        return bool(value.args) and all(map(is_number, value.args))
+    if isinstance(value, ast.BinOp):
+        return is_number(value.left) and is_number(value.right)
+    return isinstance(value, ast.UnaryOp) and is_number(value.operand)
+
+
+def constants_text() -> str:
+    """A table a room: every named number, its value, its file, and what it does or why it is so."""
+    text = (
+        "# Constants\n\nEvery number that has a name in the code, with its unit and its reason. What a user may want to change is a "
+        "[setting](settings.md) instead. `python -m benchmarks.constants NAME` tells what half and double of one do to Delft.\n"
+    )
+    for room, own in groupby(constants(), lambda constant: constant.room):
+        text += f"\n## {room}\n\n| names | value | file | unit, what it does, why |\n| --- | --- | --- | --- |\n"
+        text += "".join(
+            f"| {', '.join(f'`{name}`' for name in c.names)} | `{cell(c.value)}` | {c.file} | {cell(c.why)} |\n"
+            for c in own
+        )
+    return text
+
+
 def cell(text: str) -> str:
     """A text as a table's cell holds it."""
     return text.replace("|", "\\|").replace("\n", " ")
 
 
-PAGES = {"commands.md": commands_text, "settings.md": settings_text}
+PAGES = {"commands.md": commands_text, "settings.md": settings_text, "constants.md": constants_text}

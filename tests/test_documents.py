@@ -14,7 +14,7 @@ from hiproof.write.attribute_list import TABLES
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [*(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
-MADE = ("commands.md", "settings.md")  # by docs/generated.py, when the site is built
+MADE = ("commands.md", "settings.md", "constants.md")  # by docs/generated.py, when the site is built
 COMMANDS = typer.main.get_command(app).commands
 OPTIONS = {
     name

@@ -8,7 +8,7 @@ from typing import Any
 from ..errors import InputError, SettingsError
 from ..settings import Settings, shown
 
-MOST_PROCESSES = 1024
+MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
 
 
 def refuse_unusable(request: Any) -> None:

@@ -14,7 +14,7 @@ from ..errors import InputError, InputWarning
 from ..read.pointcloud import iter_points
 from ..settings import ReadSettings, Settings
 
-PEEK_POINTS = 100_000
+PEEK_POINTS = 100_000  # points of a file looked at to learn its classes; a thinner look than a whole chunk
 
 
 def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:

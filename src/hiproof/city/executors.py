@@ -29,9 +29,9 @@ from ..compiled.stamp import count_compiled
 from ..errors import InputError, NotKeptWarning, OutputError
 from .tasks import make_ready
 
-CONNECT_S = 20
+CONNECT_S = 20  # seconds for an answer of the scheduler
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
-WORKERLESS_S, POLL_S = 300, 5
+WORKERLESS_S, POLL_S = 300, 5  # seconds without a worker until a run gives up; seconds between looks at what is done
 
 
 class WorkerLost(Exception):

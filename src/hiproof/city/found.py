@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 CLEAR_M = 0.5  # of a roof above the ground
-BESIDE_M = 1.0
+BESIDE_M = 1.0  # m from the outline beyond which points lie beside the building
 FEWEST_BESIDE = 10  # cells beside a building, without which nothing is known of the ground
 MOSTLY, HARDLY = 0.5, 0.15  # shares of the outline's points
 

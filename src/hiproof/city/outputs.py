@@ -8,7 +8,7 @@ from pathlib import Path
 
 from .ledger import Claim
 
-CHUNK_BYTES = 1 << 20
+CHUNK_BYTES = 1 << 20  # bytes read at once: a file of any size is digested in little memory
 SQLITE = b"SQLite format 3\0"
 # bytes of an SQLite file's head that change when a viewer opens it: how it is locked, and counters of that
 RESTLESS = ((18, 20), (24, 28), (92, 100))

@@ -22,7 +22,7 @@ from .plan import Job, Plan
 
 FILE, REDO = "overrides.jsonl", "redo.json"
 TABLES = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
-SHOWN = 5
+SHOWN = 5  # ids in a sentence; more would hide what is said
 
 
 def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, fresh: bool) -> None:

@@ -25,6 +25,7 @@ from ..write.values import plain_text
 
 PLAN_FILE = "plan.jsonl"
 AROUND_M = 4.0  # of roof points around a footprint that may be moved: as fit/align.py asks, without its compiler here
+# m around a building in which its ground is looked for: where points have the class, a street's width; where it is found by shape, twice that
 GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 
 

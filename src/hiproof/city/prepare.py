@@ -19,8 +19,8 @@ from .from_cloud import jobs_from_cloud
 from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 from .request import Box, Request
 
-TILE_M = 250.0
-MOST_BUILDINGS_A_TILE = 100
+TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
+MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
 
 
 def make_plan(request: Request) -> Plan:

@@ -13,7 +13,7 @@ from typing import Any
 from .executors import WorkerLost
 from .plan import load_plan
 
-TRIES = 3
+TRIES = 3  # deaths of its process, alone, until a task is taken for their cause: memory may run out by chance
 
 
 def run_alone(executor: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:

@@ -35,7 +35,7 @@ from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
 from .tasks import ALL, MAIN_JOB, solve_tile, sort_cloud
 
-MOST_LOSSES = 3
+MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 Progress = Callable[[str, int, int], None]
 
 

@@ -32,9 +32,9 @@ from .ground import lowest_in_cells
 from .overrides import REDO, load_redo
 from .plan import PLAN_FILE, Plan, load_plan
 
-NOISE_CLASSES = (7, 18)
+NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
 KINDS = ("roof", "ground", "low")
-ROOF, GROUND, OTHER, NOISE = range(4)
+ROOF, GROUND, OTHER, NOISE = range(4)  # kinds of points, by what a work tile needs them for
 SQUARE_M = 50.0  # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
 HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
 MASKS_KEPT = 200  # of 100 kB each

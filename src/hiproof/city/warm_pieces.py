@@ -15,7 +15,8 @@ import shapely
 
 from ..compiled import news
 
-OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)
+OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)  # m; a house small enough to be fitted while code compiles
+# m; and one with a corner that points inwards
 L_OUTLINE = shapely.box(0.0, 0.0, 6.0, 7.0) | shapely.box(6.0, 2.0, 9.0, 7.0)
 
 

@@ -10,7 +10,7 @@ from .cells import PlanCells, plan_density
 from .ground import ground_grid
 from .surfaces import Surfaces, surfaces_of
 
-UNKNOWN, GROUND, BUILDING = 1, 2, 6
+UNKNOWN, GROUND, BUILDING = 1, 2, 6  # classes of ASPRS
 
 WORK_M, BORDER_M = 250.0, 40.0  # a cloud is worked through in squares, with what lies so far around each
 GROUND_M = 0.25  # of a point above or below the ground; on slopes more, by what half a cell rises
@@ -28,7 +28,7 @@ CORE_M2 = 5.0  # a building has cells with a surface of that size ...
 FEWEST_M2 = 16.0  # ... on that much of its plan,
 NARROWEST_M = 2.0  # nowhere narrower than this,
 UNLIKELY = -3.0  # log odds of what is no building even below a roof
-SQUARE = np.ones((3, 3))
+SQUARE = np.ones((3, 3))  # a cell and the eight around it
 REACH_M = 1.0  # and nothing farther from them is part of it
 
 

@@ -15,12 +15,12 @@ from scipy import ndimage
 
 from ..read.thin import cell_range
 
-CELL_M = 1.0
+CELL_M = 1.0  # m; a car or a bush covers a few cells, a street is some wide
 WINDOWS_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0)  # half sides of the openings' windows
 SLOPE = 0.15  # a rise above the opened surface of more than this much of the half side is no ground
 PIT_M = 2.0  # a cell that lies so far below all around it is noise
-PLANES = 3
-SMOOTHINGS = 30
+PLANES = 3  # rounds of fitting the plane under all cells, each to the lower half of the last
+SMOOTHINGS = 30  # passes of a mean over neighbours that smooth what fills a gap
 
 
 @dataclass(frozen=True)

@@ -18,11 +18,12 @@ from .houses import told_apart
 from .scene import roofs_by_shape
 
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
-SPACINGS_PER_GAP = 2.5
+SPACINGS_PER_GAP = 2.5  # a gap is no gap between houses where points lie sparser than this many to it
+# m, points and share of one connected group: what may be one roof cut out beforehand, the paper's case
 SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 20_000, 0.9
-NEVER_CLASSIFIED = (0, 1)
-NOISE = (7, 18)
-MIN_AREA_M2 = 4.0
+NEVER_CLASSIFIED = (0, 1)  # of ASPRS: created, unclassified
+NOISE = (7, 18)  # of ASPRS: low and high noise
+MIN_AREA_M2 = 4.0  # m2; smaller is a shed or a car's roof, and too little to model
 SPACINGS_BEYOND = 0.35  # a roof ends about so far beyond its outermost points
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 
-INTERRUPTED = 130
+INTERRUPTED = 130  # exit code, as shells know it: 128 and the signal's number
 
 
 def main() -> None:

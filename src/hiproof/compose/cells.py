@@ -21,7 +21,7 @@ from .arrangement import (
 )
 from .tidy import without_short_edges
 
-MAX_EXTENT_M = 50_000.0
+MAX_EXTENT_M = 50_000.0  # m from the frame's origin: on the integer grid, areas beyond would not fit 64 bits
 
 
 @dataclass(frozen=True)

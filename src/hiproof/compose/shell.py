@@ -15,7 +15,7 @@ from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
 from .cells import PlanCells, PlanProblem
 from .levels import first_saddle, split_at_crossings, stack_levels
 
-SETBACK_M = 0.01
+SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what makes two points one
 
 
 class Levels(NamedTuple):

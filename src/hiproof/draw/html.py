@@ -12,10 +12,10 @@ import numpy as np
 from ..model import Building
 from .view import TILT_DEG, TURN_DEG, colours_of, lightness, seen_faces, shaded
 
-SIZE = (360, 260)
-MARGIN = 12
-SHOWN_PARTS = 12
-MM = 3
+SIZE = (360, 260)  # pixels, width and height: beside a notebook's table
+MARGIN = 12  # pixels left free on each side
+SHOWN_PARTS = 12  # rows of the table; more would push the picture off the screen
+MM = 3  # digits of coordinates sent to the page: millimetres
 
 
 def html_of(building: Building) -> str:

@@ -10,8 +10,8 @@ from ..errors import InputError
 from ..model import Building
 from .view import colours_of, lightness, shaded
 
-NEAR_M = 0.2
-MOST_POINTS = 5000
+NEAR_M = 0.2  # m; within it a point counts as explained, as in share_within_20cm
+MOST_POINTS = 5000  # points drawn; more make a black patch
 
 
 def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -> Any:

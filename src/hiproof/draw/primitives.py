@@ -18,9 +18,9 @@ from ..primitives.catalogue import CATALOGUE
 from ..write.colours import TYPE_COLOURS
 from .view import WALL_COLOUR, SeenFace, projected, seen_faces, shaded
 
-WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6
-TURN_DEG, TILT_DEG = -38.0, 30.0
-SCALE, MARGIN = 26.0, 46.0
+WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
+TURN_DEG, TILT_DEG = -38.0, 30.0  # degrees; a view from the front left in which no side hides a parameter
+SCALE, MARGIN = 26.0, 46.0  # pixels a metre; pixels of margin, for the names beside the roof
 ASIDE = 1.1  # m from the roof to a line outside it
 LINE, TEXT = "#8c1c13", "#1a1a1a"
 

@@ -12,7 +12,7 @@ from ..rings import ring_normal
 from ..write.colours import TYPE_COLOURS
 
 WALL_COLOUR = "#d9d4cb"
-TURN_DEG, TILT_DEG = -35.0, 35.0
+TURN_DEG, TILT_DEG = -35.0, 35.0  # degrees; from the front left and above, so that two walls and the roof show
 
 
 @dataclass(frozen=True)

@@ -27,7 +27,7 @@ from .points import RunPoints
 from .seen import drawn, seen
 
 MOST_ROWS = 500  # of the list at once; others are found by their id
-MOST_NOTE = 500
+MOST_NOTE = 500  # characters of a note or a name; a sentence or two
 BELONGS = ("origin", "outline", "z_ground", "parts")  # of an accepted edit, in place of the run's
 SAID = ("z_ground", "leave_out")  # of the building as a whole, by a person
 

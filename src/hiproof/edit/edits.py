@@ -23,7 +23,7 @@ from ..parametric.override import override_of
 from ..write.files import atomic
 
 FILE = "edits.jsonl"
-WAIT_S = 30
+WAIT_S = 30  # seconds for another window to finish its write, which takes milliseconds
 UNTOUCHED = "run"  # the version of a building that the file does not name
 
 

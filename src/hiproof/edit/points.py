@@ -20,6 +20,7 @@ from ..model import Roof
 from ..read.pointcloud import is_url
 from ..read.thin import thin_to_count
 
+# work tiles and buildings whose points stay in memory: those a person goes back and forth between
 KEPT_TILES, KEPT_BUILDINGS = 3, 64
 
 

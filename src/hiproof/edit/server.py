@@ -25,7 +25,7 @@ from .desk import Desk, drawing
 from .edits import OtherVersion
 
 LOOPBACK = "127.0.0.1"
-MOST_BYTES = 20_000_000
+MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's parts take
 QUIET_S = 60  # until a connection that says nothing is closed
 JSON, HTML, SCRIPT, STYLE, SVG = (
     "application/json",

@@ -23,7 +23,7 @@ from .report_data import places_on_map, report_data
 from .report_pictures import building_pictures, histogram
 from .run import EvaluatedRun
 
-WORST = 20
+WORST = 20  # buildings shown with pictures: as many as are read to the end
 MOST_SHOWN = 10_000
 """Buildings on the map and in the 3D view, about 10 kB each: beyond this, browsers grow slow."""
 

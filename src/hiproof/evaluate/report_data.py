@@ -15,8 +15,8 @@ from .metrics import plan_outline, psd
 from .report_pictures import RESIDUAL_STOPS
 from .run import EvaluatedRun
 
-POINTS_PER_BUILDING = 150
-MOST_POINTS = 600_000
+POINTS_PER_BUILDING = 150  # points drawn of a building; enough to see where a roof is wrong
+MOST_POINTS = 600_000  # points in the page, 7 MB: what a browser still opens at once
 STATUS_COLOURS = {
     "modelled": "#2a9d5c",
     "sparse": "#93c54b",

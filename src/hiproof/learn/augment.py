@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-FEWEST_KEPT = 30
+FEWEST_KEPT = 30  # points that dropping leaves of a cloud; fewer show no roof
 ALONG, ACROSS = (0, 3, 8), (1, 4, 9)
 """Columns of the features that change sign when a building is mirrored along or across its own first axis."""
 

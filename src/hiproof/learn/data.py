@@ -17,10 +17,10 @@ from .roofn3d import RoofN3D
 from .sample import TRAINING, Sample, Source
 from .shapes import Shape, read_shapes
 
-DENSITY = (1.0, 20.0)
-POINTS = (60, 1500)
-ANNEX_SHARE = 0.35
-FIRST_SOURCE_SHARE = 0.7
+DENSITY = (1.0, 20.0)  # points/m2, from the sparsest to the densest of national surveys
+POINTS = (60, 1500)  # points of a training cloud: fewer show no roof, more are thinned away by the network anyway
+ANNEX_SHARE = 0.35  # of the simulated buildings have an annex
+FIRST_SOURCE_SHARE = 0.7  # of a mixture's clouds: the main source teaches most, the others what it lacks
 
 
 @dataclass(frozen=True)

@@ -17,8 +17,8 @@ ANNEX_TYPES = ("flat", "monopitch", "gable", "hip")
 LENGTHS = ("length", "ridge_length", "top_length")
 HEIGHTS = ("height", "hip_height", "break_height", "eave_step")
 COUNTS = ("teeth",)
-LOWEST_EAVE_M = 2.2
-OVERLAP_M = 0.05
+LOWEST_EAVE_M = 2.2  # m above the ground; a door fits below
+OVERLAP_M = 0.05  # m that an annex reaches into the house, so that no gap opens between them
 
 
 def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:

@@ -16,8 +16,8 @@ from .sample import TRAINING, Sample
 
 BUILDINGS, SURFACES = "roofn3d_buildings.csv", "roofn3d_surfacegrowing.csv"
 TYPES = tuple(name for name in ROOF_TYPES if name in ("gable", "hip", "pyramid"))
-HELD_OUT_PERCENT = 20
-FEWEST_POINTS = 10
+HELD_OUT_PERCENT = 20  # of the ids, which training never sees: the usual fifth
+FEWEST_POINTS = 10  # points; the least the network takes
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-TRAINING, VALIDATION, TEST = 1, 2, 3
+TRAINING, VALIDATION, TEST = 1, 2, 3  # roles; their numbers seed what is drawn for each
 
 
 @dataclass(frozen=True)

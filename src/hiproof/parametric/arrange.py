@@ -15,10 +15,11 @@ from .change import with_sizes
 INNER = {"length": ("ridge_length", "top_length"), "width": ("top_width", "break_width", "ridge_offset")}
 """Parameters that grow with a side of the rectangle."""
 
-GRID_M = 1e-4
-FAR_M = 1e4
+GRID_M = 1e-4  # m; the grid on which solids are composed
+FAR_M = 1e4  # m; beyond any building, for a half plane drawn as a rectangle
+# m; an ordinary dormer: a window wide, its wall above the slope, its gable
 DORMER_WIDTH_M, DORMER_WALL_M, DORMER_RISE_M = 1.8, 1.0, 0.6
-DORMER_DEPTH_M = (1.0, 4.0)
+DORMER_DEPTH_M = (1.0, 4.0)  # m, least and most; on a flat slope it would reach through the whole roof
 LEVEL = 0.05  # a slope that a dormer cannot run into
 
 

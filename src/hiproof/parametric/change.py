@@ -21,7 +21,7 @@ PLAN = ("width", "length")
 USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one
 HALF_HIP = 0.5  # share of the rise at which the eave of a half-hipped end lies
 TOP = 0.6  # share of the rise at which a level top cuts
-STEEPEST = math.tan(math.radians(85.0))
+STEEPEST = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a wall
 
 
 def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) -> dict[str, Any]:

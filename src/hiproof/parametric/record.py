@@ -17,7 +17,7 @@ from ..status import Status
 from ..write.attribute_list import PARAMETERS, PART
 from .shape import refuse_no_shape
 
-MOST_PARTS = 1000
+MOST_PARTS = 1000  # parts of a building; a cathedral has some hundred, a slip in a program any number
 WIDEST_M = 1e5  # of any number of a part
 MOST = 1e15  # of any number
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth

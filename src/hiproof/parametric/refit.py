@@ -31,10 +31,11 @@ ROUNDS = 6  # at each scale
 MOST_POINTS = 2000  # an even selection of more
 WELL = 0.3  # of a point's whole cost: a start that comes so near is no further searched for from afar
 FACADE_M, ENOUGH = 0.3, 30  # points so near the outline may be returns of walls; left out where enough others are
-FEWEST_POINTS = 3
+FEWEST_POINTS = 3  # points; fewer span no plane
+# m, degrees: bounds in which heights and pitches stay, short of level and of upright
 LEAST_HEIGHT_M, PITCHES_DEG = 0.01, (0.5, 85.0)
 Z = "z"
-FAR_M = 100.0
+FAR_M = 100.0  # m; larger than any length of a roof: as good as no bound
 
 
 @dataclasses.dataclass(frozen=True)

@@ -33,7 +33,7 @@ from ..write.values import plain_text
 from .building import build
 from .file import opened_parameters
 
-MOST_TOLD = 1000
+MOST_TOLD = 1000  # sentences kept of buildings that could not be built; a wrong file may have millions
 
 
 @dataclass

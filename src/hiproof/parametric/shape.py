@@ -14,8 +14,8 @@ from ..primitives.family import COMPONENTS, NAMES, SHAPES, SIDES
 SIDED = frozenset(f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew"))
 """Parameters of a member's sides; a part that has one gives all of its shape side by side."""
 
-STEEPEST_DEG = 89.0
-SHOWN = 8
+STEEPEST_DEG = 89.0  # degrees; steeper is a wall, and its height at an edge is beyond any file's digits
+SHOWN = 8  # names in a sentence; more would hide what is said
 
 
 def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> None:

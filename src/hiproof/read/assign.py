@@ -12,7 +12,7 @@ from ..model import Footprint
 from .cell_kernel import cell_keys
 from .thin import cell_range
 
-CELL_M = 4.0
+CELL_M = 4.0  # m; a house covers a few dozen cells, and a cell holds few points beside it
 
 
 class PointGrid:

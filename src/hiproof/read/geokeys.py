@@ -6,8 +6,8 @@ from typing import Any
 
 from pyproj import CRS
 
-VERTICAL_CRS_KEY, VERTICAL_UNIT_KEY = 4096, 4099
-EPSG_CODES = range(1024, 32767)
+VERTICAL_CRS_KEY, VERTICAL_UNIT_KEY = 4096, 4099  # of GeoTIFF 1.1, section 7
+EPSG_CODES = range(1024, 32767)  # what GeoTIFF takes for a code of EPSG; beyond are a file's own
 UNITS = {9001: ("metre", 1.0), 9002: ("foot", 0.3048), 9003: ("US survey foot", 1200 / 3937)}
 """Units by EPSG's number."""
 

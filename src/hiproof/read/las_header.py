@@ -19,8 +19,9 @@ from .plausible import MOST_HEIGHT, MOST_PLAN, Implausible
 
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}  # by minor version
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # by point format, without extra bytes
+# LAZ's bit in the point format, its size of chunks that vary, its compressor of layered chunks
 COMPRESSED, VARIABLE_CHUNKS, LAYERED = 0x80, 2**32 - 1, 3
-COARSEST_SCALE = 10.0
+COARSEST_SCALE = 10.0  # units of a coordinate's last digit; no survey is coarser, a damaged header is
 MOST_CHUNK_POINTS = 10_000_000  # a decoder makes room for a whole chunk; LASzip's own have 50,000
 NODES = np.dtype([("key", "<i4", 4), ("start", "<u8"), ("bytes", "<i4"), ("points", "<i4")])
 

@@ -17,7 +17,7 @@ from .crs import described, epsg_code, horizontal_crs, parse_crs, same_horizonta
 DEGREES_WIDE = 0.2  # no building is narrower in metres, hardly a tile wider in degrees
 AREA_MARGIN = 2.0  # degrees that a CRS is commonly used beyond its area: a zone is kept at the border of the next
 NEIGHBOURS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
-FOOT_M = 0.3048
+FOOT_M = 0.3048  # m, by definition
 
 
 def check_overlap(

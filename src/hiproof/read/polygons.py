@@ -8,11 +8,11 @@ import shapely
 from .plausible import is_plausible
 
 SLIVER_SHARE = 0.01  # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
-SLIVER_M2 = 0.5
-DEGENERATE_M2 = 1e-6
+SLIVER_M2 = 0.5  # m2; what repairing a polygon leaves beside it, less than any building
+DEGENERATE_M2 = 1e-6  # m2; numerically nothing
 WIDEST_M = 4000.0  # beyond any building; what is kept of terrain around one grows with the square of it
 MOST_MEETINGS = 20_000  # of edges that follow not on one another: mending takes time for each
-EDGES_A_LOOK = 256
+EDGES_A_LOOK = 256  # edges looked up at once: memory stays small for outlines of any length
 
 
 def simple_polygons(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:

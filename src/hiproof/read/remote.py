@@ -10,7 +10,7 @@ from typing import Any, BinaryIO
 
 from ..errors import InputError
 
-BLOCK_BYTES = 1 << 20
+BLOCK_BYTES = 1 << 20  # bytes a request; a server's answer takes longer than a megabyte's way
 
 
 def is_url(path: str | Path) -> bool:

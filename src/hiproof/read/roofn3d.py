@@ -20,9 +20,9 @@ from ..errors import InputError, InputWarning
 TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
 """Our catalogue's name of each RoofN3D class."""
 
-FIELD_LIMIT = 1 << 30
-UNASSIGNED = -1
-UNITS_PER_M = 1000
+FIELD_LIMIT = 1 << 30  # bytes of a field; csv's own limit is below a large roof's points
+UNASSIGNED = -1  # label of a point on no surface
+UNITS_PER_M = 1000  # points are matched to surfaces by their millimetres: the file rounds
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from ..frames import Units
 from ..masking import masked
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
 
-TILE_PX = 512
-TILES_KEPT = 8
+TILE_PX = 512  # pixels, side of what is read at once: GeoTIFFs are often stored in such tiles
+TILES_KEPT = 8  # tiles in memory, 8 MB; buildings come in order of place
 HEIGHT_UNITS = {
     **dict.fromkeys(("m", "metre", "meter", "metres", "meters"), 1.0),
     **dict.fromkeys(("ft", "foot", "feet", "international foot"), 0.3048),

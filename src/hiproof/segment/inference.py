@@ -24,12 +24,12 @@ INPUT_NAMES = (
 )  # fmt: skip
 OUTPUT_NAMES = ("point_logits", "type_logits")
 SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "roof_types.onnx"
-NOT_ROOF = -1
-FEWEST_POINTS = 10
+NOT_ROOF = -1  # label of what is no roof
+FEWEST_POINTS = 10  # points; fewer fill no neighbourhood
 # A roof point left out costs a fit more than a point of a wall left in, which its outliers bear.
 SURELY_NOT_ROOF = 0.8
-CARRIED_NEIGHBOURS = 3
-CARRIED_CHUNK = 200_000
+CARRIED_NEIGHBOURS = 3  # sampled points that a point's label is the mean of, as in PointNet++
+CARRIED_CHUNK = 200_000  # points labelled at once: memory stays bounded
 
 
 @dataclass(frozen=True)

@@ -14,14 +14,14 @@ if TYPE_CHECKING:
 # --calibrate`). The evidence is tempered because it counts the points as independent and the roof as exactly of its
 # type, and real roofs are neither.
 EVIDENCE_EXPONENT = 0.1
-SMALLEST_PRIOR = 1e-4
+SMALLEST_PRIOR = 1e-4  # probability; the network is never so sure that evidence cannot overrule it
 # A type missing from the BICs was given up by the fit as far behind. How far is not known, and an annex or a dormer
 # alone can set a type back so much that it says little: it counts as this many nats behind the best.
 GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 2.0, 0.006
 # The network may name a roof against the evidence, but a shape that lies farther from the points than the evidence's
 # by more than this is not built: a gable over a house and its porch is named so and fits neither.
 FARTHER_AT_MOST_M = 0.01
-OUTLIER_DISTANCE_M = 1.0
+OUTLIER_DISTANCE_M = 1.0  # m from the roof at which an outlier is counted when fits are compared
 
 
 def combine(

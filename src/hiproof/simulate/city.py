@@ -24,14 +24,14 @@ from .survey import Bounds, Flight, patches_of, survey, write_footprints, write_
 from .town import Lot, furnished, street_side
 
 ORIGIN_XY = np.array([95000.0, 455000.0])
-GROUND_M = 15.0
-HEADING = math.radians(11.0)
+GROUND_M = 15.0  # m, heights of hills over valleys
+HEADING = math.radians(11.0)  # rad; streets along no axis, so that nothing leans on the axes by chance
 BLOCK_M = np.array([100.0, 64.0])
-STREET_M = 10.0
-BUILDINGS_A_BLOCK = 9.6
-WORKS_SHARE = 0.12
-SURROUNDINGS_M = 30.0
-CACHED_BLOCKS = 400
+STREET_M = 10.0  # m between blocks, pavements included
+BUILDINGS_A_BLOCK = 9.6  # on average, from which a city's number of blocks is told
+WORKS_SHARE = 0.12  # of the blocks hold works instead of houses, as at a town's edge
+SURROUNDINGS_M = 30.0  # m beyond a tile in which houses may throw shadows or trees into it
+CACHED_BLOCKS = 400  # blocks kept in memory: a tile and those around it
 
 HOUSES = {
     "gable": 0.26,

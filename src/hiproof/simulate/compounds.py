@@ -28,6 +28,7 @@ COMPOUND_KINDS = (
     "winged_hip",
     "L_of_hips",
 )
+# m between dormers, and how far their roofs run into the slope, so that no gap opens
 DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 

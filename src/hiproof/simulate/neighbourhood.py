@@ -15,9 +15,9 @@ from .scanner import ScanSettings
 from .survey import CRS, Flight, patches_of, survey, write_footprints, write_laz, write_terrain
 from .town import Lot, furnished, street_side
 
-DEMO_SEED = 5
+DEMO_SEED = 5  # whose neighbourhood has every roof type
 ORIGIN_XY = np.array([92000.0, 451000.0])
-GROUND_M = 4.0
+GROUND_M = 4.0  # m, heights of hills over valleys: a gentle slope
 STREETS = (
     ("gable", "hip", "half_hip", "pyramid", "L", "gambrel"),
     ("flat", "extension", "mansard", "gable", "asymmetric_gable", "cross"),
@@ -25,8 +25,8 @@ STREETS = (
     ("shed", "U", "pyramid", "half_hip"),
     ("saw_tooth_hall", "monopitch", "asymmetric_gable", "mansard", "gambrel"),
 )
-STREET_WIDTH_M = 9.0
-BORDER_M = 8.0
+STREET_WIDTH_M = 9.0  # m between the rows of houses
+BORDER_M = 8.0  # m of ground around the outermost houses, for their terrain
 FILES = ("cloud.laz", "footprints.gpkg", "terrain.tif", "truth.json")
 SCAN = ScanSettings(density=8.0, range_noise_m=0.02, horizontal_noise_m=0.04, beam_radius_m=0.1)
 

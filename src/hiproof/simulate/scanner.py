@@ -27,8 +27,8 @@ from .scene import (
 )
 from .shapes import ROOF_TYPES
 
-MERGED_RETURNS_M = 0.6
-LEAF_PATH_M = 1.8
+MERGED_RETURNS_M = 0.6  # m; a pulse of some nanoseconds cannot tell surfaces nearer to each other
+LEAF_PATH_M = 1.8  # m that a beam goes through leaves on average before it meets one
 
 
 @dataclass(frozen=True)

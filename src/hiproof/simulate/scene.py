@@ -16,6 +16,7 @@ from .relief import Plane, Relief
 from .roofs import SimBuilding, random_parameters, turned
 from .shapes import ROOF_TYPES, box, make_part
 
+# what a beam met, by its place in SOURCES
 SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)
 SOURCES = ("roof", "wall", "ground", "tree", "clutter")
 NOT_ROOF = len(ROOF_TYPES)

@@ -19,10 +19,10 @@ from .scene import SOURCE_GROUND, SOURCE_TREE
 from .town import Lot, town_scene
 
 CRS = "EPSG:7415"
-PATCH_M = 100.0
-OUTLIER_SHARE = 2e-4
-EPOCH = datetime.date(2020, 1, 1)
-CLASS_GROUND, CLASS_TREE, CLASS_BUILDING = 2, 5, 6
+PATCH_M = 100.0  # m, side of what is scanned at once: memory stays small for any town
+OUTLIER_SHARE = 2e-4  # of the points: birds and multipath
+EPOCH = datetime.date(2020, 1, 1)  # a date that does not change, so that the same seed gives the same bytes
+CLASS_GROUND, CLASS_TREE, CLASS_BUILDING = 2, 5, 6  # classes of ASPRS
 
 Bounds = tuple[float, float, float, float]
 

@@ -14,7 +14,7 @@ from .scanner import Scan, ScanSettings, scan
 from .scene import SOURCE_ROOF, Defects
 from .shapes import ROOF_TYPES
 
-ATTEMPTS = 40
+ATTEMPTS = 40  # draws until a cloud has the points asked for, then a sentence says that it has not
 
 
 def training_sample(

@@ -34,7 +34,7 @@ LAYERS = {BUILDINGS: "MultiPolygon", "parts": "Polygon", "roof_surfaces": "Polyg
 """Tables and the geometry of their rows."""
 
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
-ROWS_AT_ONCE = 1000
+ROWS_AT_ONCE = 1000  # rows handed to GDAL at once: its overhead is a call's, its memory a row's
 RESERVED = ("fid", "geom")
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more

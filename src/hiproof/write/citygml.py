@@ -46,7 +46,7 @@ NAMESPACES = {
     "gml": "http://www.opengis.net/gml",
     "xlink": "http://www.w3.org/1999/xlink",
 }
-WIDEST = -123456789.1234
+WIDEST = -123456789.1234  # as many characters as any coordinate takes: room for what is known at the end
 
 
 def write_citygml(

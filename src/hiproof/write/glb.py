@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-VERTICES, INDICES = 34962, 34963
+VERTICES, INDICES = 34962, 34963  # ARRAY_BUFFER and ELEMENT_ARRAY_BUFFER of WebGL, which glTF names
 COMPONENTS = {"f4": 5126, "u4": 5125, "u2": 5123, "u1": 5121}
 TYPES = {1: "SCALAR", 3: "VEC3", 4: "VEC4"}
 ALIGNED = 8  # bytes: what tables of properties ask for, and more than arrays of vertices do

@@ -23,7 +23,7 @@ from .roof_figures import RoofFigures
 from .values import plain, plain_text
 from .writer import BuildingWriter
 
-VERSION = 1
+VERSION = 1  # of the file's layout; one that is not known is refused
 LENGTH_DIGITS = 6  # micrometres and millionths of a degree
 
 

@@ -27,7 +27,7 @@ from ..rings import ring_normal
 from .attribute_list import OWN, PARTS_LAYER
 from .triangles import face_triangles
 
-PARTS_AT_ONCE = 5000
+PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
 MEASURES = ", ".join(f"{a.name} double precision" for a in PARTS_LAYER if a.kind == "number")
 SCHEMA = """
 create extension if not exists postgis;

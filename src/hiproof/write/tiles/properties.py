@@ -18,7 +18,7 @@ from ..naming import UniqueNames
 
 EXTENSION = "EXT_structural_metadata"
 CLASS = "building"
-NO_NUMBER = -9999.0
+NO_NUMBER = -9999.0  # stands for what is not known, as GDAL's files use it; no attribute has it
 WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is told as text
 TOLD = {
     "id": "the building's id",
