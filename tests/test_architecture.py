@@ -12,6 +12,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/hiproof"
 PAGE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 DOORS = {("model",)}  # its methods open rooms above it when a person calls them, as the page says
+SELF_EVIDENT = {"cli", "primitives", "compiled"}  # a file a command, a shape, a word of the text
 NOT_DRAWN = {"__init__", "__main__"}  # what the package offers, and what `python -m` calls
 
 
@@ -103,3 +104,13 @@ def test_no_file_imports_itself_by_way_of_others():
 def test_only_one_room_imports(package):
     (room,) = (name for name, says in table().items() if f"the only room that imports {package}" in says)
     assert {name[0] for name in MODULES if package in foreign(name)} == {room}
+
+
+@pytest.mark.parametrize("room", sorted(name for name in rooms() - SELF_EVIDENT if (PACKAGE / name).is_dir()))
+def test_a_room_tells_its_files(room):
+    """In the text at its door, and so do rooms within it."""
+    for door in (PACKAGE / room).rglob("__init__.py"):
+        told = ast.get_docstring(ast.parse(door.read_text(encoding="utf-8"))) or ""
+        files = {path.stem for path in door.parent.glob("*.py") if not path.stem.startswith("__")}
+        files |= {path.parent.name for path in door.parent.glob("*/__init__.py")}
+        assert [name for name in sorted(files) if not re.search(rf"\b{name}\b", told)] == []

@@ -1,12 +1,32 @@
 """Many buildings: an area becomes tasks, tasks become part files, part files become the output.
 
-    plan    which buildings there are, which work tile owns each, which point files there are      plan.py
-    sort    each point file, read once in chunks, leaves the points each work tile needs           sort.py
-    solve   each work tile reconstructs its own buildings and writes them as text, ready to join   solve.py
-    merge   the tiles' parts are joined in plan order into the files of the output folder          merge.py
+request       what the user asked for
+checks        what is wrong with that before any file is read
+run           the steps below, one after the other
+lock          one run a folder at a time
+marks         by what a folder knows whose run it holds
+resume        a folder held against the request: gone on from, or begun anew
+overrides     what is known better of some buildings, and which of them have to be made again
+changed       a run whose footprints changed: what is the same stays
+prepare       the plan made: which buildings there are, from footprints or the cloud
+frame         the CRS and units of an area
+classes       which classes of points may be roofs
+from_cloud    buildings of a cloud without footprints
+plan          which buildings there are, which work tile owns each, which point files there are
+sort          each point file, read once in chunks, leaves the points each work tile needs
+solve         each work tile reconstructs its own buildings and writes them as text, ready to join
+ground        the ground around a building, from its tile's cells
+found         the roof of one building among points without classes
+merge         the tiles' parts are joined in plan order into the files of the output folder
+outputs       digests of what was written
+ledger        which tasks are done, what came of each building: SQLite
+executors     where tasks run: this process, processes, a Dask cluster
+tasks         the tasks by name, for processes that have imported nothing yet
+quarantine    a task that kills its process, found by trying it alone
+warm          what tasks call, compiled before they start
+warm_pieces   that, in pieces which processes compile side by side
 
 A building is owned by one tile and sees all points in and around its footprint from all files, in an order of its own:
-its answer does not depend on how the area was cut. Tasks are idempotent and write whole files or none; the ledger
-(ledger.py) says which are done, so a run that was killed goes on where it stopped. Where tasks run (this process,
-processes, a Dask cluster) is an executor's business (executors.py).
+its answer does not depend on how the area was cut. Tasks are idempotent and write whole files or none, so a run that was
+killed goes on where it stopped.
 """

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import ndimage
 
 from ..read.assign import PointGrid
-from .cells import PlanCells, plan_density
+from .cells import SquareCells, plan_density
 from .ground import ground_grid
 from .surfaces import Surfaces, surfaces_of
 
@@ -94,7 +94,7 @@ def smoothed(surfaces: Surfaces, odds: np.ndarray) -> np.ndarray:
 
 def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.ndarray:
     """Which (n,) of the points (n, 3), `height` (n,) above ground, are a building's."""
-    cells, high = PlanCells(xyz, cell_m), height > HIGH_M
+    cells, high = SquareCells(xyz, cell_m), height > HIGH_M
     odds, is_large = np.zeros(len(xyz)), np.zeros(len(xyz), bool)
     if high.sum() < 4:
         return is_large

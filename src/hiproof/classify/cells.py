@@ -8,7 +8,7 @@ from scipy import ndimage
 from ..read.thin import cell_range
 
 
-class PlanCells:
+class SquareCells:
     """The cells of side `cell_m` (m) that points (n, 3) lie in; tables are (columns, rows), `index` (n,) is flat."""
 
     def __init__(self, xyz: np.ndarray, cell_m: float):

@@ -1,4 +1,15 @@
-"""Fitting: one primitive to the points of one roof (single.py) by the likelihood or the paper's objective; compounds in compound/.
+"""From the points of one building to the parameters of its roof.
+
+single         `fit_roof`: one primitive by all points, the door to both objectives
+likelihood     the default objective: starts, annealing, the choice of type, what is known of the result
+direction      plan directions before any fit
+tables         the catalogue as arrays
+kernel         the likelihood with gradient and Hessian, minimised; compiled
+paper          the objective of the paper, as published
+alpha_shape    the outline that goes with it
+union          `fit_building`: a roof as a union of few volumes
+outline        the outline of a building that comes without one
+align          how far a footprint lies beside its roof
 
 `fit_roof` is imported on first use, because it brings the compiler along.
 """

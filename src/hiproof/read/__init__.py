@@ -1,9 +1,31 @@
 """From files to values: point clouds, footprints, terrain, RoofN3D, models.
 
-`read_points` and `read_footprints` give what a run starts from; `points_of_footprints` brings the two together, a
-terrain answers how high the ground is. Everything
-unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by `errors.InputWarning`.
-The names below are imported when first used: GDAL and laspy cost a third of a second.
+pointcloud    points of any kind of file, in chunks; `read_points`
+remote        files by address
+las           LAS, LAZ and COPC: laspy's points
+las_header    whether what such a file says of itself is possible
+geokeys       the height system of its GeoTIFF keys
+copc          nodes of a COPC file that meet a box
+lax           LAStools' index beside a file
+ply           PLY files
+text          XYZ, CSV and the like
+columns       which column of a table of points holds what
+plausible     what no input may say
+thin          one point a cell
+crs           reference systems and their units
+footprints    building polygons; `read_footprints`
+polygons      polygons put right
+database      footprints from PostGIS
+overlap       whether footprints lie where the cloud does
+assign        which points belong to which footprint
+cell_kernel   points and cells; compiled
+terrain       how high the ground is
+cityjson      documents of CityJSON with their vertices in place
+solids        solids of CityJSON and CityGML as they stand
+roofn3d       the RoofN3D data set
+
+Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by
+`errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a third of a second.
 """
 
 from importlib import import_module

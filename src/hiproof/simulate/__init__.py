@@ -1,9 +1,15 @@
 """Roofs whose truth is known and an airborne scanner over them: for training, experiments, tests and the demo.
 
-building = random_building(rng, "hip")          one primitive (roofs) ...
+building = random_building(rng, "hip")          one primitive (roofs, shapes) ...
 building = random_compound(rng, "L")            ... or several (compounds)
-cloud = scan(building, rng, ScanSettings())     labelled points (flight -> raycast -> scanner)
+cloud = scan(building, rng, ScanSettings())     labelled points (scene -> flight -> raycast -> scanner)
 points, labels, type = training_sample(rng)     the same for a network (training)
+
+town             houses along streets on hilly ground (relief), with what stands around them
+survey           a town flown over: points, terrain and footprints in files
+neighbourhood    the demo's town
+city             a town of any size
+edits            what a person may do to a building's parameters
 """
 
 from .compounds import COMPOUND_KINDS, random_compound

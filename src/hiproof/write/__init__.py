@@ -1,7 +1,14 @@
-"""Buildings out: CityGML, CityJSON, parameters and an attribute table, each file whole or not at all.
+"""Buildings out: CityGML, CityJSON, parameters and tables, each file whole or not at all.
 
-Every format is a function over an iterable of buildings and an incremental writer with `add`; both hold one building in
-memory at a time. `write_all` writes the four files of a run in one pass.
+What is written: attribute_list (every attribute, once), building_attributes (those of one building), roof_figures and
+roof_levels (measured on its solid), roof_codes and osm_tags (its type in other words), shapes (blocks, parts, LoD0),
+table_rows (its rows), values (numbers and text as every format holds them), naming (ids), reprojected (another CRS), colours.
+
+Formats: citygml (citygml_geometry, xml_text), citygml3 (made of 2.0), cityjson (cityjson_geometry), parameters (json_text), attributes (the
+GeoPackage, with styles), geoparquet, gltf (in the container glb), obj, triangles for these, tiles, postgis, page_mesh (for pages).
+
+Files: writer (the life of one: opened, added to, finished), files (whole or none), head (what all of a run have in common),
+fragments (a building's texts, to be joined), run_files (all files of a run in one pass).
 """
 
 from .attributes import AttributesWriter, write_attributes

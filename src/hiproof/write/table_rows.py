@@ -48,10 +48,10 @@ def table_rows(
 def building_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
     """The outline of `building` in `units` (None where it is unknown) and its attributes by column."""
     named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in attributes.items()}
-    return wkb_of(plan_outline(building), units), {"id": plain_text(building.id), **named}
+    return wkb_of(known_outline(building), units), {"id": plain_text(building.id), **named}
 
 
-def plan_outline(building: Building) -> shapely.Geometry | None:
+def known_outline(building: Building) -> shapely.Geometry | None:
     """The building's outline in world coordinates: the modelled one, else the one asked for, else None."""
     if building.built is None:
         return building.footprint

@@ -22,6 +22,7 @@ names       volume -> named part of the family of roof shapes
 larger      saw-teeth and gambrels put together
 shown       parts that show nowhere go
 clamp       no height far beyond those of the points
+fit         the outcome
 """
 
 from __future__ import annotations
