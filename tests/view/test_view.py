@@ -88,16 +88,21 @@ def answer(port, path, host=None):
     return response.status, response.read()
 
 
+def document_of(page, folder, serving, profile):
+    """The page over the tiles in `folder` after its scripts ran, as text."""
+    port = serving(ThreadingHTTPServer((HERE, 0), partial(Handler, directory=str(folder), page=page)))
+    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={profile}"]
+    command += ["--window-size=900,700", "--virtual-time-budget=8000", "--dump-dom", f"http://{HERE}:{port}/"]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
+
+
 @needs_browser
 def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving, tmp_path):
     page = page_of("a <run>").replace("</body>", ACT + "</body>")
-    port = serving(ThreadingHTTPServer((HERE, 0), partial(Handler, directory=str(tiles), page=page)))
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-    command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={tmp_path / 'profile'}"]
-    command += ["--window-size=900,700", "--virtual-time-budget=8000", "--dump-dom", f"http://{HERE}:{port}/"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
-    said = re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.DOTALL)
-    assert said, f"the page's scripts did not run to their end: {done.stderr[-2000:]}"
+    text = document_of(page, tiles, serving, tmp_path / "profile")
+    said = re.search(r'<pre id="said">(.*?)</pre>', text, re.DOTALL)
+    assert said, f"the page's scripts did not run to their end: {text[-2000:]}"
     say = json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
     assert say["faults"] == [] and say["webgl"] and say["tiles"] == 1
     assert "gable" in say["legend"] and "flat" in say["legend"]
@@ -105,6 +110,19 @@ def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving
     assert re.search(r"part 0\s+gable: width 8.12", say["clicked"]) and "unknown" not in say["clicked"]
     assert say["kept"] == say["clicked"] and say["cleared"] == ""  # a click beside the buildings changes nothing
     assert say["away"] == 0 and say["home"] == 1
+
+
+@needs_browser
+def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
+    shutil.copytree(tiles, tmp_path / "broken")
+    (tmp_path / "broken/tiles/r.glb").unlink()
+    assert "Some tiles cannot be read (tiles/r.glb: 404)" in document_of(
+        page_of("run"), tmp_path / "broken", serving, tmp_path / "first"
+    )
+    (tmp_path / "broken/tileset.json").unlink()
+    assert "is hiproof view still running" in document_of(
+        page_of("run"), tmp_path / "broken", serving, tmp_path / "second"
+    )
 
 
 def test_page_and_tiles_are_served(tiles, serving):

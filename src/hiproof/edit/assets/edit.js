@@ -30,7 +30,9 @@ function inTurn(action) {
 async function list() {
   const found = await ask("buildings", { find: $("find").value.trim() });
   rows = found.rows;
-  $("count").textContent = `${found.all}, ${found.accepted} accepted`;
+  const listed = found.found > rows.length ? `, ${rows.length} of ${found.found} listed` : "";
+  $("count").textContent = `${found.all}, ${found.accepted} accepted${listed}`;
+  if (!rows.length) say(found.all ? "no building whose id holds this" : "the run has no buildings");
   showList();
 }
 
@@ -344,7 +346,7 @@ function input(name, value, changed) {
 function numberRow(title, field, unit = "", sigma = undefined, pinned = null) {
   const row = $("numbers").insertRow();
   row.insertCell().textContent = title; row.insertCell().append(field); row.insertCell().textContent = unit;
-  row.insertCell().textContent = sigma === undefined ? "" : `± ${sigma.toFixed(2)}`;
+  row.insertCell().textContent = sigma === undefined ? "" : `± ${sigma.toFixed(3)}`;
   const cell = row.insertCell();
   if (!pinned) return;
   const label = document.createElement("label"), box = document.createElement("input"), index = now.part;

@@ -115,8 +115,9 @@ viewer.onpick = select;
 document.getElementById("mode").addEventListener("change", event => { mode = event.target.value; recolour(); });
 document.getElementById("show-points").addEventListener("change", event => { cloud.visible = event.target.checked; viewer.draw(); });
 document.getElementById("find").addEventListener("change", event => {
-  const found = data.buildings.findIndex(building => building.id === event.target.value.trim());
+  const id = event.target.value.trim(), found = data.buildings.findIndex(building => building.id === id);
   if (found >= 0) { select(found); approach(found); }
+  event.target.setCustomValidity(id && found < 0 ? "no building of this id" : ""); event.target.reportValidity();
 });
 for (const card of document.querySelectorAll("[data-select]")) card.addEventListener("click", () => {
   select(Number(card.dataset.select)); approach(Number(card.dataset.select)); scrollTo({ top: 0, behavior: "smooth" });

@@ -1,13 +1,14 @@
 // The page: what lies under a click, and which roof types are in view.
 
 const colours = JSON.parse(document.getElementById("colours").textContent), types = new Map();
+const hint = document.getElementById("hint");
 let scene = null;
 
 function show(found) {
   const rows = found ? found.tile.table.row(found.row).filter(({ value }) => value !== null && value !== "") : [];
   const lines = rows.flatMap(row => row.name === "parameters" ? parts(row) : [row]);
   document.getElementById("details").replaceChildren(...lines.map(line));
-  document.getElementById("hint").hidden = rows.length > 0;
+  hint.hidden = rows.length > 0;
   scene.select(found);
 }
 
@@ -18,13 +19,17 @@ function line({ name, told, value }) {
   return made;
 }
 
-// The parts of a roof, a line each.
-function parts({ value, told }) {
-  return JSON.parse(value).parts.map(({ type, parameters }, number) => {
-    const named = Object.entries(parameters).map(([name, size]) => `${name} ${Math.round(100 * size) / 100}`);
-    return { name: `part ${number}`, told, value: `${type}: ${named.join(", ")}` };
-  });
+// The parts of a roof, a line each; the row itself where it is the input's own of that name.
+function parts(row) {
+  try {
+    return JSON.parse(row.value).parts.map(({ type, parameters }, number) => {
+      const named = Object.entries(parameters).map(([name, size]) => `${name} ${Math.round(100 * size) / 100}`);
+      return { name: `part ${number}`, told: row.told, value: `${type}: ${named.join(", ")}` };
+    });
+  } catch { return [row]; }
 }
+
+function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
 
 function legend(tile) {
   for (let row = 0; row < tile.table.count; row++) {
@@ -40,10 +45,12 @@ function legend(tile) {
 }
 
 async function begin() {
-  const answer = await fetch("tileset.json");
-  scene = new TileScene(document.getElementById("scene"), await answer.json(), "");
-  if (!scene.gl) { document.getElementById("hint").textContent = "This browser offers no WebGL, so there is no 3D view."; return; }
+  const answer = await fetch("tileset.json").catch(() => null), tileset = answer?.ok ? await answer.json().catch(() => null) : null;
+  if (!tileset?.root) return fail("The tiles cannot be read: is hiproof view still running, and the folder still there?");
+  scene = new TileScene(document.getElementById("scene"), tileset, "");
+  if (!scene.gl) return fail("This browser offers no WebGL, so there is no 3D view.");
   scene.onload = legend;
+  scene.onfail = reason => fail(`Some tiles cannot be read (${reason}); load the page again, or make them anew.`);
   scene.onpick = show;
   document.addEventListener("keydown", event => {
     if (event.key === "Home") { scene.home(); scene.draw(); }

@@ -8,7 +8,7 @@ class TileScene extends Viewer {
   constructor(canvas, tileset, base) {
     super(canvas, new Float32Array(0), new Uint32Array(0));
     this.root = tileset.root; this.base = base; this.loading = 0; this.time = 0; this.selected = null;
-    this.onload = () => {};
+    this.onload = () => {}; this.onfail = () => {};
     this.home();
   }
 
@@ -57,7 +57,7 @@ class TileScene extends Viewer {
       Object.assign(tile, readTile(await answer.arrayBuffer()), { state: "drawn" });
       tile.layer = Object.assign(this.addLayer("TRIANGLES", tile.corners, tile.colours), { tile });
       this.onload(tile);
-    } catch (error) { tile.state = "failed"; console.error(String(error)); }
+    } catch (error) { tile.state = "failed"; this.onfail(error.message); }
     this.loading--;
     this.draw();
   }
