@@ -50,18 +50,11 @@ def move_edges(volumes, scene, k, value, reach):
         fixed += scene.evidence * volume_cost(volumes[j])
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
     known = False
-    u, v = scene.U[int(volumes[k, DIRECTION])], scene.V[int(volumes[k, DIRECTION])]
     for edge in range(4):
         places, m = places_of(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
-        x, across = (u, v) if edge < 2 else (v, u)
-        low, high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
         sign = -1.0 if edge % 2 == 0 else 1.0
-        members = np.nonzero((across >= low) & (across <= high) & (sign * (x - opposite) >= 0.0))[0]
-        distance = sign * x[members]
-        order = np.argsort(distance)
-        distance = distance[order]
-        gains, covered = np.cumsum(gain[members[order]]), np.cumsum(bare[members[order]])
+        distance, gains, covered = sums_outward(volumes, scene, k, edge, gain, bare)
         places[m] = between_points(distance, gains, sign, start) if reach < SMALL_REACH_M else start
         best, chosen = value - LEAST_GAIN, start
         for q in range(m + 1):
@@ -84,6 +77,28 @@ def move_edges(volumes, scene, k, value, reach):
             volumes[k, U0 + edge] = chosen
             value, known = best, False
     return value
+
+
+@compiled
+def sums_outward(volumes, scene, k, edge, gain, bare):
+    """Points and ghosts that an edge of volume k passes on its way out from the opposite one, in that order: their distances along
+    the way, ascending, and the sums of `gain` and of `bare` up to each."""
+    direction = int(volumes[k, DIRECTION])
+    u, v, order = scene.U[direction], scene.V[direction], scene.order[direction, edge // 2]
+    x, across = (u, v) if edge < 2 else (v, u)
+    low, high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+    sign, opposite, count = (-1.0 if edge % 2 == 0 else 1.0), volumes[k, U0 + (edge ^ 1)], len(order)
+    distance, gains, covered = np.empty(count), np.empty(count), np.empty(count)
+    gained = bared = 0.0
+    m = 0
+    for q in range(count):
+        i = order[q] if edge % 2 == 1 else order[count - 1 - q]
+        if low <= across[i] <= high and sign * (x[i] - opposite) >= 0.0:
+            gained += gain[i]
+            bared += bare[i]
+            distance[m], gains[m], covered[m] = sign * x[i], gained, bared
+            m += 1
+    return distance[:m], gains[:m], covered[:m]
 
 
 @compiled

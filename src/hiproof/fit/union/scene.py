@@ -35,7 +35,7 @@ MOST_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
 # and off for each end at a corner.
 Scene = namedtuple(
     "Scene",
-    "U V z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
+    "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
 )
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
 EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)
@@ -79,9 +79,11 @@ def scene_of(
     depth, corner, pitch = depth_raster(plan, outline)
     ring = (shapely.get_coordinates(outline.exterior)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
     lines, vertices = lines_of(plan, ring, turn)
+    U, V = np.array([c * u + s * v for c, s in turn]), np.array([c * v - s * u for c, s in turn])
     return Scene(
-        np.array([c * u + s * v for c, s in turn]),
-        np.array([c * v - s * u for c, s in turn]),
+        U,
+        V,
+        order_along(U, V),
         np.r_[cloud.z, np.zeros(len(ghosts.u))],
         np.r_[np.ones(len(cloud.u)), ghosts.weight],
         np.r_[np.zeros(len(cloud.u)), ghosts.shade],
@@ -112,7 +114,12 @@ def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
     weight[len(kept) :] *= len(kept) / scene.n
     shade *= len(kept) / scene.n
     U, V = (np.ascontiguousarray(axis[:, columns]) for axis in (scene.U, scene.V))
-    return scene._replace(U=U, V=V, z=scene.z[columns], weight=weight, shade=shade, n=len(kept), evidence=evidence)
+    return scene._replace(U=U, V=V, order=order_along(U, V), z=scene.z[columns], weight=weight, shade=shade, n=len(kept), evidence=evidence)
+
+
+def order_along(U: np.ndarray, V: np.ndarray) -> np.ndarray:
+    """The points' numbers in ascending order along each axis of each direction: (directions, 2, n)."""
+    return np.argsort(np.stack([U, V], axis=1), axis=2, kind="stable")
 
 
 def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
