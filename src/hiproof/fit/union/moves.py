@@ -14,6 +14,8 @@ All functions take volumes (k, COLUMNS) and the objective's value, and return th
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from ...compiled import compiled
@@ -28,6 +30,7 @@ from .volumes import (
     PARAMETER_COST,
     PLANES,
     REPLACES,
+    SETTLED,
     SIDES,
     SLOPE,
     TIE,
@@ -51,6 +54,9 @@ MOST_SLOPES, SLOPES_APART = 9, 0.02
 END_SEEDS = 16  # points through which a new plane is tried
 MERGE_REACH_M = 2.0
 ALMOST_LEVEL = 0.15
+AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
+DIGEST_STEP = 0.02  # of metres and of slopes: changes smaller than this are none
+DIGEST_FACTOR, DIGEST_PRIME, HIGH_ABOVE = 1_000_003.0, 2_147_483_647.0, 1e5
 TURNS, MOST_TURN, FREE_UNITS = 4, 0.45, 1.5
 
 
@@ -80,12 +86,17 @@ def without(volumes, k):
 def refit_each(volumes, scene, value):
     """Every volume refitted once, where that helps."""
     for k in range(len(volumes)):
-        trial = volumes.copy()
-        refit(trial, scene, k)
-        found = objective(trial, scene, value)
-        if found < value - LEAST_GAIN:
-            volumes, value = trial, found
+        volumes, value = refitted(volumes, scene, value, k)
     return volumes, value
+
+
+@compiled
+def refitted(volumes, scene, value, k):
+    """Volume k refitted, where that helps."""
+    trial = volumes.copy()
+    refit(trial, scene, k)
+    found = objective(trial, scene, value)
+    return (trial, found) if found < value - LEAST_GAIN else (volumes, value)
 
 
 @compiled
@@ -380,19 +391,25 @@ def merge_volumes(volumes, scene, value, steepest):
     """Two volumes become one over both rectangles, where neither is steeper than `steepest`."""
     k = 1
     while k < len(volumes):
-        merged = False
-        for j in range(1, len(volumes)):
-            if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or max_slope(volumes, j, k) > steepest:
-                continue
-            trial = volumes.copy()
-            for edge in range(4):
-                a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
-                trial[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
-            trial, found = settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
-            if found < np.inf:
-                volumes, value, merged = trial, found, True
-                break
-        k = 1 if merged else k + 1
+        before = len(volumes)
+        volumes, value = merge_with_others(volumes, scene, value, k, steepest)
+        k = k + 1 if len(volumes) == before else 1
+    return volumes, value
+
+
+@compiled
+def merge_with_others(volumes, scene, value, k, steepest):
+    """Volume k and another become one over both rectangles, where neither is steeper than `steepest`."""
+    for j in range(1, len(volumes)):
+        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or max_slope(volumes, j, k) > steepest:
+            continue
+        trial = volumes.copy()
+        for edge in range(4):
+            a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
+            trial[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
+        trial, found = settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
+        if found < np.inf:
+            return trial, found
     return volumes, value
 
 
@@ -404,8 +421,9 @@ def max_slope(volumes, j, k):
 @compiled
 def without_base(volumes, scene, value):
     """The base below everything, where the volumes can cover the outline by themselves."""
-    if volumes[0, OFFSET + LEVEL] <= scene.low - 0.6:
+    if volumes[0, OFFSET + LEVEL] <= scene.low - 0.6 or not is_unsettled(volumes, 0):
         return volumes, value
+    volumes[0, SETTLED] = surroundings(volumes, 0)
     trial = volumes.copy()
     trial[0, OFFSET + LEVEL] = scene.low - 0.7
     found = objective(trial, scene, value + 0.3 * scene.n)
@@ -416,23 +434,68 @@ def without_base(volumes, scene, value):
 
 @compiled
 def improve(volumes, scene, value, slopes, rounds):
-    """All moves in turn, for at most `rounds` rounds or until one brings next to nothing."""
+    """All moves in turn, for at most `rounds` rounds or until one brings next to nothing.
+
+    A volume that no move changed is left alone until something around it is another.
+    """
     for _ in range(rounds):
         before = value
-        volumes, value = refit_each(volumes, scene, value)
-        value = move_all_edges(volumes, scene, value, EVERYWHERE)
-        volumes, value = drop_volumes(volumes, scene, value)
+        for k in range(len(volumes)):
+            if k == 0 or is_unsettled(volumes, k):
+                volumes, value = refitted(volumes, scene, value, k)
         for k in range(1, len(volumes)):
-            volumes, value = drop_planes(volumes, scene, value, k, np.inf)
-            volumes, value = flatten(volumes, scene, value, k)
-            volumes, value = change_ties(volumes, scene, value, k)
-            volumes, value = face_walls(volumes, scene, value, k)
-            volumes, value = add_planes(volumes, scene, value, k, slopes)
-        volumes, value = merge_volumes(volumes, scene, value, np.inf)
+            if is_unsettled(volumes, k):
+                value = move_edges(volumes, scene, k, value, EVERYWHERE)
+        volumes, value = drop_volumes(volumes, scene, value)
+        k = 1
+        while k < len(volumes):
+            count, start = len(volumes), value
+            if is_unsettled(volumes, k):
+                volumes, value = change_planes(volumes, scene, value, k, slopes)
+                volumes, value = merge_with_others(volumes, scene, value, k, np.inf)
+                if value == start:
+                    volumes[k, SETTLED] = surroundings(volumes, k)
+            k = k + 1 if len(volumes) == count else 1
         volumes, value = without_base(volumes, scene, value)
         if value > before - 0.05 * scene.evidence:
             break
     return volumes, value
+
+
+@compiled
+def change_planes(volumes, scene, value, k, slopes):
+    """All moves that change which planes volume k has, how they are tied and where they face."""
+    volumes, value = drop_planes(volumes, scene, value, k, np.inf)
+    volumes, value = flatten(volumes, scene, value, k)
+    volumes, value = change_ties(volumes, scene, value, k)
+    volumes, value = face_walls(volumes, scene, value, k)
+    return add_planes(volumes, scene, value, k, slopes)
+
+
+@compiled
+def is_unsettled(volumes, k):
+    """Whether volume k or what is around it changed since no move helped there."""
+    return volumes[k, SETTLED] != surroundings(volumes, k)
+
+
+@compiled
+def surroundings(volumes, k):
+    """A digest of volume k, of those whose rectangles meet its own or lie in another direction, and of the base's height."""
+    total = math.floor(volumes[0, OFFSET + LEVEL] / DIGEST_STEP)
+    for j in range(1, len(volumes)):
+        if volumes[j, DIRECTION] == volumes[k, DIRECTION] and (
+            volumes[j, U0] > volumes[k, U1] + AROUND_M
+            or volumes[j, U1] < volumes[k, U0] - AROUND_M
+            or volumes[j, V0] > volumes[k, V1] + AROUND_M
+            or volumes[j, V1] < volumes[k, V0] - AROUND_M
+        ):
+            continue
+        term = 1.0
+        for q in range(SETTLED):
+            x = volumes[j, q]
+            term = (term * DIGEST_FACTOR + math.floor(min(x, HIGH_ABOVE) / DIGEST_STEP + 0.5)) % DIGEST_PRIME
+        total += term
+    return total + 1.0
 
 
 @compiled

@@ -17,13 +17,15 @@ from ...compiled import compiled
 
 # Columns of a volume's row: its direction's number, rectangle (metres in that direction's axes), the slopes of the four
 # inclined planes, the offsets of all five (z at u = v = 0; infinite where it has no such plane), tie and whether it replaces,
-# leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y the other of u, v.
+# leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y the other of u, v; a digest of how
+# things stood around it when no move changed it.
 DIRECTION = 0
 U0, U1, V0, V1 = 1, 2, 3, 4
 SLOPE, OFFSET = 5, 9
 TIE, REPLACES = 14, 15
 LEAN = 16
-COLUMNS = 20
+SETTLED = 20
+COLUMNS = 21
 SIDES, PLANES, LEVEL = 4, 5, 4
 
 FREE, OPPOSITE, ALL = 0.0, 1.0, 2.0  # which slopes are equal: none, those that face each other, all
