@@ -31,6 +31,7 @@ BEYOND_M = 0.6  # an edge outside the outline by so much does not show
 NEAR_VERTEX_M = 1.5
 SMALL_STEPS, SMALL_STEP_M = 4, 0.1
 TOUCH_M = 0.04
+SAME_M = 1e-3  # places nearer than this are one: of corners of the outline and grid lines at them the corner, which comes first
 LEAST_GAIN = 1e-6
 EVERYWHERE = 60.0  # m: no edge is further from where it may go
 
@@ -59,7 +60,7 @@ def move_edges(volumes, scene, k, value, reach):
         best, chosen = value - LEAST_GAIN, start
         for q in range(m + 1):
             t = places[q]
-            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
+            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M or is_repeated(places, q):
                 continue
             p = np.searchsorted(distance, sign * t, side="right")
             trial = fixed + (gains[p - 1] if p > 0 else 0.0)
@@ -118,18 +119,18 @@ def between_points(distance, gains, sign, start):
 
 @compiled
 def places_of(volumes, scene, k, edge):
-    """Where an edge may go: grid lines, corners of the outline, small steps, other volumes' edges and ridges, outside."""
+    """Where an edge may go: corners of the outline, grid lines, small steps, other volumes' edges and ridges, outside."""
     direction, axis, start = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     lines, vertices = scene.lines[direction, axis], scene.vertices[direction, axis]
     places = np.empty(len(lines) + len(vertices) + 2 * SMALL_STEPS + 3 * len(volumes) + 2)  # one is the caller's
     m, last = 0, lines[0]
-    for x in lines:
-        if x < np.inf:
-            places[m] = last = x
-            m += 1
     for x in vertices:
         if abs(x - start) < NEAR_VERTEX_M:
             places[m] = x
+            m += 1
+    for x in lines:
+        if x < np.inf:
+            places[m] = last = x
             m += 1
     for q in range(-SMALL_STEPS, SMALL_STEPS + 1):
         if q != 0:
@@ -145,6 +146,15 @@ def places_of(volumes, scene, k, edge):
                 m += 1
     places[m] = lines[0] - BEYOND_M if edge % 2 == 0 else last + BEYOND_M
     return places, m + 1
+
+
+@compiled
+def is_repeated(places, q):
+    """Whether the q-th place is one of those before it."""
+    for p in range(q):
+        if abs(places[p] - places[q]) < SAME_M:
+            return True
+    return False
 
 
 @compiled

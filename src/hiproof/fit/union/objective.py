@@ -105,75 +105,76 @@ def edge_cost(volumes, scene, k, edge):
     direction = int(volumes[k, DIRECTION])
     at = volumes[k, U0 + edge]
     start, end = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
-    count = min(MOST_SAMPLES, max(2, int((end - start) / SAMPLE_M) + 1))
-    step = (end - start) / count
-    u, v = np.empty(count), np.empty(count)
-    m = samples_inside(scene, direction, at, start, step, edge < 2, u, v)
-    if m * step < LEAST_STEP_LENGTH_M:
-        return 0.0
-    inside, outside = np.full(m, -np.inf), np.full(m, -np.inf)
-    heights_along(volumes, scene, k, u[:m], v[:m], inside, outside)
     any_step, a_metre, low_a_metre, low_step, loose, at_corner = scene.edge_prices
-    shown = low = 0.0
-    for p in range(m):
-        gap = abs(inside[p] - outside[p])
-        if gap > STEP_M:
-            shown += step
-            if gap < low_step:
-                low += step
+    first, last, shown, low = what_shows(
+        volumes,
+        k,
+        edge,
+        scene.turn,
+        scene.depth,
+        (scene.corner_u, scene.corner_v, scene.pitch),
+        low_step,
+    )
     if shown < LEAST_STEP_LENGTH_M:
         return 0.0
     cost = any_step + a_metre * shown + low_a_metre * low
-    if not is_vertex_line(scene, direction, edge // 2, at):
+    if not is_vertex_line(scene.vertices[direction, edge // 2], at):
         return cost + loose
-    along = v if edge < 2 else u
-    return cost - at_corner * ends_at_corners(scene, direction, edge // 2, at, along[0], along[m - 1])
+    return cost - at_corner * ends_at_corners(scene.corners[direction], edge // 2, at, first, last)
 
 
 @compiled
-def samples_inside(scene, direction, at, start, step, along_v, u, v):
-    """Fill `u`, `v` with the samples of an edge that lie well inside the outline; returns how many."""
-    c, s = scene.turn[direction]
-    depth, pitch = scene.depth, scene.pitch
+def what_shows(volumes, k, edge, turn, depth, raster, low_step):
+    """Of an edge of volume k where its samples inside the outline begin and end, for how many metres it shows there, and for how
+    many with a step of less than `low_step`; `depth` and `raster` are the scene's."""
+    own, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
+    start, end = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
+    count = min(MOST_SAMPLES, max(2, int((end - start) / SAMPLE_M) + 1))
+    step = (end - start) / count
+    (c, s), (corner_u, corner_v, pitch) = (turn[own, 0], turn[own, 1]), raster
+    first = last = shown = low = 0.0
     m = 0
-    for q in range(len(u)):
+    for q in range(count):
         t = start + (q + 0.5) * step
-        a, b = (at, t) if along_v else (t, at)
-        i = math.floor((c * a - s * b - scene.corner_u) / pitch + 0.5)
-        j = math.floor((s * a + c * b - scene.corner_v) / pitch + 0.5)
+        a, b = (at, t) if edge < 2 else (t, at)
+        i = math.floor((c * a - s * b - corner_u) / pitch + 0.5)
+        j = math.floor((s * a + c * b - corner_v) / pitch + 0.5)
         if 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1] and depth[i, j] >= INSIDE_M:
-            u[m], v[m] = a, b
-            m += 1
-    return m
+            first, last, m = t if m == 0 else first, t, m + 1
+            gap = gap_at(volumes, k, turn, a, b)
+            if gap > STEP_M:
+                shown += step
+                if gap < low_step:
+                    low += step
+    return first, last, shown if m * step >= LEAST_STEP_LENGTH_M else 0.0, low
 
 
 @compiled
-def heights_along(volumes, scene, k, u, v, inside, outside):
-    """Heights just inside and just outside of volume k at its own edge's samples `u`, `v`, in its direction."""
+def gap_at(volumes, k, turn, u, v):
+    """Between the heights just inside and just outside of volume k at a place u, v of its edge, in its direction."""
     own = int(volumes[k, DIRECTION])
+    inside = outside = -np.inf
     for j in range(len(volumes)):
-        c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
-        if j == k:
-            for p in range(len(u)):
-                h = lowest(c, u[p], v[p])
-                inside[p] = h if replaces else max(h, outside[p])
-            continue
-        other = int(volumes[j, DIRECTION])
-        cosine = scene.turn[other, 0] * scene.turn[own, 0] + scene.turn[other, 1] * scene.turn[own, 1]
-        sine = scene.turn[other, 1] * scene.turn[own, 0] - scene.turn[other, 0] * scene.turn[own, 1]
-        u0, u1, v0, v1 = volumes[j, U0], volumes[j, U1], volumes[j, V0], volumes[j, V1]
-        for p in range(len(u)):
-            a, b = cosine * u[p] + sine * v[p], cosine * v[p] - sine * u[p]
-            if u0 - TOUCH_M <= a <= u1 + TOUCH_M and v0 - TOUCH_M <= b <= v1 + TOUCH_M:
-                h = lowest(c, a, b)
-                inside[p] = h if replaces else max(h, inside[p])
-                outside[p] = h if replaces else max(h, outside[p])
+        other, a, b = int(volumes[j, DIRECTION]), u, v
+        if other != own:
+            cosine = turn[other, 0] * turn[own, 0] + turn[other, 1] * turn[own, 1]
+            sine = turn[other, 1] * turn[own, 0] - turn[other, 0] * turn[own, 1]
+            a, b = cosine * u + sine * v, cosine * v - sine * u
+        if (
+            j == k
+            or volumes[j, U0] - TOUCH_M <= a <= volumes[j, U1] + TOUCH_M
+            and volumes[j, V0] - TOUCH_M <= b <= volumes[j, V1] + TOUCH_M
+        ):
+            h, replaces = lowest(coefficients(volumes, j), a, b), volumes[j, REPLACES] > 0.0
+            inside = h if replaces or h > inside else inside
+            if j != k:
+                outside = h if replaces or h > outside else outside
+    return abs(inside - outside)
 
 
 @compiled
-def ends_at_corners(scene, direction, axis, at, first, last):
-    """How many of the two ends of what lies of the line `at` inside the outline are at corners of it."""
-    corners = scene.corners[direction]
+def ends_at_corners(corners, axis, at, first, last):
+    """How many of the two ends of what lies of the line `at` inside the outline are at `corners` (c, 2) of it."""
     low = high = 0
     for q in range(len(corners)):
         if abs(corners[q, axis] - at) < AT_CORNER_M:
@@ -183,8 +184,7 @@ def ends_at_corners(scene, direction, axis, at, first, last):
 
 
 @compiled
-def is_vertex_line(scene, direction, axis, at):
-    vertices = scene.vertices[direction, axis]
+def is_vertex_line(vertices, at):
     for q in range(len(vertices)):
         if abs(vertices[q] - at) < 1e-6:
             return True

@@ -12,15 +12,20 @@ from .volumes import (
     OFFSET,
     OPPOSITE,
     PLANES,
+    REPLACES,
     SIDES,
     SLOPE,
     SLOPE_HIGH,
     SLOPE_LOW,
     TIE,
+    U0,
+    U1,
+    V0,
+    V1,
     coefficients,
     distance_up,
+    lowest,
     lowest_plane,
-    roof_heights,
 )
 
 ROUNDS = 2
@@ -31,21 +36,19 @@ LEAST_WEIGHT, LEAST_SLOPE_WEIGHT, LEAST_SPREAD_M2 = 1.0, 2.0, 0.02
 def refit(volumes, scene, k):
     """Two rounds of biweighted least squares for volume k (in place) on the points where it is the one that shows."""
     direction = int(volumes[k, DIRECTION])
-    u, v, n = scene.U[direction], scene.V[direction], scene.n
-    z_points, tolerance = scene.z, scene.dead + scene.width
+    u, v, z_points = scene.U[direction], scene.V[direction], scene.z
+    members, above, not_below = where_it_may_show(volumes, scene.U, scene.V, scene.n, k)
     for turn in range(ROUNDS):
-        _, top = roof_heights(volumes, scene.U[:, :n], scene.V[:, :n])
-        scale = tolerance * (2.0 if turn == 0 else 1.5)
+        scale = (scene.dead + scene.width) * (2.0 if turn == 0 else 1.5)
         sums = np.zeros((5, PLANES))  # w, w x, w z, w x x, w x z of each plane
         c = coefficients(volumes, k)
-        for i in range(n):
-            if top[i] != k:
+        for m in range(len(members)):
+            i = members[m]
+            h = lowest(c, u[i], v[i])
+            if not (h > above[m] and h >= not_below[m] and abs(z_points[i] - h) < scale):
                 continue
-            h, plane = lowest_plane(c, u[i], v[i])
-            w = 1.0 - ((z_points[i] - h) / scale) ** 2
-            if w <= 0.0:
-                continue
-            w *= w
+            _, plane = lowest_plane(c, u[i], v[i])
+            w = (1.0 - ((z_points[i] - h) / scale) ** 2) ** 2
             x = distance_up(volumes[k], plane, u[i], v[i]) if plane < LEVEL else 0.0
             sums[0, plane] += w
             sums[1, plane] += w * x
@@ -53,6 +56,36 @@ def refit(volumes, scene, k):
             sums[3, plane] += w * x * x
             sums[4, plane] += w * x * z_points[i]
         solve_planes(volumes[k], sums)
+
+
+@compiled
+def where_it_may_show(volumes, U, V, n, k):
+    """Which of the first n points at U, V lie in the rectangle of volume k with none over them that replaces it, and how high it has
+    to be to show there: above one height (m,) and not below another (m,)."""
+    own = int(volumes[k, DIRECTION])
+    members, above, not_below = np.empty(n, np.int64), np.empty(n), np.empty(n)
+    m = 0
+    for i in range(n):
+        if volumes[k, U0] <= U[own, i] <= volumes[k, U1] and volumes[k, V0] <= V[own, i] <= volumes[k, V1]:
+            members[m], above[m], not_below[m] = i, -np.inf, -np.inf
+            m += 1
+    for j in range(len(volumes)):
+        if j == k:
+            if volumes[k, REPLACES] > 0.0:
+                above[:m] = -np.inf
+            continue
+        direction, replaces, c = int(volumes[j, DIRECTION]), volumes[j, REPLACES] > 0.0, coefficients(volumes, j)
+        u, v = U[direction], V[direction]
+        u0, u1, v0, v1 = volumes[j, U0], volumes[j, U1], volumes[j, V0], volumes[j, V1]
+        for q in range(m):
+            i = members[q]
+            if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
+                if j > k:
+                    not_below[q] = np.inf if replaces else max(not_below[q], lowest(c, u[i], v[i]))
+                else:
+                    h = lowest(c, u[i], v[i])
+                    above[q] = h if replaces else max(above[q], h)
+    return members[:m], above[:m], not_below[:m]
 
 
 @compiled
