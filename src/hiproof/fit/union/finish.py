@@ -43,12 +43,18 @@ SQUARE = 1e-3  # a side that leans less is square to the others
 class Planes:
     """A volume's planes by place (left, right, front, back, top): z = a u + b v + c as rows (5, 3), NaN where it has none.
 
-    `modes` (p, 5, 3) are independent changes of one standard deviation each; `cost` is that of their points.
+    `cost` is that of their points. They are `design` (5, 3, p) times p unknowns with this `covariance` (p, p).
     """
 
     rows: np.ndarray
-    modes: np.ndarray
-    cost: float = 0.0
+    cost: float
+    design: np.ndarray
+    covariance: np.ndarray
+
+    @property
+    def modes(self) -> np.ndarray:
+        """Independent changes (p, 5, 3) of the rows, of one standard deviation each."""
+        return np.moveaxis(self.design @ np.linalg.cholesky(self.covariance), 2, 0)
 
 
 def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene) -> list[Planes]:
@@ -70,25 +76,24 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
     start = replace(start, cost=cost_of(start.rows, points, scene.dead, scene.width))
     if len(members) < FEWEST_POINTS:
         return start
-    tolerance = scene.dead + scene.width
     base = scene.evidence * PARAMETER_COST
     facing = (0.0, 0.0, 0.0, 0.0)
-    best = fitted(start, design_of(volume, sides, facing, there, level=()), points, scene, tolerance)
+    best = fitted(start, design_of(volume, sides, facing, there, level=()), points, scene)
     for pair in (0, 2):
         for way in facings(volume[LEAN : LEAN + SIDES], sides, there, pair):
             leans = (*facing[:pair], *way, *facing[pair + 2 :])
-            found = fitted(start, design_of(volume, sides, leans, there, level=()), points, scene, tolerance)
+            found = fitted(start, design_of(volume, sides, leans, there, level=()), points, scene)
             if found.cost + FACING_GAIN * base < best.cost - 1e-9:
                 best, facing = found, leans
     anchored = tuple(k for k in range(SIDES) if there[k] and sides[k].anchored)
     if len(anchored) > 1:
         square = own_leans(sides, anchored, facing)
-        found = fitted(best, design_of(volume, sides, square, there, anchored), points, scene, tolerance)
+        found = fitted(best, design_of(volume, sides, square, there, anchored), points, scene)
         if found.cost <= best.cost + base * (len(anchored) - 1) + LEVEL_SLACK * len(members):
             best = found
     if there[:SIDES].all() and not there[LEVEL]:
         leans = own_leans(sides, (0, 1, 2, 3), facing)
-        found = fitted(best, one_apex(sides, leans), points, scene, tolerance)
+        found = fitted(best, one_apex(sides, leans), points, scene)
         saved = max(len(set(slope_groups(volume, there))) - 1, 0)
         if found.cost <= best.cost + base * saved + LEVEL_SLACK * len(members):
             best = found
@@ -116,7 +121,7 @@ def planes_as_found(volume: np.ndarray) -> Planes:
             if k < LEVEL:
                 rows[k, k // 2] = SIGN[k] * volume[SLOPE + k]
                 rows[k, 1 - k // 2] = volume[SLOPE + k] * volume[LEAN + k]
-    return Planes(rows, np.zeros((0, 5, 3)), np.inf)
+    return Planes(rows, np.inf, np.zeros((SIDES + 1, 3, 0)), np.zeros((0, 0)))
 
 
 def facings(found: np.ndarray, sides: list[Side], there: np.ndarray, pair: int) -> list[tuple[float, float]]:
@@ -168,22 +173,80 @@ def slope_groups(volume: np.ndarray, there: np.ndarray) -> list[int]:
     return [0, 0, 2, 2] if volume[TIE] == OPPOSITE else [0, 1, 2, 3]
 
 
-def fitted(start: Planes, design: np.ndarray, points: np.ndarray, scene: Scene, tolerance: float) -> Planes:
-    """The planes of `design` by biweighted least squares from `start` on `points` (3, m), and their cost."""
-    there = np.isfinite(start.rows[:, 2])
-    rows = start.rows
-    anchor = np.linalg.lstsq(design[there].reshape(-1, design.shape[2]), rows[there].ravel(), rcond=None)[0]
+def fitted(start: Planes, design: np.ndarray, points: np.ndarray, scene: Scene) -> Planes:
+    """The planes of `design` (5, 3, p) by biweighted least squares from `start` on `points` (3, m); `start` where they are improper."""
+    rows, covariance, cost = least_squares(start.rows, design, points, scene.dead, scene.width)
+    return Planes(rows, cost, design, covariance) if proper(rows) else start
+
+
+@compiled
+def least_squares(rows, design, points, dead, width):
+    """Rows (5, 3), the unknowns' covariance (p, p) and the points' cost; unknowns that no point determines stay as they were."""
+    unity, there = np.zeros((len(rows), 3, 3)), np.isfinite(rows[:, 2])
+    for k in range(len(rows)):
+        for i in range(3):
+            unity[k, i, i] = 1.0
+    normal, right = normal_equations(design, unity, rows, there)
+    anchor = times(inverse_of(normal, 1e-9), right)
+    inverse, share = normal, 0.0
     for turn in range(ROUNDS):
-        moments, products, weight, misfit = weighted_moments(rows, points, tolerance * (2.0 if turn == 0 else 1.5))
-        normal = np.einsum("kip,kij,kjq->pq", design, moments, design)
-        ridge = 1e-6 * max(np.trace(normal) / len(normal), 1e-6)
-        inverse = np.linalg.inv(normal + ridge * np.eye(len(normal)))
-        rows = design @ (inverse @ (np.einsum("kip,ki->p", design, products) + ridge * anchor))
-        rows[~there] = np.nan
-    if not proper(rows):
-        return start
-    spread = np.linalg.cholesky(inverse) * np.sqrt(misfit / max(weight, 1.0))
-    return Planes(rows, np.moveaxis(design @ spread, 2, 0), cost_of(rows, points, scene.dead, scene.width))
+        moments, products, weight, misfit = weighted_moments(rows, points, (dead + width) * (2.0 if turn == 0 else 1.5))
+        normal, right = normal_equations(design, moments, products, there)
+        ridge, share = 1e-6 * max(np.trace(normal) / len(normal), 1e-6), misfit / max(weight, 1.0)
+        inverse = inverse_of(normal, ridge)
+        unknowns = times(inverse, right + ridge * anchor)
+        rows = np.full_like(rows, np.nan)
+        for k in range(len(rows)):
+            if there[k]:
+                rows[k] = times(design[k], unknowns)
+    return rows, inverse * share, cost_of(rows, points, dead, width)
+
+
+@compiled
+def normal_equations(design, moments, products, there):
+    """The matrix (p, p) and right side (p,) of least squares for planes (5, 3) that are `design` (5, 3, p) times p unknowns."""
+    size = design.shape[2]
+    matrix, right = np.zeros((size, size)), np.zeros(size)
+    for k in range(len(design)):
+        if not there[k]:
+            continue
+        for i in range(3):
+            for a in range(size):
+                right[a] += design[k, i, a] * products[k, i]
+                if design[k, i, a] != 0.0:
+                    for j in range(3):
+                        for b in range(size):
+                            matrix[a, b] += design[k, i, a] * moments[k, i, j] * design[k, j, b]
+    return matrix, right
+
+
+@compiled
+def inverse_of(matrix, ridge):
+    """The inverse of a symmetric matrix (p, p) with no negative eigenvalue, `ridge` added along its diagonal (Gauss and Jordan)."""
+    size = len(matrix)
+    left, inverse = matrix + ridge * np.eye(size), np.eye(size)
+    for k in range(size):
+        pivot = left[k, k]
+        for j in range(size):
+            left[k, j] /= pivot
+            inverse[k, j] /= pivot
+        for i in range(size):
+            factor = left[i, k]
+            if i != k and factor != 0.0:
+                for j in range(size):
+                    left[i, j] -= factor * left[k, j]
+                    inverse[i, j] -= factor * inverse[k, j]
+    return inverse
+
+
+@compiled
+def times(matrix, vector):
+    """Matrix (m, p) times vector (p,), without a library of linear algebra to load."""
+    product = np.zeros(len(matrix))
+    for i in range(len(matrix)):
+        for j in range(len(vector)):
+            product[i] += matrix[i, j] * vector[j]
+    return product
 
 
 @compiled
