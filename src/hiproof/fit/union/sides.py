@@ -8,10 +8,12 @@ it, up to the price of a loose edge.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from .objective import costs
 from .plan import Plan
 from .scene import Scene
@@ -26,8 +28,7 @@ LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 0.45, 0.4, 0.1
 FACING = 1e-9
 
 
-@dataclass(frozen=True)
-class Lines:
+class Lines(NamedTuple):
     """Lines x = start + lean * y through the outline's edges and chords that may be sides, from one to the other of y (2, m).
 
     The ends of all edges, across and along, are `x_edges`, `y_edges` (2, n).
@@ -105,44 +106,65 @@ def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: 
 
 def side_of(volume: np.ndarray, edge: int, lines: Lines, uv: np.ndarray, gain: np.ndarray, evidence: float) -> Side:
     """The cheapest line for one side of a volume; `gain` (n,) is what its points at `uv` (2, n) cost more within it."""
-    axis, own = edge // 2, Side(float(volume[U0 + edge]))
-    low, high = (volume[V0], volume[V1]) if axis == 0 else (volume[U0], volume[U1])
-    low, high = max(low, lines.y_edges.min()), min(high, lines.y_edges.max())
-    candidates = [own, *(Side(*line, True) for line in lines_near(lines, own.at, low, high))]
-    if len(candidates) == 1:
-        return own
-    x, y = uv[axis], uv[1 - axis]
+    m = cheapest_line(volume, edge, lines, uv, gain, evidence)
+    return Side(float(volume[U0 + edge])) if m < 0 else Side(float(lines.start[m]), float(lines.lean[m]), True)
+
+
+@compiled
+def cheapest_line(volume, edge, lines, uv, gain, evidence):
+    """Which of the lines is cheapest for a side of a volume; -1 where the side as it is is cheaper than all."""
+    axis, at = edge // 2, volume[U0 + edge]
+    low = max(volume[V0 - 2 * axis], lines.y_edges.min())
+    high = min(volume[V1 - 2 * axis], lines.y_edges.max())
     sign = -1.0 if edge % 2 == 0 else 1.0
-    opposite = volume[U0 + (edge ^ 1)]
-    strip = (y >= low) & (y <= high) & (sign * (x - opposite) >= 0.0)
-    x, y, gain = x[strip], y[strip], gain[strip]
-
-    def price(side: Side) -> float:
-        points = gain[sign * (x - side.at - side.lean * y) <= 0.0].sum()
-        if not side.anchored:
-            return float(points + evidence * LOOSE_UNITS)
-        bare = 1.0 - min(support(side, lines, low, high) / max(high - low, 1e-6), 1.0)
-        off = abs(side.at + side.lean * 0.5 * (low + high) - own.at)
-        return float(points + evidence * (UNSUPPORTED_UNITS * bare + FAR_UNITS_A_METRE * off))
-
-    return min(candidates, key=price)
-
-
-def lines_near(lines: Lines, at: float, low: float, high: float) -> list[tuple[float, float]]:
-    """(at, lean) of those lines that may be the side x = at from y = low to high."""
-    first, last = lines.y.min(axis=0), lines.y.max(axis=0)
-    along = (last > low - BESIDE_M) & (first < high + BESIDE_M)
-    within = (first > low - CHORD_END_M) & (last < high + CHORD_END_M)
-    places = np.stack([np.full(len(first), 0.5 * (low + high)), *np.clip(lines.y, low, high)])
-    near = (np.abs(lines.start + lines.lean * places - at) < GAP_M).all(axis=0) & np.where(lines.is_edge, along, within)
-    return list(dict.fromkeys(zip(lines.start[near].tolist(), lines.lean[near].tolist(), strict=True)))
+    x, y = uv[axis], uv[1 - axis]
+    strip = np.nonzero((y >= low) & (y <= high) & (sign * (x - volume[U0 + (edge ^ 1)]) >= 0.0))[0]
+    x, y, gain = sign * x[strip], sign * y[strip], gain[strip]
+    best, cheapest = -1, gain[x <= sign * at].sum() + evidence * LOOSE_UNITS
+    for m in range(len(lines.start)):
+        if not may_be_side(lines, m, at, low, high):
+            continue
+        start, lean = lines.start[m], lines.lean[m]
+        bare = 1.0 - min(support(start, lean, lines.x_edges, lines.y_edges, low, high) / max(high - low, 1e-6), 1.0)
+        off = abs(start + lean * 0.5 * (low + high) - at)
+        price = evidence * (UNSUPPORTED_UNITS * bare + FAR_UNITS_A_METRE * off)
+        for i in range(len(x)):
+            if x[i] - lean * y[i] <= sign * start:
+                price += gain[i]
+        if price < cheapest:
+            best, cheapest = m, price
+    return best
 
 
-def support(side: Side, lines: Lines, low: float, high: float) -> float:
-    """Length (m) of outline along the side, between `low` and `high`."""
-    along = (np.abs(lines.x_edges - side.at - side.lean * lines.y_edges) < ALONG_M).all(axis=0)
-    y = lines.y_edges[:, along]
-    return float(np.clip(np.minimum(y.max(axis=0), high) - np.maximum(y.min(axis=0), low), 0.0, None).sum())
+@compiled
+def may_be_side(lines, m, at, low, high):
+    """Whether line m is near enough to the side x = at from y = low to high."""
+    start, lean = lines.start[m], lines.lean[m]
+    first, last = min(lines.y[0, m], lines.y[1, m]), max(lines.y[0, m], lines.y[1, m])
+    if lines.is_edge[m]:
+        near = last > low - BESIDE_M and first < high + BESIDE_M
+    else:
+        near = first > low - CHORD_END_M and last < high + CHORD_END_M
+    if not near:
+        return False
+    for y in (0.5 * (low + high), min(max(first, low), high), min(max(last, low), high)):
+        if abs(start + lean * y - at) >= GAP_M:
+            return False
+    return True
+
+
+@compiled
+def support(start, lean, x_edges, y_edges, low, high):
+    """Length (m) of outline along the line x = start + lean y, between y = low and high."""
+    total = 0.0
+    for e in range(x_edges.shape[1]):
+        if (
+            abs(x_edges[0, e] - start - lean * y_edges[0, e]) < ALONG_M
+            and abs(x_edges[1, e] - start - lean * y_edges[1, e]) < ALONG_M
+        ):
+            first, last = min(y_edges[0, e], y_edges[1, e]), max(y_edges[0, e], y_edges[1, e])
+            total += max(min(last, high) - max(first, low), 0.0)
+    return total
 
 
 def shared(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> Side:
