@@ -22,6 +22,7 @@ from .volumes import (
     ALL,
     COLUMNS,
     DIRECTION,
+    FREE,
     LEAN,
     LEVEL,
     OFFSET,
@@ -42,6 +43,7 @@ MOST_GABLES = 6
 ALONG_AXIS = 0.12  # a plane that leans so little off an axis or a wall is taken along it
 RIDGE_INSIDE_M = 0.4
 MOST_TOPS, MOST_PAIRS = 2, 3  # level tops and pairs of slopes, strongest first, that make hips and mansards
+SAME_SLOPE = 1e-6
 WRONG_COVER = 0.02  # of a point: what covering one without explaining it costs
 NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 
@@ -49,25 +51,17 @@ NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 def candidates_of(scene: Scene, members: np.ndarray, grids: list[Grid], most_planes: int) -> np.ndarray:
     """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
     found = [
-        as_allowed(volume, scene.allowed)
+        volume_of(direction, np.array(planes), scene.allowed)
         for direction, grid in enumerate(grids)
-        for volume in candidates_in(scene, members, direction, grid, most_planes)
+        for planes in candidates_in(scene, members, direction, grid, most_planes)
     ]
-    return np.array([volume for volume in found if volume is not None]).reshape(-1, COLUMNS)
+    return np.array([volume for volume, allowed in found if allowed]).reshape(-1, COLUMNS)
 
 
-def as_allowed(volume: np.ndarray, allowed: np.ndarray) -> np.ndarray | None:
-    """The volume, with opposite slopes equal if it is only so among the `allowed` shapes; None where it is not."""
-    if is_allowed(volume, allowed):
-        return volume
-    volume = volume.copy()
-    volume[TIE] = OPPOSITE
-    equalise_slopes(volume)
-    return volume if is_allowed(volume, allowed) else None
-
-
-def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int) -> list[np.ndarray]:
-    """Those of one direction: every plane of the pool along an axis, the gables, and all pairs that form a ridge."""
+def candidates_in(
+    scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int
+) -> list[list[np.ndarray]]:
+    """The planes of each in one direction: every plane of the pool along an axis, the gables, all pairs that form a ridge."""
     every = members[np.arange(min(len(members), POOL_POINTS)) * len(members) // min(len(members), POOL_POINTS)]
     u, v, z = (np.ascontiguousarray(x[every]) for x in (scene.U[direction], scene.V[direction], scene.z))
     few = Cloud(u, v, z, cells_of(grid.u, u), cells_of(grid.v, v))
@@ -79,10 +73,8 @@ def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid,
     middle = np.array([np.median(u), np.median(v)])
     along = [facing for plane in pool for facing in facings(plane, middle, scene.leans[direction])]
     pairs = [list(g[:c]) for g, c in zip(gables, counts, strict=True)]
-    pairs += [[p, q] for i, p in enumerate(along) for q in along[:i] if has_ridge(p, q, grid)]
-    groups = [[plane] for plane in along] + pairs + larger_groups(along, pairs)
-    volumes = (volume_of(direction, planes) for planes in groups)
-    return [volume for volume in volumes if volume is not None]
+    pairs += [[p, q] for i, p in enumerate(along) for q in along[:i] if has_ridge(p, q, grid.u, grid.v)]
+    return [[plane] for plane in along] + pairs + larger_groups(along, pairs)
 
 
 def larger_groups(planes: list[np.ndarray], pairs: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
@@ -111,49 +103,61 @@ def facings(plane: np.ndarray, middle: np.ndarray, leans: np.ndarray) -> list[np
     return found
 
 
-def axis_of(plane: np.ndarray) -> int:
+@compiled
+def axis_of(plane):
     """The axis that an inclined plane faces most nearly along; -1 for a level one."""
     return int(abs(plane[1]) > abs(plane[0])) if kind_of(plane) else -1
 
 
-def has_ridge(one: np.ndarray, other: np.ndarray, grid: Grid) -> bool:
-    """Whether two planes fall away from a ridge inside the plan."""
+@compiled
+def has_ridge(one, other, u, v):
+    """Whether two planes fall away from a ridge inside the plan, whose grid lines are `u`, `v`."""
     axis = axis_of(one)
     if axis < 0 or axis_of(other) != axis or one[axis] * other[axis] >= 0.0:
         return False
     rising, falling = (one, other) if one[axis] > 0.0 else (other, one)
-    lines, across = (grid.u, grid.v)[axis], (grid.v, grid.u)[axis]
+    lines, across = (u, v) if axis == 0 else (v, u)
     y = 0.5 * (across[0] + across[-1])
-    at = (falling[2] - rising[2] + (falling - rising)[1 - axis] * y) / (rising[axis] - falling[axis])
-    return bool(lines[0] + RIDGE_INSIDE_M < at < lines[-1] - RIDGE_INSIDE_M)
+    at = (falling[2] - rising[2] + (falling[1 - axis] - rising[1 - axis]) * y) / (rising[axis] - falling[axis])
+    return lines[0] + RIDGE_INSIDE_M < at < lines[-1] - RIDGE_INSIDE_M
 
 
-def volume_of(direction: int, planes: list[np.ndarray]) -> np.ndarray | None:
-    """A volume of planes (a, b, c); None where two face the same way."""
+@compiled
+def volume_of(direction, planes, allowed):
+    """A volume of planes (m, 3), and whether it is one of the `allowed` shapes, if need be with opposite slopes equal; it is none
+    where two planes face the same way."""
     volume = np.zeros(COLUMNS)
     volume[DIRECTION], volume[OFFSET : OFFSET + PLANES] = direction, np.inf
     for plane in planes:
         axis = axis_of(plane)
-        place = LEVEL if axis < 0 else 2 * axis + (plane[axis] < 0.0)
+        place = LEVEL if axis < 0 else 2 * axis + int(plane[axis] < 0.0)
         if volume[OFFSET + place] < np.inf:
-            return None
+            return volume, False
         volume[OFFSET + place] = plane[2]
         if axis >= 0:
             volume[SLOPE + place] = abs(plane[axis])
             volume[LEAN + place] = plane[1 - axis] / abs(plane[axis])
     volume[TIE] = tie_of(volume)
-    return volume
+    if not is_allowed(volume, allowed):
+        volume[TIE] = OPPOSITE
+        equalise_slopes(volume)
+    return volume, is_allowed(volume, allowed)
 
 
-def tie_of(volume: np.ndarray) -> float:
+@compiled
+def tie_of(volume):
     """The tightest tie that holds of a volume's slopes."""
-    there, slope = np.isfinite(volume[OFFSET : OFFSET + SIDES]), volume[SLOPE : SLOPE + SIDES]
-    if there.sum() < 2:
-        return 0.0
-    if there.all() and np.ptp(slope) < 1e-6:
+    offset, slope = volume[OFFSET : OFFSET + SIDES], volume[SLOPE : SLOPE + SIDES]
+    low, high, count = np.inf, -np.inf, 0
+    for k in range(SIDES):
+        if offset[k] < np.inf:
+            low, high, count = min(low, slope[k]), max(high, slope[k]), count + 1
+    if count == SIDES and high - low < SAME_SLOPE:
         return ALL
-    pairs = [abs(slope[k] - slope[k + 1]) < 1e-6 for k in (0, 2) if there[k] and there[k + 1]]
-    return OPPOSITE if all(pairs) else 0.0
+    for k in (0, 2):
+        if offset[k] < np.inf and offset[k + 1] < np.inf and abs(slope[k] - slope[k + 1]) >= SAME_SLOPE:
+            return FREE
+    return OPPOSITE if count > 1 else FREE
 
 
 @compiled

@@ -104,7 +104,6 @@ def edge_cost(volumes, scene, k, edge):
     """Units of complexity for what shows of one edge (0 u low, 1 u high, 2 v low, 3 v high) of volume k."""
     direction = int(volumes[k, DIRECTION])
     at = volumes[k, U0 + edge]
-    start, end = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     any_step, a_metre, low_a_metre, low_step, loose, at_corner = scene.edge_prices
     first, last, shown, low = what_shows(
         volumes,
@@ -160,9 +159,8 @@ def gap_at(volumes, k, turn, u, v):
             cosine = turn[other, 0] * turn[own, 0] + turn[other, 1] * turn[own, 1]
             sine = turn[other, 1] * turn[own, 0] - turn[other, 0] * turn[own, 1]
             a, b = cosine * u + sine * v, cosine * v - sine * u
-        if (
-            j == k
-            or volumes[j, U0] - TOUCH_M <= a <= volumes[j, U1] + TOUCH_M
+        if j == k or (
+            volumes[j, U0] - TOUCH_M <= a <= volumes[j, U1] + TOUCH_M
             and volumes[j, V0] - TOUCH_M <= b <= volumes[j, V1] + TOUCH_M
         ):
             h, replaces = lowest(coefficients(volumes, j), a, b), volumes[j, REPLACES] > 0.0

@@ -114,7 +114,16 @@ def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
     weight[len(kept) :] *= len(kept) / scene.n
     shade *= len(kept) / scene.n
     U, V = (np.ascontiguousarray(axis[:, columns]) for axis in (scene.U, scene.V))
-    return scene._replace(U=U, V=V, order=order_along(U, V), z=scene.z[columns], weight=weight, shade=shade, n=len(kept), evidence=evidence)
+    return scene._replace(
+        U=U,
+        V=V,
+        order=order_along(U, V),
+        z=scene.z[columns],
+        weight=weight,
+        shade=shade,
+        n=len(kept),
+        evidence=evidence,
+    )
 
 
 def order_along(U: np.ndarray, V: np.ndarray) -> np.ndarray:

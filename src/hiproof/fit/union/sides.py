@@ -17,7 +17,7 @@ from ...compiled import compiled
 from .objective import costs
 from .plan import Plan
 from .scene import Scene
-from .volumes import DIRECTION, U0, U1, V0, V1, with_and_without
+from .volumes import DIRECTION, U0, V0, V1, with_and_without
 
 LEAN = 0.35  # of a line that a side may take
 GAP_M = 1.0  # how far off it may be, in the middle of the side and at the ends
