@@ -23,6 +23,7 @@ BASE_QUANTILE = 0.02
 MOST_SLOPES = 5
 FINAL_ROUNDS = 3
 STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
+SAME_UNITS = 0.1  # roofs of as many volumes that cost so nearly the same are one
 MOST_REGROWN = 8  # of more volumes each is too little of the whole to be worth as much work
 HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED = 6.0, 1.0  # units above the best: of 334 best additions 324 are still found
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
@@ -50,7 +51,7 @@ def regrown(
     while k > 0 and 2 < len(volumes) <= MOST_REGROWN:
         trial = without(volumes, k)
         trial, found = improve(trial, scene, objective(trial, scene, np.inf), slopes, STARTING_ROUNDS)
-        trial, found = grown(trial, found, scene, grids, candidates, slopes)
+        trial, found = grown(trial, found, scene, grids, candidates, slopes, (len(volumes), value))
         if found < value - REGROWN_UNITS * scene.evidence:
             volumes, value = trial, found
         k = min(k, len(volumes)) - 1
@@ -58,9 +59,16 @@ def regrown(
 
 
 def grown(
-    volumes: np.ndarray, value: float, scene: Scene, grids: list[Grid], candidates: np.ndarray, slopes: np.ndarray
+    volumes: np.ndarray,
+    value: float,
+    scene: Scene,
+    grids: list[Grid],
+    candidates: np.ndarray,
+    slopes: np.ndarray,
+    known: tuple[int, float] | None = None,
 ) -> tuple[np.ndarray, float]:
-    """The volumes with more of them added one by one, as long as that pays."""
+    """The volumes with more of them added one by one, as long as that pays, or until there are as many as in a `known` roof for
+    as much: nothing can be added to that one, and it has come back."""
     fresh = False
     for _ in range(MOST_ADDITIONS):
         far = unexplained(volumes, scene)
@@ -69,6 +77,8 @@ def grown(
         found = best_addition(volumes, scene, value, grids, candidates)
         if found is not None:
             (volumes, value), fresh = improve(*found[:1], scene, found[1], slopes, 1), False
+            if known is not None and len(volumes) == known[0] and abs(value - known[1]) < SAME_UNITS * scene.evidence:
+                return volumes, value
         elif fresh:
             break
         else:
