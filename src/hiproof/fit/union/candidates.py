@@ -169,13 +169,19 @@ def best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, r
     cannot come near the best found are left out (minus infinity).
     """
     gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
-    threshold = 0.0
+    threshold, left = 0.0, np.zeros(len(cost_now) + 1)  # what is left to gain at each point and those after it
+    for i in range(len(cost_now) - 1, -1, -1):
+        left[i] = left[i + 1] + cost_now[i]
     for m in range(len(candidates)):
         direction = int(candidates[m, DIRECTION])
         nu, nv = shape[direction]
         cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
         price = scene.evidence * (volume_cost(candidates[m]) + NEW_EDGES)
-        if gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacing, cells) <= price + threshold:
+        least = price + threshold
+        if left[0] <= least:
+            continue
+        places = cell_u[direction], cell_v[direction]
+        if not gains_enough(scene, candidates, m, places, cost_now, left, z_now, replacing, least, cells):
             continue
         reach_of_rows(cells, reach)
         if reach[0] <= price + threshold:
@@ -189,13 +195,18 @@ def best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, r
 
 
 @compiled
-def gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacing, cells):
-    """Add to `cells` what candidate m would gain at each point and ghost; returns the sum of what is gained."""
+def gains_enough(scene, candidates, m, places, cost_now, left, z_now, replacing, least, cells):
+    """Whether the gains of candidate m at points and ghosts sum up to more than `least`; then `cells` holds them by cell.
+
+    It is given up as soon as what is `left` to gain cannot do.
+    """
     direction = int(candidates[m, DIRECTION])
     c = coefficients(candidates, m)
-    u, v, i_of, j_of = scene.U[direction], scene.V[direction], cell_u[direction], cell_v[direction]
+    u, v, (i_of, j_of) = scene.U[direction], scene.V[direction], places
     gained = 0.0
     for i in range(len(z_now)):
+        if gained + left[i] <= least:
+            return False
         h = lowest(c, u[i], v[i])
         if h <= z_now[i] + 1e-9 and not replacing:
             continue
@@ -203,4 +214,4 @@ def gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacin
         gain = cost_now[i] - (cost + WRONG_COVER if i < scene.n and cost >= 1.0 else cost)
         cells[i_of[i], j_of[i]] += gain
         gained += max(gain, 0.0)
-    return gained
+    return gained > least
