@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.candidates import candidates_of
-from hiproof.fit.union.grow import regrown, typical_slopes
+from hiproof.fit.union.grow import ground_of, regrown
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import emptiness, lay_out_plan
 from hiproof.fit.union.planes import Cloud, Grid
@@ -50,7 +50,7 @@ def test_growing_anew_never_costs(seed):
     value = objective(volumes, scene, np.inf)
     grids = [Grid(np.arange(-8.0, 8.5, 0.5), np.arange(-8.0, 8.5, 0.5))] * len(scene.turn)
     candidates = candidates_of(scene, np.arange(scene.n), grids, 12)
-    found, lower = regrown(volumes, value, scene, grids, candidates, typical_slopes(candidates))
+    found, lower = regrown(volumes, value, ground_of(scene, grids, candidates), candidates)
     assert lower <= value
     assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
 

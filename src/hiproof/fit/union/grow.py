@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import compiled
@@ -17,7 +19,7 @@ from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, 
 
 MOST_VOLUMES, MOST_ADDITIONS = 24, 20
 MOST_PLANES, MOST_NEW_PLANES = 16, 10
-TRIED_EACH_WAY = 3
+TRIED_EACH_WAY = 2
 UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
 BASE_QUANTILE = 0.02
 MOST_SLOPES = 5
@@ -29,29 +31,45 @@ HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED = 6.0, 1.0  # units above the best: of 33
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 
+class Ground(NamedTuple):
+    """What volumes grow on: the scene, the grid of each direction, in which cells (directions, n + g) along u and v the points and
+    ghosts lie, and the slopes (m,) to try for a further plane."""
+
+    scene: Scene
+    grids: list[Grid]
+    cell_u: np.ndarray
+    cell_v: np.ndarray
+    slopes: np.ndarray
+
+
 def grow(scene: Scene, grids: list[Grid]) -> tuple[np.ndarray, float]:
     """Volumes (k, COLUMNS) and their objective: grown from the base, then each taken out in turn and its place grown anew."""
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
     base = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
     candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
-    slopes = typical_slopes(candidates)
-    volumes, value = grown(base, objective(base, scene, np.inf), scene, grids, candidates, slopes)
-    return regrown(volumes, value, scene, grids, candidates, slopes)
+    ground = ground_of(scene, grids, candidates)
+    volumes, value = grown(base, objective(base, scene, np.inf), ground, candidates)
+    return regrown(volumes, value, ground, candidates)
 
 
-def regrown(
-    volumes: np.ndarray, value: float, scene: Scene, grids: list[Grid], candidates: np.ndarray, slopes: np.ndarray
-) -> tuple[np.ndarray, float]:
+def ground_of(scene: Scene, grids: list[Grid], candidates: np.ndarray) -> Ground:
+    """The ground that a scene and the first candidates give."""
+    cell_u = np.array([cells_of(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
+    cell_v = np.array([cells_of(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
+    return Ground(scene, grids, cell_u, cell_v, typical_slopes(candidates))
+
+
+def regrown(volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray) -> tuple[np.ndarray, float]:
     """The volumes with each in turn taken out and what is missing grown anew, where that is clearly better.
 
     The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
     volume over both. Without it the others take the places that are theirs.
     """
-    k = len(volumes) - 1
+    k, scene = len(volumes) - 1, ground.scene
     while k > 0 and 2 < len(volumes) <= MOST_REGROWN:
         trial = without(volumes, k)
-        trial, found = improve(trial, scene, objective(trial, scene, np.inf), slopes, STARTING_ROUNDS)
-        trial, found = grown(trial, found, scene, grids, candidates, slopes, (len(volumes), value))
+        trial, found = improve(trial, scene, objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS)
+        trial, found = grown(trial, found, ground, candidates, (len(volumes), value))
         if found < value - REGROWN_UNITS * scene.evidence:
             volumes, value = trial, found
         k = min(k, len(volumes)) - 1
@@ -59,35 +77,29 @@ def regrown(
 
 
 def grown(
-    volumes: np.ndarray,
-    value: float,
-    scene: Scene,
-    grids: list[Grid],
-    candidates: np.ndarray,
-    slopes: np.ndarray,
-    known: tuple[int, float] | None = None,
+    volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray, known: tuple[int, float] | None = None
 ) -> tuple[np.ndarray, float]:
     """The volumes with more of them added one by one, as long as that pays, or until there are as many as in a `known` roof for
     as much: nothing can be added to that one, and it has come back."""
-    fresh = False
+    scene, fresh = ground.scene, False
     for _ in range(MOST_ADDITIONS):
         far = unexplained(volumes, scene)
         if len(far) < FEWEST_UNEXPLAINED or len(volumes) >= MOST_VOLUMES:
             break
-        found = best_addition(volumes, scene, value, grids, candidates)
+        found = best_addition(volumes, value, ground, candidates)
         if found is not None:
-            (volumes, value), fresh = improve(*found[:1], scene, found[1], slopes, 1), False
+            (volumes, value), fresh = improve(found[0], scene, found[1], ground.slopes, 1), False
             if known is not None and len(volumes) == known[0] and abs(value - known[1]) < SAME_UNITS * scene.evidence:
                 return volumes, value
         elif fresh:
             break
         else:
-            volumes, value = improve(volumes, scene, value, slopes, 2)
+            volumes, value = improve(volumes, scene, value, ground.slopes, 2)
             far = unexplained(volumes, scene)
             if len(far) < FEWEST_UNEXPLAINED:
                 break
-            candidates, fresh = candidates_of(scene, far, grids, MOST_NEW_PLANES), True
-    return improve(volumes, scene, value, slopes, FINAL_ROUNDS)
+            candidates, fresh = candidates_of(scene, far, ground.grids, MOST_NEW_PLANES), True
+    return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)
 
 
 def unexplained(volumes: np.ndarray, scene: Scene) -> np.ndarray:
@@ -117,19 +129,20 @@ def grids_of(plan: Plan, scene: Scene) -> list[Grid]:
 
 
 def best_addition(
-    volumes: np.ndarray, scene: Scene, value: float, grids: list[Grid], candidates: np.ndarray
+    volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray
 ) -> tuple[np.ndarray, float] | None:
     """The volumes with the one more that lowers the objective most, and that objective; None where none does."""
     if len(candidates) == 0:
         return None
+    scene, grids = ground.scene, ground.grids
     z_now, _ = roof_heights(volumes, scene.U, scene.V)
     cost_now = costs(z_now, scene)
-    cell_u = np.array([cells_of(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
-    cell_v = np.array([cells_of(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
     shape = np.array([(len(grid.u) - 1, len(grid.v) - 1) for grid in grids])
     best = None
     for replacing in (False, True):
-        gains, cells = best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, replacing)
+        gains, cells = best_rectangles(
+            scene, candidates, ground.cell_u, ground.cell_v, shape, cost_now, z_now, replacing
+        )
         for m in np.argsort(-gains, kind="stable")[:TRIED_EACH_WAY]:
             if not gains[m] > 0.0:
                 break
