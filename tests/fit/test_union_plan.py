@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union.finish import cost_of, finished, weighted_moments
+from hiproof.fit.union.finish import cost_of, finished, inverse_of, least_squares, weighted_moments
 from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
@@ -252,3 +252,27 @@ def test_moments_are_the_sums_over_the_points_of_each_plane(seed):
     assert (total, misfit) == pytest.approx((weight.sum(), (weight * left**2).sum()))
     plain = np.clip((np.abs(left) - 0.05) / 0.3, 0.0, 1.0) ** 2
     assert cost_of(rows, points, 0.05, 0.3) == pytest.approx(plain.sum())
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_least_squares_find_planes_that_explain_all_points(seed):
+    """Two planes with a slope in common, points on them exactly: the unknowns come back, and nothing is left to vary."""
+    rng = np.random.default_rng(seed)
+    unknowns = np.array([*rng.uniform(4.0, 6.0, 2), rng.uniform(0.3, 1.0)])
+    design = np.zeros((5, 3, 3))
+    design[0, 2, 0] = design[1, 2, 1] = design[0, 0, 2] = 1.0
+    design[1, 0, 2] = -1.0
+    rows = design @ unknowns
+    rows[2:] = np.nan
+    uv = rng.uniform(-4.0, 4.0, (2, 200))
+    points = np.vstack([uv, np.nanmin(rows @ np.vstack([uv, np.ones(200)]), axis=0)])
+    found, covariance, cost = least_squares(rows + rng.normal(0.0, 0.02, rows.shape), design, points, 0.03, 0.2)
+    assert found[:2] == pytest.approx(rows[:2], abs=1e-5) and np.isnan(found[2:]).all()
+    assert np.abs(covariance).max() < 1e-9 and cost == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize("size", [1, 2, 6])
+def test_the_inverse_of_a_symmetric_matrix_is_numpys(size):
+    root = np.random.default_rng(size).normal(size=(size, size))
+    matrix = root @ root.T
+    assert inverse_of(matrix, 0.1) == pytest.approx(np.linalg.inv(matrix + 0.1 * np.eye(size)), rel=1e-9)

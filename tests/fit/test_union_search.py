@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.union.candidates import best_rectangles, gain_by_cell
+from hiproof.fit.union.candidates import best_rectangles, gains_enough
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
-from hiproof.fit.union.moves import improve, merge_volumes, refit_each, settled, simplify
+from hiproof.fit.union.moves import improve, merge_volumes, refit_each, settled, simplify, surroundings
 from hiproof.fit.union.objective import (
     AT_CORNER_M,
     BASE_SHARE,
@@ -380,7 +380,7 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
     brute, found = np.empty(6), np.empty(6)
     for m, (i0, i1, j0, j1) in enumerate(cells):
         gain = np.zeros((6, 6))
-        gain_by_cell(scene, candidates, m, cell_u, cell_v, cost_now, z_now, replacing, gain)
+        gains_in(scene, candidates, m, (cell_u, cell_v), cost_now, z_now, replacing, gain)
         price = scene.evidence * (volume_cost(candidates[m]) + 0.5)
         brute[m], found[m] = brute_rectangle(gain) - price, gain[i0:i1, j0:j1].sum() - price
     assert gains.max() == pytest.approx(brute.max()) if brute.max() > 1e-6 else not np.isfinite(gains).any()
@@ -390,6 +390,12 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
     assert (brute[~told] <= max(0.5 * brute.max(), 1e-6) + 1e-9).all()
 
 
+def gains_in(scene, candidates, m, cells, cost_now, z_now, replacing, gain):
+    """All that candidate m gains, by cell, never given up."""
+    places, nothing_left = tuple(cell[int(candidates[m, DIRECTION])] for cell in cells), np.zeros(len(z_now) + 1)
+    assert gains_enough(scene, candidates, m, places, cost_now, nothing_left, z_now, replacing, -np.inf, gain)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
     rng, volumes, scene = drawn(seed)
@@ -397,10 +403,23 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
     cell = np.zeros(scene.U.shape, int)
     z_now, _ = roof_heights(volumes, scene.U, scene.V)
     cost_now, gain = costs(z_now, scene), np.zeros((1, 1))
-    gain_by_cell(scene, candidate, 0, cell, cell, cost_now, z_now, False, gain)
+    gains_in(scene, candidate, 0, (cell, cell), cost_now, z_now, False, gain)
     wide = candidate.copy()
     wide[0, U0 : V1 + 1] = -1e3, 1e3, -1e3, 1e3
     h = heights(wide, scene.U, scene.V)[0]
     cost = costs(h, scene)
     cost[: scene.n][cost[: scene.n] >= 1.0] += 0.02  # what covers a point without explaining it
     assert gain[0, 0] == pytest.approx((cost_now - cost)[h > z_now + 1e-9].sum())
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_surroundings_of_a_volume_are_what_is_near_it(seed):
+    """Moved, it or a volume that meets it changes the digest; one far away does not until it comes near."""
+    rng = np.random.default_rng(seed)
+    volumes = np.vstack([base_only(2.0), random_volume(rng, 0.0), random_volume(rng, 0.0)])
+    volumes[1:, DIRECTION], volumes[1:, U0 : V1 + 1] = 0.0, [(-3.0, 3.0, -2.0, 2.0), (9.0, 14.0, -2.0, 2.0)]
+    digest = surroundings(volumes, 1)
+    for row, column, value, same in ((2, V1, 4.0, True), (2, U0, 3.0, False), (1, V1, 2.1, False)):
+        moved = volumes.copy()
+        moved[row, column] = value
+        assert (surroundings(moved, 1) == digest) is same

@@ -54,7 +54,8 @@ class Planes:
     @property
     def modes(self) -> np.ndarray:
         """Independent changes (p, 5, 3) of the rows, of one standard deviation each."""
-        return np.moveaxis(self.design @ np.linalg.cholesky(self.covariance), 2, 0)
+        variances, axes = np.linalg.eigh(self.covariance)
+        return np.moveaxis(self.design @ (axes * np.sqrt(np.clip(variances, 0.0, None))), 2, 0)
 
 
 def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene) -> list[Planes]:
