@@ -40,18 +40,24 @@ def random_roof(name: str, rng: np.random.Generator) -> TrueRoof:
 
 def shape_of(name: str, width: float, length: float, height: float, rng: np.random.Generator) -> dict[str, float]:
     """The lengths that make a type what it is, drawn where they can be seen."""
-    if name == "hip":
-        return {"ridge_length": length - width * rng.uniform(0.6, 1.0)}
-    if name == "half_hip":
-        share = rng.uniform(0.3, 0.6)
-        return {"hip_height": share * height, "ridge_length": length - share * width * rng.uniform(0.6, 1.0)}
-    if name == "mansard":
+    ends = 1 if name.startswith(("side", "corner")) else 2  # sloping ends, and sides
+    sides = 1 if name in ("half_mansard", "corner", "corner_mansard") else 2
+    if name in ("hip", "side_hip"):
+        return {"ridge_length": length - ends * width / 2 * rng.uniform(0.6, 1.0)}
+    if name in ("half_hip", "side_half_hip"):
+        share = rng.uniform(0.3, 0.6) if ends == 2 else rng.uniform(0.45, 0.7)  # so that one end is seen as well
+        ridge = length - ends * share * width / 2 * rng.uniform(0.6, 1.0)
+        return {"hip_height": share * height, "ridge_length": ridge}
+    if "top_width" in CATALOGUE[name].parameters:
         run = width * rng.uniform(0.15, 0.3)
-        top = {"top_width": width - 2 * run, "top_length": length - 2 * run * rng.uniform(0.8, 1.2)}
-        return top | {"height": run * rng.uniform(0.7, 2.0)}
+        lengths = {"top_width": width - sides * run, "top_length": length - ends * run * rng.uniform(0.8, 1.2)}
+        lengths["height"] = run * rng.uniform(0.7, 2.0)
+        return {own: lengths[own] for own in lengths if own in CATALOGUE[name].parameters}
+    if name == "corner":
+        slope = rng.uniform(0.3, 0.9)
+        return {"height": slope * width, "end_height": slope * length * rng.uniform(0.8, 1.25)}
     if name == "asymmetric_gable":
-        offset = width * rng.uniform(0.08, 0.25)
-        return {"ridge_offset": offset, "eave_step": height * rng.uniform(0.1, 0.5)}
+        return asymmetry(width, height, rng)
     if name == "gambrel":
         return {"break_width": width * rng.uniform(0.5, 0.7), "break_height": height * rng.uniform(0.62, 0.75)}
     if name == "monopitch":
@@ -60,6 +66,22 @@ def shape_of(name: str, width: float, length: float, height: float, rng: np.rand
         teeth = int(rng.integers(2, min(6, int(width / 2)) + 1))  # none narrower than 2 m
         return {"teeth": teeth, "height": width / teeth * rng.uniform(0.3, 0.9)}
     return {}
+
+
+def asymmetry(width: float, height: float, rng: np.random.Generator) -> dict[str, float]:
+    """A ridge off the middle and a step between the eaves with which one slope is at least a seventh steeper."""
+    while True:
+        offset, step = width * rng.uniform(0.08, 0.25), height * rng.uniform(0.1, 0.5)
+        steeper = (height - step) / (width / 2 - offset) / (height / (width / 2 + offset))
+        if abs(np.log(steeper)) > np.log(8 / 7):
+            return {"ridge_offset": offset, "eave_step": step}
+
+
+def catslide(rng: np.random.Generator) -> TrueRoof:
+    """A gable whose ridge lies off the middle."""
+    gable = random_roof("gable", rng)
+    theta_p = gable.theta_p | {"ridge_offset": gable.theta_p["width"] * rng.uniform(0.08, 0.25)}
+    return TrueRoof(gable.primitive.variant(theta_p), theta_p, gable.kappa, gable.translation)
 
 
 def scan(

@@ -21,15 +21,14 @@ from hiproof.fit import fit_roof
 from hiproof.learn.data import POINTS, as_sample
 from hiproof.learn.shapes import Shape, read_shapes
 from hiproof.model import ROOF
-from hiproof.primitives.catalogue import CATALOGUE
 from hiproof.rings import ring_normal
 from hiproof.segment import combine, segment
 from hiproof.segment.inference import SHIPPED_WEIGHTS
 from hiproof.segment.scores import Scores
 from hiproof.settings import Settings
-from hiproof.simulate import ScanSettings, scan_solids, training_sample
+from hiproof.simulate import ROOF_TYPES, ScanSettings, scan_solids, training_sample
 
-TYPES = tuple(CATALOGUE)
+TYPES = ROOF_TYPES
 THREE = ("gable", "hip", "pyramid")
 TEST_SEED = 2024
 DATA = Path(__file__).parents[1] / ".." / "shared" / "data"

@@ -35,7 +35,7 @@ from hiproof.evaluate.run import evaluate_run, run_inputs
 from hiproof.model import ROOF, Face, Part, Piece, Solid
 from hiproof.parametric.record import building_of
 from hiproof.stages import moved
-from hiproof.write.colours import TYPE_COLOURS
+from hiproof.write.colours import type_colour
 
 SETS = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 NAMED = ("delft", "amsterdam_west", "stbarth", "ctview")
@@ -61,7 +61,7 @@ class DrawnPart:
 
     @property
     def colour(self) -> str:
-        return TYPE_COLOURS.get(self.type, TYPE_COLOURS["unknown"])
+        return type_colour(self.type)
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
         """Height (n,) at plan points (n, 2), minus infinity beside the part."""

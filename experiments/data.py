@@ -12,9 +12,8 @@ import shapely
 
 from hiproof.errors import FitError, InputError
 from hiproof.fit.alpha_shape import alpha_shape
-from hiproof.primitives import CATALOGUE
 from hiproof.read.roofn3d import read_roofn3d
-from hiproof.simulate import Defects, ScanSettings, random_building, scan
+from hiproof.simulate import NOT_ROOF, ROOF_TYPES, Defects, ScanSettings, random_building, scan
 
 from .output import Options
 
@@ -73,9 +72,9 @@ def roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
 def simulated_roofs(seed: int, roofs: int, quick: bool) -> Iterator[RoofSample]:
     """`roofs` of every type as an airborne scanner sees them: chimneys, dormers, trees, missing strips, no neighbours."""
     settings = ScanSettings(density=5.0, defects=Defects(neighbour=0.0), margin_m=0.0)
-    for index, kind in enumerate(ROOFN3D_TYPES if quick else CATALOGUE):
+    for index, kind in enumerate(ROOFN3D_TYPES if quick else ROOF_TYPES):
         for roof in range(roofs):
             rng = np.random.default_rng([seed, index, roof, 7])
             building = random_building(rng, kind)
             cloud = scan(building, rng, settings)
-            yield RoofSample(cloud.points, cloud.label < len(CATALOGUE), building.footprint, kind)
+            yield RoofSample(cloud.points, cloud.label != NOT_ROOF, building.footprint, kind)

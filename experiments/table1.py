@@ -6,15 +6,14 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hiproof.primitives import CATALOGUE
 from hiproof.segment import NOT_ROOF, Segmentation, segment
 from hiproof.segment.scores import Scores
-from hiproof.simulate import training_sample
+from hiproof.simulate import ROOF_TYPES, training_sample
 
 from .data import MOST_ROWS, ROOFN3D_TYPES, SHARED, roofn3d_roofs
 from .output import Options, Result, Table
 
-TYPES = tuple(CATALOGUE)
+TYPES = ROOF_TYPES
 LABELS = (*TYPES, "not roof")
 UNSEEN = 90_001
 """Added to the seed, so that these roofs are not those the network was trained on."""

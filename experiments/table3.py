@@ -13,7 +13,7 @@ import numpy as np
 
 from hiproof.primitives import CATALOGUE, Primitive
 from hiproof.primitives.contract import KAPPA, Q1, Q2, Q3
-from hiproof.simulate import random_building, uniform_points
+from hiproof.simulate import ROOF_TYPES, random_building, uniform_points
 
 from .cramer_rao import HEIGHTS_AND_SLOPES, THETA_NAMES, bounds_by_name
 from .methods import OBJECTIVES, fit_model, in_parallel
@@ -32,7 +32,7 @@ def run(options: Options) -> Result:
     """Both objectives on all types; the paper's, a hundred times slower, with five trials for types it did not test."""
     tables, errors = [], {}
     for method in OBJECTIVES:
-        for kind in ("gable", "hip") if options.quick else CATALOGUE:
+        for kind in ("gable", "hip") if options.quick else ROOF_TYPES:
             errors[method, kind] = errors_of_type(method, kind, options)
     kinds = list(dict.fromkeys(kind for _, kind in errors))
     tables.append(Table("Errors by type", ERROR_COLUMNS, [error_row(kind, errors) for kind in kinds], ERROR_NOTE))

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import shapely
 
+from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.scene import allowed_shapes, scene_of
+from hiproof.fit.union.scene import scene_of
 from hiproof.fit.union.volumes import (
     COLUMNS,
     DIRECTION,

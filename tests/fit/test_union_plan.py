@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.finish import cost_of, finished, inverse_of, least_squares, weighted_moments
 from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
-from hiproof.fit.union.scene import allowed_shapes, scene_of
+from hiproof.fit.union.scene import scene_of
 from hiproof.fit.union.sides import Side, corners_of, plan_chords, plan_edges, sides_of
 from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, U0, V1, base_only, roof_heights
 from hiproof.model import Part, Piece

@@ -12,8 +12,8 @@ from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
 from hiproof.model import Roof
-from hiproof.primitives import get
-from hiproof.primitives.family import COMPONENTS, NAMES, SHAPES, planes_of
+from hiproof.primitives import CATALOGUE, get
+from hiproof.primitives.family import COMPONENTS, SHAPES, planes_of
 from hiproof.settings import Settings
 from hiproof.simulate import ScanSettings, random_building, random_compound, scan
 from hiproof.simulate.scene import Defects
@@ -265,7 +265,7 @@ def test_a_hip_that_may_only_be_a_gable_is_no_hip_of_that_name():
 
 
 def test_components_and_names_belong_together():
-    assert all(get(name).name == name and set(parts) <= set(NAMES) for name, parts in COMPONENTS.items())
+    assert all(get(name).name == name and set(parts) <= set(CATALOGUE) for name, parts in COMPONENTS.items())
 
 
 def test_a_tooth_with_something_more_is_a_tooth():

@@ -7,12 +7,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hiproof.fit.union import fit_building
+from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.candidates import candidates_of
 from hiproof.fit.union.grow import ground_of, regrown
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import emptiness, lay_out_plan
 from hiproof.fit.union.planes import Cloud, Grid
-from hiproof.fit.union.scene import allowed_shapes, directions_of, scene_of
+from hiproof.fit.union.scene import directions_of, scene_of
 from hiproof.model import Roof
 from roof_zoo import FRAME
 from union_scenes import random_scene, random_volumes

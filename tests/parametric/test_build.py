@@ -20,7 +20,6 @@ from hiproof.parametric.run import build_file
 from hiproof.parametric.schema import schema, schema_text
 from hiproof.parametric.shape import names_of
 from hiproof.primitives import CATALOGUE
-from hiproof.primitives.family import NAMES
 from hiproof.simulate import demo_files
 
 FILES = ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
@@ -78,7 +77,7 @@ def test_all_lines_are_as_the_published_schema_says(demo_run):
 
 
 def test_every_type_can_be_built_by_its_own_parameters():
-    for name in NAMES:
+    for name in CATALOGUE:
         if name in CATALOGUE:
             parameters = CATALOGUE[name].typical(8.0, 12.0, 3.0)
         else:
@@ -227,7 +226,7 @@ def test_buildings_may_be_fewer_and_in_another_order(demo_run, tmp_path):
 
 def test_shapes_and_schema_are_printed():
     shapes = CliRunner().invoke(app, ["build", "--shapes"]).output
-    assert [line.split(":")[0] for line in shapes.splitlines()] == list(NAMES)
+    assert [line.split(":")[0] for line in shapes.splitlines()] == list(CATALOGUE)
     assert json.loads(CliRunner().invoke(app, ["build", "--schema"]).output) == json.loads(PUBLISHED.read_text())
 
 

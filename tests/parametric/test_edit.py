@@ -10,7 +10,7 @@ from hiproof.compose import check_solid
 from hiproof.compose.settle import settled_roof
 from hiproof.errors import FitError, InputError
 from hiproof.parametric.building import with_model
-from hiproof.primitives.family import NAMES
+from hiproof.primitives import CATALOGUE
 from hiproof.settings import ComposeSettings
 from hiproof.simulate import random_building
 from hiproof.status import Status
@@ -18,7 +18,7 @@ from hiproof.write.parameters import building_record
 from parametric_house import gable_house
 
 EDITS, BUILDINGS = 150, 30
-RIDGED = [name for name in NAMES if name not in ("flat", "shed")]
+RIDGED = [name for name in CATALOGUE if name not in ("flat", "shed")]
 RECOVERED = ("gable", "hip", "monopitch", "pyramid", "half_hip", "mansard", "asymmetric_gable", "gambrel", "shed")
 
 
@@ -43,7 +43,7 @@ def test_a_changed_building_is_composed_as_it_was(gable):
         assert changed.solid.vertices[:, 2].min() < hiproof.build(record).solid.vertices[:, 2].min() - 1.0
 
 
-@pytest.mark.parametrize("kind", NAMES)
+@pytest.mark.parametrize("kind", CATALOGUE)
 def test_another_type_keeps_the_eave(gable, kind):
     other = gable.with_part(0, type=kind)
     assert other.type == kind and not check_solid(other.solid)

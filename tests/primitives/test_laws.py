@@ -10,7 +10,7 @@ from hiproof.primitives.algebra import SYMBOLS, U, V, formula, q0, q1, q2
 from hiproof.primitives.contract import HALF_WIDTH, placed
 
 VARIANTS = [variant for primitive in CATALOGUE.values() for variant in primitive.variants]
-IDS = [f"{variant.name}-{variant.strips}" for variant in VARIANTS]
+IDS = [f"{variant.name}-{len(variant.parameters)}-{variant.strips}" for variant in VARIANTS]
 each_variant = pytest.mark.parametrize("primitive", VARIANTS, ids=IDS)
 
 
@@ -140,7 +140,7 @@ def test_formula_cancels_and_divides_by_monomials_only():
 
 
 def test_unknown_type_is_named_with_the_known_ones():
-    with pytest.raises(SettingsError, match=r"expected a roof type \(flat, .*gambrel\), got 'onion'"):
+    with pytest.raises(SettingsError, match=r"expected a roof type \(flat, .*corner_mansard\), got 'onion'"):
         get("onion")
 
 

@@ -9,7 +9,6 @@ import pytest
 
 from hiproof.errors import FitError, InputError, SettingsError
 from hiproof.fit import fit_roof
-from hiproof.primitives.catalogue import CATALOGUE
 from hiproof.segment import NOT_ROOF, Segmentation, inference, most_probable, segment
 from hiproof.segment.inference import SHIPPED_WEIGHTS, carried_back, load
 from hiproof.settings import Settings
@@ -30,8 +29,8 @@ def cloud(seed, types=ROOF_TYPES):
     return points, np.where(labels == len(types), NOT_ROOF, labels), types[type]
 
 
-def test_types_are_the_catalogues_in_its_order():
-    assert load(str(SHIPPED_WEIGHTS)).types == tuple(CATALOGUE)
+def test_types_are_those_of_whole_roofs_in_the_catalogues_order():
+    assert load(str(SHIPPED_WEIGHTS)).types == ROOF_TYPES
 
 
 def test_probabilities_are_distributions():
@@ -40,7 +39,7 @@ def test_probabilities_are_distributions():
     assert sum(found.types.values()) == pytest.approx(1.0)
     assert found.labels.shape == found.not_roof.shape == (len(points),)
     assert ((found.not_roof >= 0) & (found.not_roof <= 1)).all()
-    assert set(np.unique(found.labels)) <= {NOT_ROOF, *range(len(CATALOGUE))}
+    assert set(np.unique(found.labels)) <= {NOT_ROOF, *range(len(ROOF_TYPES))}
 
 
 def test_simulated_roofs_are_recognised_and_freed_of_what_is_no_roof():
@@ -77,7 +76,7 @@ def test_named_types_alone_are_chosen_among():
     found = segment(points, Settings().replace({"fit": {"types": ("pyramid", "gable", "hip")}}))
     assert found.type == "hip"
     assert sum(found.types[name] for name in ("pyramid", "gable", "hip")) == pytest.approx(1.0)
-    names = {tuple(CATALOGUE)[label] for label in np.unique(found.labels) if label != NOT_ROOF}
+    names = {ROOF_TYPES[label] for label in np.unique(found.labels) if label != NOT_ROOF}
     assert names <= {"pyramid", "gable", "hip"}
 
 

@@ -9,7 +9,8 @@ from hiproof.cli.attributes import run
 from hiproof.evaluate.evaluation import BuildingFigures, Comparison
 from hiproof.frames import METRES, Units
 from hiproof.parametric.shape import names_of, side_by_side_names
-from hiproof.primitives.family import COMPONENTS, NAMES
+from hiproof.primitives import CATALOGUE
+from hiproof.primitives.family import COMPONENTS
 from hiproof.write import write_all
 from hiproof.write.attribute_list import (
     EVALUATION,
@@ -92,7 +93,7 @@ def test_tables_of_the_database_are_as_declared():
 
 
 def test_the_table_of_parts_has_a_column_for_every_parameter():
-    parameters = {parameter for kind in NAMES for parameter in (*names_of(kind), *side_by_side_or_none(kind))}
+    parameters = {parameter for kind in CATALOGUE for parameter in (*names_of(kind), *side_by_side_or_none(kind))}
     assert parameters <= set(names(PARTS_LAYER))
 
 

@@ -21,7 +21,7 @@ from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
 from hiproof.write.citygml import NAMESPACES
-from hiproof.write.colours import TYPE_COLOURS
+from hiproof.write.colours import type_colours
 from hiproof.write.roof_codes import CODE_SPACES
 from hiproof.write.styles import TABLE, TYPE_COLUMN
 
@@ -194,4 +194,4 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
     for name, _, _, qml in styles:
         renderer = etree.fromstring(qml.encode()).find("renderer-v2")
         assert renderer.get("attr") in pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"]
-        assert len(renderer.findall("symbols/symbol")) == len(TYPE_COLOURS)
+        assert len(renderer.findall("symbols/symbol")) == len(type_colours())

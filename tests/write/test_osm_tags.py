@@ -8,10 +8,10 @@ import shapely
 import hiproof
 from handmade import box, modelled, unmodelled
 from hiproof.model import ROOF
-from hiproof.primitives.family import NAMES
+from hiproof.primitives import CATALOGUE
 from hiproof.write.attribute_list import Attribute
 from hiproof.write.building_attributes import building_attributes
-from hiproof.write.osm_tags import ONE_ENDED, OSM, SHAPES, osm_tags
+from hiproof.write.osm_tags import ONE_ENDED, OSM, osm_tags
 from hiproof.write.roof_figures import roof_figures
 
 # The values that OpenStreetMap's page of roof:shape documents for roofs of planes.
@@ -41,7 +41,7 @@ def apart(first, second):
 
 
 def test_every_roof_type_has_a_documented_shape():
-    assert set(SHAPES) == set(NAMES) and set(SHAPES.values()) == DOCUMENTED
+    assert {shape.osm_shape for shape in CATALOGUE.values()} == DOCUMENTED
     assert all(isinstance(tag, Attribute) for tag in OSM)
 
 

@@ -39,11 +39,10 @@ def refuse_settings(settings: Settings) -> None:
 
 
 def refuse_unknown_types(fit: Any) -> None:
-    """Roof types must be those that the kind of fit knows: one primitive takes the catalogue's, volumes the whole family's."""
+    """Roof types must be those of the catalogue."""
     from ..primitives import CATALOGUE
-    from ..primitives.family import NAMES
 
-    known = tuple(CATALOGUE) if fit.parts == "one" or fit.objective == "paper" else NAMES
+    known = tuple(CATALOGUE)
     unknown = [name for name in fit.types if name not in known]
     if unknown:
         near = [difflib.get_close_matches(name.lower(), known, n=1, cutoff=0.5) for name in unknown]

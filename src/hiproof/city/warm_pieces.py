@@ -51,8 +51,9 @@ def planes() -> None:
 
 def scene_of_house() -> tuple:
     """The plan of the house and the scene that the search sees."""
+    from ..fit.union.allowed import allowed_shapes
     from ..fit.union.plan import lay_out_plan
-    from ..fit.union.scene import allowed_shapes, directions_of, scene_of
+    from ..fit.union.scene import directions_of, scene_of
 
     plan = lay_out_plan(house(), OUTLINE)
     return plan, scene_of(plan, OUTLINE, directions_of(OUTLINE, plan), 1.5, 0.25, allowed_shapes(()))

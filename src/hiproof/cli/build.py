@@ -12,9 +12,10 @@ from .options import with_settings
 
 def print_shapes(wanted: bool) -> None:
     if wanted:
-        from ..parametric.shape import NAMES, names_of
+        from ..parametric.shape import names_of
+        from ..primitives.catalogue import CATALOGUE
 
-        for name in NAMES:
+        for name in CATALOGUE:
             typer.echo(f"{name}: {', '.join(names_of(name))}")
         raise typer.Exit
 

@@ -12,10 +12,8 @@ import numpy as np
 
 from ..model import Building
 from ..parametric.building import build
-from ..parametric.change import typical_member
-from ..parametric.shape import names_of
 from ..primitives.catalogue import CATALOGUE
-from ..write.colours import TYPE_COLOURS
+from ..write.colours import type_colour
 from .view import WALL_COLOUR, SeenFace, projected, seen_faces, shaded
 
 WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
@@ -40,9 +38,7 @@ class Measure:
 
 def typical_parameters(kind: str) -> dict[str, float]:
     """Parameters of an ordinary roof of a type."""
-    if kind in CATALOGUE:
-        return CATALOGUE[kind].typical(WIDTH, LENGTH, RISE)
-    return typical_member(kind, WIDTH, LENGTH, RISE)
+    return CATALOGUE[kind].typical(WIDTH, LENGTH, RISE)
 
 
 def typical_building(kind: str) -> Building:
@@ -60,71 +56,43 @@ def measures(kind: str) -> list[Measure]:
     [('width', 8.0), ('length', 12.0), ('height', 3.6)]
     """
     parameters = typical_parameters(kind)
-    return [measure_of(name, parameters, kind) for name in names_of(kind)]
+    vertices = CATALOGUE[kind].vertices(parameters)
+    highest = vertices[vertices[:, 2] > vertices[:, 2].max() - 1e-9]
+    return [measure_of(name, parameters, highest) for name in parameters]
 
 
-def measure_of(name: str, p: dict[str, float], kind: str) -> Measure:
-    """One parameter `name` among all, `p`."""
+def measure_of(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
+    """One parameter `name` among all, `p`; `highest` (k, 3) are the corners of the roof's ridge or top.
+
+    A parameter that no line is known for is only named, beside the roof.
+    """
     u, v, h = p["length"] / 2, p["width"] / 2, p.get("height", 0.0)
-    if "_" in name and name.rsplit("_", 1)[1] in ENDS:
-        return measure_of_side(name, p)
-    ridge = p.get("ridge_offset", 0.0)
+    (x0, y0, _), (x1, y1, _) = highest.min(axis=0), highest.max(axis=0)
+    half_break, z_break = p.get("break_width", 0) / 2, p.get("break_height", 0)
     ends = {
         "width": ((u + ASIDE, -v, -WALL), (u + ASIDE, v, -WALL)),
         "length": ((-u, -v - ASIDE, -WALL), (u, -v - ASIDE, -WALL)),
-        "height": height_line(p, kind, ridge),
-        "ridge_length": ((-p.get("ridge_length", 0) / 2, 0, h), (p.get("ridge_length", 0) / 2, 0, h)),
+        "height": ((x1, y0, 0), (x1, y0, h)),
+        "end_height": ((-u, -v, 0), (-u, -v, p.get("end_height", 0))),
+        "ridge_length": ((x0, y0, h), (x1, y1, h)),
         "hip_height": ((u, 0, h - p.get("hip_height", 0)), (u, 0, h)),
-        "top_width": ((p.get("top_length", 0) / 2, -p.get("top_width", 0) / 2, h), (p.get("top_length", 0) / 2, p.get("top_width", 0) / 2, h)),
-        "top_length": ((-p.get("top_length", 0) / 2, -p.get("top_width", 0) / 2, h), (p.get("top_length", 0) / 2, -p.get("top_width", 0) / 2, h)),
-        "ridge_offset": ((u, 0, h), (u, ridge, h)),
+        "top_width": ((x1, y0, h), (x1, y1, h)),
+        "top_length": ((x0, y0, h), (x1, y0, h)),
+        "ridge_offset": ((u, 0, h), (u, p.get("ridge_offset", 0), h)),
         "eave_step": ((u + 0.3, v, 0), (u + 0.3, v, p.get("eave_step", 0))),
-        "break_width": ((u, -p.get("break_width", 0) / 2, p.get("break_height", 0)), (u, p.get("break_width", 0) / 2, p.get("break_height", 0))),
-        "break_height": ((u, p.get("break_width", 0) / 2, 0), (u, p.get("break_width", 0) / 2, p.get("break_height", 0))),
-    }  # fmt: skip
-    if name == "teeth":
-        return Measure("teeth", np.array([0.0, v + 0.5, h]))
+        "break_width": ((u, -half_break, z_break), (u, half_break, z_break)),
+        "break_height": ((u, half_break, 0), (u, half_break, z_break)),
+    }
+    if name not in ends:
+        return Measure(name, np.array([0.0, v + 0.5, h]))
     start, end = ends[name]
     return Measure(name, np.array(start, float), np.array(end, float))
-
-
-def height_line(p: dict[str, float], kind: str, ridge: float) -> tuple[tuple, tuple]:
-    """Where a roof's height is seen: at its end towards the eye, upright from the lowest eave's height."""
-    u, v, h = p["length"] / 2, p["width"] / 2, p.get("height", 0.0)
-    along = p["ridge_length"] / 2 if "ridge_length" in p else 0.0 if kind == "pyramid" else u
-    if kind == "shed":
-        across = -v + 2 * v / p["teeth"]
-    elif kind == "monopitch":
-        across = v
-    elif "top_width" in p:
-        along, across = p["top_length"] / 2, -p["top_width"] / 2
-    elif "pitch_front" in p:
-        along, across = (0.0, 0.0) if "pitch_back" in p else (-u / 2, v / 2)  # on the level top
-    else:
-        across = ridge
-    return (along, across, 0.0), (along, across, h)
-
-
-ENDS = {"left": (-1, 0), "right": (1, 0), "front": (0, -1), "back": (0, 1)}
-
-
-def measure_of_side(name: str, p: dict[str, float]) -> Measure:
-    """A pitch is marked on its plane; an eave is measured in the middle of its side."""
-    what, side = name.rsplit("_", 1)
-    x, y = ENDS[side]
-    u, v = p["length"] / 2, p["width"] / 2
-    if what == "eave":
-        place = np.array([x * u, y * v, 0.0])
-        return Measure(name, place, place + [0.0, 0.0, p[name]])
-    run = 0.16 * p["width"]
-    slope = math.tan(math.radians(p[name]))
-    return Measure(name, np.array([x * (u - run), y * (v - run), p[f"eave_{side}"] + slope * run]))
 
 
 def primitive_svg(kind: str) -> str:
     """The figure of a roof type."""
     building = typical_building(kind)
-    colours = [TYPE_COLOURS[kind] if face.kind == "RoofSurface" else WALL_COLOUR for face in building.solid.faces]
+    colours = [type_colour(kind) if face.kind == "RoofSurface" else WALL_COLOUR for face in building.solid.faces]
     centre = building.solid.vertices.mean(axis=0)
     lines = measures(kind)
     page = {id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None] for m in lines}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import ROOF, Building, Solid
 from ..rings import ring_normal
-from ..write.colours import TYPE_COLOURS
+from ..write.colours import type_colour
 
 WALL_COLOUR = "#d9d4cb"
 TURN_DEG, TILT_DEG = -35.0, 35.0  # degrees; from the front left and above, so that two walls and the roof show
@@ -36,7 +36,7 @@ def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
 def colours_of(building: Building) -> list[str]:
     """A colour a face: that of its part's type for roofs."""
     return [
-        TYPE_COLOURS.get(building.parts[face.part].type, TYPE_COLOURS["unknown"])
+        type_colour(building.parts[face.part].type)
         if face.kind == ROOF and 0 <= face.part < len(building.parts)
         else WALL_COLOUR
         for face in building.solid.faces

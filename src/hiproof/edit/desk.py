@@ -16,7 +16,7 @@ from ..errors import HiproofError, InputError
 from ..evaluate.run import run_record
 from ..parametric.building import build
 from ..parametric.record import building_of, list_at, number, text_at
-from ..primitives.family import NAMES
+from ..primitives.catalogue import CATALOGUE
 from ..write.page_mesh import packed
 from ..write.parameters import building_record
 from ..write.values import plain_text
@@ -105,7 +105,7 @@ class Desk:
         """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
         record = self.draft(id, body)
         points, tried = self.points.of(id, building_of(record)[1]), []
-        for kind in NAMES:
+        for kind in CATALOGUE:
             asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:
                 changed = building_record(edited(record, asked, points, self.run.settings, False))
@@ -144,8 +144,8 @@ class Desk:
 @functools.cache
 def drawing(kind: str) -> str:
     """The figure of a roof type with its parameters, as SVG. Raises InputError for no type."""
-    if kind not in NAMES:
-        raise InputError(f"expected a roof type ({', '.join(NAMES)}), got {kind!r:.40}; choose one")
+    if kind not in CATALOGUE:
+        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r:.40}; choose one")
     return primitive_svg(kind)
 
 

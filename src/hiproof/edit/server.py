@@ -19,8 +19,8 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from ..errors import HiproofError, InputError, OutputError
 from ..evaluate.report_pictures import RESIDUAL_STOPS
 from ..log import LOGGER
-from ..primitives.family import NAMES
-from ..write.colours import TYPE_COLOURS, WALL_COLOUR
+from ..primitives.catalogue import CATALOGUE
+from ..write.colours import WALL_COLOUR, type_colour
 from .desk import Desk, drawing
 from .edits import OtherVersion
 
@@ -145,11 +145,11 @@ class Service:
 
 def started(desk: Desk) -> dict[str, Any]:
     """What the page knows from the start."""
-    colours = {name: TYPE_COLOURS.get(name, TYPE_COLOURS["unknown"]) for name in NAMES}
+    colours = {name: type_colour(name) for name in CATALOGUE}
     return {
         "folder": str(desk.run.folder),
         "who": desk.who,
-        "types": list(NAMES),
+        "types": list(CATALOGUE),
         "colours": colours,
         "wall": WALL_COLOUR,
         "stops": [list(stop) for stop in RESIDUAL_STOPS],

@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from ..status import Status
-from ..write.colours import TYPE_COLOURS
+from ..write.colours import type_colour
 from ..write.page_mesh import packed, solid_mesh
 from .metrics import plan_outline, psd
 from .report_pictures import RESIDUAL_STOPS
@@ -37,7 +37,7 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     return {
         "buildings": buildings,
         "colours": {
-            "type": {name: TYPE_COLOURS.get(name, TYPE_COLOURS["unknown"]) for name in types},
+            "type": {name: type_colour(name) for name in types},
             "status": {name: STATUS_COLOURS.get(name, NO_MODEL_COLOUR) for name in statuses},
             "residual": [list(stop) for stop in RESIDUAL_STOPS],
         },

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..model import GROUND, ROOF, Solid
 from ..rings import ring_normal
-from ..write.colours import TYPE_COLOURS, WALL_COLOUR
+from ..write.colours import WALL_COLOUR, type_colour
 
 RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "#fdae61"), (0.4, "#d7191c"))
 """Colour from each distance in metres upwards, blue near and red far; the same on map, models and points."""
@@ -66,7 +66,7 @@ def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, r
         points, distances = points[keep], distances[keep]
     across = slope_direction(solid)
     along = np.array([-across[1], across[0], 0.0])
-    colour = TYPE_COLOURS.get(roof_type, TYPE_COLOURS["unknown"])
+    colour = type_colour(roof_type)
     above = (0.8 * across + 0.6 * along, 0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)])
     side = (across, np.array([0.0, 0.0, 1.0]))
     return "".join(projection(solid, points, distances, colour, *view) for view in (above, side))

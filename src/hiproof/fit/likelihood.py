@@ -35,6 +35,8 @@ SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, larg
 SIDE_TAU_M = 0.1  # softness of the sides while types are compared
 SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04  # types further behind the best after annealing are dropped
 ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15  # the same after the rough fit to the thinned points
+SOURCE_SLACK_NATS_A_POINT = 1.0  # of the rough fit: nothing is derived from types further behind the best
+LEAST_GAIN_NATS = 0.2  # of the fine fit, that a type must have over the one it derives from to be considered
 SIDE_GRID = 28
 PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
 
@@ -88,7 +90,7 @@ class Search:
     thinned: Problem
     tables: Tables
     shapes: tuple[Primitive, ...]
-    family: np.ndarray  # (T,) the type's number, the same for all tooth counts
+    family: np.ndarray  # (T,) the number of the type with its parameters, the same for all tooth counts
     low: np.ndarray  # (T, 9)
     high: np.ndarray
 
@@ -131,6 +133,16 @@ class Search:
                 kept.append(row)
         return candidates.chosen(np.array(kept, int))
 
+    def that_gain(self, candidates: Candidates) -> Candidates:
+        """Those but for types that explain no more than one that they derive from.
+
+        A gable is also a hip whose ends stand upright; learning the noise of every such type would take most of the time.
+        """
+        shapes = [self.shapes[kind] for kind in candidates.kinds]
+        own = {shape.name: value for shape, value in zip(shapes, candidates.values, strict=True) if shape.vote}
+        simpler = [min([own.get(start.source, np.inf) for start in shape.starts], default=np.inf) for shape in shapes]
+        return candidates.chosen(candidates.values < np.array(simpler) - LEAST_GAIN_NATS)
+
 
 def fit_likelihood(
     points: np.ndarray,
@@ -150,7 +162,7 @@ def fit_likelihood(
     candidates = candidates.chosen(np.array([search.shapes[kind].name in types for kind in candidates.kinds]))
     candidates = candidates.within(ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points))
     candidates = search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
-    candidates = candidates.within(SLACK_NATS + SLACK_NATS_A_POINT * len(points))
+    candidates = search.that_gain(candidates).within(SLACK_NATS + SLACK_NATS_A_POINT * len(points))
     candidates, noises = learn(search, candidates)
     winner, bics = choose(search, candidates, log_prior or {})
     return finish(search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus)
@@ -161,7 +173,8 @@ def needed_for(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     """(`types` and those their starts derive from, the number of its type for each of their variants)."""
     needed = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
     names = tuple(name for name in CATALOGUE if name in needed)
-    return names, np.array([names.index(shape.name) for shape in variants(names)])
+    families = [(shape.name, shape.theta_size) for shape in variants(names)]
+    return names, np.array([list(dict.fromkeys(families)).index(family) for family in families])
 
 
 def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool) -> Search:
@@ -232,9 +245,13 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
 def derived_starts(search: Search, basic: Candidates) -> Candidates:
     """Starts of the types that derive from simpler ones, from the best `basic` fit of each."""
     basic = search.best_of_type(basic, 1)
+    basic = basic.within(SOURCE_SLACK_NATS_A_POINT * len(search.thinned.points))
     theta_of = {search.shapes[kind].name: theta for kind, theta in zip(basic.kinds, basic.thetas, strict=True)}
     starts = [
-        (t, start.theta(theta_of[start.source])) for t, shape in enumerate(search.shapes) for start in shape.starts
+        (t, start.theta(theta_of[start.source]))
+        for t, shape in enumerate(search.shapes)
+        for start in shape.starts
+        if start.source in theta_of
     ]
     kinds = np.array([t for t, _ in starts], np.int64)
     return Candidates(kinds, np.reshape([theta for _, theta in starts], (-1, 9)), np.zeros(len(starts)))
@@ -257,7 +274,9 @@ def choose(search: Search, candidates: Candidates, log_prior: dict[str, float]) 
     evidence = candidates.values + sizes * np.log(len(search.whole.points))
     evidence -= np.array([log_prior.get(shape.name, 0.0) for shape in shapes])
     order = np.argsort(evidence, kind="stable")
-    bics = {shapes[row].name: 2 * float(evidence[row]) for row in order}
+    bics: dict[str, float] = {}
+    for row in order:
+        bics.setdefault(shapes[row].name, 2 * float(evidence[row]))
     for row in order:
         if shapes[row].is_proper(shapes[row].canonical_theta(candidates.thetas[row])):
             return int(row), bics

@@ -27,6 +27,8 @@ BETA = 0.1
 ALPHA_SPACINGS = 4.0
 """Radius of the alpha shape in point spacings, which the paper does not give: of 1.5, 2.5 and 4 this comes closest to its figures."""
 SMALLEST_M = 0.1
+TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "pyramid", "mansard", "shed")
+"""Those that the paper names, tried where none are asked for."""
 IMPROPER = 1.0
 """Added to J where the vertices form no roof (a ridge longer than the eaves): larger than any difference of J2."""
 
@@ -37,13 +39,11 @@ def fit_paper(
     outline: shapely.Polygon | None = None,
     settings: Settings | None = None,
 ) -> Fit:
-    """Fit one of `types` (default: those of the settings, else the catalogue) to `points` (n, 3) metres, any frame.
+    """Fit one of `types` (default: those of the settings, else the paper's) to `points` (n, 3) metres, any frame.
 
     `outline` (same frame) takes the place of the alpha shape. In the outcome `value` is J; `bics` hold J by type, which
     plays BIC's role here, and there are no standard deviations. Raises FitError when the points span no area.
     """
-    from ..primitives import CATALOGUE
-
     points = np.asarray(points, float)
     points = points[np.isfinite(points).all(axis=1)]
     if len(points) < 4:
@@ -51,7 +51,7 @@ def fit_paper(
     frame = LocalFrame.around(points)
     xyz = frame.to_local(points)
     boundary = observed_outline(xyz[:, :2]) if outline is None else shapely.transform(outline, frame.to_local)
-    names = types or (settings or Settings()).fit.types or tuple(CATALOGUE)
+    names = types or (settings or Settings()).fit.types or TYPES
     tried = [best_variant(get(name), xyz, boundary) for name in names]
     values = {fitted.shape.name: fitted.value for fitted in tried}
     return min(tried, key=lambda fitted: fitted.value).outcome(xyz, frame, values)

@@ -54,7 +54,7 @@ def fit_roof(
     if settings.fit.objective == "paper":
         from .paper import fit_paper
 
-        return fit_paper(cloud[:, :3], names, outline, settings)
+        return fit_paper(cloud[:, :3], settings.fit.types, outline, settings)
     frame = LocalFrame.around(cloud)
     local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
     outline_local = None if outline is None else shapely.transform(outline, frame.to_local)

@@ -14,13 +14,11 @@ import shapely
 
 from ..errors import InputError
 from ..primitives.catalogue import CATALOGUE
-from ..primitives.family import COMPONENTS, NAMES, Member, member_of
-from .shape import SIDED, side_by_side_names
+from ..primitives.family import Member, member_of
+from .shape import SIDED
 
 PLAN = ("width", "length")
 USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one
-HALF_HIP = 0.5  # share of the rise at which the eave of a half-hipped end lies
-TOP = 0.6  # share of the rise at which a level top cuts
 STEEPEST = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a wall
 
 
@@ -71,32 +69,11 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
 
 def of_type(part: dict[str, Any], kind: str) -> dict[str, Any]:
     """The part as another roof type over the same rectangle, with the same lowest eave and the same rise."""
-    if kind not in NAMES:
-        raise InputError(f"expected a roof type ({', '.join(NAMES)}), got {kind!r}; choose one")
+    if kind not in CATALOGUE:
+        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
     width, length = (part["parameters"][name] for name in PLAN)
     rise = rise_of(part) or 0.5 * USUAL_PITCH * width
-    if kind in CATALOGUE:
-        parameters = CATALOGUE[kind].typical(width, length, rise)
-    else:
-        parameters = typical_member(kind, width, length, rise)
-    return {**part, "type": kind, "parameters": parameters}
-
-
-def typical_member(kind: str, width: float, length: float, rise: float) -> dict[str, float]:
-    """An ordinary member of the family that the catalogue does not have: equal pitches, a level top where it has one."""
-    names = side_by_side_names(kind)
-    two_across = "pitch_front" in names and "pitch_back" in names
-    pitch = math.degrees(math.atan(rise / (0.5 * width if two_across else width)))
-    parameters = {"width": width, "length": length}
-    for name in names[2:]:
-        if name == "height":
-            parameters[name] = TOP * rise
-        elif name.startswith("pitch_"):
-            parameters[name] = pitch
-        else:
-            is_end = name.endswith(("left", "right"))
-            parameters[name] = HALF_HIP * rise if "half_hip" in kind and is_end else 0.0
-    return parameters
+    return {**part, "type": kind, "parameters": CATALOGUE[kind].typical(width, length, rise)}
 
 
 def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
@@ -104,39 +81,20 @@ def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
     parameters = part["parameters"]
     if SIDED & parameters.keys():
         return part
-    if part["type"] in COMPONENTS or part["type"] == "flat":
+    if not CATALOGUE[part["type"]].is_of_family or part["type"] == "flat":
         raise InputError(
             f"expected a roof with pitches of its own sides, got a {part['type']} roof; change its type first"
         )
-    return {**part, "parameters": member_like(part).side_by_side()[0]}
-
-
-def member_like(part: dict[str, Any]) -> Member:
-    """The member of the family that is the same surface as the catalogue's shape, in its own axes."""
-    kind, parameters = part["type"], part["parameters"]
-    if SIDED & parameters.keys():
-        return member_of(kind, parameters, 0.0, np.zeros(3))
-    shape = CATALOGUE[kind]
-    planes = shape.plane_values(shape.to_theta(parameters))
-    half = 0.5 * np.array([parameters["length"], parameters["width"]])
-    eaves, slopes, top = np.full(4, np.inf), np.zeros(4), math.inf
-    for a, b, c in planes:
-        if a == 0.0 and b == 0.0:
-            top = float(c)
-            continue
-        axis = 0 if abs(a) > abs(b) else 1
-        slope = (a, b)[axis]
-        side = 2 * axis + (0 if slope > 0.0 else 1)
-        slopes[side] = abs(slope)
-        eaves[side] = c - abs(slope) * half[axis]
-    return Member(0.0, np.zeros(2), half, eaves, slopes, top)
+    return {**part, "parameters": member_of(part["type"], parameters, 0.0, np.zeros(3)).side_by_side()[0]}
 
 
 def rise_of(part: dict[str, Any]) -> float:
     """Height of the part's ridge or top over its lowest eave [m]."""
     if part["type"] == "flat":
         return 0.0
-    return part["parameters"]["height"] if part["type"] in COMPONENTS else rise_of_member(member_like(part))
+    if not CATALOGUE[part["type"]].is_of_family:
+        return part["parameters"]["height"]
+    return rise_of_member(member_of(part["type"], part["parameters"], 0.0, np.zeros(3)))
 
 
 def rise_of_member(member: Member) -> float:
@@ -162,12 +120,9 @@ def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
             f"expected a ridge above the eave, got one {-rise:.2f} m below it; lower the eave too (eave_height)"
         )
     if not SIDED & parameters.keys():
-        heights = {name: parameters[name] for name in ("hip_height", "break_height", "eave_step") if name in parameters}
-        scale = rise / parameters["height"]
-        return {
-            **part,
-            "parameters": {**parameters, "height": rise, **{name: h * scale for name, h in heights.items()}},
-        }
+        scale = rise / rise_of(part)
+        heights = {n: scale * h for n, h in parameters.items() if n.endswith("height") or n == "eave_step"}
+        return {**part, "parameters": {**parameters, **heights}}
     if "height" not in parameters:
         return {**part, "parameters": parameters | pitches_for(parameters, part["type"], rise)}
     steeper = rise / parameters["height"]  # a level top keeps its size

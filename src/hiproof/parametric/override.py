@@ -26,7 +26,7 @@ from .. import stages
 from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint
-from ..primitives.family import NAMES
+from ..primitives.catalogue import CATALOGUE
 from ..settings import Settings
 from ..status import Status
 from ..write.attribute_list import PARAMETERS
@@ -126,10 +126,10 @@ def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     """Types that parts may have; a text names several by commas."""
     types = record.get("types", ())
     types = tuple(name.strip() for name in types.split(",")) if isinstance(types, str) else tuple(types)
-    for name in (*types, record.get("type", NAMES[0])):
-        if name not in NAMES:
+    for name in (*types, record.get("type", "flat")):
+        if name not in CATALOGUE:
             raise InputError(
-                f"expected roof types ({', '.join(NAMES)}) in {where}, got {shown(name)}; choose among these"
+                f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {shown(name)}; choose among these"
             )
     if types and record.get("type", types[0]) not in types:
         raise InputError(f"expected the type among the types in {where}, got {record['type']!r}; keep one of them")

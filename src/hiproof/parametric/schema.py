@@ -5,12 +5,11 @@ from __future__ import annotations
 import json
 from typing import Any
 
-from ..primitives.family import NAMES
+from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
 from ..status import Status
 from ..write.attribute_list import HEAD, PARAMETERS, PART, Attribute
 from ..write.parameters import VERSION
-from .shape import names_of
 
 NUMBER, TEXT = {"type": "number"}, {"type": "string"}
 NUMBER_OR_NULL, TEXT_OR_NULL = {"type": ["number", "null"]}, {"type": ["string", "null"]}
@@ -48,7 +47,6 @@ BUILDING_KINDS = {
     "types": SHARES,
 }
 PART_KINDS = {
-    "type": {"enum": list(NAMES)},
     "parameters": {**NUMBERS, "properties": {"width": LENGTH, "length": LENGTH}},
     "position": PLACE,
     "rotation": NUMBER,
@@ -66,7 +64,9 @@ def schema() -> dict[str, Any]:
     defs = {
         "head": described(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
         "building": described(PARAMETERS, BUILDING_KINDS, required=("id",)),
-        "part": described(PART, PART_KINDS, required=("type", "parameters", "position"))
+        "part": described(
+            PART, {"type": {"enum": list(CATALOGUE)}, **PART_KINDS}, required=("type", "parameters", "position")
+        )
         | {"allOf": parameters_by_type()},
     }
     return {
@@ -93,12 +93,13 @@ def parameters_by_type() -> list[dict[str, Any]]:
     """What the parameters of a part of each type must hold, unless they are given side by side."""
     side_by_side = {"propertyNames": {"pattern": "^(width|length|height|(pitch|eave|skew)_(left|right|front|back))$"}}
     rules = []
-    for kind in NAMES:
-        names = names_of(kind)
-        needed = [] if kind == "flat" else list(names)
-        own = {"required": needed, "propertyNames": {"enum": list(names)}}
+    for kind, shape in CATALOGUE.items():
+        own = [
+            {"required": [] if kind == "flat" else list(names), "propertyNames": {"enum": list(names)}}
+            for names in dict.fromkeys(variant.parameters for variant in shape.variants)
+        ]
         is_kind = {"properties": {"type": {"const": kind}}}
-        rules.append({"if": is_kind, "then": {"properties": {"parameters": {"anyOf": [own, side_by_side]}}}})
+        rules.append({"if": is_kind, "then": {"properties": {"parameters": {"anyOf": [*own, side_by_side]}}}})
     return rules
 
 

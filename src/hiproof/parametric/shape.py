@@ -9,7 +9,8 @@ import numpy as np
 
 from ..errors import FitError, InputError
 from ..primitives.catalogue import CATALOGUE
-from ..primitives.family import COMPONENTS, NAMES, SHAPES, SIDES
+from ..primitives.contract import LEVEL
+from ..primitives.family import COMPONENTS, SIDES, eaves_of
 
 SIDED = frozenset(f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew"))
 """Parameters of a member's sides; a part that has one gives all of its shape side by side."""
@@ -25,15 +26,15 @@ def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> N
     Traceback (most recent call last):
     hiproof.errors.InputError: expected a positive width of part 0, got -8; give metres
     """
-    if kind not in NAMES:
-        raise InputError(f"expected a roof type ({', '.join(NAMES)}) in {where}, got {kind!r}; choose one")
+    if kind not in CATALOGUE:
+        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got {kind!r}; choose one")
     for name in ("width", "length"):
         if name in parameters and not parameters[name] > 0.0:
             raise InputError(f"expected a positive {name} of {where}, got {parameters[name]:g}; give metres")
     if kind == "flat":
         refuse_other_names(kind, parameters, [], ["width", "length"], where)
-    elif kind in CATALOGUE and not SIDED & parameters.keys():
-        refuse_other_names(kind, parameters, CATALOGUE[kind].parameters, [], where)
+    elif not SIDED & parameters.keys():
+        refuse_other_names(kind, parameters, CATALOGUE[kind].variant(parameters).parameters, [], where)
         refuse_falling(kind, parameters, where)
     else:
         refuse_no_member(kind, parameters, where)
@@ -90,17 +91,16 @@ def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> 
 
 
 def names_of(kind: str) -> tuple[str, ...]:
-    """The parameters of a type: those of the catalogue's shape, else side by side.
+    """The parameters of an ordinary roof of a type.
 
-    >>> names_of("hip"), names_of("corner")[:4]
-    (('width', 'length', 'height', 'ridge_length'), ('width', 'length', 'pitch_right', 'eave_right'))
+    >>> names_of("hip"), names_of("corner")
+    (('width', 'length', 'height', 'ridge_length'), ('width', 'length', 'height', 'end_height'))
     """
-    return CATALOGUE[kind].parameters if kind in CATALOGUE else side_by_side_names(kind)
+    return CATALOGUE[kind].parameters
 
 
 def side_by_side_names(kind: str) -> tuple[str, ...]:
     """The parameters of a member of the family, each side's own; skews, which are seldom there, left out."""
-    base = kind.replace("half_hip", "hip").replace("asymmetric_", "").replace("pyramid", "hip")
-    top, sides = next((top, sides) for (top, _, _), (name, sides) in SHAPES.items() if name == base)
-    of_sides = [f"{what}_{SIDES[side]}" for side in sorted(sides) for what in ("pitch", "eave")]
-    return ("width", "length", *(["height"] if top else []), *of_sides)
+    shape = CATALOGUE[kind]
+    of_sides = [f"{what}_{SIDES[side]}" for side in eaves_of(shape) for what in ("pitch", "eave")]
+    return ("width", "length", *(["height"] if LEVEL in shape.sides else []), *of_sides)

@@ -30,7 +30,7 @@ class Formula:
         """Value at the six shape parameters."""
         return self.at((V, U, q0, q1, q2, q3))
 
-    def at(self, shape: Sequence[float]) -> float:
+    def at(self, shape: Sequence[float] | np.ndarray) -> float:
         """Value at `shape` (6,): V, U, q0, q1, q2, q3."""
         total = 0.0
         for factor, powers in self._sparse:
@@ -44,9 +44,14 @@ class Formula:
         """The terms with only the exponents that are not zero."""
         return tuple((f, tuple((k, power) for k, power in enumerate(powers) if power)) for f, powers in self.terms)
 
-    def gradient(self, shape: np.ndarray) -> np.ndarray:
+    def gradient(self, shape: Sequence[float] | np.ndarray) -> np.ndarray:
         """Derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""
         return np.array([derivative.at(shape) for derivative in self.derivatives])
+
+    @property
+    def rises(self) -> bool:
+        """Whether a sum of terms of one sign is positive where all symbols are."""
+        return self.terms[0][0] > 0
 
     @cached_property
     def derivatives(self) -> tuple[Formula, ...]:
@@ -56,6 +61,15 @@ class Formula:
             lowered = ((f * p[k], p[:k] + (p[k] - 1,) + p[k + 1 :]) for f, p in self.terms if p[k])
             result.append(Formula(tuple(lowered)))
         return tuple(result)
+
+    def with_multiple(self, symbol: str, factor: float) -> Formula:
+        """The formula in which `factor` times a symbol stands for it.
+
+        >>> (q1 * V / U).with_multiple("V", 2.0)(V=3.0, U=4.0, q0=0.0, q1=1.0, q2=0.0, q3=0.0)
+        1.5
+        """
+        k = SYMBOLS.index(symbol)
+        return Formula(tuple((f * factor ** powers[k], powers) for f, powers in self.terms))
 
     def __add__(self, other: Formula | float) -> Formula:
         total: dict[tuple[int, ...], float] = {}

@@ -5,10 +5,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from .algebra import U, V, q0, q1, q2, q3
-from .contract import KAPPA, Q1, Q2, Q3, SLOPE_MAX, DerivedStart, Primitive
+from .contract import BACK, FRONT, HALF_WIDTH, KAPPA, Q1, Q2, Q3, SLOPE_MAX, DerivedStart, Primitive, Sides
+from .drawing import drawn_plan, drawn_slope
 from .gable import FACES
 
 RISE = q1 * V + q1 * q3 * V  # from the eave at -v, the lower one, to the ridge
+SAME_M = 1e-9
 RISE_HIGH_SIDE = q2 * V - q2 * q3 * V
 
 
@@ -24,8 +26,9 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The lower eave lies at -v."""
-    if theta[Q1] * (1 + theta[Q3]) >= theta[Q2] * (1 - theta[Q3]):
+    """The lower eave lies at -v, of equal ones that of the steeper slope."""
+    higher = theta[HALF_WIDTH] * (theta[Q1] * (1 + theta[Q3]) - theta[Q2] * (1 - theta[Q3]))  # the eave at +v
+    if higher > SAME_M or (higher > -SAME_M and theta[Q3] <= 0):
         return theta
     turned = theta.copy()
     turned[KAPPA] += np.pi
@@ -45,10 +48,26 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
     }
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    height = width / 2 * drawn_slope(rng, 22, 46)
+    offset, step = width * float(rng.uniform(0.1, 0.28)), 0.0
+    if rng.random() < 0.4:
+        # One slope on both sides and eaves at different heights: a catslide roof.
+        step = height * (1 - (width / 2 - offset) / (width / 2 + offset))
+    return drawn_plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_step": step}
+
+
+def of_member(member: Sides) -> tuple[float, ...]:
+    (front, back), ridge = member.slopes[[FRONT, BACK]], member.apex(1)
+    return ridge, front, back, (ridge - member.eaves[FRONT]) / (front * member.half[1]) - 1.0
+
+
 PRIMITIVE = Primitive(
     name="asymmetric_gable",
     citygml_code="1030",
     adv_code="3100",
+    osm_shape="gabled_height_moved",
+    colour="#f08a4b",
     measures={
         "width": 2 * V,
         "length": 2 * U,
@@ -70,4 +89,6 @@ PRIMITIVE = Primitive(
     canonical=canonical,
     signed=("ridge_offset", "eave_step"),
     half_turn_symmetric=False,
+    draw=draw,
+    of_member=of_member,
 )

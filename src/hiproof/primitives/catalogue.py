@@ -1,21 +1,33 @@
-"""All roof shapes by name. A new shape is one file with its `PRIMITIVE` and one line here; it inherits every test."""
+"""All roof shapes by name. A new shape is one file with its `PRIMITIVE` and its name here; it inherits every test."""
 
 from ..errors import SettingsError
-from . import asymmetric_gable, flat, gable, gambrel, half_hip, hip, mansard, monopitch, pyramid, shed
+from . import (
+    asymmetric_gable,
+    corner,
+    corner_mansard,
+    flat,
+    gable,
+    gambrel,
+    half_hip,
+    half_mansard,
+    hip,
+    mansard,
+    monopitch,
+    pyramid,
+    shed,
+    side_half_hip,
+    side_hip,
+    side_mansard,
+    truncated_gable,
+)
 from .contract import Primitive
 
-CATALOGUE: dict[str, Primitive] = {
-    "flat": flat.PRIMITIVE,
-    "monopitch": monopitch.PRIMITIVE,
-    "gable": gable.PRIMITIVE,
-    "hip": hip.PRIMITIVE,
-    "half_hip": half_hip.PRIMITIVE,
-    "pyramid": pyramid.PRIMITIVE,
-    "mansard": mansard.PRIMITIVE,
-    "shed": shed.PRIMITIVE,
-    "asymmetric_gable": asymmetric_gable.PRIMITIVE,
-    "gambrel": gambrel.PRIMITIVE,
-}
+# In the order in which types are tried and told; where several have planes on the same sides, the first is the general one.
+SHAPES = (
+    *(flat, monopitch, gable, hip, half_hip, pyramid, mansard, shed, asymmetric_gable, gambrel),
+    *(side_hip, side_half_hip, half_mansard, truncated_gable, side_mansard, corner, corner_mansard),
+)
+CATALOGUE: dict[str, Primitive] = {shape.PRIMITIVE.name: shape.PRIMITIVE for shape in SHAPES}
 
 
 def get(name: str) -> Primitive:

@@ -14,9 +14,10 @@ x = cx + u cos(kappa) - v sin(kappa), y = cy + u sin(kappa) + v cos(kappa); T_L 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 import shapely
@@ -24,26 +25,55 @@ import shapely
 from ..errors import FitError
 from ..model import Part, Piece
 from .algebra import Formula, formula
+from .drawing import drawn_slope
 
 CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
 SLOPE_MIN, SLOPE_MAX = 0.04, 2.75  # 2 and 70 degrees: steeper planes swallow facade points
+LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: -u, +u, -v, +v, none
 
 Plane = tuple[Formula | float, Formula | float, Formula | float]
-Shape = tuple[float, float, float, float, float, float]
+Shape = tuple[float, ...]  # V, U, q0..q3
+Corners = Sequence[tuple[float, float, float]] | np.ndarray  # (n, 3)
+
+
+class Sides(Protocol):
+    """What a member of the family (family.py) tells of its planes: by side their eaves (m) and slopes, a level top (m)."""
+
+    @property
+    def half(self) -> np.ndarray: ...
+    @property
+    def eaves(self) -> np.ndarray: ...
+    @property
+    def slopes(self) -> np.ndarray: ...
+    @property
+    def top(self) -> float: ...
+    def apex(self, axis: int) -> float: ...
+    def over(self, half: np.ndarray) -> Sides: ...
 
 
 @dataclass(frozen=True)
 class DerivedStart:
-    """Start values from the fit of a simpler type: `q` are formulas of the `source`'s V, U and q."""
+    """Start values from the fit of a simpler type: `q` are formulas of the `source`'s V, U and q, in axes that are turned
+    by so many quarters from its own."""
 
     source: str
     q: tuple[Formula | float, ...]
+    quarters: int = 0
 
     def theta(self, source_theta: np.ndarray) -> np.ndarray:
         """theta (9,) with the plan of `source_theta` (9,) and its q by the formulas."""
         theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
+        for _ in range(self.quarters):
+            theta = quarter_turned(theta)
         theta[Q0 : Q0 + len(self.q)] = [q.at(shape) if isinstance(q, Formula) else q for q in self.q]
         return theta
+
+
+def at_quarters(
+    source: str, q: tuple[Formula | float, ...], quarters: tuple[int, ...] = (0, 1, 2, 3)
+) -> tuple[DerivedStart, ...]:
+    """The same start in several directions, for roofs of which a half turn makes another."""
+    return tuple(DerivedStart(source, q, quarter) for quarter in quarters)
 
 
 @dataclass(frozen=True)
@@ -66,12 +96,16 @@ class Primitive:
     corners      theta_p -> vertices (n, 3) in the primitive frame: the paper's S = f(theta_p)
     faces        vertex indices (from 0) of each roof surface, counter-clockwise from above
     typical      (width, length, height) -> theta_p of an ordinary roof of that size
+    draw         (generator, width) -> theta_p of one of the roofs that are built so, for simulations; typical ones without
     bounds       (low, high) of q1, q2, q3 as far as used
     vote         how the points vote for start values, or None for a type whose
     starts       derive from the fits of simpler types
     canonical    theta -> the one theta chosen among those of the same surface
     strips       number of teeth: planes are then chosen by equal strips across instead of by the minimum
-    more         the same roof type with other strips
+    more         the same roof type with other strips or other parameters
+    of_member    a member of the family with planes on the same sides -> q of the shape with its front's and right's slopes
+    osm_shape    the nearest value of OpenStreetMap's roof:shape
+    colour       of its roofs in pictures, #rrggbb
     """
 
     name: str
@@ -81,7 +115,7 @@ class Primitive:
     eave: Formula
     planes: tuple[Plane, ...]
     shape: Callable[[Mapping[str, float]], Shape]
-    corners: Callable[[Mapping[str, float]], np.ndarray]
+    corners: Callable[[Mapping[str, float]], Corners]
     faces: tuple[tuple[int, ...], ...]
     typical: Callable[[float, float, float], dict[str, float]]
     bounds: tuple[tuple[float, float], ...] = ()
@@ -92,6 +126,10 @@ class Primitive:
     half_turn_symmetric: bool = True
     strips: int = 1
     more: tuple[Primitive, ...] = ()
+    draw: Callable[[np.random.Generator, float], dict[str, float]] | None = None
+    of_member: Callable[[Sides], tuple[float, ...]] | None = None
+    osm_shape: str | None = None
+    colour: str = "#b5b5b5"
 
     @property
     def parameters(self) -> tuple[str, ...]:
@@ -108,8 +146,24 @@ class Primitive:
         """Used entries of theta: five for the plan, q0 and one for each bound."""
         return 6 + len(self.bounds)
 
+    @cached_property
+    def sides(self) -> tuple[int, ...]:
+        """The side that each of `planes` rises from, LEVEL for a level one."""
+        return tuple(
+            LEVEL if not (a.terms or b.terms) else (RIGHT, LEFT)[a.rises] if a.terms else (BACK, FRONT)[b.rises]
+            for a, b, _ in self.plane_formulas
+        )
+
+    @property
+    def is_of_family(self) -> bool:
+        """Whether it has at most one plane a side and a level one, so that a volume can have its shape."""
+        return self.strips == 1 and len(set(self.sides)) == len(self.sides)
+
     def variant(self, theta_p: Mapping[str, float]) -> Primitive:
-        """The variant with the tooth count of `theta_p`; itself where there is none."""
+        """The variant with the tooth count or the parameters of `theta_p`; itself where these tell of no other."""
+        if self.strips == 1:
+            told = [variant for variant in self.variants if set(variant.parameters) <= set(theta_p)]
+            return max(told, key=lambda variant: len(variant.parameters), default=self)
         for variant in self.variants:
             if variant.strips == theta_p.get("teeth", self.strips):
                 return variant
@@ -117,16 +171,32 @@ class Primitive:
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
         """The paper's S = f(theta_p): vertices (n, 3) in the primitive frame. Raises FitError where one is missing."""
-        missing = [name for name in self.parameters if name not in theta_p]
+        shape = self.variant(theta_p)
+        missing = [name for name in shape.parameters if name not in theta_p]
         if missing:
             raise FitError(
-                f"expected the parameters {', '.join(self.parameters)} of a {self.name} roof, got none for "
+                f"expected the parameters {', '.join(shape.parameters)} of a {self.name} roof, got none for "
                 f"{', '.join(missing)}; give every parameter in metres"
             )
-        return np.asarray(self.variant(theta_p).corners(theta_p), float)
+        return np.asarray(shape.corners(theta_p), float)
+
+    def drawn(self, rng: np.random.Generator, width: float) -> dict[str, float]:
+        """theta_p of a roof made up at random, `width` (m) wide."""
+        if self.draw is not None:
+            return self.draw(rng, width)
+        return self.typical(width, width * rng.uniform(1.05, 2.2), 0.5 * width * drawn_slope(rng, 20.0, 45.0))
+
+    def from_member(self, member: Sides) -> tuple[float, ...]:
+        """q of the shape with the slopes of a member's front and right. Raises FitError for a shape that is of no family."""
+        if self.of_member is None:
+            raise FitError(f"expected a shape of at most one plane a side, got {self.name}; name its parameters")
+        return self.of_member(member)
 
     def to_theta(
-        self, theta_p: Mapping[str, float], kappa: float = 0.0, translation: np.ndarray = (0.0, 0.0, 0.0)
+        self,
+        theta_p: Mapping[str, float],
+        kappa: float = 0.0,
+        translation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     ) -> np.ndarray:
         """theta (9,) of the roof with `theta_p`, turned by `kappa` and moved to `translation` T_L (3,)."""
         theta = np.zeros(9)

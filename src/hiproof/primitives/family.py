@@ -27,8 +27,8 @@ import shapely
 from ..errors import FitError
 from ..model import Part, Piece
 from .catalogue import CATALOGUE, get
+from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, LEFT, LEVEL, RIGHT, Primitive
 
-LEFT, RIGHT, FRONT, BACK = range(4)
 SIDES = ("left", "right", "front", "back")
 AXIS = np.array([0, 0, 1, 1])
 SIGN = np.array([1.0, -1.0, 1.0, -1.0])  # the plane from the left rises to +u, from the right to -u, ...
@@ -41,44 +41,30 @@ QUARTER_TURN = [
 SAME = 1e-9
 HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
 
-# name by (has a top, planes along u, planes across v), and which sides have planes in the direction that is kept
-SHAPES = {
-    (True, 0, 0): ("flat", ()),
-    (False, 0, 1): ("monopitch", (FRONT,)),
-    (False, 0, 2): ("gable", (FRONT, BACK)),
-    (False, 1, 1): ("corner", (FRONT, RIGHT)),
-    (False, 1, 2): ("side_hip", (FRONT, BACK, RIGHT)),
-    (False, 2, 2): ("hip", (FRONT, BACK, LEFT, RIGHT)),
-    (True, 0, 1): ("half_mansard", (FRONT,)),
-    (True, 0, 2): ("truncated_gable", (FRONT, BACK)),
-    (True, 1, 1): ("corner_mansard", (FRONT, RIGHT)),
-    (True, 1, 2): ("side_mansard", (FRONT, BACK, RIGHT)),
-    (True, 2, 2): ("mansard", (FRONT, BACK, LEFT, RIGHT)),
-}
-# CityGML (SIG3D) and AdV codes of the members that the catalogue does not have: the nearest that the lists know.
-CODES = {
-    "corner": ("1040", "3200"),
-    "side_hip": ("1040", "3200"),
-    "side_half_hip": ("1050", "3300"),
-    "half_mansard": ("1060", "3400"),
-    "truncated_gable": ("1060", "3400"),
-    "corner_mansard": ("1060", "3400"),
-    "side_mansard": ("1060", "3400"),
-}
-NAMES = (*CATALOGUE, *CODES)
-# Shapes of as many planes on the same sides, told apart by their eaves and pitches: one may be described as the other.
-KIN = (("hip", "half_hip", "pyramid"), ("side_hip", "side_half_hip"), ("gable", "asymmetric_gable"))
+
+def has_of(shape: Primitive) -> tuple[bool, int, int]:
+    """Whether a shape of the family has a top, and how many planes along u and across v."""
+    along = sum(side in (LEFT, RIGHT) for side in shape.sides)
+    return LEVEL in shape.sides, along, sum(side in (FRONT, BACK) for side in shape.sides)
+
+
+def eaves_of(shape: Primitive) -> tuple[int, ...]:
+    """The sides from which a shape has planes."""
+    return tuple(sorted(side for side in shape.sides if side != LEVEL))
+
+
+ALIKE: dict[tuple[bool, int, int], list[Primitive]] = {}  # shapes of the family with planes on as many sides
+for member in CATALOGUE.values():
+    if member.is_of_family:
+        ALIKE.setdefault(has_of(member), []).append(member)
+# The general one of each, by (has a top, planes along u, planes across v), and which sides have planes in its own direction.
+SHAPES = {has: (shapes[0].name, eaves_of(shapes[0])) for has, shapes in ALIKE.items()}
+# Names told apart by eaves and pitches alone: one may be described as the other.
+KIN = tuple(tuple(shape.name for shape in shapes) for shapes in ALIKE.values() if len(shapes) > 1)
 COMPONENTS = {
     "gambrel": ("gable", "truncated_gable"),
     "shed": ("monopitch",),
 }  # what the larger shapes are put together from
-
-
-def citygml_code(name: str) -> str | None:
-    """SIG3D code of a roof type, None for "free" and what is no type."""
-    if name in CATALOGUE:
-        return CATALOGUE[name].citygml_code
-    return CODES[name][0] if name in CODES else None
 
 
 @dataclass(frozen=True)
@@ -137,6 +123,10 @@ class Member:
             return math.inf
         run = (high - low + 2.0 * self.half[axis] * other) / (one + other)  # from the low side's eave to the ridge
         return float(low + one * run)
+
+    def over(self, half: np.ndarray) -> Member:
+        """The member with its eaves and slopes over a rectangle of other half extents (2,)."""
+        return replace(self, half=half)
 
     def turned(self) -> Member:
         """The same surface with its axes turned by 90 degrees."""
@@ -206,53 +196,32 @@ class Member:
                 return "pyramid"
         return name
 
-    def is_regular(self) -> bool:
-        """Whether the catalogue's shape of this name is the same surface."""
-        name, e = self.name, self.eaves
-        if name not in CATALOGUE or self.leans.any():
-            return False
-        even = {
-            "gable": self.mirrored(1),
-            "hip": self.mirrored(0) and self.mirrored(1) and same(e[FRONT], e[RIGHT]),
-            "half_hip": self.mirrored(0) and self.mirrored(1),
-            "pyramid": self.mirrored(0) and self.mirrored(1) and same(e[FRONT], e[RIGHT]),
-            "mansard": self.mirrored(0) and self.mirrored(1) and same(e[FRONT], e[RIGHT]),
-        }
-        return even.get(name, True)
+    @cached_property
+    def in_catalogue(self) -> Primitive | None:
+        """The catalogue's shape that is the same surface, of a member in its canonical direction."""
+        if self.leans.any():
+            return None
+        for shape in get(self.name).variants:
+            theta = self.theta(shape)
+            planes = shape.plane_values(theta)[np.argsort(shape.sides)]
+            if np.abs(planes - self.own_planes()).max() < SAME * 10.0 and shape.is_proper(theta):
+                return shape
+        return None
 
-    def theta(self, name: str) -> np.ndarray:
-        """theta (9,) of the catalogue's shape `name`, by the front and the right side where the others are as these."""
-        e, s = self.eaves, self.slopes
-        across, along = (e[FRONT], s[FRONT]), (e[RIGHT], s[RIGHT])
-        u, v = self.half
-        q = {
-            "flat": lambda: [self.top],
-            "monopitch": lambda: [across[0] + across[1] * v, across[1]],
-            "gable": lambda: [self.apex(1), across[1]],
-            "asymmetric_gable": lambda: [
-                self.apex(1),
-                s[FRONT],
-                s[BACK],
-                (self.apex(1) - e[FRONT]) / s[FRONT] / v - 1.0,
-            ],
-            "hip": lambda: [self.apex(1), across[1], along[1]],
-            "half_hip": lambda: [self.apex(1), across[1], along[1], (self.apex(1) - along[0]) / (across[1] * v)],
-            "pyramid": lambda: [self.apex(1), across[1]],
-            "mansard": lambda: [self.top, across[1], along[1], (self.top - across[0]) / (across[1] * v)],
-        }[name]()
-        return get(name).canonical_theta(np.array([*self.centre, self.kappa, v, u, *q, *[0.0] * (4 - len(q))]))
+    def theta(self, shape: Primitive) -> np.ndarray:
+        """theta (9,) of the catalogue's `shape`, by the front and the right side where the others are as these."""
+        q = shape.from_member(self)
+        return np.array([*self.centre, self.kappa, self.half[1], self.half[0], *q, *[0.0] * (4 - len(q))])
 
-    def mirrored(self, axis: int) -> bool:
-        """Whether the two sides across `axis` have the same eave and pitch."""
-        one, other = 2 * axis, 2 * axis + 1
-        return same(self.eaves[one], self.eaves[other]) and same(self.slopes[one], self.slopes[other])
+    def in_words_of(self, shape: Primitive) -> tuple[dict[str, float], float, np.ndarray]:
+        """(parameters by name, kappa, T_L (3,)) of the catalogue's `shape` that this member is."""
+        return shape.from_theta(shape.canonical_theta(self.theta(shape)))
 
     def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member in its canonical direction."""
         member = self.canonical()
-        if as_catalogue and member.is_regular():
-            return get(self.name).from_theta(member.theta(self.name))
-        return member.side_by_side()
+        shape = member.in_catalogue if as_catalogue else None
+        return member.side_by_side() if shape is None else member.in_words_of(shape)
 
     def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member, each side's own."""
@@ -270,11 +239,10 @@ class Member:
     def sigma(self, changes: list[Member], as_catalogue: bool = True) -> dict[str, float]:
         """Standard deviations by parameter (and t_z) where `changes` are this member after independent changes of one each."""
 
+        shape = self.in_catalogue if as_catalogue else None
+
         def values(member: Member) -> np.ndarray:
-            if as_catalogue and self.is_regular():
-                described = get(self.name).from_theta(member.theta(self.name))
-            else:
-                described = member.side_by_side()
+            described = member.side_by_side() if shape is None else member.in_words_of(shape)
             return np.array([*described[0].values(), described[2][2]])
 
         centre = values(self)
@@ -308,10 +276,6 @@ def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
     return next((kin for kins in KIN if name in kins for kin in kins if kin in allowed), None)
 
 
-def same(one: float, other: float) -> bool:
-    return one == other or abs(one - other) < SAME
-
-
 def planes_of(name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> np.ndarray:
     """Planes (k, 3) over x, y of the roof type `name` with its parameters: the inverse of `Member.describe`.
 
@@ -328,15 +292,15 @@ def planes_of(name: str, parameters: Mapping[str, float], kappa: float, translat
 
 
 def member_of(name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> Member:
-    """The member with parameters given side by side. Raises FitError where one is missing."""
-    shapes = {shape: (top, sides) for (top, _, _), (shape, sides) in SHAPES.items()}
-    base = name.replace("half_hip", "hip").replace("asymmetric_", "").replace("pyramid", "hip")
-    if base not in shapes:
-        raise FitError(f"expected a roof type ({', '.join(NAMES)}), got {name!r}; choose one of these")
-    top, sides = shapes[base]
+    """The member with these parameters, the catalogue's or each side's own. Raises FitError where one is missing."""
+    if name not in CATALOGUE:
+        raise FitError(f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; choose one of these")
+    if not any(key.startswith("pitch_") for key in parameters):
+        return member_like(get(name).variant(parameters), parameters, kappa, translation)
+    *sides, top = (side in get(name).sides for side in range(5))
     eaves, slopes, leans = np.full(4, np.inf), np.zeros(4), np.zeros(4)
     try:
-        for side in sides:
+        for side in np.flatnonzero(sides):
             eaves[side] = translation[2] + parameters[f"eave_{SIDES[side]}"]
             slopes[side] = math.tan(math.radians(parameters[f"pitch_{SIDES[side]}"]))
             leans[side] = math.tan(math.radians(parameters.get(f"skew_{SIDES[side]}", 0.0)))
@@ -347,3 +311,17 @@ def member_of(name: str, parameters: Mapping[str, float], kappa: float, translat
             f"expected the parameter {missing.args[0]} of a {name} roof, got {', '.join(parameters)}; give every one"
         ) from missing
     return Member(kappa, np.asarray(translation[:2], float), half, eaves, slopes, height, leans)
+
+
+def member_like(shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> Member:
+    """The member that is the same surface as the catalogue's `shape` with its own parameters."""
+    theta = shape.to_theta(parameters, kappa, translation)
+    half = theta[[HALF_LENGTH, HALF_WIDTH]]
+    eaves, slopes, top = np.full(4, np.inf), np.zeros(4), math.inf
+    for side, plane in zip(shape.sides, shape.plane_values(theta), strict=True):
+        if side == LEVEL:
+            top = float(plane[2])
+        else:
+            slopes[side] = abs(plane[AXIS[side]])
+            eaves[side] = plane[2] - slopes[side] * half[AXIS[side]]
+    return Member(kappa, theta[:2].copy(), half, eaves, slopes, top)

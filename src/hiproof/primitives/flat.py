@@ -4,6 +4,7 @@ import numpy as np
 
 from .algebra import U, V, q0
 from .contract import HALF_LENGTH, HALF_WIDTH, Primitive, Vote, quarter_turned, rectangle
+from .drawing import drawn_plan
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
@@ -11,10 +12,16 @@ def canonical(theta: np.ndarray) -> np.ndarray:
     return quarter_turned(theta) if theta[HALF_WIDTH] > theta[HALF_LENGTH] else theta
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return drawn_plan(rng, width, 1.0, 2.6)
+
+
 PRIMITIVE = Primitive(
     name="flat",
     citygml_code="1000",
     adv_code="1000",
+    osm_shape="flat",
+    colour="#7f8c9b",
     measures={"width": 2 * V, "length": 2 * U},
     eave=q0,
     planes=((0, 0, q0),),
@@ -24,4 +31,6 @@ PRIMITIVE = Primitive(
     typical=lambda width, length, height: {"width": width, "length": length},
     vote=Vote(turns=1, slopes=(0.0,)),
     canonical=canonical,
+    draw=draw,
+    of_member=lambda m: (m.top,),
 )

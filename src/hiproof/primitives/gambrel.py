@@ -2,8 +2,11 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from .algebra import U, V, q0, q1, q2, q3
 from .contract import SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive
+from .drawing import drawn_plan, drawn_slope
 from .gable import SLOPES
 
 LOWER_SLOPE = q1 + q2  # q2 is how much steeper the lower part is, q3 the share of the half width above the break
@@ -38,10 +41,19 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
     }
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    run = width / 2 * float(rng.uniform(0.22, 0.45))
+    lower, upper = run * drawn_slope(rng, 54, 69), (width / 2 - run) * drawn_slope(rng, 15, 34)
+    breaks = {"break_width": width - 2 * run, "break_height": lower}
+    return drawn_plan(rng, width, 0.9, 2.0) | {"height": lower + upper} | breaks
+
+
 PRIMITIVE = Primitive(
     name="gambrel",
     citygml_code="1060",
     adv_code="3400",
+    osm_shape="gambrel",
+    colour="#93c54b",
     measures={
         "width": 2 * V,
         "length": 2 * U,
@@ -60,4 +72,5 @@ PRIMITIVE = Primitive(
         DerivedStart("gable", (q0 - 0.15 * q1 * V, 0.6 * q1, q1, 0.5)),
         DerivedStart("gable", (q0, 0.9 * q1, 2.0, 0.8)),
     ),
+    draw=draw,
 )

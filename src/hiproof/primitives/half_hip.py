@@ -2,8 +2,11 @@
 
 from collections.abc import Mapping
 
+import numpy as np
+
 from .algebra import U, V, q0, q1, q2, q3
-from .contract import SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive
+from .contract import FRONT, RIGHT, SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive, Sides
+from .drawing import drawn_slope
 from .gable import SLOPES
 
 DROP = q3 * q1 * V  # height of the hip's own triangle, from its eave up to the ridge
@@ -30,10 +33,25 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
     return {"width": width, "length": length, "height": height, "ridge_length": ridge, "hip_height": 0.4 * height}
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    height = width / 2 * drawn_slope(rng, 30, 54)
+    hip_height = height * float(rng.uniform(0.35, 0.7))
+    ridge = width * float(rng.uniform(0.35, 1.4))
+    plan = {"width": width, "length": ridge + 2 * hip_height / drawn_slope(rng, 35, 60)}
+    return plan | {"height": height, "ridge_length": ridge, "hip_height": hip_height}
+
+
+def of_member(member: Sides) -> tuple[float, ...]:
+    slope, ridge = member.slopes[FRONT], member.apex(1)
+    return ridge, slope, member.slopes[RIGHT], (ridge - member.eaves[RIGHT]) / (slope * member.half[1])
+
+
 PRIMITIVE = Primitive(
     name="half_hip",
     citygml_code="1050",
     adv_code="3300",
+    osm_shape="half-hipped",
+    colour="#5fc3e4",
     measures={
         "width": 2 * V,
         "length": 2 * U,
@@ -49,4 +67,6 @@ PRIMITIVE = Primitive(
     typical=typical,
     bounds=((SLOPE_MIN, SLOPE_MAX), (SLOPE_MIN, SLOPE_MAX), (0.15, 0.75)),
     starts=(DerivedStart("gable", (q0, q1, 1.0, 0.5)), DerivedStart("hip", (q0, q1, q2, 0.7))),
+    draw=draw,
+    of_member=of_member,
 )

@@ -5,7 +5,20 @@ from collections.abc import Mapping
 import numpy as np
 
 from .algebra import U, V, q0, q1, q2
-from .contract import HALF_LENGTH, HALF_WIDTH, Q1, Q2, SLOPE_MAX, SLOPE_MIN, Primitive, Vote, quarter_turned
+from .contract import (
+    FRONT,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    Q1,
+    Q2,
+    RIGHT,
+    SLOPE_MAX,
+    SLOPE_MIN,
+    Primitive,
+    Vote,
+    quarter_turned,
+)
+from .drawing import drawn_slope
 from .gable import FACES, SLOPES
 
 EAVE = q0 - q1 * V
@@ -40,10 +53,18 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
     return {"width": width, "length": length, "height": height, "ridge_length": max(length - width, 0.2 * length)}
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    run, ridge = width / 2 * float(rng.uniform(0.6, 1.15)), width * float(rng.uniform(0.25, 1.3))
+    plan = {"width": width, "length": 2 * run + ridge}
+    return plan | {"height": width / 2 * drawn_slope(rng, 18, 48), "ridge_length": ridge}
+
+
 PRIMITIVE = Primitive(
     name="hip",
     citygml_code="1040",
     adv_code="3200",
+    osm_shape="hipped",
+    colour="#2e86ab",
     measures={"width": 2 * V, "length": 2 * U, "height": q1 * V, "ridge_length": 2 * U - 2 * q1 * V / q2},
     eave=EAVE,
     planes=(*SLOPES, (-q2, 0, EAVE + q2 * U), (q2, 0, EAVE + q2 * U)),
@@ -54,4 +75,6 @@ PRIMITIVE = Primitive(
     bounds=((SLOPE_MIN, SLOPE_MAX), (SLOPE_MIN, SLOPE_MAX)),
     vote=Vote(),
     canonical=canonical,
+    draw=draw,
+    of_member=lambda m: (m.apex(1), m.slopes[FRONT], m.slopes[RIGHT]),
 )

@@ -6,17 +6,21 @@ import numpy as np
 
 from .algebra import U, V, q0, q1, q2, q3
 from .contract import (
+    FRONT,
     HALF_LENGTH,
     HALF_WIDTH,
     Q1,
     Q2,
     Q3,
+    RIGHT,
     SLOPE_MAX,
     DerivedStart,
     Primitive,
+    Sides,
     quarter_turned,
     rectangle,
 )
+from .drawing import drawn_plan, drawn_slope
 
 RISE = q3 * q1 * V  # q3 is the share of the half width that the slope takes
 EAVE = q0 - RISE
@@ -54,10 +58,24 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
     }
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    inset = width * float(rng.uniform(0.12, 0.26))
+    plan = drawn_plan(rng, width, 1.0, 1.9)
+    top = {"top_width": plan["width"] - 2 * inset, "top_length": plan["length"] - 2 * inset}
+    return plan | {"height": inset * drawn_slope(rng, 45, 68)} | top
+
+
+def of_member(member: Sides) -> tuple[float, ...]:
+    slope = member.slopes[FRONT]
+    return member.top, slope, member.slopes[RIGHT], (member.top - member.eaves[FRONT]) / (slope * member.half[1])
+
+
 PRIMITIVE = Primitive(
     name="mansard",
     citygml_code="1060",
     adv_code="3400",
+    osm_shape="quadruple_saltbox",
+    colour="#2a9d5c",
     measures={
         "width": 2 * V,
         "length": 2 * U,
@@ -83,4 +101,6 @@ PRIMITIVE = Primitive(
         DerivedStart("flat", (q0, 1.0, 1.0, 0.25)),
     ),
     canonical=canonical,
+    draw=draw,
+    of_member=of_member,
 )

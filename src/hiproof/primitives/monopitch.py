@@ -1,12 +1,22 @@
 """Monopitch: one plane rising across the roof, towards +v."""
 
+import numpy as np
+
 from .algebra import U, V, q0, q1
-from .contract import SLOPE_MAX, Primitive, Vote, rectangle
+from .contract import FRONT, SLOPE_MAX, Primitive, Vote, rectangle
+from .drawing import drawn_plan, drawn_slope
+
+
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return drawn_plan(rng, width, 0.9, 2.2) | {"height": width * drawn_slope(rng, 6, 28)}
+
 
 PRIMITIVE = Primitive(
     name="monopitch",
     citygml_code="1010",
     adv_code="2100",
+    osm_shape="skillion",
+    colour="#e6b800",
     measures={"width": 2 * V, "length": 2 * U, "height": 2 * q1 * V},
     eave=q0 - q1 * V,
     planes=((0, q1, q0),),
@@ -17,4 +27,6 @@ PRIMITIVE = Primitive(
     bounds=((1e-4, SLOPE_MAX),),
     vote=Vote(turns=4),
     half_turn_symmetric=False,
+    draw=draw,
+    of_member=lambda m: (m.eaves[FRONT] + m.slopes[FRONT] * m.half[1], m.slopes[FRONT]),
 )

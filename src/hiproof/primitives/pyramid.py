@@ -5,7 +5,19 @@ from collections.abc import Mapping
 import numpy as np
 
 from .algebra import U, V, q0, q1
-from .contract import HALF_LENGTH, HALF_WIDTH, Q1, SLOPE_MAX, SLOPE_MIN, Primitive, Vote, quarter_turned, rectangle
+from .contract import (
+    FRONT,
+    HALF_LENGTH,
+    HALF_WIDTH,
+    Q1,
+    SLOPE_MAX,
+    SLOPE_MIN,
+    Primitive,
+    Vote,
+    quarter_turned,
+    rectangle,
+)
+from .drawing import drawn_plan, drawn_slope
 from .gable import SLOPES
 
 END_SLOPE = q1 * V / U
@@ -25,10 +37,16 @@ def canonical(theta: np.ndarray) -> np.ndarray:
     return turned
 
 
+def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
+    return drawn_plan(rng, width, 1.0, 1.15) | {"height": width / 2 * drawn_slope(rng, 15, 52)}
+
+
 PRIMITIVE = Primitive(
     name="pyramid",
     citygml_code="1070",
     adv_code="3500",
+    osm_shape="pyramidal",
+    colour="#7b3fa0",
     measures={"width": 2 * V, "length": 2 * U, "height": q1 * V},
     eave=q0 - q1 * V,
     planes=(*SLOPES, (-END_SLOPE, 0, q0), (END_SLOPE, 0, q0)),
@@ -39,4 +57,6 @@ PRIMITIVE = Primitive(
     bounds=((SLOPE_MIN, SLOPE_MAX),),
     vote=Vote(),
     canonical=canonical,
+    draw=draw,
+    of_member=lambda m: (m.apex(1), m.slopes[FRONT]),
 )

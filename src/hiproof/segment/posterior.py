@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..primitives import CATALOGUE
+
 if TYPE_CHECKING:
     from ..model import Fit
 
@@ -35,7 +37,7 @@ def combine(
     `types` the network's probability by type, `bics` by type from `Fit.bics` (lower is better, on the scale of twice a
     negative log-likelihood, without a prior in them) of a fit to `points` points; posterior proportional to
     prior * exp(-BIC / 2)^b. A type the fit gave up gets a BIC some way behind the best; one the network does not know
-    the mean prior; one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the posterior,
+    the prior of the nearest that it does; one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the posterior,
     and without `types` the evidence alone counts.
 
     >>> combine({"gable": 0.5, "hip": 0.5}, {"gable": 100.0, "hip": 260.0})["gable"] > 0.9
@@ -63,8 +65,15 @@ def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str,
 
     A network may be wrong with confidence; no evidence could undo a prior of zero.
     """
-    mean_prior = 1.0 / max(len(types), 1)
-    return {name: float(np.log(max(types.get(name, mean_prior), SMALLEST_PRIOR))) for name in names or tuple(types)}
+    return {name: float(np.log(max(prior_of(name, types), SMALLEST_PRIOR))) for name in names or tuple(types)}
+
+
+def prior_of(name: str, types: dict[str, float]) -> float:
+    """The probability of a type; of one that the network does not know that of the first of the same CityGML code, else the mean."""
+    if name not in types and name in CATALOGUE:
+        code = CATALOGUE[name].citygml_code
+        name = next((known for known in types if known in CATALOGUE and CATALOGUE[known].citygml_code == code), name)
+    return types.get(name, 1.0 / max(len(types), 1))
 
 
 def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]) -> tuple[Fit, dict[str, float]]:

@@ -16,8 +16,8 @@ from .compounds import COMPOUND_KINDS, random_compound
 from .neighbourhood import demo_files
 from .roofs import SimBuilding, building_of, random_building
 from .scanner import Scan, ScanSettings, scan, scan_solids, uniform_points
-from .scene import NOT_ROOF, SOURCES, Defects
-from .shapes import ROOF_TYPES
+from .scene import SOURCES, Defects
+from .shapes import NOT_ROOF, ROOF_TYPES
 from .training import training_sample
 
 __all__ = [

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..model import Building
-from ..primitives.family import NAMES
+from ..primitives.catalogue import CATALOGUE
 
 KINDS = ("parameter", "type", "ridge", "eave", "turn", "move", "size", "add", "remove")
 
@@ -28,17 +28,17 @@ def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int,
         return kind, index, {name: random_value(rng, part.parameters[name])}
     if kind == "add":
         place = [rng.uniform(x0, x1), rng.uniform(y0, y1), float(part.translation[2]) + rng.uniform(-2.0, 4.0)]
-        new = {"type": str(rng.choice(NAMES)), "position": place, "rotation": rng.uniform(-180.0, 180.0)}
+        new = {"type": str(rng.choice(list(CATALOGUE))), "position": place, "rotation": rng.uniform(-180.0, 180.0)}
         return kind, len(building.parts), new | {"width": width, "length": length}
     changes: dict[str, dict[str, Any]] = {
-        "type": {"type": str(rng.choice(NAMES))},
+        "type": {"type": str(rng.choice(list(CATALOGUE)))},
         "ridge": {"ridge_height": z + float(part.translation[2]) + rng.uniform(-1.0, 8.0)},
         "eave": {"eave_height": z + float(part.translation[2]) + rng.uniform(-4.0, 4.0)},
         "turn": {"rotation": rng.uniform(-180.0, 180.0)},
         "move": {"position": (part.translation + rng.uniform(-5.0, 5.0, 3)).tolist()},
         "size": {"width": width, "length": length},
     }
-    return kind, index, changes.get(kind, {"type": str(rng.choice(NAMES))})
+    return kind, index, changes.get(kind, {"type": str(rng.choice(list(CATALOGUE)))})
 
 
 def random_value(rng: np.random.Generator, value: float) -> float:

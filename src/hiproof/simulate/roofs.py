@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,7 @@ import shapely
 from ..errors import InputError
 from ..frames import LocalFrame
 from ..model import Part, Roof
+from ..primitives import CATALOGUE, get
 from .shapes import ROOF_TYPES, make_part
 
 
@@ -82,8 +82,8 @@ def random_building(
     """
     if type is None:
         type = ROOF_TYPES[rng.integers(len(ROOF_TYPES))]
-    if type not in ROOF_TYPES:
-        raise InputError(f"expected a roof type ({', '.join(ROOF_TYPES)}), got {type!r}")
+    if type not in CATALOGUE:
+        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {type!r}")
     kappa = rng.uniform(-math.pi, math.pi) if kappa is None else kappa
     part = make_part(type, random_parameters(rng, type), kappa, np.array([0.0, 0.0, random_eave(rng)]))
     return assemble((part,), "single", origin)
@@ -147,89 +147,8 @@ def random_eave(rng: np.random.Generator) -> float:
 def random_parameters(rng: np.random.Generator, type: str, width: float | None = None) -> dict[str, float]:
     """theta_p of one roof of `type`; `width` (m) may be given, for parts that must fit together.
 
-    The draws keep each type apart from its neighbours in the catalogue: a hip has a ridge, a half-hip a gable wall
+    The shapes' own draws keep each type apart from its neighbours in the catalogue: a hip has a ridge, a half-hip a gable wall
     worth the name, an asymmetric gable a visible difference of slopes or eaves.
     """
     width = float(rng.uniform(5.0, 13.0)) if width is None else float(width)
-    return _DRAWS[type](rng, width)
-
-
-def _slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> float:
-    return math.tan(math.radians(rng.uniform(low_deg, high_deg)))
-
-
-def _plan(rng: np.random.Generator, width: float, low: float = 1.05, high: float = 2.2) -> dict[str, float]:
-    return {"width": width, "length": width * float(rng.uniform(low, high))}
-
-
-def _flat(rng: np.random.Generator, width: float) -> dict[str, float]:
-    return _plan(rng, width, 1.0, 2.6)
-
-
-def _monopitch(rng: np.random.Generator, width: float) -> dict[str, float]:
-    return _plan(rng, width, 0.9, 2.2) | {"height": width * _slope(rng, 6, 28)}
-
-
-def _gable(rng: np.random.Generator, width: float) -> dict[str, float]:
-    return _plan(rng, width, 0.9) | {"height": width / 2 * _slope(rng, 15, 56)}
-
-
-def _hip(rng: np.random.Generator, width: float) -> dict[str, float]:
-    run, ridge = width / 2 * float(rng.uniform(0.6, 1.15)), width * float(rng.uniform(0.25, 1.3))
-    plan = {"width": width, "length": 2 * run + ridge}
-    return plan | {"height": width / 2 * _slope(rng, 18, 48), "ridge_length": ridge}
-
-
-def _half_hip(rng: np.random.Generator, width: float) -> dict[str, float]:
-    height = width / 2 * _slope(rng, 30, 54)
-    hip_height = height * float(rng.uniform(0.35, 0.7))
-    ridge = width * float(rng.uniform(0.35, 1.4))
-    plan = {"width": width, "length": ridge + 2 * hip_height / _slope(rng, 35, 60)}
-    return plan | {"height": height, "ridge_length": ridge, "hip_height": hip_height}
-
-
-def _pyramid(rng: np.random.Generator, width: float) -> dict[str, float]:
-    return _plan(rng, width, 1.0, 1.15) | {"height": width / 2 * _slope(rng, 15, 52)}
-
-
-def _mansard(rng: np.random.Generator, width: float) -> dict[str, float]:
-    inset = width * float(rng.uniform(0.12, 0.26))
-    plan = _plan(rng, width, 1.0, 1.9)
-    top = {"top_width": plan["width"] - 2 * inset, "top_length": plan["length"] - 2 * inset}
-    return plan | {"height": inset * _slope(rng, 45, 68)} | top
-
-
-def _shed(rng: np.random.Generator, width: float) -> dict[str, float]:
-    teeth, tooth = int(rng.integers(3, 7)), float(rng.uniform(3.5, 7.0))
-    length = max(width, 7.0) * float(rng.uniform(1.0, 2.0))
-    return {"width": teeth * tooth, "length": length, "height": tooth * _slope(rng, 14, 34), "teeth": float(teeth)}
-
-
-def _asymmetric_gable(rng: np.random.Generator, width: float) -> dict[str, float]:
-    height = width / 2 * _slope(rng, 22, 46)
-    offset, step = width * float(rng.uniform(0.1, 0.28)), 0.0
-    if rng.random() < 0.4:
-        # One slope on both sides and eaves at different heights: a catslide roof.
-        step = height * (1 - (width / 2 - offset) / (width / 2 + offset))
-    return _plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_step": step}
-
-
-def _gambrel(rng: np.random.Generator, width: float) -> dict[str, float]:
-    run = width / 2 * float(rng.uniform(0.22, 0.45))
-    lower, upper = run * _slope(rng, 54, 69), (width / 2 - run) * _slope(rng, 15, 34)
-    breaks = {"break_width": width - 2 * run, "break_height": lower}
-    return _plan(rng, width, 0.9, 2.0) | {"height": lower + upper} | breaks
-
-
-_DRAWS: dict[str, Callable[[np.random.Generator, float], dict[str, float]]] = {
-    "flat": _flat,
-    "monopitch": _monopitch,
-    "gable": _gable,
-    "hip": _hip,
-    "half_hip": _half_hip,
-    "pyramid": _pyramid,
-    "mansard": _mansard,
-    "shed": _shed,
-    "asymmetric_gable": _asymmetric_gable,
-    "gambrel": _gambrel,
-}
+    return get(type).drawn(rng, width)

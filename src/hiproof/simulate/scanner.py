@@ -14,7 +14,6 @@ from .flight import Beams, beams_of, joined, random_swaths
 from .raycast import cast_convex, cast_crowns, cast_triangles
 from .roofs import SimBuilding
 from .scene import (
-    NOT_ROOF,
     SOURCE_CLUTTER,
     SOURCE_GROUND,
     SOURCE_TREE,
@@ -25,7 +24,7 @@ from .scene import (
     scene_of,
     solids_scene,
 )
-from .shapes import ROOF_TYPES
+from .shapes import NOT_ROOF, label_of
 
 MERGED_RETURNS_M = 0.6  # m; a pulse of some nanoseconds cannot tell surfaces nearer to each other
 LEAF_PATH_M = 1.8  # m that a beam goes through leaves on average before it meets one
@@ -49,7 +48,7 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class Scan:
-    """`points` (n, 3) world metres; `label` (n,) index into ROOF_TYPES, NOT_ROOF for all else; `source` (n,) index into
+    """`points` (n, 3) world metres; `label` (n,) index into the catalogue, NOT_ROOF for all else; `source` (n,) index into
     SOURCES (roof, wall, ground, tree, clutter)."""
 
     points: np.ndarray
@@ -73,7 +72,7 @@ def scan(building: SimBuilding, rng: np.random.Generator, settings: ScanSettings
     >>> rng = np.random.default_rng(0)
     >>> cloud = scan(random_building(rng, "gable"), rng)
     >>> cloud.points.shape[1], int(cloud.label.max())
-    (3, 10)
+    (3, 2)
     """
     settings = checked(settings or ScanSettings())
     scene = random_scene(rng, building, settings.defects)
@@ -90,7 +89,7 @@ def scan_solids(
 ) -> Scan:
     """Solids of any origin (all in one frame) as a scanner sees them together.
 
-    Their RoofSurfaces are labelled with `types` (names of ROOF_TYPES; None or an unknown name gives NOT_ROOF but
+    Their RoofSurfaces are labelled with `types` (names of the catalogue; None or an unknown name gives NOT_ROOF but
     still the source "roof"). The terrain is level at the solids' lowest height. Of the defects only the scanner's own
     happen (missing strips, swath edges, partial roofs, outliers). Raises InputError without solids.
     """
@@ -98,7 +97,7 @@ def scan_solids(
     if not solids:
         raise InputError("expected at least one solid to scan, got none; check the file that was read")
     types = [None] * len(solids) if types is None else types
-    labels = [ROOF_TYPES.index(type) if type in ROOF_TYPES else NOT_ROOF for type in types]
+    labels = [label_of(type) for type in types]
     vertices = np.concatenate([solid.vertices for solid in solids])
     origin = np.append(np.round(vertices[:, :2].mean(axis=0)), vertices[:, 2].min())
     scene = solids_scene([solid.moved(-origin) for solid in solids], labels)

@@ -14,12 +14,11 @@ from ..model import ROOF, Piece, Solid
 from ..rings import ring_normal
 from .relief import Plane, Relief
 from .roofs import SimBuilding, random_parameters, turned
-from .shapes import ROOF_TYPES, box, make_part
+from .shapes import NOT_ROOF, ROOF_TYPES, box, label_of, make_part
 
 # what a beam met, by its place in SOURCES
 SOURCE_ROOF, SOURCE_WALL, SOURCE_GROUND, SOURCE_TREE, SOURCE_CLUTTER = range(5)
 SOURCES = ("roof", "wall", "ground", "tree", "clutter")
-NOT_ROOF = len(ROOF_TYPES)
 DISC_SLACK_M = 3.0  # a building's walls may go this far down below its own ground
 
 
@@ -129,7 +128,7 @@ def scene_of(bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: 
 
 def building_bodies(building: SimBuilding) -> list[Body]:
     """The building's pieces, each roof labelled with its part's type."""
-    return [Body(piece, label=ROOF_TYPES.index(part.type)) for part in building.roof.parts for piece in part.pieces]
+    return [Body(piece, label=label_of(part.type)) for part in building.roof.parts for piece in part.pieces]
 
 
 def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> Scene:
@@ -238,7 +237,7 @@ def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
 
 
 def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
-    """Any closed solids as triangles; their RoofSurfaces carry `labels` (indices of ROOF_TYPES or NOT_ROOF)."""
+    """Any closed solids as triangles; their RoofSurfaces carry `labels` (of `label_of`)."""
     triangles, source, label = [np.empty((0, 3, 3))], [], []
     for solid, roof_label in zip(solids, labels, strict=True):
         for face in solid.faces:

@@ -10,7 +10,17 @@ import shapely
 from ..model import Part, Piece
 from ..primitives import CATALOGUE
 
-ROOF_TYPES = tuple(CATALOGUE)
+NOT_ROOF = -1
+ROOF_TYPES = (
+    *("flat", "monopitch", "gable", "hip", "half_hip"),
+    *("pyramid", "mansard", "shed", "asymmetric_gable", "gambrel"),
+)
+"""The types of whole roofs: what a building made up at random has where none is named, and what the network tells apart."""
+
+
+def label_of(type: str | None) -> int:
+    """The label of a roof's points: the place of its type in the catalogue, NOT_ROOF for what is none."""
+    return list(CATALOGUE).index(type) if type in CATALOGUE else NOT_ROOF
 
 
 def make_part(type: str, parameters: dict[str, float], kappa: float, translation: np.ndarray) -> Part:

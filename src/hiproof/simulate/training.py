@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import InputError
+from ..primitives import CATALOGUE
 from .roofs import random_building
 from .scanner import Scan, ScanSettings, scan
 from .scene import SOURCE_ROOF, Defects
-from .shapes import ROOF_TYPES
+from .shapes import ROOF_TYPES, label_of
 
 ATTEMPTS = 40  # draws until a cloud has the points asked for, then a sentence says that it has not
 
@@ -34,9 +35,9 @@ def training_sample(
     >>> points.shape[1], len(labels) == len(points), type in (0, 1, 2)
     (3, True, True)
     """
-    unknown = [type for type in types if type not in ROOF_TYPES]
+    unknown = [type for type in types if type not in CATALOGUE]
     if unknown or not len(types):
-        raise InputError(f"expected roof types among {', '.join(ROOF_TYPES)}, got {list(types)!r}")
+        raise InputError(f"expected roof types among {', '.join(CATALOGUE)}, got {list(types)!r}")
     low, high = n_points
     kind = int(rng.integers(len(types)))
     for _ in range(ATTEMPTS):
@@ -79,7 +80,7 @@ def _as_sample(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     if len(cloud) > high:
         cloud = cloud.chosen(np.sort(rng.choice(len(cloud), high, replace=False)))
-    index = np.full(len(ROOF_TYPES) + 1, len(types))
+    index = np.full(len(CATALOGUE) + 1, len(types))  # the last for NOT_ROOF
     for position, type in enumerate(types):
-        index[ROOF_TYPES.index(type)] = position
+        index[label_of(type)] = position
     return cloud.points - cloud.points.mean(axis=0), index[cloud.label], kind

@@ -10,7 +10,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import InputError
-from ..write.colours import TYPE_COLOURS
+from ..write.colours import type_colours
 
 HERE = "127.0.0.1"
 PARTS = {
@@ -44,7 +44,7 @@ def page_of(title: str) -> str:
     content = {
         "title": escape(title),
         "style": parts["style"],
-        "colours": json.dumps(TYPE_COLOURS),
+        "colours": json.dumps(type_colours()),
         "script": parts["viewer"] + parts["tiles"] + parts["page"],
     }
     page = parts["html"]

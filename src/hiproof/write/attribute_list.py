@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ..formats import FORMATS
+from ..primitives.catalogue import CATALOGUE
 
 PREFIX = "rf_"
 OWN = "hiproof_"
@@ -152,7 +153,7 @@ PARAMETERS = (
 )
 
 PART = (
-    Attribute("type", "text", "", "a name of the catalogue or of the family"),
+    Attribute("type", "text", "", "a name of the catalogue"),
     Attribute("parameters", "object", "m, deg", "by name; `hiproof build --shapes` lists those of every type"),
     Attribute("position", "list", "m", "x, y of the rectangle's centre and z of the lowest eave, about the origin"),
     Attribute("rotation", "number", "deg", "from the x axis to the rectangle's length, counter-clockwise"),
@@ -168,10 +169,14 @@ SIZES = {
     "height": ("m", "of the ridge or the level top over the lowest eave; of a saw-tooth's tooth"),
     "ridge_length": ("m", "of a hip or half-hip"),
     "hip_height": ("m", "of a half-hip's end, from its eave to the ridge"),
-    "top_width": ("m", "of a mansard's level top"),
-    "top_length": ("m", "of a mansard's level top"),
+    "end_height": (
+        "m",
+        "of a corner, to which its end would rise at the other; its height is that of the front at the back",
+    ),
+    "top_width": ("m", "of a level top between slopes"),
+    "top_length": ("m", "of a level top between slopes"),
     "teeth": ("", "of a saw-tooth"),
-    "ridge_offset": ("m", "of an asymmetric gable's ridge from the middle, to the back"),
+    "ridge_offset": ("m", "of a gable's ridge from the middle, to the back"),
     "eave_step": ("m", "of an asymmetric gable: the back eave over the front eave"),
     "break_width": ("m", "of a gambrel, between the lines where its slopes break"),
     "break_height": ("m", "of these lines over the eave"),
@@ -183,6 +188,12 @@ OF_SIDES = {
 }
 SHAPE = {
     **SIZES,
+    **{
+        name: ("m", f"of a {kind}")
+        for kind, shape in CATALOGUE.items()
+        for name in shape.parameters
+        if name not in SIZES
+    },
     **{f"{what}_{side}": told for side in ("front", "back", "left", "right") for what, told in OF_SIDES.items()},
 }
 """Every parameter of a part by name: unit and meaning."""

@@ -2,29 +2,26 @@
 
 from __future__ import annotations
 
-TYPE_COLOURS = {
-    "flat": "#7f8c9b",
-    "monopitch": "#e6b800",
-    "gable": "#d1495b",
-    "asymmetric_gable": "#f08a4b",
-    "hip": "#2e86ab",
-    "half_hip": "#5fc3e4",
-    "pyramid": "#7b3fa0",
-    "mansard": "#2a9d5c",
-    "gambrel": "#93c54b",
-    "shed": "#c98bdb",
-    "side_hip": "#4fa3c7",
-    "side_half_hip": "#8fd6ee",
-    "corner": "#1f6f8b",
-    "half_mansard": "#6fbf8f",
-    "truncated_gable": "#4cb27a",
-    "corner_mansard": "#1e7a46",
-    "side_mansard": "#35a866",
-    "free": "#a3785f",
-    "unknown": "#b5b5b5",
-}
+from ..primitives.catalogue import CATALOGUE
+
+UNKNOWN_COLOUR = "#b5b5b5"
+NO_TYPES = {"free": "#a3785f", "unknown": UNKNOWN_COLOUR}
 WALL_COLOUR = "#e8e2d6"
 GROUND_COLOUR = "#8c8c84"
+
+
+def type_colours() -> dict[str, str]:
+    """The colour (#rrggbb) of every roof type, of "free" and of "unknown".
+
+    >>> type_colours()["gable"]
+    '#d1495b'
+    """
+    return {name: shape.colour for name, shape in CATALOGUE.items()} | NO_TYPES
+
+
+def type_colour(name: str | None) -> str:
+    """The colour (#rrggbb) of a roof type; that of unknown ones of any other name."""
+    return type_colours().get(name or "unknown", UNKNOWN_COLOUR)
 
 
 def linear_rgb(colour: str) -> tuple[float, float, float]:

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..model import GROUND, ROOF, WALL, Solid
 from ..rings import ring_normal
-from .colours import GROUND_COLOUR, TYPE_COLOURS, WALL_COLOUR, linear_rgb
+from .colours import GROUND_COLOUR, WALL_COLOUR, linear_rgb, type_colour
 from .glb import GlbDocument, y_up
 from .triangles import face_triangles
 
@@ -79,7 +79,7 @@ class GlbContent:
 
 def surface_colours(roof_type: str) -> dict[str, str]:
     """The colour of each kind of face of a building."""
-    return {ROOF: TYPE_COLOURS.get(roof_type, TYPE_COLOURS["unknown"]), WALL: WALL_COLOUR, GROUND: GROUND_COLOUR}
+    return {ROOF: type_colour(roof_type), WALL: WALL_COLOUR, GROUND: GROUND_COLOUR}
 
 
 def material_table(key: str) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..model import ROOF, Face, Solid
-from .colours import GROUND_COLOUR, TYPE_COLOURS, WALL_COLOUR, srgb
+from .colours import GROUND_COLOUR, WALL_COLOUR, srgb, type_colours
 from .triangles import face_triangles
 
 
@@ -56,7 +56,7 @@ def building_text(id: str, roof_type: str, solid: Solid, origin: np.ndarray, fir
     lines = [f"o {name}"]
     lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in solid.vertices - origin]
     for kind in dict.fromkeys(face.kind for face in solid.faces):
-        material = f"roof_{roof_type if roof_type in TYPE_COLOURS else 'unknown'}" if kind == ROOF else kind
+        material = f"roof_{roof_type if roof_type in type_colours() else 'unknown'}" if kind == ROOF else kind
         lines += [f"g {name} {kind} roof_type={roof_type}", f"usemtl {material}"]
         for face in solid.of_kind(kind):
             lines += ["f " + " ".join(str(first + index) for index in polygon) for polygon in polygons(solid, face)]
@@ -70,7 +70,7 @@ def polygons(solid: Solid, face: Face) -> Iterable[Iterable[int]]:
 
 def material_library() -> str:
     """Every material a model may name."""
-    colours = {f"roof_{name}": colour for name, colour in TYPE_COLOURS.items()}
+    colours = {f"roof_{name}": colour for name, colour in type_colours().items()}
     colours |= {"WallSurface": WALL_COLOUR, "GroundSurface": GROUND_COLOUR}
     entries = ["newmtl {}\nKd {:.3f} {:.3f} {:.3f}\n".format(name, *srgb(colour)) for name, colour in colours.items()]
     return "\n".join(entries)

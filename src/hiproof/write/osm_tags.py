@@ -8,30 +8,10 @@ from typing import Any
 import numpy as np
 
 from ..model import ROOF, Building
+from ..primitives.catalogue import CATALOGUE
 from .attribute_list import OSM
 from .roof_figures import RoofFigures, ground_height
 from .values import rounded
-
-SHAPES = {
-    "flat": "flat",
-    "monopitch": "skillion",
-    "gable": "gabled",
-    "asymmetric_gable": "gabled_height_moved",
-    "hip": "hipped",
-    "half_hip": "half-hipped",
-    "side_hip": "side_hipped",
-    "side_half_hip": "side_half-hipped",
-    "corner": "hipped",
-    "pyramid": "pyramidal",
-    "mansard": "quadruple_saltbox",
-    "truncated_gable": "double_saltbox",
-    "half_mansard": "saltbox",
-    "side_mansard": "mansard",
-    "corner_mansard": "mansard",
-    "gambrel": "gambrel",
-    "shed": "sawtooth",
-}
-"""The value of roof:shape by roof type; of those that the tags do not know, the nearest."""
 
 ONE_ENDED = ("side_hip", "side_half_hip")
 
@@ -56,13 +36,18 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     lowest = min(building.solid.vertices[list(ring), 2].min() for i in shown for ring in building.solid.faces[i].rings)
     ground = min(ground_height(building, figures), figures.h_base)
     values = (
-        SHAPES.get(building.parts[main].type),
+        osm_shape(building.parts[main].type),
         figures.h_max - lowest,
         direction_of(building, main, figures.face_azimuth_deg[largest]),
         figures.face_slope_deg[largest],
         figures.h_max - ground,
     )
     return {tag.name: told(value) for tag, value in zip(OSM, values, strict=True)}
+
+
+def osm_shape(name: str) -> str | None:
+    """The value of roof:shape of a roof type; None of what is none."""
+    return CATALOGUE[name].osm_shape if name in CATALOGUE else None
 
 
 def direction_of(building: Building, main: int, azimuth_deg: float) -> float:

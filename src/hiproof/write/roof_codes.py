@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from ..primitives.catalogue import CATALOGUE
-from ..primitives.family import CODES
 
 CODE_SPACES = {
     "sig3d": "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml",
@@ -27,7 +26,7 @@ def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
 
 def own_code(name: str, code_list: str) -> str:
     """The code of one roof type."""
-    if name in CATALOGUE:
-        shape = CATALOGUE[name]
-        return shape.citygml_code if code_list == "sig3d" else shape.adv_code
-    return CODES[name][code_list != "sig3d"] if name in CODES else MIXED[code_list]
+    if name not in CATALOGUE:
+        return MIXED[code_list]
+    shape = CATALOGUE[name]
+    return shape.citygml_code if code_list == "sig3d" else shape.adv_code

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from .attribute_list import OWN
-from .colours import TYPE_COLOURS
+from .colours import type_colour, type_colours
 from .xml_text import xml_attribute
 
 TABLE = "layer_styles"
@@ -42,16 +42,16 @@ def style_rows() -> list[dict[str, Any]]:
 def style_qml(layer: str) -> str:
     """A layer's style in QGIS' own form: a colour for each roof type, that of an unknown one for all others.
 
-    >>> style_qml("parts").count("<category ") == len(TYPE_COLOURS)
+    >>> style_qml("parts").count("<category ") == len(type_colours())
     True
     """
-    kinds = [*(name for name in TYPE_COLOURS if name != "unknown"), "unknown"]
+    kinds = [*(name for name in type_colours() if name != "unknown"), "unknown"]
     categories = "".join(
         f'<category symbol="{k}" value="{"" if name == "unknown" else xml_attribute(name)}" label="{xml_attribute(name)}"'
         ' render="true"/>'
         for k, name in enumerate(kinds)
     )
-    symbols = "".join(fill_symbol(k, TYPE_COLOURS[name], FILL_ALPHA[layer]) for k, name in enumerate(kinds))
+    symbols = "".join(fill_symbol(k, type_colour(name), FILL_ALPHA[layer]) for k, name in enumerate(kinds))
     return (
         "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>"
         '<qgis version="3.22.0" styleCategories="Symbology">'

@@ -195,7 +195,7 @@ async function edit(asked, after = () => {}) {
   $("say").dataset.ms = (performance.now() - began).toFixed(1);
 }
 
-const heightsOf = part => ["z", ...Object.keys(part.parameters).filter(name => /^(height|hip_height|break_height|eave_step|pitch_|eave_)/.test(name))];
+const heightsOf = part => ["z", ...Object.keys(part.parameters).filter(name => /^(pitch_|eave_)|height$/.test(name))];
 function pin(index, names) { now.held[index] = [...new Set([...(now.held[index] || []), ...names])]; }
 function unpin(index, name) { now.held[index] = (now.held[index] || []).filter(held => held !== name); }
 const changePart = (change, names) => inTurn(() => edit({ action: "change", part: now.part, change }, () => pin(now.part, names)));

@@ -3,6 +3,7 @@
 z(x, y) = max over volumes whose rectangle holds (x, y)  of  min over its at most five planes
 
 plan        the building's frame, the points that count, a grid, ghosts of unseen roof
+allowed     which shapes volumes may have
 scene       these in each of the building's directions, as the compiled search reads them
 planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes of these planes, and where each would gain most

@@ -12,6 +12,8 @@ import shapely
 
 from ...model import Part, Piece
 from ...primitives import get
+from ...primitives.contract import BACK, FRONT
+from ...primitives.family import member_of
 from ...primitives.shed import TEETH
 from .regions import GRID_M, polygons_of
 
@@ -187,10 +189,10 @@ def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
                 return []
             found.append(Slope(step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"], outlines))
         elif part.type == "truncated_gable" and len(lower) == 1 and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD:
-            for side, name in ((-1.0, "front"), (1.0, "back")):
-                slope = math.tan(math.radians(p[f"pitch_{name}"]))
-                eave = part.translation[2] + p[f"eave_{name}"]
-                found.append(Slope(step + side * 0.5 * p["width"], eave, slope, outlines))
+            member = member_of(part.type, p, part.kappa, part.translation)
+            for sign, side in ((-1.0, FRONT), (1.0, BACK)):
+                at = step + sign * 0.5 * p["width"]
+                found.append(Slope(at, member.eaves[side], member.slopes[side], outlines))
         else:
             return []
     return sorted(found, key=lambda slope: slope.at)
@@ -199,7 +201,7 @@ def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
 def gambrel_of(upper: Part, below: list[Slope]) -> Part | None:
     """The gable `upper` and the slopes on its two sides as one gambrel, None where they are none."""
     top = upper.parameters
-    if upper.type != "gable" or "height" not in top or len(below) != 2:
+    if upper.type != "gable" or tuple(top) != get("gable").parameters or len(below) != 2:
         return None
     front, back = below
     slope, upper_slope = 0.5 * (front.slope + back.slope), 2.0 * top["height"] / top["width"]

@@ -8,7 +8,6 @@ from collections import namedtuple
 import numpy as np
 import shapely
 
-from ...primitives.family import COMPONENTS, KIN, NAMES, SHAPES
 from .plan import Plan, grid_lines, ring_edges, signed_depth
 
 MOST_DIRECTIONS = 2
@@ -129,19 +128,6 @@ def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
 def order_along(U: np.ndarray, V: np.ndarray) -> np.ndarray:
     """The points' numbers in ascending order along each axis of each direction: (directions, 2, n)."""
     return np.argsort(np.stack([U, V], axis=1), axis=2, kind="stable")
-
-
-def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
-    """Which shapes (2, 3, 3, 2) volumes may have to become parts of these `types` (all where there are none)."""
-    allowed = np.zeros((2, 3, 3, 2), bool)
-    names = {part for name in types or NAMES for part in (name, *COMPONENTS.get(name, ()))} | {"flat"}
-    kin = {name: base for base, *others in KIN for name in others}
-    for (top, along, across), (shape, _) in SHAPES.items():
-        ties = [tied for tied in (0, 1) if shape != "gable" or ("gable", "asymmetric_gable")[tied] in names]
-        if shape in names or any(kin.get(name) == shape for name in names):
-            for tied in ties:
-                allowed[int(top), along, across, tied] = allowed[int(top), across, along, tied] = True
-    return allowed
 
 
 DEAD_M = 0.03  # residuals that cost nothing

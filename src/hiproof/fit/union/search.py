@@ -7,11 +7,12 @@ import math
 import numpy as np
 import shapely
 
+from .allowed import allowed_shapes
 from .grow import grids_of, grow
 from .moves import move_all_edges, refit_each, simplify
 from .objective import objective
 from .plan import Plan
-from .scene import Scene, allowed_shapes, directions_of, scene_of, seen_through
+from .scene import Scene, directions_of, scene_of, seen_through
 from .trim import trim
 
 SEARCH_POINTS = 600

@@ -1,0 +1,17 @@
+"""What the shapes' own draws share: slopes and plans as real roofs have them."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+
+def drawn_slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> float:
+    """A slope (rise by run) of an angle between two, in degrees."""
+    return math.tan(math.radians(rng.uniform(low_deg, high_deg)))
+
+
+def drawn_plan(rng: np.random.Generator, width: float, low: float = 1.05, high: float = 2.2) -> dict[str, float]:
+    """A plan of that width (m), `low` to `high` times as long."""
+    return {"width": width, "length": width * float(rng.uniform(low, high))}
