@@ -22,7 +22,7 @@ from hiproof.city import run as city_run
 from hiproof.city.lock import held
 from hiproof.city.marks import choice_of, file_stamps, inputs_of, mark_of
 from hiproof.city.outputs import broken_claims, claims
-from hiproof.city.plan import Job, Plan
+from hiproof.city.plan import Job, WorkPlan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
@@ -239,11 +239,11 @@ def test_a_plan_comes_back_as_it_was(tmp_path):
         Job(2, "of the cloud", square, None),
     )
     settings = Settings.from_dict({"fit": {"types": ["gable"], "side_softness_m": [0.1]}, "read": {"split_gap_m": 0.3}})
-    plan = Plan(
+    plan = WorkPlan(
         jobs, {"0_0_0": (0, 2), "-1_0_0": (1,)}, "EPSG:7415", settings, {1: ("x", "y")}, np.array([1e5, 0.1, 0])
     )
     plan.save(tmp_path / "plan.jsonl")
-    again = Plan.load(tmp_path / "plan.jsonl")
+    again = WorkPlan.load(tmp_path / "plan.jsonl")
     assert np.array_equal(again.translate, plan.translate)
     assert list(again.tiles) == list(plan.tiles)
     assert dataclasses.replace(again, translate=plan.translate) == plan

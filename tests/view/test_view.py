@@ -8,13 +8,13 @@ import shutil
 import subprocess
 import threading
 from functools import partial
-from http.server import ThreadingHTTPServer
 
 import pytest
 
 from hiproof.cli.view import tiles_of
 from hiproof.errors import HiproofError, InputError
-from hiproof.view.server import HERE, Handler, page_of, server_of
+from hiproof.loopback import LOOPBACK, LoopbackServer
+from hiproof.view.server import Handler, page_of, server_of
 from hiproof.write.tiles import write_models
 from sample_models import SOLIDS, write_sample_run
 
@@ -82,7 +82,7 @@ def serving():
 
 
 def answer(port, path, host=None):
-    connection = http.client.HTTPConnection(HERE, port, timeout=20)
+    connection = http.client.HTTPConnection(LOOPBACK, port, timeout=20)
     connection.request("GET", path, headers={"Host": host} if host else {})
     response = connection.getresponse()
     return response.status, response.read()
@@ -90,10 +90,10 @@ def answer(port, path, host=None):
 
 def document_of(page, folder, serving, profile):
     """The page over the tiles in `folder` after its scripts ran, as text."""
-    port = serving(ThreadingHTTPServer((HERE, 0), partial(Handler, directory=str(folder), page=page)))
+    port = serving(LoopbackServer(partial(Handler, directory=str(folder), page=page)))
     command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
     command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={profile}"]
-    command += ["--window-size=900,700", "--virtual-time-budget=8000", "--dump-dom", f"http://{HERE}:{port}/"]
+    command += ["--window-size=900,700", "--virtual-time-budget=8000", "--dump-dom", f"http://{LOOPBACK}:{port}/"]
     return subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
 
 
@@ -138,11 +138,12 @@ def test_nothing_outside_is_served(tiles, serving):
     port = serving(server_of(tiles, "run"))
     assert answer(port, "/../secret.txt")[0] == 404
     assert answer(port, "/", host="elsewhere.example")[0] == 403
+    assert answer(port, "/", host=f"localhost:{port + 1}")[0] == 403
 
 
 def test_a_port_that_is_taken_is_told(tiles, serving):
     port = serving(server_of(tiles, "run"))
-    with pytest.raises(InputError, match="try another --port"):
+    with pytest.raises(InputError, match="leave --port out"):
         server_of(tiles, "run", port)
 
 

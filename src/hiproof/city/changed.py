@@ -20,7 +20,7 @@ from ..write.fragments import Fragment, Fragments, load_fragments, save_fragment
 from .ledger import Ledger, Task
 from .merge import remove_tiles, tile_parts, write_tile
 from .overrides import REDO, load_redo
-from .plan import PLAN_FILE, Plan
+from .plan import PLAN_FILE, WorkPlan
 
 
 class Place(NamedTuple):
@@ -31,7 +31,7 @@ class Place(NamedTuple):
     number: int
 
 
-def take_over(new: Plan, old: Plan, state: Path, ledger: Ledger) -> bool:
+def take_over(new: WorkPlan, old: WorkPlan, state: Path, ledger: Ledger) -> bool:
     """Put the run in `state` on the plan `new`, with all that is known of buildings that `old` has too; whether that could be.
 
     It could not where the two plans tell buildings apart, read them or write them in different ways.
@@ -65,12 +65,12 @@ def take_over(new: Plan, old: Plan, state: Path, ledger: Ledger) -> bool:
     return True
 
 
-def common_of(plan: Plan) -> tuple:
+def common_of(plan: WorkPlan) -> tuple:
     """What all texts of a plan have in common."""
     return plan.settings, plan.crs_wkt, plan.translate.tolist(), plan.around_m
 
 
-def digest_of(plan: Plan, index: int) -> str:
+def digest_of(plan: WorkPlan, index: int) -> str:
     """What a building's texts depend on beside the points, as a digest."""
     job = plan.jobs[index]
     attributes = job.footprint.attributes if job.footprint else None
@@ -78,7 +78,7 @@ def digest_of(plan: Plan, index: int) -> str:
     return hashlib.sha256(json.dumps(known, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def known_places(plan: Plan, state: Path, ledger: Ledger) -> dict[str, Place]:
+def known_places(plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, Place]:
     """Where the texts of every building stand that was solved, by its digest."""
     done, left = {task.name for task in ledger.tasks() if task.state == "done"}, load_redo(state)
     found = {}
@@ -91,7 +91,7 @@ def known_places(plan: Plan, state: Path, ledger: Ledger) -> dict[str, Place]:
     return found
 
 
-def move_texts(plan: Plan, state: Path, kept: dict[int, Place], redo: dict[str, list[int]]) -> None:
+def move_texts(plan: WorkPlan, state: Path, kept: dict[int, Place], redo: dict[str, list[int]]) -> None:
     """Write the tiles' files anew from those that are there, and drop these; points are sorted again."""
     before, after = state / "tiles", state / "tiles.new"
     shutil.rmtree(after, ignore_errors=True)
@@ -112,7 +112,7 @@ def move_texts(plan: Plan, state: Path, kept: dict[int, Place], redo: dict[str, 
     (state / REDO).unlink(missing_ok=True)
 
 
-def to_do(plan: Plan) -> Fragments:
+def to_do(plan: WorkPlan) -> Fragments:
     """What stands in a tile's file where a building is to be solved."""
     return dict.fromkeys(asked_fragments(plan.settings.write), Fragment(b""))
 
@@ -123,7 +123,7 @@ def sorting(tasks: list[Task], again: bool) -> list[Task]:
     return [task._replace(state="open", losses=0) for task in own] if again else own
 
 
-def solving(plan: Plan, redo: dict[str, list[int]]) -> list[Task]:
+def solving(plan: WorkPlan, redo: dict[str, list[int]]) -> list[Task]:
     """The tasks that solve tiles, open where a building is to be solved."""
     return [
         Task(f"solve:{tile}", "solve", len(members), "open" if tile in redo else "done")

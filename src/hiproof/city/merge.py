@@ -9,14 +9,14 @@ from pathlib import Path
 from ..formats import FORMATS, OF_TILES, asked_files, asked_tile_files
 from ..write.fragments import Fragments, load_fragments
 from ..write.run_files import join_fragments
-from .plan import Plan
+from .plan import WorkPlan
 
 TILE_FOLDER = "models"
 ENDINGS = "|".join(re.escape(format.tile_ending) for format in OF_TILES.values())
 TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: unfinished
 
 
-def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
+def merge(plan: WorkPlan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
     """Write the files of the run, each whole or not at all, and remove what a killed merge left unfinished."""
     for name in (format.file for format in FORMATS.values() if format.fragment):
         for leftover in out.glob(f".{name}-*"):
@@ -25,7 +25,7 @@ def merge(plan: Plan, state: Path, out: Path, progress: Callable[[str, int, int]
     join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.head)
 
 
-def parts_of(plan: Plan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
+def parts_of(plan: WorkPlan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
     for number, tile in enumerate(plan.tiles):
         progress("merge", number, len(plan.tiles))
         yield from load_fragments(tile_parts(state, tile))
@@ -36,7 +36,7 @@ def tile_parts(state: Path, tile: str) -> Path:
     return state / "tiles" / f"{tile}.npz"
 
 
-def output_files(plan: Plan, out: Path) -> list[Path]:
+def output_files(plan: WorkPlan, out: Path) -> list[Path]:
     """All files that a run of this plan says it has written, the record of the run aside."""
     return [
         *whole_files(plan, out).values(),
@@ -44,17 +44,17 @@ def output_files(plan: Plan, out: Path) -> list[Path]:
     ]
 
 
-def whole_files(plan: Plan, out: Path) -> dict[str, Path]:
+def whole_files(plan: WorkPlan, out: Path) -> dict[str, Path]:
     """Files of the whole area by format."""
     return asked_files(plan.settings, out)
 
 
-def tile_files(plan: Plan, out: Path, tile: str) -> dict[str, Path]:
+def tile_files(plan: WorkPlan, out: Path, tile: str) -> dict[str, Path]:
     """Files of one work tile's models by format, where the settings ask for them."""
     return asked_tile_files(plan.settings, out / TILE_FOLDER, tile)
 
 
-def write_tile(plan: Plan, out: Path, tile: str, parts: list[Fragments]) -> None:
+def write_tile(plan: WorkPlan, out: Path, tile: str, parts: list[Fragments]) -> None:
     """Write the models of a work tile into the folder of tiles, where the settings ask for it."""
     join_fragments(tile_files(plan, out, tile), parts, plan.head)
 

@@ -18,14 +18,14 @@ from ..read.footprints import attribute_rows, reading
 from ..write.files import atomic
 from .ledger import Ledger
 from .merge import tile_parts
-from .plan import Job, Plan
+from .plan import Job, WorkPlan
 
 FILE, REDO = "overrides.jsonl", "redo.json"
 TABLES = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
 SHOWN = 5  # ids in a sentence; more would hide what is said
 
 
-def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, fresh: bool) -> None:
+def settle_overrides(path: str | None, plan: WorkPlan, state: Path, ledger: Ledger, fresh: bool) -> None:
     """Keep the overrides at `path` for the workers; of a run that is not `fresh`, open the tiles of buildings whose override
     is another than before. Raises InputError for a file that cannot be read or contradicts itself."""
     records = matched(dict(read_overrides(path)) if path else {}, plan)
@@ -46,7 +46,7 @@ def settle_overrides(path: str | None, plan: Plan, state: Path, ledger: Ledger, 
     ledger.open_again([f"solve:{tile}" for tile in redo], digests)
 
 
-def tiles_to_redo(changed: set[int], plan: Plan, state: Path, ledger: Ledger) -> dict[str, list[int]]:
+def tiles_to_redo(changed: set[int], plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, list[int]]:
     """By tile the buildings to solve: those `changed`, what a killed run left to redo, and all of a tile not solved yet."""
     finished = {task.name for task in ledger.tasks() if task.state == "done"}
     left, redo = load_redo(state), {}
@@ -115,7 +115,7 @@ def typed(name: str, value: Any) -> Any:
     return str(value) if name == "id" else value
 
 
-def matched(records: dict[str, dict[str, Any]], plan: Plan) -> dict[int, dict[str, Any]]:
+def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dict[str, Any]]:
     """The overrides by the number of their building, with those that columns of the footprints hold; unknown ones are told."""
     names = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
     found, left = {}, dict(records)

@@ -40,7 +40,7 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Plan:
+class WorkPlan:
     """Everything a worker needs to know, kept as JSON in the run's folder: a line for the whole, then a line a building.
 
     What a task reads (its point file, the terrain model) comes with the task: an address may hold a password.
@@ -103,13 +103,13 @@ class Plan:
                 file.write(json.dumps([job.id, area, attributes], default=str) + "\n")
 
     @staticmethod
-    def load(path: Path) -> Plan:
+    def load(path: Path) -> WorkPlan:
         """The plan at `path`. Raises OutputError where it is missing or damaged."""
         try:
             with path.open(encoding="utf-8") as file:
                 whole, rows = json.loads(file.readline()), [json.loads(line) for line in file]
             areas = shapely.from_wkb([area for _, area, _ in rows])
-            return Plan(
+            return WorkPlan(
                 jobs=tuple(job_of_row(i, *row) for i, row in enumerate(zip(rows, areas, strict=True))),
                 tiles={name: tuple(members) for name, members in whole["tiles"].items()},
                 crs_wkt=whole["crs"],
@@ -129,15 +129,15 @@ def job_of_row(index: int, row: list, area: shapely.Polygon) -> Job:
     return Job(index, id, area, None if attributes is None else Footprint(id, area, attributes))
 
 
-def load_plan(folder: Path) -> Plan:
+def load_plan(folder: Path) -> WorkPlan:
     """The plan of the run whose state is in `folder`, read once a process."""
     path = folder / PLAN_FILE
     return loaded_plan(path, path.stat().st_mtime_ns)
 
 
 @functools.lru_cache(maxsize=1)
-def loaded_plan(path: Path, stamp: int) -> Plan:
-    return Plan.load(path)
+def loaded_plan(path: Path, stamp: int) -> WorkPlan:
+    return WorkPlan.load(path)
 
 
 def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:

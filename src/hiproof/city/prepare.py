@@ -16,15 +16,15 @@ from ..write.naming import FileUnits
 from ..write.reprojected import crs_of_files
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
-from .plan import Job, Plan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
+from .plan import Job, WorkPlan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 from .request import Box, Request
 
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
 MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
 
 
-def make_plan(request: Request) -> Plan:
-    """Plan of a request. Raises InputError when nothing can be read."""
+def make_plan(request: Request) -> WorkPlan:
+    """The plan of a request. Raises InputError when nothing can be read."""
     from ..read.terrain import read_terrain
     from .frame import settle_frame
 
@@ -42,7 +42,7 @@ def make_plan(request: Request) -> Plan:
     units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
     if settings.write.out_crs:
         say_where_files_lie(jobs, crs_of_files(frame.crs, settings.write.out_crs), units)
-    return Plan(
+    return WorkPlan(
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
         crs_wkt=frame.crs.to_wkt() if frame.crs is not None else None,

@@ -21,7 +21,7 @@ from .marks import choice_of, inputs_of, mark_of
 from .merge import remove_tiles, tile_parts
 from .outputs import broken_claims
 from .overrides import REDO, settle_overrides
-from .plan import PLAN_FILE, Plan
+from .plan import PLAN_FILE, WorkPlan
 from .prepare import make_plan
 from .request import Request
 
@@ -58,7 +58,7 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
     return ledger
 
 
-def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
+def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
     """The plan of an earlier run of the same request whose files stand as it left them, else a new one; where the
     footprints changed since, a new one that takes over what is known of the others."""
     fresh = False
@@ -81,18 +81,18 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> Plan:
     return plan
 
 
-def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> Plan | None:
+def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | None:
     """The plan of the run that the folder holds, None where it holds none to go on from. Raises OutputError for another's."""
     if ledger.get("mark") is None:
         return None
     refuse_other_inputs(request.out, inputs_of(request), ledger)
     if not stands(request.out, ledger):
         return None
-    plan = Plan.load(state / PLAN_FILE)
+    plan = WorkPlan.load(state / PLAN_FILE)
     return plan if ledger.get("merged") != "yes" or has_parts(plan, state) else None
 
 
-def begin(plan: Plan, request: Request, state: Path, ledger: Ledger) -> None:
+def begin(plan: WorkPlan, request: Request, state: Path, ledger: Ledger) -> None:
     """Put the run on `plan`, with nothing done yet."""
     forget(state, ledger)
     with atomic(state / PLAN_FILE) as beside:
@@ -130,7 +130,7 @@ def stands(out: Path, ledger: Ledger) -> bool:
     return not broken
 
 
-def has_parts(plan: Plan, state: Path) -> bool:
+def has_parts(plan: WorkPlan, state: Path) -> bool:
     """Whether the texts of all work tiles are still there."""
     return all(tile_parts(state, tile).exists() for tile in plan.tiles)
 

@@ -29,7 +29,7 @@ from .lock import held
 from .merge import merge, output_files
 from .outputs import claims
 from .overrides import REDO
-from .plan import Plan
+from .plan import WorkPlan
 from .quarantine import run_alone, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
@@ -208,7 +208,7 @@ def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Cal
         record(ledger, kind, name, result, error)
 
 
-def refuse_without_points(plan: Plan, ledger: Ledger) -> None:
+def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
     """A clear sentence when no file could be read, or none holds a point of the building classes."""
     tasks = [task for task in ledger.tasks() if task.kind == "sort"]
     failed = [task.message for task in tasks if task.state == "failed"]
@@ -229,7 +229,7 @@ def refuse_without_points(plan: Plan, ledger: Ledger) -> None:
         )
 
 
-def summarise(request: Request, plan: Plan, ledger: Ledger, clock: Clock) -> Summary:
+def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) -> Summary:
     clock.lap("merge")
     failed = [task for task in ledger.tasks() if task.state == "failed"]
     broken = tuple((request_name(task.name, request), task.message) for task in failed)
@@ -262,7 +262,7 @@ def mean(values: list) -> float | None:
     return math.fsum(known) / len(known) if known else None
 
 
-def write_run_record(request: Request, plan: Plan, summary: Summary) -> None:
+def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
     """run.json: version, effective settings, inputs, counts, timings: the only file of a run that knows the time."""
     record = {
         "hiproof": __version__,

@@ -29,7 +29,7 @@ from .ground import BareAround, Cells, GroundAround, LowestAround, ground_cells,
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
 from .overrides import load_overrides, load_redo
-from .plan import Job, Plan, load_plan, neighbourhood
+from .plan import Job, WorkPlan, load_plan, neighbourhood
 from .sort import load_points
 
 NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
@@ -38,7 +38,7 @@ NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside
 class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
 
-    def __init__(self, points: dict[str, np.ndarray], model: Terrain | None, plan: Plan):
+    def __init__(self, points: dict[str, np.ndarray], model: Terrain | None, plan: WorkPlan):
         self.roof, self.model, self.plan = points["roof"], model, plan
         self.grid = PointGrid(self.roof)
         self.ground = ground_cells(points["ground"])
@@ -107,7 +107,7 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
     return rows
 
 
-def kept_parts(root: Path, tile: str, plan: Plan) -> dict[int, Fragments]:
+def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
     """The texts of buildings that need not be made again, by number: all of a tile but those whose override changed."""
     redo = load_redo(root).get(tile)
     if redo is None or set(redo) == set(plan.tiles[tile]):
@@ -125,7 +125,7 @@ def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: i
 
 
 def solve_one(
-    plan: Plan, job: Job, surroundings: Surroundings, override: Override | None = None
+    plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None = None
 ) -> tuple[Building, Fragments]:
     """One building and its texts, whatever happens: an exception becomes its status.
 
@@ -156,7 +156,7 @@ def not_seen(job: Job, detail: str) -> Building:
     return Building(job.id, Status.NO_ROOF, detail, footprint=job.area, attributes=attributes)
 
 
-def failed(plan: Plan, job: Job, detail: str) -> tuple[Building, Fragments]:
+def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
     """A building that hiproof failed on, with what the input said of it."""
     attributes = job.footprint.attributes if job.footprint else {}
     building = Building(job.id, Status.INTERNAL_ERROR, masked(detail), footprint=job.area, attributes=attributes)

@@ -30,7 +30,7 @@ from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import lowest_in_cells
 from .overrides import REDO, load_redo
-from .plan import PLAN_FILE, Plan, load_plan
+from .plan import PLAN_FILE, WorkPlan, load_plan
 
 NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
 KINDS = ("roof", "ground", "low")
@@ -71,7 +71,7 @@ class Reach:
 class Reaches:
     """Reach of every work tile, or of those in `only`, that has an area to gather points for, found by place; made once a process."""
 
-    def __init__(self, plan: Plan, only: Sequence[str] | None = None):
+    def __init__(self, plan: WorkPlan, only: Sequence[str] | None = None):
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
         low, high = bounds[:, :2], bounds[:, 2:]
         # a border on a whole metre belongs to the area: one metre more on the upper sides

@@ -21,12 +21,12 @@ def view(
     """
     import webbrowser
 
-    from ..view.server import address_of, server_of
+    from ..view.server import server_of
 
     with server_of(tiles_of(folder), f"hiproof: {folder.resolve().name}", port) as server:
-        typer.echo(f"{address_of(server)} shows {folder}; Ctrl-C ends")
+        typer.echo(f"{server.address} shows {folder}; Ctrl-C ends")
         if browser:
-            webbrowser.open(address_of(server))
+            webbrowser.open(server.address)
         try:
             server.serve_forever()
         except KeyboardInterrupt:

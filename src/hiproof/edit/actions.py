@@ -22,7 +22,7 @@ from ..status import Status
 Record = Mapping[str, Any]
 
 
-def edited(record: Record, asked: Record, points: np.ndarray, settings: Settings, is_measured: bool = True) -> Building:
+def edited(record: Record, asked: Any, points: np.ndarray, settings: Settings, is_measured: bool = True) -> Building:
     """The building of `record` (an object of parameters.jsonl) after the edit `asked`: {"action": ..., "part": ..., ...}.
 
     points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). settings: those of

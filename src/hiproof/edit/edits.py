@@ -45,7 +45,8 @@ class Edits:
         self.path, self.obeyed = folder / FILE, obeyed or {}
         if self.path.is_symlink():
             raise InputError(f"expected a file of its own at {self.path}, got a link; remove it")
-        self.lock, self.stamp = threading.Lock(), None
+        self.lock = threading.Lock()
+        self.stamp: tuple[int, int, int] | None = None
         self.records: dict[str, dict[str, Any]] = {}
         self.refresh()
 

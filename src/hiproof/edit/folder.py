@@ -40,7 +40,7 @@ class RunFolder:
                 f"expected the folder of a finished `hiproof reconstruct` or `hiproof build`, got {folder} without "
                 f"{PARAMETERS}; check the path"
             )
-        self.stamp = None
+        self.stamp: tuple[int, int, int] | None = None
         self.refresh()
 
     def refresh(self) -> None:

@@ -11,10 +11,10 @@ import numpy as np
 import shapely
 
 from .. import stages
-from ..city.plan import PLAN_FILE, Job, Plan
+from ..city.plan import PLAN_FILE, Job, WorkPlan
 from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
-from ..errors import HiproofError
+from ..errors import HiproofError, InputError
 from ..evaluate.run import run_record
 from ..model import Roof
 from ..read.pointcloud import is_url
@@ -43,11 +43,18 @@ class RunPoints:
                 f"the run's points are gone ({gone[0]}{more} is not there): all but refitting works; start where the run "
                 "was started, or bring them back"
             )
-        self.plan = None if self.missing else Plan.load(plan)
-        jobs = self.plan.jobs if self.plan else ()
+        self.known = None if self.missing else WorkPlan.load(plan)
+        jobs = self.known.jobs if self.known else ()
         self.jobs = {job.id: job for job in reversed(jobs)}
-        tiles = self.plan.tiles.items() if self.plan else ()
+        tiles = self.known.tiles.items() if self.known else ()
         self.tile_of = {index: tile for tile, members in tiles for index in members}
+
+    @property
+    def plan(self) -> WorkPlan:
+        """The run's. Raises InputError where there is none, or no cloud to read by it."""
+        if self.known is None:
+            raise InputError(self.missing)
+        return self.known
 
     def of(self, id: str, roof: Roof | None) -> np.ndarray:
         """World points (n, 3) inside the `roof` of building `id`; (0, 3) where the run has none, or where its clouds cannot be read,

@@ -11,7 +11,8 @@ import json
 import secrets
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from email.message import Message
+from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -19,12 +20,12 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from ..errors import HiproofError, InputError, OutputError
 from ..evaluate.report_pictures import RESIDUAL_STOPS
 from ..log import LOGGER
+from ..loopback import LOOPBACK, LoopbackServer, own_hosts
 from ..primitives.catalogue import CATALOGUE
 from ..write.colours import WALL_COLOUR, type_colour
 from .desk import Desk, drawing
 from .edits import OtherVersion
 
-LOOPBACK = "127.0.0.1"
 MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's parts take
 QUIET_S = 60  # until a connection that says nothing is closed
 JSON, HTML, SCRIPT, STYLE, SVG = (
@@ -34,6 +35,7 @@ JSON, HTML, SCRIPT, STYLE, SVG = (
     "text/css; charset=utf-8",
     "image/svg+xml",
 )
+Headers = Mapping[str, str] | Message
 ASSETS = {
     "": ("hiproof.edit", "assets/edit.html", HTML),
     "edit.css": ("hiproof.edit", "assets/edit.css", STYLE),
@@ -82,7 +84,7 @@ class Service:
     def address(self) -> str:
         return f"http://{LOOPBACK}:{self.port}/{self.token}/"
 
-    def answer(self, method: str, target: str, headers: Mapping[str, str], body: bytes = b"") -> Answer:
+    def answer(self, method: str, target: str, headers: Headers, body: bytes = b"") -> Answer:
         """The answer to a request; a wrong one gets a sentence, never a traceback."""
         try:
             refused = self.refusal(method, target, headers)
@@ -102,9 +104,9 @@ class Service:
             LOGGER.error("failed on %s %s; please report this", method, unquote(target)[-80:], exc_info=True)
             return said(500, f"hiproof failed on this ({type(error).__name__}: {error}); nothing was written")
 
-    def refusal(self, method: str, target: str, headers: Mapping[str, str]) -> Answer | None:
+    def refusal(self, method: str, target: str, headers: Headers) -> Answer | None:
         """An answer to those who may not ask, None to those who may."""
-        own = {f"{name}:{self.port}" for name in (LOOPBACK, "localhost")}
+        own = own_hosts(self.port)
         if headers.get("Host") not in own:
             return said(403, f"expected a request to {LOOPBACK}, got another host; use the address that was printed")
         origin = headers.get("Origin")
@@ -196,15 +198,9 @@ class Handler(BaseHTTPRequestHandler):
         LOGGER.debug("%s %s", self.command, arguments[1] if len(arguments) > 1 else "")  # the address holds the token
 
 
-class Server(ThreadingHTTPServer):
-    """Listens at the loopback address alone. Raises InputError where the port is taken."""
-
-    daemon_threads = True
+class Server(LoopbackServer):
+    """The service at a port. Raises InputError where that is taken."""
 
     def __init__(self, service: Service, port: int = 0) -> None:
-        self.service = service
-        try:
-            super().__init__((LOOPBACK, port), Handler)
-        except (OSError, OverflowError) as error:
-            raise InputError(f"expected a free port, got {port}: {error}; leave --port out to get any") from error
-        service.port = self.server_port
+        super().__init__(Handler, port)
+        self.service, service.port = service, self.server_port

@@ -5,14 +5,13 @@ from __future__ import annotations
 import json
 from functools import partial
 from html import escape
-from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from http.server import SimpleHTTPRequestHandler
 from importlib.resources import files
 from pathlib import Path
 
-from ..errors import InputError
+from ..loopback import LoopbackServer, own_hosts
 from ..write.colours import type_colours
 
-HERE = "127.0.0.1"
 PARTS = {
     "style": ("hiproof.view", "view.css"),
     "viewer": ("hiproof.evaluate", "viewer.js"),
@@ -22,20 +21,12 @@ PARTS = {
 }
 
 
-def server_of(tileset: Path, title: str, port: int = 0) -> ThreadingHTTPServer:
+def server_of(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
     """A server of the page at `/` and of the files of the folder `tileset`; 0 is any free `port`.
 
     Raises InputError where the port is taken.
     """
-    handler = partial(Handler, directory=str(tileset), page=page_of(title))
-    try:
-        return ThreadingHTTPServer((HERE, port), handler)
-    except OSError as error:
-        raise InputError(f"expected a free port, got {port}: {error}; try another --port, or leave it out") from error
-
-
-def address_of(server: ThreadingHTTPServer) -> str:
-    return f"http://{HERE}:{server.server_address[1]}/"
+    return LoopbackServer(partial(Handler, directory=str(tileset), page=page_of(title)), port)
 
 
 def page_of(title: str) -> str:
@@ -56,13 +47,14 @@ def page_of(title: str) -> str:
 class Handler(SimpleHTTPRequestHandler):
     """Serves the page and a folder, only to those who call this machine by its own name."""
 
+    server: LoopbackServer
+
     def __init__(self, *args, page: str, **named) -> None:
         self.page = page.encode()
         super().__init__(*args, **named)
 
     def do_GET(self) -> None:
-        # A site elsewhere that gives its name this machine's address must not read the models.
-        if self.headers.get("Host", "").split(":")[0] not in (HERE, "localhost"):
+        if self.headers.get("Host") not in own_hosts(self.server.server_port):
             self.send_error(403)
         elif self.path in ("/", "/index.html"):
             self.send_response(200)
