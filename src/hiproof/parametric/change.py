@@ -35,7 +35,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     if kind != part["type"]:
         part = of_type(with_sizes(part), kind)
     ridge, eave = change.pop("ridge_height", None), change.pop("eave_height", None)
-    placed = {name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change}
+    placed: dict[str, Any] = {name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change}
     if SIDED & change.keys():
         part = side_by_side(part)
     moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN)

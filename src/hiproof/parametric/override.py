@@ -185,7 +185,7 @@ def as_given(override: Override, points: np.ndarray, building: Building, terrain
     area = polygon(rings, "outline")
     ground = given_ground(override, area, local, frame, terrain)
     parts = override.parts
-    if parts is None:
+    if parts is None and override.block_height is not None:
         level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
         parts = [{"type": "flat", "parameters": {}, "position": level, "rotation": 0.0, "outlines": [rings]}]
     place = {"origin": frame.origin.tolist(), "outline": rings, "z_ground": ground.z, "ground_source": ground.source}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -41,7 +41,7 @@ def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> N
 
 
 def refuse_other_names(
-    kind: str, parameters: Mapping[str, float], needed: list[str], allowed: list[str], where: str
+    kind: str, parameters: Mapping[str, float], needed: Sequence[str], allowed: Sequence[str], where: str
 ) -> None:
     """Raise InputError where a parameter is missing or is none of the type's."""
     missing = [name for name in needed if name not in parameters]
