@@ -17,6 +17,7 @@ import numpy as np
 from ..errors import FitError, InputError, SettingsError
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
+from .nearest import nearest_of
 
 FORMAT = "hiproof-roof-types-2"
 INPUT_NAMES = (
@@ -115,12 +116,13 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
 
 
 def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
-    """Log prior (types,) of a choice among `allowed` types only: 0 or minus infinity; empty allows all."""
-    if allowed and not set(allowed) & set(model.types):
+    """Log prior (types,) of a choice among `allowed` types, or those nearest to them, only: 0 or minus infinity; empty allows all."""
+    classes = {nearest_of(name, model.types) for name in allowed}
+    if allowed and not classes & set(model.types):
         raise SettingsError(
             f"expected fit.types to name types the network knows ({', '.join(model.types)}), got {', '.join(allowed)}"
         )
-    return np.array([0.0 if not allowed or name in allowed else -np.inf for name in model.types])
+    return np.array([0.0 if not allowed or name in classes else -np.inf for name in model.types])
 
 
 def run(model: Model, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:

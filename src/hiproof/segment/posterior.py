@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..primitives import CATALOGUE
+from .nearest import nearest_of
 
 if TYPE_CHECKING:
     from ..model import Fit
@@ -69,11 +69,8 @@ def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str,
 
 
 def prior_of(name: str, types: dict[str, float]) -> float:
-    """The probability of a type; of one that the network does not know that of the first of the same CityGML code, else the mean."""
-    if name not in types and name in CATALOGUE:
-        code = CATALOGUE[name].citygml_code
-        name = next((known for known in types if known in CATALOGUE and CATALOGUE[known].citygml_code == code), name)
-    return types.get(name, 1.0 / max(len(types), 1))
+    """The probability of a type; of one that the network does not know that of the nearest, else the mean."""
+    return types.get(nearest_of(name, types), 1.0 / max(len(types), 1))
 
 
 def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]) -> tuple[Fit, dict[str, float]]:

@@ -21,6 +21,7 @@ unite       volumes that only skewed walls keep apart, made one
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
 larger      saw-teeth and gambrels put together
+own         shapes of your own in place of neighbours
 shown       parts that show nowhere go
 clamp       no height far beyond those of the points
 fit         the outcome
@@ -42,6 +43,7 @@ from .larger import put_together
 from .names import part_of
 from .objective import base_shows
 from .outline import outline_of_points
+from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
 from .search import find_volumes
@@ -88,7 +90,8 @@ def fit_building(
         if own
     ]
     parts = that_show(parts, plan, scene)
-    parts = [as_allowed(part, types, points_local) for part in put_together(parts, types)]
+    parts = in_own_shapes(put_together(parts, types), points_local, settings)
+    parts = [as_allowed(part, types, points_local) for part in parts]
     parts = clamped(parts, *(plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max())))
     parts = that_show(parts, plan, scene, widest_m2=0.0)
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)

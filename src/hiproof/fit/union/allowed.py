@@ -12,10 +12,15 @@ from ...primitives.catalogue import CATALOGUE
 from ...primitives.family import COMPONENTS, KIN, SHAPES
 
 
+def components_of(name: str) -> tuple[str, ...]:
+    """What a type that no volume has by itself may be put together from: any shape where nothing is said of it."""
+    return () if CATALOGUE[name].is_of_family else COMPONENTS.get(name, tuple(name for name, _ in SHAPES.values()))
+
+
 def allowed_shapes(types: tuple[str, ...]) -> np.ndarray:
     """Which shapes (2, 3, 3, 2) volumes may have to become parts of these `types` (all where there are none)."""
     allowed = np.zeros((2, 3, 3, 2), bool)
-    names = {part for name in types or CATALOGUE for part in (name, *COMPONENTS.get(name, ()))} | {"flat"}
+    names = {part for name in types or CATALOGUE for part in (name, *components_of(name))} | {"flat"}
     kin = {name: base for base, *others in KIN for name in others}
     for (top, along, across), (shape, _) in SHAPES.items():
         ties = [tied for tied in (0, 1) if shape != "gable" or ("gable", "asymmetric_gable")[tied] in names]

@@ -1,0 +1,79 @@
+"""Shapes of the catalogue that are neither of the family nor put together in `larger`: one part or neighbours that are one of them by their points.
+
+None of the shapes that come with the package is such a one; a shape of your own may be.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import shapely
+
+from ...errors import FitError
+from ...model import Part, Piece
+from ...primitives.catalogue import CATALOGUE
+from ...primitives.contract import Primitive
+from ...primitives.family import COMPONENTS
+from ...settings import Settings
+from .regions import GRID_M, polygons_of
+
+MOST_PARTS = 3
+RECTANGULAR = 0.9  # share of the smallest rectangle around them that the parts roof together
+FAR_M = 0.25  # points farther off are counted as this far
+FARTHER_M = 0.01  # in the mean: one shape may lie so much farther from the points than several, must lie so much nearer than one
+
+
+def in_own_shapes(parts: list[Part], points: np.ndarray, settings: Settings) -> list[Part]:
+    """`parts` with one or several replaced by a part of another shape where the `points` (n, 3) say as much for it."""
+    for name in own_names(settings.fit.types):
+        for count in range(1, min(MOST_PARTS, len(parts)) + 1):
+            for chosen in combinations([part for part in parts if part.type != name], count):
+                one = as_one(CATALOGUE[name], chosen, points, settings)
+                if one is not None:
+                    rest = [part for part in parts if not any(part is other for other in chosen)]
+                    return in_own_shapes([*rest, one], points, settings)
+    return parts
+
+
+def own_names(allowed: tuple[str, ...]) -> list[str]:
+    """Types with other planes than a volume has, for which nothing else is made to find them."""
+    others = [name for name, shape in CATALOGUE.items() if not shape.is_of_family and name not in COMPONENTS]
+    return [name for name in others if not allowed or name in allowed]
+
+
+def as_one(shape: Primitive, chosen: tuple[Part, ...], points: np.ndarray, settings: Settings) -> Part | None:
+    """The `chosen` parts as one of `shape` over what they roof, None where they are none."""
+    outlines = [piece.outline for part in chosen for piece in part.pieces]
+    covered = polygons_of(shapely.union_all(outlines, grid_size=GRID_M))
+    if len(covered) != 1 or covered[0].area < RECTANGULAR * shapely.minimum_rotated_rectangle(covered[0]).area:
+        return None
+    own = points[shapely.intersects_xy(covered[0], points[:, 0], points[:, 1])]
+    found = fitted(shape, own, covered[0], settings)
+    farther = FARTHER_M if len(chosen) > 1 else -FARTHER_M  # fewer parts are worth a little, another name is not
+    return None if found is None or misfit([found], own) > misfit(list(chosen), own) + farther else found
+
+
+def fitted(shape: Primitive, points: np.ndarray, outline: shapely.Polygon, settings: Settings) -> Part | None:
+    """A part of `shape` that roofs `outline` by its points, None where these are too few."""
+    from ..single import fit_roof
+
+    try:
+        fit = fit_roof(points, outline, settings.replace({"fit": {"types": [shape.name], "objective": "likelihood"}}))
+    except FitError:
+        return None
+    variant = shape.variant(fit.parameters)
+    theta = variant.to_theta(fit.parameters, fit.kappa, fit.translation + fit.global_translation)
+    part = variant.part(theta, fit.sigma)
+    if len(part.pieces) == 1:
+        pieces = [Piece(outline, part.pieces[0].planes)]
+    else:
+        cut = [(polygons_of(shapely.intersection(p.outline, outline, grid_size=GRID_M)), p.planes) for p in part.pieces]
+        pieces = [Piece(polygon, planes) for polygons, planes in cut for polygon in polygons]
+    return Part(shape.name, tuple(pieces), part.parameters, part.kappa, part.translation, part.sigma)
+
+
+def misfit(parts: list[Part], points: np.ndarray) -> float:
+    """Mean distance in height (m) of points (n, 3) from the highest of the parts, those far off counted as FAR_M."""
+    z = np.max([part.height_at(points[:, :2]) for part in parts], axis=0)
+    return float(np.minimum(np.abs(points[:, 2] - z), FAR_M).mean())
