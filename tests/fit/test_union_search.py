@@ -17,6 +17,7 @@ from hiproof.fit.union.objective import (
     costs,
     edge_cost,
     objective,
+    walls_of,
 )
 from hiproof.fit.union.refit import refit
 from hiproof.fit.union.scene import nodes
@@ -99,7 +100,7 @@ def test_a_hidden_volume_changes_no_height_and_no_misfit(seed):
     place = rng.integers(1, len(volumes) + 1)
     more = np.insert(volumes, place, hidden, axis=0)
     assert (roof_heights(more, scene.U, scene.V)[0] == roof_heights(volumes, scene.U, scene.V)[0]).all()
-    assert sum(edge_cost(more, scene, place, edge) for edge in range(4)) == 0.0
+    assert sum(edge_cost(more, walls_of(scene), place, edge) for edge in range(4)) == 0.0
     paid = objective(more, scene, np.inf) - objective(volumes, scene, np.inf)
     assert paid == pytest.approx(scene.evidence * volume_cost(hidden), rel=1e-9)
 
@@ -193,7 +194,7 @@ def test_an_edge_costs_what_shows_of_it(seed):
     _, volumes, scene = drawn(seed)
     for k in range(1, len(volumes)):
         for edge in range(4):
-            cost = edge_cost(volumes, scene, k, edge)
+            cost = edge_cost(volumes, walls_of(scene), k, edge)
             assert cost == pytest.approx(slow_edge_cost(volumes, scene, k, edge, 0.5), abs=1e-9)
 
 
@@ -204,7 +205,7 @@ def test_an_edge_costs_nearly_what_dense_samples_of_it_say():
         for k in range(1, len(volumes)):
             for edge in range(4):
                 dense = slow_edge_cost(volumes, scene, k, edge, 0.01)
-                differences.append(abs(edge_cost(volumes, scene, k, edge) - dense))
+                differences.append(abs(edge_cost(volumes, walls_of(scene), k, edge) - dense))
     a_sample = 0.5 * (scene.edge_prices.a_metre + scene.edge_prices.low_a_metre)
     assert np.median(differences) < a_sample
     assert np.mean(np.array(differences) < 3 * a_sample) > 0.95

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import BASE_SHARE, costs, edge_cost
+from .objective import BASE_SHARE, costs, edge_cost, walls_of
 from .volumes import (
     BASE_COST,
     DIRECTION,
@@ -50,7 +50,7 @@ def move_edges(volumes, scene, k, value, reach):
     for j in range(1, len(volumes)):
         fixed += scene.evidence * volume_cost(volumes[j])
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
-    known = False
+    walls, known = walls_of(scene), False
     for edge in range(4):
         places, m = places_of(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
@@ -69,9 +69,9 @@ def move_edges(volumes, scene, k, value, reach):
             if trial >= best:
                 continue
             if not known:
-                charge_all(volumes, scene, int(volumes[k, DIRECTION]), charge, boxes)
+                charge_all(volumes, walls, int(volumes[k, DIRECTION]), charge, boxes)
                 known = True
-            trial = charged(volumes, scene, k, edge, t, trial, best, charge, boxes)
+            trial = charged(volumes, walls, k, edge, t, trial, best, charge, boxes)
             if trial < best:
                 best, chosen = trial, t
         if chosen != start:
@@ -158,15 +158,15 @@ def is_repeated(places, q):
 
 
 @compiled
-def charge_all(volumes, scene, direction, charge, boxes):
+def charge_all(volumes, walls, direction, charge, boxes):
     """Fill the cost of every edge (k, 4) and its bounds (k, 4, 4) in the axes of `direction`."""
-    c, s = scene.turn[direction]
+    c, s = walls.turn[direction]
     for j in range(1, len(volumes)):
         other = int(volumes[j, DIRECTION])
-        cosine = scene.turn[other, 0] * c + scene.turn[other, 1] * s
-        sine = scene.turn[other, 1] * c - scene.turn[other, 0] * s
+        cosine = walls.turn[other, 0] * c + walls.turn[other, 1] * s
+        sine = walls.turn[other, 1] * c - walls.turn[other, 0] * s
         for e in range(4):
-            charge[j, e] = edge_cost(volumes, scene, j, e)
+            charge[j, e] = edge_cost(volumes, walls, j, e)
             boxes[j, e, 0] = boxes[j, e, 2] = np.inf
             boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
             for end in range(2):
@@ -178,7 +178,7 @@ def charge_all(volumes, scene, direction, charge, boxes):
 
 
 @compiled
-def charged(volumes, scene, k, edge, t, trial, best, charge, boxes):
+def charged(volumes, walls, k, edge, t, trial, best, charge, boxes):
     """`trial` and all edges' costs were edge `edge` of volume k at `t`; given up as soon as it is not below `best`."""
     start = volumes[k, U0 + edge]
     low, high = min(start, t) - TOUCH_M, max(start, t) + TOUCH_M
@@ -194,11 +194,11 @@ def charged(volumes, scene, k, edge, t, trial, best, charge, boxes):
                 meets = box[along] <= high and box[along + 1] >= low
                 touched[j, e] = meets and box[cross] <= cross_high + TOUCH_M and box[cross + 1] >= cross_low - TOUCH_M
             if not touched[j, e]:
-                trial += scene.evidence * charge[j, e]
+                trial += walls.evidence * charge[j, e]
     volumes[k, U0 + edge] = t
     for j in range(1, len(volumes)):
         for e in range(4):
             if trial < best and touched[j, e]:
-                trial += scene.evidence * edge_cost(volumes, scene, j, e)
+                trial += walls.evidence * edge_cost(volumes, walls, j, e)
     volumes[k, U0 + edge] = start
     return trial

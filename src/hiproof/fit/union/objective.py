@@ -12,6 +12,7 @@ stand for a valley or a needless cut, and something extra where no corner of the
 from __future__ import annotations
 
 import math
+from collections import namedtuple
 
 import numpy as np
 
@@ -36,6 +37,16 @@ AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
 SAMPLE_M, MOST_SAMPLES = 0.5, 40
 TOUCH_M = 0.03
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
+
+
+# Of a scene what the cost of edges depends on; fewer arrays are fewer to count references of, a million times.
+Walls = namedtuple("Walls", "turn depth corner_u corner_v pitch vertices corners prices evidence")
+
+
+@compiled
+def walls_of(scene):
+    where = scene.corner_u, scene.corner_v, scene.pitch
+    return Walls(scene.turn, scene.depth, *where, scene.vertices, scene.corners, scene.edge_prices, scene.evidence)
 
 
 @compiled
@@ -84,11 +95,12 @@ def objective(volumes, scene, limit):
             bare += scene.weight[i]
     if bare > BASE_SHARE * scene.n:
         total += scene.evidence * BASE_COST
+    walls = walls_of(scene)
     for k in range(1, len(volumes)):
         for edge in range(4):
             if total > limit:
                 return np.inf
-            total += scene.evidence * edge_cost(volumes, scene, k, edge)
+            total += scene.evidence * edge_cost(volumes, walls, k, edge)
     return total if total <= limit else np.inf
 
 
@@ -100,44 +112,35 @@ def base_shows(volumes, scene):
 
 
 @compiled
-def edge_cost(volumes, scene, k, edge):
+def edge_cost(volumes, walls, k, edge):
     """Units of complexity for what shows of one edge (0 u low, 1 u high, 2 v low, 3 v high) of volume k."""
-    direction = int(volumes[k, DIRECTION])
-    at = volumes[k, U0 + edge]
-    any_step, a_metre, low_a_metre, low_step, loose, at_corner = scene.edge_prices
-    first, last, shown, low = what_shows(
-        volumes,
-        k,
-        edge,
-        scene.turn,
-        scene.depth,
-        (scene.corner_u, scene.corner_v, scene.pitch),
-        low_step,
-    )
+    direction, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
+    any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
+    first, last, shown, low = what_shows(volumes, walls, k, edge, low_step)
     if shown < LEAST_STEP_LENGTH_M:
         return 0.0
     cost = any_step + a_metre * shown + low_a_metre * low
-    if not is_vertex_line(scene.vertices[direction, edge // 2], at):
+    if not is_vertex_line(walls.vertices[direction, edge // 2], at):
         return cost + loose
-    return cost - at_corner * ends_at_corners(scene.corners[direction], edge // 2, at, first, last)
+    return cost - at_corner * ends_at_corners(walls.corners[direction], edge // 2, at, first, last)
 
 
 @compiled
-def what_shows(volumes, k, edge, turn, depth, raster, low_step):
+def what_shows(volumes, walls, k, edge, low_step):
     """Of an edge of volume k where its samples inside the outline begin and end, for how many metres it shows there, and for how
-    many with a step of less than `low_step`; `depth` and `raster` are the scene's."""
+    many with a step of less than `low_step`."""
     own, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
     start, end = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     count = min(MOST_SAMPLES, max(2, int((end - start) / SAMPLE_M) + 1))
     step = (end - start) / count
-    (c, s), (corner_u, corner_v, pitch) = (turn[own, 0], turn[own, 1]), raster
+    turn, depth, c, s = walls.turn, walls.depth, walls.turn[own, 0], walls.turn[own, 1]
     first = last = shown = low = 0.0
     m = 0
     for q in range(count):
         t = start + (q + 0.5) * step
         a, b = (at, t) if edge < 2 else (t, at)
-        i = math.floor((c * a - s * b - corner_u) / pitch + 0.5)
-        j = math.floor((s * a + c * b - corner_v) / pitch + 0.5)
+        i = math.floor((c * a - s * b - walls.corner_u) / walls.pitch + 0.5)
+        j = math.floor((s * a + c * b - walls.corner_v) / walls.pitch + 0.5)
         if 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1] and depth[i, j] >= INSIDE_M:
             first, last, m = t if m == 0 else first, t, m + 1
             gap = gap_at(volumes, k, turn, a, b)

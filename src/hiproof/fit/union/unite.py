@@ -15,7 +15,7 @@ import shapely
 
 from .finish import SQUARE, Planes, finished
 from .moves import refit_each, without
-from .objective import base_shows, edge_cost, objective
+from .objective import base_shows, edge_cost, objective, walls_of
 from .plan import Plan
 from .scene import Scene
 from .sides import Side, plan_chords, plan_edges, sides_of
@@ -69,8 +69,8 @@ def drawn(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: Sce
     """The volumes with the sides and planes that suit them; `edges` and `chords` are those of the outline."""
     sides = sides_of(volumes, edges, chords, scene)
     planes = finished(volumes, sides, scene)
-    units = sum(volume_cost(volume) for volume in volumes[1:])
-    units += sum(edge_cost(volumes, scene, k, edge) for k in range(1, len(volumes)) for edge in range(4))
+    walls, units = walls_of(scene), sum(volume_cost(volume) for volume in volumes[1:])
+    units += sum(edge_cost(volumes, walls, k, edge) for k in range(1, len(volumes)) for edge in range(4))
     return Drawn(volumes, sides, planes, sum(own.cost for own in planes) + scene.evidence * units)
 
 
