@@ -113,7 +113,8 @@ def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
     volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
     plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
     side = sides_of(volumes, plan_edges(outline, plan), plan_chords(outline, plan), scene)[1][1]
-    assert side == Side(1.3)
+    assert side == Side(1.3, sigma=side.sigma)
+    assert 0.0 < side.sigma < 0.2  # the gap between the points on either side
 
 
 # --- larger shapes ---------------------------------------------------------------------------------------------------

@@ -240,6 +240,32 @@ def test_errors_are_about_as_large_as_the_deviations_say(shape):
     assert 0.6 < np.sqrt(np.mean(np.square(ratios))) < 1.5
 
 
+def test_a_side_at_a_step_has_a_deviation_and_one_on_the_outline_or_hidden_has_none():
+    """A tower over half of a level roof, and a gabled wing that runs on into a house: its length is no one's to tell."""
+    errors = []
+    for seed in range(8):
+        rng = np.random.default_rng([seed, 5])
+        xy = rng.uniform((-8.0, -4.0), (8.0, 4.0), (600, 2))
+        step = rng.uniform(-3.0, 3.0)
+        z = np.where(xy[:, 0] < step, 9.0, 5.0) + rng.normal(0.0, 0.02, len(xy))
+        parts = fit_building(np.column_stack([xy, z]), shapely.box(-8.0, -4.0, 8.0, 4.0)).roof_parts
+        tower = max(parts, key=lambda part: part.translation[2])
+        deviations = [tower.sigma[name] for name in ("width", "length") if name in tower.sigma]
+        assert len(deviations) == 1
+        widths = [tower.parameters[name] for name in ("width", "length")]
+        errors.append(min(abs(width - 8.0 - step) for width in widths) / deviations[0])
+    assert np.sqrt(np.mean(np.square(errors))) < 2.0
+    xy = rng.uniform((-10.0, -4.0), (10.0, 12.0), (4000, 2))
+    outline = shapely.box(-10.0, -4.0, 10.0, 4.0) | shapely.box(-2.5, 4.0, 2.5, 12.0)
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    house = np.where(np.abs(xy[:, 1]) < 4.0, 9.0 - 0.8 * np.abs(xy[:, 1]), -np.inf)
+    wing = np.where((np.abs(xy[:, 0]) < 2.5) & (xy[:, 1] > 0.0), 7.8 - 0.8 * np.abs(xy[:, 0]), -np.inf)
+    z = np.maximum(house, wing) + rng.normal(0.0, 0.02, len(xy))
+    parts = fit_building(np.column_stack([xy, z]), outline).roof_parts
+    short = min(parts, key=lambda part: part.parameters["width"])
+    assert short.type == "gable" and "length" not in short.sigma and short.sigma["height"] < 0.05
+
+
 # --- types that are allowed ------------------------------------------------------------------------------------------
 
 LISTS = [("flat",), ("gable",), ("hip", "flat"), ("pyramid",), ("monopitch",), ("shed",), ("gambrel", "mansard")]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,9 @@ from .volumes import DIRECTION, LEVEL, SIDES
 LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
 APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
 STRAIGHT = 1e-9
+GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
+REGISTERED_M = 0.01  # standard deviation of a swath's height, which no point of a building tells
+PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it
 
 
 def part_of(
@@ -38,20 +42,29 @@ def part_of(
     turn = common_lean(rows)
     rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ rotation
     rows = turned(rows, turn)
-    low, high = rectangle_of([moved(side, k, turn) for k, side in enumerate(sides)], corners @ rotation.T)
-    member = with_one_apex(level(member_of(rows, low, high)))
-    kappa = math.atan2(rotation[0, 1], rotation[0, 0])
-    centre = plan.frame.xy_local((member.centre @ rotation @ plan.frame.rotation.T)[None])[0]
+    sides = [moved(side, k, turn) for k, side in enumerate(sides)]
+    low, high = rectangle_of(sides, corners @ rotation.T)
+    member = regular(rows, low, high)
+    kappa, turns = math.atan2(rotation[0, 1], rotation[0, 0]), 0
 
-    def in_place(member: Member) -> Member:
+    def in_place(change: Member) -> Member:
+        """The member, or one changed, where it stands and in its canonical direction."""
+        centre = plan.frame.xy_local((change.centre @ rotation @ plan.frame.rotation.T)[None])[0]
         z = plan.frame.origin[2]
-        return replace(member, kappa=kappa, centre=centre, eaves=member.eaves + z, top=member.top + z)
+        change = replace(change, kappa=kappa, centre=centre, eaves=change.eaves + z, top=change.top + z)
+        for _ in range(turns):
+            change = change.turned()
+        return change
 
-    changes = [in_place(changed(member, turned(mode, turn))) for mode in planes.modes]
-    member = in_place(member)
-    for _ in range(member.quarter_turns):
-        member, changes = member.turned(), [change.turned() for change in changes]
-    return member.part(regions, name_among(member.name, allowed), changes)
+    turns = in_place(member).quarter_turns
+    loose, unknown = (
+        [in_place(regular(rows, *ends)) for ends in ends_moved(sides, low, high, known)] for known in (True, False)
+    )
+    lifted = np.tile((0.0, 0.0, REGISTERED_M), (SIDES + 1, 1))
+    changes = [in_place(changed(member, turned(mode, turn))) for mode in (*planes.modes, lifted)] + loose
+    part = in_place(member).part(regions, name_among(member.name, allowed), changes)
+    untold = in_place(member).sigma(unknown, part.type == member.name)
+    return replace(part, sigma={name: value for name, value in part.sigma.items() if name not in untold})
 
 
 def showing(rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -104,6 +117,28 @@ def rectangle_of(sides: list[Side], corners: np.ndarray) -> tuple[np.ndarray, np
     high = np.array([at[k] if sides[k].anchored else min(at[k], most[AXIS[k]]) for k in (1, 3)])
     narrow = high - low < 1e-3
     return np.where(narrow, least, low), np.where(narrow, most, high)
+
+
+def ends_moved(
+    sides: list[Side], low: np.ndarray, high: np.ndarray, known: bool
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """The rectangle from `low` to `high` (2,) after each of its sides moved by its standard deviation, if that is `known`; or else
+    a little, of those that stand where no points tell."""
+    middle = 0.5 * (low + high)
+    for k, side in enumerate(sides):
+        ends = np.array([low, high])
+        given = side.anchored or abs(ends[k % 2, AXIS[k]] - side.at - side.lean * middle[1 - AXIS[k]]) > GIVEN_M
+        if side.sigma == math.inf and not known:
+            ends[k % 2, AXIS[k]] += PROBE_M
+            yield ends[0], ends[1]
+        elif known and not given and 0.0 < side.sigma < math.inf:
+            ends[k % 2, AXIS[k]] += side.sigma
+            yield ends[0], ends[1]
+
+
+def regular(rows: np.ndarray, low: np.ndarray, high: np.ndarray) -> Member:
+    """The member over a rectangle with planes `rows` (5, 3), with eaves and an apex in common where they nearly are."""
+    return with_one_apex(level(member_of(rows, low, high)))
 
 
 def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray) -> Member:

@@ -26,6 +26,11 @@ CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line 
 SHARED_M = 0.3
 LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 0.45, 0.4, 0.1
 FACING = 1e-9
+MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
+NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
+NEEDED, FEWEST_NEEDED = 0.3, 3  # a point that costs so much more without a volume needs it; fewer show nothing
+PLACE_M = 0.03  # standard deviation of where points themselves are in plan: of their swath and in their beam
+LEAST_KNOWN = 0.05  # a place so likely at the end of the way is not known
 
 
 class Lines(NamedTuple):
@@ -46,12 +51,14 @@ class Lines(NamedTuple):
 class Side:
     """A line x = at + lean * y in the axes of its volume's direction: x across the side, y along it.
 
-    `anchored` to the outline: its eave is where the outline is.
+    `anchored` to the outline: its eave is where the outline is. `sigma` (m) is the standard deviation of where it is, 0 where
+    the outline gives it, infinite where no points tell, or where other volumes hide it.
     """
 
     at: float
     lean: float = 0.0
     anchored: bool = False
+    sigma: float = 0.0
 
 
 def sides_of(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: Scene) -> list[list[Side]]:
@@ -106,8 +113,10 @@ def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: 
 
 def side_of(volume: np.ndarray, edge: int, lines: Lines, uv: np.ndarray, gain: np.ndarray, evidence: float) -> Side:
     """The cheapest line for one side of a volume; `gain` (n,) is what its points at `uv` (2, n) cost more within it."""
-    m = cheapest_line(volume, edge, lines, uv, gain, evidence)
-    return Side(float(volume[U0 + edge])) if m < 0 else Side(float(lines.start[m]), float(lines.lean[m]), True)
+    m, shown = cheapest_line(volume, edge, lines, uv, gain, evidence), shows_at(volume, edge, lines, uv, gain)
+    if m < 0:
+        return Side(float(volume[U0 + edge]), sigma=float(sigma_of_place(volume, edge, uv, gain)) if shown else np.inf)
+    return Side(float(lines.start[m]), float(lines.lean[m]), True, 0.0 if shown else np.inf)
 
 
 @compiled
@@ -134,6 +143,38 @@ def cheapest_line(volume, edge, lines, uv, gain, evidence):
         if price < cheapest:
             best, cheapest = m, price
     return best
+
+
+@compiled
+def shows_at(volume, edge, lines, uv, gain):
+    """Whether points next to an edge of the volume, or to the outline where it lies beyond that, need the volume."""
+    axis, sign = edge // 2, -1.0 if edge % 2 == 0 else 1.0
+    at = min(max(volume[U0 + edge], lines.x_edges.min()), lines.x_edges.max())
+    x, y = uv[axis], uv[1 - axis]
+    count = 0
+    for i in range(len(x)):
+        within = volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis] and -MOVED_M < sign * (x[i] - at) <= 0.0
+        count += int(within and gain[i] < -NEEDED)
+    return count >= FEWEST_NEEDED
+
+
+@compiled
+def sigma_of_place(volume, edge, uv, gain):
+    """Standard deviation (m) of where the edge of a volume is, by what its points cost were it elsewhere within MOVED_M; infinite
+    where they do not tell, or where another place is better than the volume's own."""
+    axis, at = edge // 2, volume[U0 + edge]
+    sign = -1.0 if edge % 2 == 0 else 1.0
+    x, y = uv[axis], uv[1 - axis]
+    near = (y >= volume[V0 - 2 * axis]) & (y <= volume[V1 - 2 * axis]) & (np.abs(x - at) < MOVED_M)
+    off, gain = sign * (x[near] - at), gain[near]
+    cost = np.empty(2 * MOVES + 1)
+    for m in range(len(cost)):
+        cost[m] = gain[off <= (m - MOVES) * MOVED_M / MOVES].sum()
+    weight = np.exp(-NATS_A_POINT * (cost - cost.min()))
+    if max(weight[0], weight[-1]) > LEAST_KNOWN * weight.max():
+        return np.inf
+    moved = (np.arange(len(cost)) - MOVES) * MOVED_M / MOVES
+    return np.sqrt((weight * moved**2).sum() / weight.sum() + PLACE_M**2)
 
 
 @compiled
