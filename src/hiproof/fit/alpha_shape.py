@@ -32,7 +32,9 @@ def alpha_shape(xy: np.ndarray, radius: float | None = None, holes: bool = False
     """
     from scipy.spatial import Delaunay, QhullError
 
-    xy = np.asarray(xy, float)
+    xy = np.asarray(xy, float).reshape(-1, 2)
+    origin = np.floor(xy.mean(axis=0)) if len(xy) else np.zeros(2)
+    xy = xy - origin  # far from the origin rounding lets triangles overlap
     try:
         triangles = xy[Delaunay(xy).simplices]
     except (QhullError, ValueError) as error:
@@ -46,4 +48,4 @@ def alpha_shape(xy: np.ndarray, radius: float | None = None, holes: bool = False
         raise FitError(f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger one")
     shape = shapely.coverage_union_all(shapely.polygons(kept))
     largest = max(shapely.get_parts(shape), key=lambda polygon: polygon.area)
-    return largest if holes else shapely.Polygon(largest.exterior)
+    return shapely.transform(largest if holes else shapely.Polygon(largest.exterior), lambda corners: corners + origin)

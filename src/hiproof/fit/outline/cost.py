@@ -34,8 +34,9 @@ def drawing_of(lines, kappa, border):
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or area_of(corners) <= 0.0:
         return Drawing(lines, kappa, corners, own, np.inf)
+    sides = np.arange(len(lines))
     for k in range(len(own)):
-        own[k] = point_cost(border.x[k], border.y[k], corners, border.blur, border.stray)
+        own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.blur, border.stray)
     misfit = border.density * area_of(corners) + own.sum()
     return Drawing(lines, kappa, corners, own, misfit + structure_cost(lines, kappa, border))
 
@@ -56,15 +57,21 @@ def structure_cost(lines, kappa, border):
 
 
 @compiled
-def point_cost(x, y, corners, blur, stray):
-    """Minus the logarithm of how likely a point at x, y is, against one deep inside."""
-    n, inside, nearest = len(corners), False, np.inf
-    for i in range(n):
-        k = i + 1 if i + 1 < n else 0
-        x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[k, 0], corners[k, 1]
+def point_cost(x, y, corners, sides, blur, stray):
+    """Minus the logarithm of how likely a point at x, y is, against one deep inside; `sides` are all that come near its y."""
+    inside, reach = False, SURE * blur
+    nearest = reach * reach
+    for i in sides:
+        k = i + 1 if i + 1 < len(corners) else 0
+        y0, y1 = corners[i, 1], corners[k, 1]
+        if (y < y0 - reach and y < y1 - reach) or (y > y0 + reach and y > y1 + reach):  # neither near nor crossed
+            continue
+        x0, x1 = corners[i, 0], corners[k, 0]
         dx, dy = x1 - x0, y1 - y0
         if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / dy * dx:
             inside = not inside
+        if (x < x0 - reach and x < x1 - reach) or (x > x0 + reach and x > x1 + reach):
+            continue
         t = min(max(((x - x0) * dx + (y - y0) * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
         squared = (x0 + t * dx - x) ** 2 + (y0 + t * dy - y) ** 2
         nearest = min(nearest, squared)
@@ -72,6 +79,18 @@ def point_cost(x, y, corners, blur, stray):
     if depth >= SURE:
         return 0.0 if inside else -math.log(stray)
     return -math.log(stray + (1.0 - stray) * 0.5 * math.erfc((-depth if inside else depth) / math.sqrt(2.0)))
+
+
+@compiled
+def sides_near(corners, low, high):
+    """Which sides (m,) of the polygon come between y = low and high."""
+    found, m = np.empty(len(corners), np.int64), 0
+    for i in range(len(corners)):
+        k = i + 1 if i + 1 < len(corners) else 0
+        if max(corners[i, 1], corners[k, 1]) >= low and min(corners[i, 1], corners[k, 1]) <= high:
+            found[m] = i
+            m += 1
+    return found[:m]
 
 
 @compiled
@@ -88,13 +107,15 @@ def cost_of_change(lines, drawing, i, count, fresh, border):
         return np.inf
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
     for k in range(count + 1 + fresh):
-        x, y = old[(i + k) % len(old)] if k <= count else corners[k - count - 1]
+        ring, at = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
+        x, y = ring[at, 0], ring[at, 1]
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
     reach = SURE * border.blur
+    sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
     misfit = border.density * (area - area_of(old))
     for k in range(len(border.x)):
         x, y = border.x[k], border.y[k]
         if x_low - reach < x < x_high + reach and y_low - reach < y < y_high + reach:
-            misfit += point_cost(x, y, corners, border.blur, border.stray) - drawing.own[k]
+            misfit += point_cost(x, y, corners, sides, border.blur, border.stray) - drawing.own[k]
     structure = structure_cost(lines, drawing.kappa, border) - structure_cost(drawing.lines, drawing.kappa, border)
     return drawing.cost + misfit + structure

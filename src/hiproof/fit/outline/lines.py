@@ -48,20 +48,24 @@ def find_corners(lines, corners, fresh=-1):
         i = (k - 1) % n
         for j in range(n):
             apart = (j - i) % n
-            if 1 < apart < n - 1 and cross(corners[i], corners[(i + 1) % n], corners[j], corners[(j + 1) % n]):
+            if 1 < apart < n - 1 and cross(corners, i, (i + 1) % n, j, (j + 1) % n):
                 return False
     return True
 
 
 @compiled
-def cross(a, b, c, d):
-    """Whether the segments a-b and c-d cross."""
-    return left_of(a, b, c) * left_of(a, b, d) < 0.0 and left_of(c, d, a) * left_of(c, d, b) < 0.0
+def cross(corners, a, b, c, d):
+    """Whether the segments between the corners a and b and between c and d cross."""
+    return (
+        left_of(corners, a, b, c) * left_of(corners, a, b, d) < 0.0
+        and left_of(corners, c, d, a) * left_of(corners, c, d, b) < 0.0
+    )
 
 
 @compiled
-def left_of(a, b, c):
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+def left_of(corners, a, b, c):
+    u, v = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
+    return u * (corners[c, 1] - corners[a, 1]) - v * (corners[c, 0] - corners[a, 0])
 
 
 @compiled
