@@ -1,6 +1,7 @@
 """Laws of the family of roof shapes: one surface, whichever way it is turned, named or written down."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -155,6 +156,24 @@ def test_a_member_like_a_shape_is_described_in_its_words(shape):
             period = math.pi if shape.half_turn_symmetric else 2 * math.pi
             assert math.remainder(kappa_named - kappa, period) == pytest.approx(0.0, abs=1e-9)
             assert place == pytest.approx(translation)
+
+
+@pytest.mark.parametrize("lower", [0, 1])
+def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes_alone(lower):
+    """Which eave is the lower decides from where it is described; a change of a millimetre must not."""
+    member = planted_gable(eaves=(3.0, 3.0 + 1e-4 * (1 - 2 * lower)))
+    changes = [
+        replace(member, eaves=member.eaves + change) for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])
+    ]
+    sigma = member.part([shapely.Polygon(rectangle_of(member))], None, changes).sigma
+    assert 0.0 < max(sigma.values()) < 0.01
+
+
+def planted_gable(eaves):
+    """An asymmetric gable in its canonical direction with these eaves in front and at the back."""
+    parameters = {"width": 8.0, "length": 12.0, "pitch_front": 50.0, "pitch_back": 30.0}
+    parameters |= {"eave_front": eaves[0] - 3.0, "eave_back": eaves[1] - 3.0}
+    return member_of("asymmetric_gable", parameters, 0.4, np.array([1.0, 2.0, 3.0])).canonical()
 
 
 def test_every_shape_of_the_family_has_its_own_planes_or_is_kin():

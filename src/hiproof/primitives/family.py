@@ -27,7 +27,7 @@ import shapely
 from ..errors import FitError
 from ..model import Part, Piece
 from .catalogue import CATALOGUE, get
-from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, LEFT, LEVEL, RIGHT, Primitive
+from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, RIGHT, Primitive
 
 SIDES = ("left", "right", "front", "back")
 AXIS = np.array([0, 0, 1, 1])
@@ -39,6 +39,7 @@ QUARTER_TURN = [
     LEFT,
 ]  # which side becomes left, right, front, back when the axes turn by 90 degrees
 SAME = 1e-9
+ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
 HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
 
 
@@ -213,8 +214,13 @@ class Member:
         q = shape.from_member(self)
         return np.array([*self.centre, self.kappa, self.half[1], self.half[0], *q, *[0.0] * (4 - len(q))])
 
-    def in_words_of(self, shape: Primitive) -> tuple[dict[str, float], float, np.ndarray]:
-        """(parameters by name, kappa, T_L (3,)) of the catalogue's `shape` that this member is."""
+    def in_words_of(self, shape: Primitive, kappa: float | None = None) -> tuple[dict[str, float], float, np.ndarray]:
+        """(parameters by name, kappa, T_L (3,)) of the catalogue's `shape` that this member is; seen from `kappa` or its opposite if
+        that is told, so that a small change does not turn it round."""
+        for member in (self, self.turned().turned()) if kappa is not None else ():
+            theta = member.theta(shape)
+            if math.cos(theta[KAPPA] - kappa) > ALONG:
+                return shape.from_theta(theta)
         return shape.from_theta(shape.canonical_theta(self.theta(shape)))
 
     def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
@@ -238,11 +244,11 @@ class Member:
 
     def sigma(self, changes: list[Member], as_catalogue: bool = True) -> dict[str, float]:
         """Standard deviations by parameter (and t_z) where `changes` are this member after independent changes of one each."""
-
         shape = self.in_catalogue if as_catalogue else None
+        kappa = None if shape is None else shape.canonical_theta(self.theta(shape))[KAPPA]
 
         def values(member: Member) -> np.ndarray:
-            described = member.side_by_side() if shape is None else member.in_words_of(shape)
+            described = member.side_by_side() if shape is None else member.in_words_of(shape, kappa)
             return np.array([*described[0].values(), described[2][2]])
 
         centre = values(self)
