@@ -85,7 +85,7 @@ def las_crs(header: laspy.LasHeader, path: str | Path):
 def las_chunks(
     path: str | Path,
     chunk_points: int,
-    box: tuple[float, float, float, float] | None,
+    box: tuple[float, float, float, float] | None = None,
     runs: np.ndarray | None = None,
 ) -> Iterator[Chunk]:
     """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the box are decoded.

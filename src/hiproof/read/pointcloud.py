@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import glob
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -21,10 +21,27 @@ from .crs import described, parse_crs, same_heights, same_horizontal, units_of, 
 from .plausible import MOST_HEIGHT, MOST_PLAN, is_plausible
 from .remote import is_url
 
-LAS_SUFFIXES = (".las", ".laz")
+
+class Reader(NamedTuple):
+    """A kind of point file: what it is called, its endings, the bytes that its files start with (none in text), and how it is read:
+    chunks of a file's coordinates (n, 3) and classes (n,) or None, of so many points at most."""
+
+    name: str
+    suffixes: tuple[str, ...]
+    start: bytes
+    chunks: Callable[[str | Path, int], Iterator[las.Chunk]]
+
+
 TEXT_SUFFIXES = (".xyz", ".txt", ".csv", ".pts", ".asc", ".xyzc")
-POINT_SUFFIXES = (*LAS_SUFFIXES, *TEXT_SUFFIXES, ".ply")
-FORMATS = "LAS, LAZ, COPC, PLY or text (" + " ".join(TEXT_SUFFIXES) + ")"
+READERS = {
+    "las": Reader("LAS, LAZ, COPC", (".las", ".laz"), b"LASF", las.las_chunks),
+    "ply": Reader("PLY", (".ply",), b"ply", ply.ply_chunks),
+    "text": Reader("text (" + " ".join(TEXT_SUFFIXES) + ")", TEXT_SUFFIXES, b"", text.text_chunks),
+}
+"""A further kind of point file is a module and a line here. Only "las" is asked for more: parts of a file, a CRS."""
+
+POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
+FORMATS = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
 PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
 CHUNK_POINTS = 250_000  # five of LASzip's own chunks, and 30 MB while they are sorted
 
@@ -82,7 +99,7 @@ def iter_points(
     if kind == "las":
         chunks = las.las_chunks(path, most, None if box is None else box_in_file(box, units), runs)
     else:
-        chunks = (ply.ply_chunks if kind == "ply" else text.text_chunks)(path, most)
+        chunks = READERS[kind].chunks(path, most)
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)
@@ -165,33 +182,30 @@ def expand_path(path: str | Path) -> list[str | Path]:
 
 
 def file_kind(path: str | Path) -> str:
-    """ "las", "ply" or "text", from the first bytes and the ending. Raises InputError for anything else.
+    """One of READERS, by the first bytes, else the ending. Raises InputError for anything else.
 
     An address is not opened for it: it goes by its ending, and is LAS without one of the others'.
     """
     if is_url(path):
         suffix = Path(urlsplit(str(path)).path).suffix.lower()
-        return "ply" if suffix == ".ply" else "text" if suffix in TEXT_SUFFIXES else "las"
+        return next((kind for kind, reader in READERS.items() if suffix in reader.suffixes), "las")
     try:
         with open(path, "rb") as file:
-            head = file.read(4)
+            head = file.read(8)
     except OSError as error:
         raise InputError(f"expected a readable point cloud at {path}, got: {error.strerror or error}") from error
     suffix = Path(path).suffix.lower()
     if not head:
         raise InputError(f"expected points in {path}, got an empty file; copy or download it again")
-    if head == b"LASF":
-        return "las"
-    if head[:3] == b"ply":
-        return "ply"
-    if suffix in TEXT_SUFFIXES:
-        return "text"
+    for kind, reader in READERS.items():
+        if head.startswith(reader.start) if reader.start else suffix in reader.suffixes:
+            return kind
     for start, program in PACKED.items():
         if head.startswith(start):
             raise InputError(f"expected {FORMATS} at {path}, got a packed file; unpack it first: {program} {path}")
     got = "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
     raise InputError(
-        f"expected {FORMATS} at {path}, got {got} that starts with {head!r}; "
+        f"expected {FORMATS} at {path}, got {got} that starts with {head[:4]!r}; "
         "if it is text with x y z on each line, rename it to .xyz"
     )
 
