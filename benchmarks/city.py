@@ -70,7 +70,7 @@ def city_files(work: Path, buildings: int) -> tuple[list[str], str]:
     if not (folder / "complete").exists():
         shutil.rmtree(folder, ignore_errors=True)
         for tile in write_city(folder, City(buildings)):
-            print(f"  simulated {tile['tile']}: {tile['buildings']} buildings, {tile['points']} points", flush=True)
+            print(f"  simulated {tile.tile}: {tile.buildings} buildings, {tile.points} points", flush=True)
         (folder / "complete").touch()
     return sorted(str(path) for path in (folder / "tiles").glob("*.laz")), str(folder / "footprints.gpkg")
 

@@ -51,6 +51,19 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
     assert len(solids) == len(was) and not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
 
 
+def test_on_a_level_roof_a_dormer_is_a_block_that_a_hand_can_size(desk):
+    start = desk.building("house-3")  # flat indeed
+    block = edited(desk, start["parts"], id="house-3", action="dormer", part=0)
+    assert [part["type"] for part in block["parts"]] == ["flat", "flat"]
+    grown = (
+        block["figures"]["ridge_height"]
+        - edited(desk, start["parts"], id="house-3", action="show")["figures"]["ridge_height"]
+    )
+    assert grown == pytest.approx(2.5, abs=1e-3)
+    wide = edited(desk, block["parts"], id="house-3", action="change", part=1, change={"width": 4.0})
+    assert wide["figures"]["volume_m3"] > block["figures"]["volume_m3"] + 1.0
+
+
 def test_ground_and_leaving_out_are_kept_in_place_of_each_other(desk):
     start = desk.building(ID)
     assert start["said"] == {"z_ground": None, "leave_out": None}
@@ -142,7 +155,6 @@ def test_types_are_tried_and_the_right_one_wins(desk):
         ({"action": "merge", "part": 0, "other": 0}, "got one twice"),
         ({"action": "split", "part": 0, "share": 2.0}, "between 0 and 1"),
         ({"action": "split", "part": 0, "side": "height"}, "length or width"),
-        ({"action": "dormer", "part": 0}, "a level roof there"),
         ({"action": "refit", "held": {"0": ["colour"]}}, "got colour"),
         ({"action": "refit", "held": {"first": []}}, "names by part"),
     ],

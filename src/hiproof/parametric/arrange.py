@@ -20,7 +20,8 @@ FAR_M = 1e4  # m; beyond any building, for a half plane drawn as a rectangle
 # m; an ordinary dormer: a window wide, its wall above the slope, its gable
 DORMER_WIDTH_M, DORMER_WALL_M, DORMER_RISE_M = 1.8, 1.0, 0.6
 DORMER_DEPTH_M = (1.0, 4.0)  # m, least and most; on a flat slope it would reach through the whole roof
-LEVEL = 0.05  # a slope that a dormer cannot run into
+LEVEL = 0.05  # a slope that a dormer cannot run into; a block stands there
+BLOCK_M, BLOCK_HEIGHT_M = 3.0, 2.5  # m; a lift's or a staircase's head
 
 
 def split_part(part: dict[str, Any], side: str = "length", share: float = 0.5) -> list[dict[str, Any]]:
@@ -70,7 +71,7 @@ def merged_parts(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
 
 def dormer_on(roof: Roof, index: int, place: tuple[float, float] | None = None) -> dict[str, Any]:
     """A gable dormer on part `index`, its middle at `place` (x, y about the roof's origin) or half-way up a slope, its ridge
-    running into the slope. Raises InputError where the part is level there."""
+    running into the slope; where the part is level a flat block, turned as the part is."""
     part = roof.parts[index]
     x, y = place if place is not None else middle_of_slope(part)
     around = np.array([[x, y], [x + 0.01, y], [x, y + 0.01]])
@@ -78,7 +79,12 @@ def dormer_on(roof: Roof, index: int, place: tuple[float, float] | None = None) 
     slope = np.array([z[1] - z[0], z[2] - z[0]]) / 0.01
     steepness = float(np.hypot(*slope))
     if not steepness > LEVEL:
-        raise InputError("expected a slope for a dormer to stand on, got a level roof there; choose another place")
+        return {
+            "type": "flat",
+            "parameters": {"width": BLOCK_M, "length": BLOCK_M},
+            "position": [float(x), float(y), float(z[0]) + BLOCK_HEIGHT_M],
+            "rotation": math.degrees(part.kappa),
+        }
     depth = float(np.clip((DORMER_WALL_M + DORMER_RISE_M) / steepness, *DORMER_DEPTH_M))
     eave = float(z[0]) - 0.5 * depth * steepness + DORMER_WALL_M
     return {
