@@ -217,8 +217,9 @@ class Member:
     def in_words_of(self, shape: Primitive, kappa: float | None = None) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of the catalogue's `shape` that this member is; seen from `kappa` or its opposite if
         that is told, so that a small change does not turn it round."""
-        for member in (self, self.turned().turned()) if kappa is not None else ():
-            theta = member.theta(shape)
+        if kappa is not None:
+            opposite = math.cos(self.kappa - kappa) < 0.0
+            theta = (self.turned().turned() if opposite else self).theta(shape)
             if math.cos(theta[KAPPA] - kappa) > ALONG:
                 return shape.from_theta(theta)
         return shape.from_theta(shape.canonical_theta(self.theta(shape)))

@@ -62,8 +62,9 @@ def part_of(
     )
     lifted = np.tile((0.0, 0.0, REGISTERED_M), (SIDES + 1, 1))
     changes = [in_place(changed(member, turned(mode, turn))) for mode in (*planes.modes, lifted)] + loose
-    part = in_place(member).part(regions, name_among(member.name, allowed), changes)
-    untold = in_place(member).sigma(unknown, part.type == member.name)
+    member = in_place(member)
+    part = member.part(regions, name_among(member.name, allowed), changes)
+    untold = member.sigma(unknown, part.type == member.name)
     return replace(part, sigma={name: value for name, value in part.sigma.items() if name not in untold})
 
 
