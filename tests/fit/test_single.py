@@ -47,6 +47,27 @@ def test_errors_are_a_few_standard_deviations():
     assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.5)
 
 
+@pytest.mark.parametrize(("name", "seed"), [("gable", 0), ("hip", 0), ("corner_mansard", 1)])
+def test_a_wide_steep_roof_among_outliers_keeps_its_type(name, seed):
+    """Starts were too large where outliers lie around, and too far apart in slope: other types won."""
+    width, length, height = (10.6, 22.0, 5.4) if name == "corner_mansard" else (11.8, 25.0, 5.9)
+    theta = typical_theta(name, width, length, height, kappa=0.97)
+    points = points_on(name, theta, density=5.0, noise_m=0.08, outlier_share=0.05, seed=seed)
+    assert fit_roof(points).type == name
+
+
+def test_a_gable_is_one_wherever_its_ridge_lies():
+    offset = CATALOGUE["gable"].variant({"width": 0, "length": 0, "height": 0, "ridge_offset": 0})
+    truth = {"width": 9.0, "length": 13.0, "height": 3.5, "ridge_offset": 1.2}
+    theta = offset.to_theta(truth, 0.4, np.array([0.6, -0.3, 5.0]))
+    rng = np.random.default_rng(0)
+    uv = rng.uniform((-6.5, -4.5), (6.5, 4.5), (700, 2))
+    c, s = np.cos(0.4), np.sin(0.4)
+    xy = uv @ np.array([[c, s], [-s, c]]) + theta[:2]
+    fit = fit_roof(np.column_stack([xy, offset.height_at(theta, xy) + rng.normal(0, 0.05, len(xy))]))
+    assert fit.type == "gable" and fit.parameters == pytest.approx(truth, abs=0.15)
+
+
 def test_order_of_points_does_not_matter(gable_points):
     shuffled = np.random.default_rng(0).permutation(gable_points)
     first, second = fit_roof(gable_points), fit_roof(shuffled)

@@ -111,6 +111,10 @@ class Search:
         )
         return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations)
 
+    def coarsely_fitted(self, candidates: Candidates) -> Candidates:
+        """The best two of each type after coarse steps on the thinned points."""
+        return self.best_of_type(self.minimised(self.thinned, candidates, COARSE, 4, 0.5), 2, self.slack)
+
     def roughly_fitted(self, candidates: Candidates) -> Candidates:
         """The best two of each type after medium steps on the thinned points."""
         return self.best_of_type(self.minimised(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack)
@@ -158,7 +162,7 @@ def fit_likelihood(
     """
     search = new_search(points, types, outline is None)
     basic = search.roughly_fitted(vote_starts(search, outline))
-    candidates = basic.joined(search.roughly_fitted(derived_starts(search, basic)))
+    candidates = basic.joined(search.roughly_fitted(search.coarsely_fitted(derived_starts(search, basic))))
     candidates = candidates.chosen(np.array([search.shapes[kind].name in types for kind in candidates.kinds]))
     candidates = candidates.within(ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points))
     candidates = search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
@@ -212,7 +216,7 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
     """
     rectangles = np.array(
         [
-            rectangle_in_direction(search.thinned.points, kappa, 0.02)
+            rectangle_in_direction(search.thinned.points, kappa, 0.03)
             if outline is None
             else outline_rectangle(outline, kappa)
             for kappa in directions(search, outline)
@@ -221,7 +225,7 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
     kinds, thetas, votes = kernel.vote_each(search.thinned, search.tables, rectangles)
     few_votes_less = 0.2 * len(search.thinned.points)
     candidates = search.best_of_type(Candidates(kinds, thetas, -votes), 8, few_votes_less)
-    return search.best_of_type(search.minimised(search.thinned, candidates, COARSE, 4, 0.5), 2, search.slack)
+    return search.coarsely_fitted(candidates)
 
 
 def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:

@@ -81,7 +81,7 @@ class Vote:
     """Start values by a vote of the points: which quarter turns, slopes and shifts of the ridge (shares of V) are tried."""
 
     turns: int = 2
-    slopes: tuple[float, ...] = (0.08, 0.2, 0.32, 0.45, 0.58, 0.72, 0.9, 1.15)
+    slopes: tuple[float, ...] = (0.08, 0.2, 0.32, 0.45, 0.58, 0.72, 0.86, 1.0, 1.2)
     shifts: tuple[float, ...] = (0.0,)
 
 
