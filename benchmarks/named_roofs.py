@@ -21,7 +21,6 @@ from hiproof import read_footprints, read_points, reconstruct
 from hiproof.model import Building, Footprint, Part, Roof
 from hiproof.read.assign import points_of_footprints
 from hiproof.simulate import SimBuilding, building_of, demo_files
-from hiproof.stages import moved
 
 from .compounds import compared
 from .judging import SHARED
@@ -46,7 +45,7 @@ def parts_in(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
     shift = roof.frame.origin - origin
     return tuple(
         dataclasses.replace(
-            part, translation=part.translation + shift, pieces=tuple(moved(piece, shift) for piece in part.pieces)
+            part, translation=part.translation + shift, pieces=tuple(piece.moved(shift) for piece in part.pieces)
         )
         for part in roof.parts
     )

@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src/hiproof"
 PAGE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
 DOORS = {("model",)}  # its methods open rooms above it when a person calls them, as the page says
-SELF_EVIDENT = {"cli", "primitives", "compiled"}  # a file a command, a shape, a word of the text
+SELF_EVIDENT = {"cli", "primitives"}  # a file a command, a file a shape
 NOT_DRAWN = {"__init__", "__main__"}  # what the package offers, and what `python -m` calls
 
 

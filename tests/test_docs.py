@@ -135,6 +135,15 @@ def test_the_sites_generated_pages_tell_every_command_option_and_setting():
         assert [name for name in values if f"| `{name}` |" not in settings] == []
 
 
+def test_every_named_number_has_a_reason():
+    """Its unit and what it does, behind it, above it or below it: the site's page of constants is made of these."""
+    from docs.generated import constants
+
+    found = constants()
+    assert len(found) > 200
+    assert [f"{c.file}: {', '.join(c.names)}" for c in found if len(c.why) < 4] == []
+
+
 def test_importing_brings_neither_torch_nor_dask_nor_the_compiler():
     code = "import sys, hiproof; print([m for m in ('torch', 'dask', 'numba', 'scipy', 'onnxruntime') if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=ENVIRONMENT, check=True)

@@ -1,8 +1,8 @@
-"""The only place that shifts and scales coordinates.
+"""The only place that shifts, turns and scales coordinates.
 
 Files count in the unit of their reference system; `Units` makes them metres where they are read and the files' own
 again where they are written. In between, the world is in metres, and each building has a local origin, so that all
-geometry runs on small float64.
+geometry runs on small float64; the search for its roof turns that into the roof's own axes.
 """
 
 from dataclasses import dataclass
@@ -76,3 +76,20 @@ class LocalFrame:
         """Shift (n, 2) or (n, 3) local coordinates back to the world."""
         local = np.asarray(local, float)
         return local + self.origin[: local.shape[-1]]
+
+
+@dataclass(frozen=True)
+class PlanFrame:
+    """A roof's own axes: origin (3,) in local coordinates, `rotation` (2, 2) with uv = rotation @ (xy - origin)."""
+
+    origin: np.ndarray
+    rotation: np.ndarray
+
+    def to_plan(self, xyz_local: np.ndarray) -> np.ndarray:
+        """(n, 3) local coordinates to (n, 3) u, v, z."""
+        shifted = xyz_local - self.origin
+        return np.column_stack([shifted[:, :2] @ self.rotation.T, shifted[:, 2]])
+
+    def xy_local(self, uv: np.ndarray) -> np.ndarray:
+        """(n, 2) plan coordinates back to local x, y."""
+        return uv @ self.rotation + self.origin[:2]

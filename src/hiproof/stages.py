@@ -229,7 +229,7 @@ def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Rec
     found, types = most_probable(fit, recognised.types)
     shift = found.global_translation
     part = dataclasses.replace(
-        found.part, translation=found.part.translation + shift, pieces=tuple(moved(p, shift) for p in found.part.pieces)
+        found.part, translation=found.part.translation + shift, pieces=tuple(p.moved(shift) for p in found.part.pieces)
     )
     outline = shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
     return Fitted((part,), outline, found.value, types)
@@ -249,13 +249,6 @@ def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, .
         return asked
     likely = [name for name, share in recognised.items() if share >= LIKELY and name in (asked or recognised)]
     return tuple(likely) or asked
-
-
-def moved(piece: Piece, shift: np.ndarray) -> Piece:
-    """A piece moved by `shift` (3,): its outline, and its planes with it."""
-    planes = piece.planes.copy()
-    planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
-    return Piece(shapely.transform(piece.outline, lambda xy: xy + shift[:2]), planes)
 
 
 def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:

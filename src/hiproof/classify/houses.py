@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
+from ..fit.direction import quarter_gap, support_of
 from .surfaces import Surfaces, surfaces_of
 
 REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
@@ -23,8 +24,10 @@ UPRIGHT = 0.25  # cosine of the slope from which a surface is a wall
 HOLD = 3.0  # what a bond that holds counts against one that does not
 AWAY_M = 0.5  # of a line: nearer to it is its own border
 SHORT_M = 0.3  # bonds count by their shortness down to this
+# m between the lines that cuts are looked for on, at first and when refined; m of a line judged as one stretch
 LINE_M, FINE_LINE_M, STRETCH_M = 0.25, 0.1, 0.5
 NEXT_M = 2.0  # what lies so far from a line tells what is on its sides
+# degrees that a cut is turned by, and m that it is moved by at most, when it is refined
 FINE_TURNS_DEG, FINE_SHIFT_M = (-4.0, -2.0, 0.0, 2.0, 4.0), 0.6
 LEAST_APART, LEAST_GAIN, LEAST_LENGTH_M = (
     0.7,
@@ -33,8 +36,9 @@ LEAST_APART, LEAST_GAIN, LEAST_LENGTH_M = (
 )  # of a run: share of stretches that nothing holds; gain a metre
 COARSE = 0.5  # of these two for lines that are not yet in their place
 LEAST_HOUSE_M2, LEAST_DEPTH_M = 25.0, 4.0  # of roof on either side, and by the metre of the cut
-TRIES = 20
-LIKE_DEG, LIKE_M = 12.0, 1.0
+TRIES = 20  # cuts tried of an area, the best first
+LIKE_DEG, LIKE_M = 12.0, 1.0  # degrees and m within which two cuts are one
+# degrees within which edges and slopes support a direction, and between two directions; how many at most; least share of all support
 DIRECTION_DEG, APART_DEG, MOST_DIRECTIONS, LEAST_SUPPORT = 3.0, 8.0, 6, 0.05
 STRAIGHT_M = 0.7  # corners of the block's border that are none
 
@@ -53,7 +57,7 @@ class Bonds:
         return self.among(shapely.intersects_xy(area, *self.ends.mean(axis=1).T))
 
 
-HELD, LOOSE, UNKNOWN = 0, 1, 2
+HELD, LOOSE, UNKNOWN = 0, 1, 2  # states of a bond between neighbouring points
 
 
 @dataclass(frozen=True)
@@ -191,11 +195,10 @@ def directions_of(area: shapely.Geometry, surfaces: Surfaces) -> np.ndarray:
     angle = np.r_[np.arctan2(normal[:, 1], normal[:, 0]), np.arctan2(edges[:, 1], edges[:, 0])]
     weight = np.r_[steep / max(steep.sum(), 1e-9), np.hypot(*edges.T) / np.hypot(*edges.T).sum()]
     tried = np.radians(np.arange(0.0, 90.0, 1.0))
-    gap = np.angle(np.exp(4j * (angle[None, :] - tried[:, None]))) / 4.0
-    support = (weight * np.exp(-0.5 * (gap / math.radians(DIRECTION_DEG)) ** 2)).sum(axis=1)
+    support = support_of(tried, angle, weight, math.radians(DIRECTION_DEG))
     found: list[float] = []
     for k in np.argsort(-support):
-        far = all(abs(np.angle(np.exp(4j * (tried[k] - other)))) / 4.0 > math.radians(APART_DEG) for other in found)
+        far = all(abs(quarter_gap(tried[k], other)) > math.radians(APART_DEG) for other in found)
         if far and support[k] > LEAST_SUPPORT * weight.sum() and len(found) < MOST_DIRECTIONS:
             found.append(tried[k])
     return np.array([turned for angle in found for turned in (angle, angle + 0.5 * math.pi)])

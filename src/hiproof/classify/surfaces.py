@@ -8,8 +8,8 @@ import numpy as np
 
 from ..read.thin import hashes
 
-VOXEL_M = 0.5
-NEIGHBOURS = 12
+VOXEL_M = 0.5  # m; clouds are thinned to one point in such a cube, so that a drone's cloud costs no more
+NEIGHBOURS = 12  # points that tell how smooth the surface around one is
 SMOOTH_M = 0.1  # a plane with larger residuals is no surface, and a point farther off is not on it
 TURN_DEG = 10.0  # neighbours of one surface have planes that differ by less
 LARGEST_M2 = 50.0  # surfaces of that size and larger are all alike

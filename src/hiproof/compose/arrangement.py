@@ -14,10 +14,11 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from ..parity import flips
 
-GRID_M = 1e-4
-OUTSIDE, UNCOVERED = -1, -2
-COLLINEAR_UNITS = 5.0
+GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
+OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
+COLLINEAR_UNITS = 5.0  # units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
 
 
 @compiled
@@ -324,10 +325,8 @@ def covers(soup, low, high, x, y):
     """Whether the polygon of soup[low:high] holds (x, y), by parity."""
     inside = False
     for e in range(low, high):
-        if (soup[e, 1] > y) != (soup[e, 3] > y):
-            t = (y - soup[e, 1]) / (soup[e, 3] - soup[e, 1])
-            if x < soup[e, 0] + t * (soup[e, 2] - soup[e, 0]):
-                inside = not inside
+        if flips(soup[e, 0], soup[e, 1], soup[e, 2], soup[e, 3], x, y):
+            inside = not inside
     return inside
 
 

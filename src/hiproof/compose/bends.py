@@ -9,6 +9,7 @@ import shapely
 
 from ..compiled import compiled
 
+# val3dity's limit of 20 degrees, and half of it, below which no pair needs to be compared
 FLAT_COSINE, SURELY_FLAT_COSINE = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(10.0))
 
 

@@ -10,11 +10,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
+from ..parity import flips
 from .bends import SURELY_FLAT_COSINE, dot
 
-SAME_POINT_M = 1e-3
-TOUCH_M = 1e-9
-MOST_VERTICES_IN_THREES = 40
+SAME_POINT_M = 1e-3  # m; val3dity's snap tolerance
+TOUCH_M = 1e-9  # m; numerically on the segment
+MOST_VERTICES_IN_THREES = 40  # vertices up to which all triples of a ring are looked at: they grow with the cube
 SKEW = np.array([0.43, 0.61, 0.67])  # shorter than one: what is further apart along it is further apart in space
 
 
@@ -91,7 +92,7 @@ def inside_ring(p, flat, index, low, high):
     inside = False
     for k in range(low, high):
         a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
-        if (a[1] > p[1]) != (b[1] > p[1]) and p[0] < a[0] + (p[1] - a[1]) / (b[1] - a[1]) * (b[0] - a[0]):
+        if flips(a[0], a[1], b[0], b[1], p[0], p[1]):
             inside = not inside
     return inside
 

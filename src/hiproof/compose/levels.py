@@ -8,7 +8,8 @@ from ..compiled import compiled
 from .arrangement import OUTSIDE, half_edge_order, next_half_edges, trace_faces
 
 LEVEL_GAP_M = 1.1e-3  # levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
-NEAR_UNITS = 2000.0
+NEAR_UNITS = 2000.0  # units of the grid, 0.2 m: a crossing nearer to a corner is moved aside of it
+# units of the grid that it is moved by, about a millimetre; the first that leaves the face flat
 ASIDE_UNITS = (6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
 
 

@@ -8,7 +8,7 @@ from ..compiled import compiled
 from .arrangement import OUTSIDE, is_beside, renumbered, turn
 from .levels import height
 
-SHORT_UNITS = 30.0
+SHORT_UNITS = 30.0  # units of the grid, 3 mm: beside a shorter edge no face can be flat to val3dity's 20 degrees
 
 
 @compiled

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..errors import InputError
+from ..parity import flips
 
 Ring = np.ndarray
 """(m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer first, holes after."""
@@ -149,11 +150,8 @@ def _contains(vertices, rings, first, second, x, y):
     for ring in range(rings.shape[0] - 1):
         j = rings[ring + 1] - 1
         for i in range(rings[ring], rings[ring + 1]):
-            yi, yj = vertices[i, second], vertices[j, second]
-            if (yi > y) != (yj > y):
-                xi, xj = vertices[i, first], vertices[j, first]
-                if x < (xj - xi) * (y - yi) / (yj - yi) + xi:
-                    inside = not inside
+            if flips(vertices[i, first], vertices[i, second], vertices[j, first], vertices[j, second], x, y):
+                inside = not inside
             j = i
     return inside
 

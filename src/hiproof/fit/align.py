@@ -22,16 +22,20 @@ from .union.plan import ring_edges, signed_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
 AROUND_M = 4.0  # of points that are asked for around it
+# m between the shifts tried first, and after that; m of half a cell of the raster of costs
 COARSE_M, FINE_M, PITCH_M = 0.5, 0.1, 0.1
+# m over which a side is soft, as in fit/outline; density outside over that inside: points of walls and neighbours
 BLUR_M, STRAY = 0.25, math.exp(-4.0)
-LEAST_POINTS, LEAST_SIDE_M = 20, 1.5
+LEAST_POINTS, LEAST_SIDE_M = 20, 1.5  # points; with fewer every shift holds as many; m: shorter sides tell no offset
 FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may be so many points of those behind it
 SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
 REACH_SIGMA_M = 0.5  # how far roofs usually reach beyond footprints, or stay behind
-ROUNDS, NEAR_M = 3, 0.2
+ROUNDS, NEAR_M = 3, 0.2  # of putting each side where its points are, from the last shift; m that counts as no shift
+# m; standard deviations; m that sides may disagree by; share of the border that must be free
 LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.5
+# free sides: two directions and one to check them; share of the points outside, below which the footprint fits
 LEAST_SIDES, LEAST_OUTSIDE = 3, 0.01
-LEAST_BEYOND_M = 0.3
+LEAST_BEYOND_M = 0.3  # m that the roof's sides must lie off the footprint's to be told
 
 
 @dataclass(frozen=True)

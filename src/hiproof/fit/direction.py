@@ -9,6 +9,9 @@ import shapely
 
 from ..compiled import compiled
 
+# rad within which edges support a direction of an outline, and whose mean it is
+PEAK_RAD, NEAR_PEAK_RAD = math.radians(3.0), math.radians(5.0)
+
 
 @compiled
 def nearest(points, i, indices, distances):
@@ -123,6 +126,38 @@ def rectangle_in_direction(points, kappa, trim):
     low_v, high_v = trimmed_range(c * points[:, 1] - s * points[:, 0], trim)
     u, v = 0.5 * (low_u + high_u), 0.5 * (low_v + high_v)
     return np.array([c * u - s * v, s * u + c * v, kappa, 0.5 * (high_v - low_v), 0.5 * (high_u - low_u)])
+
+
+def quarter_gap(one, other):
+    """Angles between directions modulo 90 degrees, in [-45, 45] degrees (rad)."""
+    return np.angle(np.exp(4j * (one - other))) / 4.0
+
+
+def support_of(tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float) -> np.ndarray:
+    """Weight (k,) of those of the directions `angle` (n,) that lie near each one `tried` (k,), all modulo 90 degrees.
+
+    >>> support_of(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0, 3.0, 1.0]), 0.01)
+    array([5., 1.])
+    """
+    gaps = quarter_gap(angle[None, :], tried[:, None])
+    return (weight * np.exp(-0.5 * (gaps / spread_rad) ** 2)).sum(axis=1)
+
+
+def main_direction(outline: shapely.Polygon) -> float:
+    """Angle (rad) of the outline's main direction modulo 90 degrees: the peak of its edges' lengths, then their mean.
+
+    >>> round(math.degrees(main_direction(shapely.box(0, 0, 4, 3))) % 90, 6)
+    0.0
+    """
+    edges = np.diff(shapely.get_coordinates(outline.exterior), axis=0)
+    length, angle = np.hypot(edges[:, 0], edges[:, 1]), np.arctan2(edges[:, 1], edges[:, 0])
+    candidates = angle[length > 0.5] if (length > 0.5).any() else angle
+    if len(candidates) > 200:
+        candidates = np.radians(np.arange(0.0, 90.0, 0.5))
+    peak = candidates[np.argmax(support_of(candidates, angle, length, PEAK_RAD))]
+    off = quarter_gap(angle, peak)
+    weight = length * (np.abs(off) < NEAR_PEAK_RAD)
+    return float(peak + (weight * off).sum() / max(weight.sum(), 1e-12))
 
 
 def outline_direction(outline: shapely.Polygon) -> float:

@@ -22,9 +22,11 @@ import numpy as np
 
 from ..compiled import compiled
 
-MAX_PLANES = 6
+MAX_PLANES = 6  # of a primitive: a saw-tooth's teeth
+# places in theta (9,); after the last come q1, q2, q3
 CENTRE_X, CENTRE_Y, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0 = range(6)
-SIZE = 9
+SIZE = 9  # numbers of theta
+# m and rad that a number may change by in a step: beyond, the quadratic model is none
 STEP_CAP_M, STEP_CAP_RAD = 1.5, 0.25
 FAR_SQUARED = 60.0  # squared normalised residual beyond which a point is certainly an outlier
 SOFT = 10.0  # margins of more than this many tau are inside for certain

@@ -27,8 +27,8 @@ from .direction import (
 from .kernel import Noise, Problem, Tables
 from .tables import bounds, tables, variants
 
-COARSE_POINTS = 120
-OUTLIERS_AT_FIRST = 0.1
+COARSE_POINTS = 120  # points that starts are judged on: a bound on time
+OUTLIERS_AT_FIRST = 0.1  # share of the points; what is found replaces it in the first round of EM
 OUTLIER_REACH_M = 4.0  # outliers may lie anywhere in the points' extent and this far around
 COARSE, MIDDLE, FINE = (Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in ((0.5, 0.5), (0.25, 0.3), (0.15, 0.15)))
 SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, largest
@@ -37,7 +37,7 @@ SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04  # types further behind the best aft
 ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15  # the same after the rough fit to the thinned points
 SOURCE_SLACK_NATS_A_POINT = 1.0  # of the rough fit: nothing is derived from types further behind the best
 LEAST_GAIN_NATS = 0.2  # of the fine fit, that a type must have over the one it derives from to be considered
-SIDE_GRID = 28
+SIDE_GRID = 28  # cells a side over which its posterior mean is summed
 PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
 
 

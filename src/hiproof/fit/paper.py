@@ -23,10 +23,10 @@ from ..primitives.contract import placed
 from ..settings import Settings
 from .alpha_shape import SPACINGS, alpha_shape, default_radius
 
-BETA = 0.1
+BETA = 0.1  # weight of the outline in the objective, the paper's own
 ALPHA_SPACINGS = 4.0
 """Radius of the alpha shape in point spacings, which the paper does not give: of 1.5, 2.5 and 4 this comes closest to its figures."""
-SMALLEST_M = 0.1
+SMALLEST_M = 0.1  # m; no length of a roof is smaller
 TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "pyramid", "mansard", "shed")
 """Those that the paper names, tried where none are asked for."""
 IMPROPER = 1.0

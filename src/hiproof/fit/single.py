@@ -15,7 +15,7 @@ from ..primitives.contract import HALF_WIDTH, KAPPA, placed
 from ..settings import Settings
 from .likelihood import Estimate, fit_likelihood, plan_extents
 
-FEWEST_POINTS = 4
+FEWEST_POINTS = 4  # points; a plane and one to contradict it
 THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
 
 

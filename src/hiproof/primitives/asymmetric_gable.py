@@ -10,7 +10,7 @@ from .drawing import drawn_plan, drawn_slope
 from .gable import FACES
 
 RISE = q1 * V + q1 * q3 * V  # from the eave at -v, the lower one, to the ridge
-SAME_M = 1e-9
+SAME_M = 1e-9  # m; numerically level with each other
 RISE_HIGH_SIDE = q2 * V - q2 * q3 * V
 
 

@@ -27,6 +27,7 @@ from ..model import Part, Piece
 from .algebra import Formula, formula
 from .drawing import drawn_slope
 
+# places in theta (9,): centre, rotation, half sizes, and four numbers of the shape
 CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
 SLOPE_MIN, SLOPE_MAX = 0.04, 2.75  # 2 and 70 degrees: steeper planes swallow facade points
 LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: -u, +u, -v, +v, none

@@ -38,7 +38,7 @@ QUARTER_TURN = [
     RIGHT,
     LEFT,
 ]  # which side becomes left, right, front, back when the axes turn by 90 degrees
-SAME = 1e-9
+SAME = 1e-9  # m; numerically equal
 ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
 HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
 

@@ -14,7 +14,7 @@ import numpy as np
 from .algebra import Formula, U, V, formula
 from .contract import BACK, LEFT, Plane, Primitive, Shape, Sides
 
-ALONG, ACROSS = 0, 1
+ALONG, ACROSS = 0, 1  # the axis that the cut halves
 CROSSED = (("length", "ridge_length", "top_length"), ("width", "top_width"))
 EXTENT = (("U", U), ("V", V))
 

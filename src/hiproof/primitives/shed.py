@@ -8,7 +8,7 @@ from .algebra import U, V, formula, q0, q1
 from .contract import SLOPE_MAX, Primitive, Vote, rectangle
 from .drawing import drawn_slope
 
-TEETH = range(2, 7)
+TEETH = range(2, 7)  # of a saw-tooth that is one primitive; longer rows are put together from volumes
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:

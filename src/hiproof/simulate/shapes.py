@@ -10,7 +10,7 @@ import shapely
 from ..model import Part, Piece
 from ..primitives import CATALOGUE
 
-NOT_ROOF = -1
+NOT_ROOF = -1  # label of what is no roof, as in segment
 ROOF_TYPES = (
     *("flat", "monopitch", "gable", "hip", "half_hip"),
     *("pyramid", "mansard", "shed", "asymmetric_gable", "gambrel"),

@@ -23,14 +23,15 @@ from .settle import settled
 
 __all__ = ["estimate_outline", "iou"]
 
+# m over which a side is soft: the scanner's noise in plan; density outside over that inside: points of walls and trees
 BLUR_M, STRAY = 0.15, math.exp(-4.0)
 LINE, DIRECTION, SKEW = 2.5, 3.0, 1.0  # prices in nats
 MOST_DENSE = (
     8.0  # points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them
 )
 REACH_M, REACH_SPACINGS = 2.0, 3.0  # of points that bear on the border
-SAME_DIRECTION_RAD = math.radians(1.5)
-STEP_SPACINGS = 0.2
+SAME_DIRECTION_RAD = math.radians(1.5)  # rad; within it the direction of slopes and that of the outline are one
+STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
 
 def estimate_outline(xy: np.ndarray, kappa: float | None = None) -> shapely.Polygon:

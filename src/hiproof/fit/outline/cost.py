@@ -16,6 +16,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
+from ...parity import flips
 from .lines import SAME_RAD, area_of, find_corners, quarter_gap
 
 SURE = 4.0  # blurs from the border beyond which a point is inside or outside for sure
@@ -68,7 +69,7 @@ def point_cost(x, y, corners, sides, blur, stray):
             continue
         x0, x1 = corners[i, 0], corners[k, 0]
         dx, dy = x1 - x0, y1 - y0
-        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) / dy * dx:
+        if flips(x0, y0, x1, y1, x, y):
             inside = not inside
         if (x < x0 - reach and x < x1 - reach) or (x > x0 + reach and x > x1 + reach):
             continue

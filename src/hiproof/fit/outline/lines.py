@@ -13,7 +13,7 @@ import numpy as np
 from ...compiled import compiled
 
 SHARPEST = 0.15  # sine of the angle between neighbours: lines closer to parallel have no corner to speak of
-SAME_RAD = 1e-6
+SAME_RAD = 1e-6  # rad; numerically parallel
 
 
 def lines_through(corners: np.ndarray) -> np.ndarray:

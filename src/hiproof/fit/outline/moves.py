@@ -17,10 +17,12 @@ from .lines import SAME_RAD, dropped, quarter_gap, replaced
 LONGEST_RUN = 3  # lines that become one
 TURN_RAD = math.radians(35.0)  # of a line, at most
 APART = (0.0, 1.0, 1.5, 0.7)  # turns by which the first and last of so many lines may differ to become one
+# m and rad that lines are moved and turned by, coarse to fine
 STEPS_M, TURNS_RAD = (0.3, 0.1, 0.05), (0.03, 0.01, 0.003)
+# of all moves; of shifts in each; changes of one kind at most, which ends what would go in circles
 ROUNDS, SHIFT_ROUNDS, MOST_CHANGES = 3, 3, 400
 REACHED = LONGEST_RUN  # lines on either side of a change whose own changes it concerns
-GAIN = 1e-6
+GAIN = 1e-6  # nats; numerically none
 
 
 @compiled

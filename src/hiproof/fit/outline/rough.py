@@ -10,8 +10,9 @@ import shapely
 from ..alpha_shape import alpha_shape
 from .lines import SHARPEST, find_corners, lines_through
 
+# spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points, corners dropped
 CLOSING_SPACINGS, PUSH_SPACINGS, SIMPLIFY_SPACINGS = 1.0, 0.5, 0.5
-COARSER, TRIES = 1.3, 12
+COARSER, TRIES = 1.3, 12  # factor between tries at few corners, and how many tries
 MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 

@@ -19,6 +19,7 @@ BLURS_M, WALLS_M = (
     (0.02, 0.06, 0.12),
     (0.0, 0.3, 1.0),
 )  # points on the wall a metre, as the depth of roof that holds as many
+# m across a side at which it is tried: outlines of points lie inside of walls more than outside
 OFFSETS_M = np.arange(-0.5, 0.7, 0.02)
 DEEP_M, SHALLOW_M, OUTSIDE_M = (
     2.0,
@@ -27,7 +28,7 @@ DEEP_M, SHALLOW_M, OUTSIDE_M = (
 )  # the density is that between shallow and deep; points further out are stray
 LEAST_DENSITY, STRAY = 0.3, 0.02  # shares of the outline's density
 END_M, LONG_M = 0.3, 1.0  # of a side longer than that, its ends do not count: points there may be another side's
-FEWEST, FARTHEST_M = 4, 0.4
+FEWEST, FARTHEST_M = 4, 0.4  # points across a side; fewer tell nothing; m that a side may be moved beyond the last row
 ROW_M, MOSTLY = 0.1, 0.6  # points closer across the side are of one row where most of the depth is between rows
 
 

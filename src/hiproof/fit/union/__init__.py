@@ -85,8 +85,8 @@ def fit_building(
     volumes, sides, planes = roof.volumes, roof.sides, roof.planes
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
-        part_of(*each, own, plan, scene, types)
-        for *each, own in zip(volumes, planes, sides, regions, strict=True)
+        part_of(volume, fitted, edges, own, plan, scene, types)
+        for volume, fitted, edges, own in zip(volumes, planes, sides, regions, strict=True)
         if own
     ]
     parts = that_show(parts, plan, scene)
@@ -113,5 +113,5 @@ def as_allowed(part: Part, types: tuple[str, ...], points: np.ndarray) -> Part:
     z = points[inside, 2] if inside.any() else np.array([part.translation[2]])
     level = np.array([[0.0, 0.0, float(np.sort(z)[len(z) // 2])]])
     pieces = tuple(Piece(piece.outline, level) for piece in part.pieces)
-    size = {name: part.parameters[name] for name in ("width", "length") if name in part.parameters}
+    size: dict[str, float] = {name: part.parameters[name] for name in ("width", "length") if name in part.parameters}
     return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], level[0, 2]]))

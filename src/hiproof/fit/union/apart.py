@@ -15,6 +15,7 @@ from .volumes import DIRECTION, LEVEL, OFFSET, U0, roof_heights
 HIDDEN_M, LEAST_M2 = 0.8, 1.0  # hidden for so long between two places of so much area at least
 LEAST_NODES = 2.5  # and for so many of the raster's steps, which are long on large roofs
 IN_LINE_M = 0.5  # what stands in a row is as deep as its neighbours
+# m within which an edge of another volume is taken for that at which one ends; m inside the outline at which it must show
 NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
 
 

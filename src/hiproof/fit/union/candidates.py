@@ -38,12 +38,13 @@ from .volumes import (
     volume_cost,
 )
 
+# points that candidates are found among; points planes are fitted around; pairs of points whose planes are tried
 POOL_POINTS, SEEDS, PAIRS = 500, 100, 200
-MOST_GABLES = 6
+MOST_GABLES = 6  # gables kept of those that explain most
 ALONG_AXIS = 0.12  # a plane that leans so little off an axis or a wall is taken along it
-RIDGE_INSIDE_M = 0.4
+RIDGE_INSIDE_M = 0.4  # m that a ridge lies inside the rectangle; nearer to an edge it is a slope
 MOST_TOPS, MOST_PAIRS = 2, 3  # level tops and pairs of slopes, strongest first, that make hips and mansards
-SAME_SLOPE = 1e-6
+SAME_SLOPE = 1e-6  # rise over run; numerically equal
 WRONG_COVER = 0.02  # of a point: what covering one without explaining it costs
 NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 

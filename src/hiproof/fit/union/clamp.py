@@ -10,7 +10,7 @@ import shapely
 from ...model import Part, Piece
 from .regions import GRID_M, polygons_of
 
-CLAMP_M = 0.4
+CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
 
 
 def clamped(parts: list[Part], low: float, high: float) -> list[Part]:

@@ -24,15 +24,15 @@ from .volumes import (
     with_and_without,
 )
 
-MIN_SIDE_M = 0.8
+MIN_SIDE_M = 0.8  # m; a narrower volume is no part of a roof but a gutter or a parapet
 BETWEEN_M = 0.4  # how far an edge may go to a place midway between points,
 SMALL_REACH_M = 1.0  # once it is settled to within this: in the search it would rather stay on a line
 BEYOND_M = 0.6  # an edge outside the outline by so much does not show
-NEAR_VERTEX_M = 1.5
-SMALL_STEPS, SMALL_STEP_M = 4, 0.1
-TOUCH_M = 0.04
+NEAR_VERTEX_M = 1.5  # m within which corners of the outline are places to put an edge
+SMALL_STEPS, SMALL_STEP_M = 4, 0.1  # steps tried to either side of where an edge lies, and m of a step
+TOUCH_M = 0.04  # m within which two volumes count as touching
 SAME_M = 1e-3  # places nearer than this are one: of corners of the outline and grid lines at them the corner, which comes first
-LEAST_GAIN = 1e-6
+LEAST_GAIN = 1e-6  # of the objective; numerically none
 EVERYWHERE = 60.0  # m: no edge is further from where it may go
 
 

@@ -30,12 +30,12 @@ from .volumes import (
     roof_heights,
 )
 
-ROUNDS = 3
-FEWEST_POINTS = 6
+ROUNDS = 3  # of fitting and re-weighting
+FEWEST_POINTS = 6  # points; with fewer a volume's planes stay as the search found them
 FACING_GAIN = 0.1  # units: planes face other than along the axes only where that explains so much more
 LEVEL_SLACK = 0.004  # of a volume's points: what level eaves may leave unexplained besides the parameters they save
 SIGN = np.array([1.0, -1.0, 1.0, -1.0])
-FLATTEST = 0.02
+FLATTEST = 0.02  # rise over run; a flatter plane does not tell which way it faces
 SQUARE = 1e-3  # a side that leans less is square to the others
 
 
@@ -78,7 +78,7 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
     if len(members) < FEWEST_POINTS:
         return start
     base = scene.evidence * PARAMETER_COST
-    facing = (0.0, 0.0, 0.0, 0.0)
+    facing: tuple[float, ...] = (0.0, 0.0, 0.0, 0.0)
     best = fitted(start, design_of(volume, sides, facing, there, level=()), points, scene)
     for pair in (0, 2):
         for way in facings(volume[LEAN : LEAN + SIDES], sides, there, pair):

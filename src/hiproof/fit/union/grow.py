@@ -17,13 +17,14 @@ from .refit import refit
 from .scene import Scene
 from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, base_only, roof_heights
 
-MOST_VOLUMES, MOST_ADDITIONS = 24, 20
-MOST_PLANES, MOST_NEW_PLANES = 16, 10
-TRIED_EACH_WAY = 2
+MOST_VOLUMES, MOST_ADDITIONS = 24, 20  # of one building, and additions tried: a bound on time
+MOST_PLANES, MOST_NEW_PLANES = 16, 10  # candidate planes from all points at first, from unexplained ones later
+TRIED_EACH_WAY = 2  # candidates of the largest gain that are tried in earnest
+# of the highest misfit, from which on a point counts as unexplained; points worth a further volume
 UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
-BASE_QUANTILE = 0.02
-MOST_SLOPES = 5
-FINAL_ROUNDS = 3
+BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs but not below a stray point
+MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
+FINAL_ROUNDS = 3  # of all moves at the end
 STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
 SAME_UNITS = 0.1  # roofs of as many volumes that cost so nearly the same are one
 MOST_REGROWN = 8  # of more volumes each is too little of the whole to be worth as much work

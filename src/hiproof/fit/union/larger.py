@@ -17,6 +17,7 @@ from ...primitives.family import member_of
 from ...primitives.shed import TEETH
 from .regions import GRID_M, polygons_of
 
+# rise over run; m; share of a size; rad: within which teeth or the halves of a gambrel are alike
 SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
 UNEVEN_M = 0.1  # heights of teeth, were they equally wide, that differ by more: they are not
 NEARLY, GRID_STEP_M = 0.8, 0.4  # of a tooth's area, at places so close, that a part must show as
@@ -42,7 +43,7 @@ def with_saw_teeth(parts: list[Part]) -> list[Part]:
         while grown and len(row) < max(TEETH):
             neighbour = next((part for part in teeth if follows(row[-1], part) or follows(part, row[0])), None)
             grown = neighbour is not None
-            if grown:
+            if neighbour is not None:
                 teeth = [part for part in teeth if part is not neighbour]
                 row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
         if len(row) >= min(TEETH):

@@ -50,13 +50,15 @@ from .volumes import (
 )
 
 HOPELESS_UNITS, HOPELESS_SHARE = 2.0, 0.01  # a trial that starts further above the best than this is given up
-MOST_SLOPES, SLOPES_APART = 9, 0.02
+MOST_SLOPES, SLOPES_APART = 9, 0.02  # slopes a plane is tried at, and rise over run between two of them
 END_SEEDS = 16  # points through which a new plane is tried
-MERGE_REACH_M = 2.0
-ALMOST_LEVEL = 0.15
+MERGE_REACH_M = 2.0  # m that edges may move when one volume takes another's place
+ALMOST_LEVEL = 0.15  # rise over run; below it a plane may as well be level
 AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
 DIGEST_STEP = 0.02  # of metres and of slopes: changes smaller than this are none
+# of a digest: primes whose product float64 holds, and m above which all heights are one
 DIGEST_FACTOR, DIGEST_PRIME, HIGH_ABOVE = 1_000_003.0, 2_147_483_647.0, 1e5
+# of a plane towards what its points say; most of a turn as rise over run along its edge; units that a free direction costs
 TURNS, MOST_TURN, FREE_UNITS = 4, 0.45, 1.5
 
 

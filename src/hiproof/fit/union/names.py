@@ -19,7 +19,7 @@ from .volumes import DIRECTION, LEVEL, SIDES
 
 LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
 APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
-STRAIGHT = 1e-9
+STRAIGHT = 1e-9  # rad; numerically the same direction
 GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
 REGISTERED_M = 0.01  # standard deviation of a swath's height, which no point of a building tells
 PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it

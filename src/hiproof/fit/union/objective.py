@@ -33,9 +33,11 @@ from .volumes import (
 )
 
 STEP_M, INSIDE_M, LEAST_STEP_LENGTH_M = 0.05, 0.2, 0.55  # a gap that is a step; how far inside the outline it shows
+# m from an outline's corner within which an edge is in line with it, and within which it ends there
 AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
+# m between the places at which a step between volumes is judged, and how many at most of an edge
 SAMPLE_M, MOST_SAMPLES = 0.5, 40
-TOUCH_M = 0.03
+TOUCH_M = 0.03  # m; a volume that reaches so near covers the place
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
 
 

@@ -8,8 +8,8 @@ import shapely
 from ..direction import slope_direction
 from ..outline import estimate_outline
 
-SLOPES, NEIGHBOURS = 150, 9
-SURE = 0.5
+SLOPES, NEIGHBOURS = 150, 9  # places at which slopes are looked at, and points around each
+SURE = 0.5  # confidence (0 to 1) from which on the direction of slopes is the outline's
 
 
 def outline_of_points(points_local: np.ndarray) -> shapely.Polygon:

@@ -18,7 +18,7 @@ from ...primitives.family import COMPONENTS
 from ...settings import Settings
 from .regions import GRID_M, polygons_of
 
-MOST_PARTS = 3
+MOST_PARTS = 3  # that one shape may take the place of
 RECTANGULAR = 0.9  # share of the smallest rectangle around them that the parts roof together
 FAR_M = 0.25  # points farther off are counted as this far
 FARTHER_M = 0.01  # in the mean: one shape may lie so much farther from the points than several, must lie so much nearer than one

@@ -10,31 +10,18 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
+from ...frames import PlanFrame
+from ...parity import flips
+from ..direction import main_direction
 from .planes import Cloud, Ghosts, Grid
 
-MIN_STRUCTURE_POINTS = 4
+MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
 BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this close to the border: facade returns
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
+# m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
 MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
-GHOST_MARGIN_M = 0.3
+GHOST_MARGIN_M = 0.3  # m beyond the range of heights that unseen roof may have
 SHADE = 0.2  # of a point: what the highest of roofs costs for each that is missing
-
-
-@dataclass(frozen=True)
-class PlanFrame:
-    """The building's frame: origin (3,) in local coordinates, `rotation` (2, 2) with uv = rotation @ (xy - origin)."""
-
-    origin: np.ndarray
-    rotation: np.ndarray
-
-    def to_plan(self, xyz_local: np.ndarray) -> np.ndarray:
-        """(n, 3) local coordinates to (n, 3) u, v, z."""
-        shifted = xyz_local - self.origin
-        return np.column_stack([shifted[:, :2] @ self.rotation.T, shifted[:, 2]])
-
-    def xy_local(self, uv: np.ndarray) -> np.ndarray:
-        """(n, 2) plan coordinates back to local x, y."""
-        return uv @ self.rotation + self.origin[:2]
 
 
 @dataclass(frozen=True)
@@ -48,28 +35,6 @@ class Plan:
     density: float
 
 
-def main_direction(outline: shapely.Polygon) -> float:
-    """Angle (rad) of the outline's main direction modulo 90 degrees: the peak of its edges' lengths, then their mean.
-
-    >>> round(math.degrees(main_direction(shapely.box(0, 0, 4, 3))) % 90, 6)
-    0.0
-    """
-    edges = np.diff(shapely.get_coordinates(outline.exterior), axis=0)
-    length, angle = np.hypot(edges[:, 0], edges[:, 1]), np.arctan2(edges[:, 1], edges[:, 0])
-
-    def off(direction):
-        return np.angle(np.exp(4j * (angle - direction))) / 4.0
-
-    candidates = angle[length > 0.5] if (length > 0.5).any() else angle
-    if len(candidates) > 200:
-        candidates = np.radians(np.arange(0.0, 90.0, 0.5))
-    gaps = np.angle(np.exp(4j * (angle[None, :] - candidates[:, None]))) / 4.0
-    support = (length * np.exp(-0.5 * (gaps / math.radians(3.0)) ** 2)).sum(axis=1)
-    peak = candidates[np.argmax(support)]
-    weight = length * (np.abs(off(peak)) < math.radians(5.0))
-    return float(peak + (weight * off(peak)).sum() / max(weight.sum(), 1e-12))
-
-
 @compiled
 def signed_depth(x, y, starts, ends):
     """Distance (n,) of points to the nearest of the edges `starts`, `ends` (m, 2), negative outside (even-odd rule)."""
@@ -79,7 +44,7 @@ def signed_depth(x, y, starts, ends):
         for e in range(len(starts)):
             x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
             dx, dy = x1 - x0, y1 - y0
-            if (y0 > y[i]) != (y1 > y[i]) and x[i] < x0 + (y[i] - y0) / dy * dx:
+            if flips(x0, y0, x1, y1, x[i], y[i]):
                 inside = not inside
             t = ((x[i] - x0) * dx + (y[i] - y0) * dy) / max(dx * dx + dy * dy, 1e-18)
             t = min(max(t, 0.0), 1.0)
@@ -167,5 +132,5 @@ def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Poly
     weight = (np.diff(grid.u)[i] * np.diff(grid.v)[j]) * len(cloud.u) / outline.area
     shade = SHADE * weight * emptiness(grid, cloud, weight.reshape(len(centre_u), -1)).ravel()
     low, high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
-    kept = [np.ascontiguousarray(column[inside]) for column in (u, v, weight, shade)]
-    return Ghosts(*kept, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)
+    u, v, weight, shade = (np.ascontiguousarray(column[inside]) for column in (u, v, weight, shade))
+    return Ghosts(u, v, weight, shade, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)

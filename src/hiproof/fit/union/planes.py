@@ -17,15 +17,15 @@ from ...compiled import compiled
 FLAT, AXIS_SLOPE, FREE_SLOPE = 1.0, 1.4, 1.9
 KIND_COST = np.array([FLAT, AXIS_SLOPE, AXIS_SLOPE, FREE_SLOPE])
 
-MAX_SLOPE = 2.5
-MIN_AXIS_SLOPE = 0.05
+MAX_SLOPE = 2.5  # rise over run, 68 degrees; steeper planes are not looked for
+MIN_AXIS_SLOPE = 0.05  # rise over run, 3 degrees; a flatter plane is level
 MAX_PLANES = 5  # of one part
 SLOPE_RIDGE = 2e-4  # keeps the slope of a plane determined when its points lie on a line
-NEIGHBOUR_RADIUS_M = 2.5
+NEIGHBOUR_RADIUS_M = 2.5  # m; points further away are no neighbours
 LOCAL_POINTS = (9, 17)  # neighbours of a local plane, the point itself among them
-RIDGE_STEP_M = 0.4
-SAME_PLANE = 0.05
-TEMPLATE_POINTS = 150
+RIDGE_STEP_M = 0.4  # m between the ridges tried
+SAME_PLANE = 0.05  # rise over run, and m at the centre: planes nearer to each other are one
+TEMPLATE_POINTS = 150  # points that templates are laid over; few do for a start
 
 Cloud = namedtuple("Cloud", "u v z i j")  # points (n,) and the grid cell that holds each
 Grid = namedtuple("Grid", "u v")  # grid lines, ascending

@@ -28,7 +28,8 @@ from .volumes import (
     lowest_plane,
 )
 
-ROUNDS = 2
+ROUNDS = 2  # of fitting and re-weighting
+# points a plane must show over to be refitted, and to find its slope; m2 of their spread along it
 LEAST_WEIGHT, LEAST_SLOPE_WEIGHT, LEAST_SPREAD_M2 = 1.0, 2.0, 0.02
 
 

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections import namedtuple
+from collections.abc import Sequence
 
 import numpy as np
 import shapely
 
+from ..direction import quarter_gap, support_of
 from .plan import Plan, grid_lines, ring_edges, signed_depth
 
-MOST_DIRECTIONS = 2
+MOST_DIRECTIONS = 2  # of a building that volumes may follow, the main one first
 APART_RAD, NEAR_RAD = math.radians(7.0), math.radians(3.0)  # directions differ by more; edges support one within
 LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for a further direction
-RASTER_M, RASTER_CELLS = 0.2, 120
+RASTER_M, RASTER_CELLS = 0.2, 120  # m of a cell of the outline's depth, and cells a side at most
 MOST_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
     0.45,
     0.035,
@@ -37,7 +39,7 @@ Scene = namedtuple(
     "U V order z weight shade n low high turn depth corner_u corner_v pitch lines vertices corners leans evidence dead width edge_prices allowed",
 )
 EdgePrices = namedtuple("EdgePrices", "any_step a_metre low_a_metre low_step loose at_corner")
-EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)
+EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # by the names above: units of evidence, m
 
 
 def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
@@ -49,18 +51,12 @@ def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
         new = np.all([np.abs(quarter_gap(angle, other)) > APART_RAD for other in found], axis=0)
         if not new.any():
             break
-        gaps = quarter_gap(angle[None, :], angle[new][:, None])
-        support = (length * np.exp(-0.5 * (gaps / NEAR_RAD) ** 2)).sum(axis=1)
+        support = support_of(angle[new], angle, length, NEAR_RAD)
         best = int(np.argmax(support))
         if support[best] < max(LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE * length.sum()):
             break
         found.append(float(angle[new][best]))
     return found
-
-
-def quarter_gap(one, other):
-    """Angles between directions modulo 90 degrees, in [-45, 45] degrees (rad)."""
-    return np.angle(np.exp(4j * (one - other))) / 4.0
 
 
 def scene_of(
@@ -180,7 +176,7 @@ def leans_along(ring: np.ndarray, axis: int) -> list[float]:
     return found
 
 
-def padded(rows: list[np.ndarray]) -> np.ndarray:
+def padded(rows: Sequence[Sequence[float] | np.ndarray]) -> np.ndarray:
     """Rows of several lengths, two a direction, as (directions, 2, m), filled up with infinity."""
     filled = np.full((len(rows), max(1, *map(len, rows))), np.inf)
     for row, values in zip(filled, rows, strict=True):

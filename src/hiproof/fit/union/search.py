@@ -15,8 +15,8 @@ from .plan import Plan
 from .scene import Scene, directions_of, scene_of, seen_through
 from .trim import trim
 
-SEARCH_POINTS = 600
-SETTLE_REACH_M = 0.7
+SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
+SETTLE_REACH_M = 0.7  # m that edges may move when all points settle them
 MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
 COMMON_HOUSE_M2, LARGEST_FACTOR = 60.0, 16.0  # larger roofs ask more of each volume
 # What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).

@@ -23,9 +23,10 @@ LEAN = 0.35  # of a line that a side may take
 GAP_M = 1.0  # how far off it may be, in the middle of the side and at the ends
 ALONG_M, BESIDE_M, SHORTEST_M = 0.12, 6.0, 0.7  # outline so near a line lies along it; edges so far beside carry on
 CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line between corners may be
-SHARED_M = 0.3
+SHARED_M = 0.3  # m within which a side takes its neighbour's line
+# units of evidence: for a side along no line, for one with no wall below, and for each metre off
 LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 0.45, 0.4, 0.1
-FACING = 1e-9
+FACING = 1e-9  # m; numerically along the axis
 MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
 NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
 NEEDED, FEWEST_NEEDED = 0.3, 3  # a point that costs so much more without a volume needs it; fewer show nothing

@@ -10,8 +10,9 @@ from .scene import Scene, nodes
 from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
 
 HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
+# m from what shows within which an edge or a corner is the place to draw a side in to
 NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
-SLACK_UNITS = 0.02
+SLACK_UNITS = 0.02  # units of evidence that drawing in may cost; what is hidden explains nothing
 
 
 def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:

@@ -22,7 +22,7 @@ from .sides import Side, plan_chords, plan_edges, sides_of
 from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, distances_up, volume_cost
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
-SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5
+SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
 
 
 @dataclass(frozen=True)

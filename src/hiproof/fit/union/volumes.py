@@ -20,16 +20,16 @@ from ...compiled import compiled
 # leans: plane k is z = offset + slope (x + lean y) with x = u, -u, v, -v and y the other of u, v; a digest of how
 # things stood around it when no move changed it.
 DIRECTION = 0
-U0, U1, V0, V1 = 1, 2, 3, 4
-SLOPE, OFFSET = 5, 9
-TIE, REPLACES = 14, 15
-LEAN = 16
-SETTLED = 20
-COLUMNS = 21
-SIDES, PLANES, LEVEL = 4, 5, 4
+U0, U1, V0, V1 = 1, 2, 3, 4  # columns of a volume's row: its rectangle
+SLOPE, OFFSET = 5, 9  # columns of the four slopes, and of the five planes' offsets
+TIE, REPLACES = 14, 15  # columns: which slopes are equal, and whether it replaces what lies below
+LEAN = 16  # first column of how far each plane faces off its axis
+SETTLED = 20  # column: a digest of the surroundings in which no move was found for it
+COLUMNS = 21  # of a row
+SIDES, PLANES, LEVEL = 4, 5, 4  # planes that slope, all planes, the level one's number
 
 FREE, OPPOSITE, ALL = 0.0, 1.0, 2.0  # which slopes are equal: none, those that face each other, all
-SLOPE_LOW, SLOPE_HIGH = 0.04, 2.75
+SLOPE_LOW, SLOPE_HIGH = 0.04, 2.75  # rise over run, 2 and 70 degrees: flatter is level, steeper a wall
 
 # Units of complexity: what a volume costs, each of its offsets and its own slopes, and that it replaces.
 PART_COST, PARAMETER_COST, REPLACING_COST, BASE_COST = 0.5, 0.45, 0.5, 0.95
