@@ -22,7 +22,7 @@ import numpy as np
 
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.classify import BUILDING, GROUND, classify
-from hiproof.classify.cells import PlanCells
+from hiproof.classify.cells import SquareCells
 from hiproof.classify.ground import GroundGrid, filled, ground_grid
 from hiproof.model import PointCloud
 from hiproof.read import read_points
@@ -55,7 +55,7 @@ def agreement(found: np.ndarray, truth: np.ndarray) -> str:
 
 def ground_differences(cloud: PointCloud) -> np.ndarray:
     """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold points of class 6."""
-    cells, is_ground = PlanCells(cloud.xyz, 1.0), cloud.classification == GROUND
+    cells, is_ground = SquareCells(cloud.xyz, 1.0), cloud.classification == GROUND
     count = cells.count(is_ground)
     total = np.bincount(cells.index[is_ground], cloud.xyz[is_ground, 2], count.size).reshape(count.shape)
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
@@ -89,7 +89,7 @@ def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) ->
     """Half-metre cells: grey by height, green where found and true agree, red false alarms, blue misses."""
     from matplotlib import image
 
-    cells = PlanCells(cloud.xyz, 0.5)
+    cells = SquareCells(cloud.xyz, 0.5)
     height = cells.highest(cloud.xyz[:, 2] - ground_grid(cloud.xyz).height_at(cloud.xyz), np.ones(len(cloud), bool))
     shade = 0.25 + 0.5 * np.clip(np.nan_to_num(height, neginf=0.0) / 12, 0, 1)
     picture = np.repeat(shade[..., None], 3, axis=2)

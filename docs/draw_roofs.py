@@ -34,7 +34,6 @@ from hiproof.evaluate.models import read_models
 from hiproof.evaluate.run import evaluate_run, run_inputs
 from hiproof.model import ROOF, Face, Part, Piece, Solid
 from hiproof.parametric.record import building_of
-from hiproof.stages import moved
 from hiproof.write.colours import type_colour
 
 SETS = Path(__file__).resolve().parents[1].parent / "shared" / "data"
@@ -125,7 +124,7 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
 
 def drawn_part(part: Part, shift: np.ndarray) -> DrawnPart:
     """A part in world coordinates, its polygons made valid."""
-    pieces = (moved(piece, shift) for piece in part.pieces)
+    pieces = (piece.moved(shift) for piece in part.pieces)
     return DrawnPart(part.type, tuple(Piece(shapely.make_valid(piece.outline), piece.planes) for piece in pieces))
 
 
