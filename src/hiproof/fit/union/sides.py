@@ -114,10 +114,11 @@ def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: 
 
 def side_of(volume: np.ndarray, edge: int, lines: Lines, uv: np.ndarray, gain: np.ndarray, evidence: float) -> Side:
     """The cheapest line for one side of a volume; `gain` (n,) is what its points at `uv` (2, n) cost more within it."""
-    m, shown = cheapest_line(volume, edge, lines, uv, gain, evidence), shows_at(volume, edge, lines, uv, gain)
+    m = cheapest_line(volume, edge, lines, uv, gain, evidence)
+    sigma = float(sigma_of_side(volume, edge, lines, uv, gain, m >= 0))
     if m < 0:
-        return Side(float(volume[U0 + edge]), sigma=float(sigma_of_place(volume, edge, uv, gain)) if shown else np.inf)
-    return Side(float(lines.start[m]), float(lines.lean[m]), True, 0.0 if shown else np.inf)
+        return Side(float(volume[U0 + edge]), sigma=sigma)
+    return Side(float(lines.start[m]), float(lines.lean[m]), True, sigma)
 
 
 @compiled
@@ -144,6 +145,14 @@ def cheapest_line(volume, edge, lines, uv, gain, evidence):
         if price < cheapest:
             best, cheapest = m, price
     return best
+
+
+@compiled
+def sigma_of_side(volume, edge, lines, uv, gain, anchored):
+    """The `sigma` of a side, which the outline gives where it is `anchored`."""
+    if not shows_at(volume, edge, lines, uv, gain):
+        return np.inf
+    return 0.0 if anchored else sigma_of_place(volume, edge, uv, gain)
 
 
 @compiled
