@@ -1,8 +1,8 @@
 """Roof type by evidence alone, all types simulated alike often with 5 % outliers. python -m benchmarks.types [--quick] [--seed 21]
 
 Half of the gables have their ridge off the middle. The draws (roofs.py) keep types apart that are one surface at a bound: an
-asymmetric gable has one slope at least a seventh steeper, a half-hip an end of 0.3 to 0.6 of the rise, a level top at least 0.4 of
-the width, a gambrel's break is seen.
+asymmetric gable has one slope at least a seventh steeper, a half-hip ends of 0.3 to 0.6 of the rise and a one-ended one of 0.45
+to 0.7, a level top at least 0.4 of the width, a gambrel's break is seen.
 """
 
 from __future__ import annotations
