@@ -28,6 +28,10 @@ from .kernel import Noise, Problem, Tables
 from .tables import bounds, tables, variants
 
 COARSE_POINTS = 120  # points that starts are judged on: a bound on time
+DOUBTFUL = Noise(
+    0.2, np.inf, 0.1
+)  # noise above which a fit is tried again on more points: twice a flight's, or ten times the outliers
+MORE_POINTS = 4  # times as many: on the few the right start of a saw-tooth is lost once in 300 fits
 OUTLIERS_AT_FIRST = 0.1  # share of the points; what is found replaces it in the first round of EM
 OUTLIER_REACH_M = 4.0  # outliers may lie anywhere in the points' extent and this far around
 COARSE, MIDDLE, FINE = (Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in ((0.5, 0.5), (0.25, 0.3), (0.15, 0.15)))
@@ -35,7 +39,6 @@ SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, larg
 SIDE_TAU_M = 0.1  # softness of the sides while types are compared
 SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04  # types further behind the best after annealing are dropped
 ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15  # the same after the rough fit to the thinned points
-SOURCE_SLACK_NATS_A_POINT = 1.0  # of the rough fit: nothing is derived from types further behind the best
 LEAST_GAIN_NATS = 0.2  # of the fine fit, that a type must have over the one it derives from to be considered
 SIDE_GRID = 28  # cells a side over which its posterior mean is summed
 PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
@@ -160,13 +163,27 @@ def fit_likelihood(
     With an `outline` the plan is its rectangle in the roof's direction and only heights are fitted. `side_taus` are the
     softnesses (m) tried at last on the sides; `log_prior` by type is added to the evidence (nats).
     """
-    search = new_search(points, types, outline is None)
+    estimate = searched(new_search(points, types, outline is None, COARSE_POINTS), types, outline, side_taus, log_prior)
+    if all(np.less(estimate.noise, DOUBTFUL)) or len(points) <= COARSE_POINTS:
+        return estimate
+    larger = new_search(points, types, outline is None, MORE_POINTS * COARSE_POINTS)
+    return min(estimate, searched(larger, types, outline, side_taus, log_prior), key=lambda one: min(one.bics.values()))
+
+
+def searched(
+    search: Search,
+    types: tuple[str, ...],
+    outline: shapely.Polygon | None,
+    side_taus: tuple[float, ...],
+    log_prior: dict[str, float] | None,
+) -> Estimate:
+    """The most evident roof of `types` from the starts that the thinned points vote for."""
     basic = search.roughly_fitted(vote_starts(search, outline))
     candidates = basic.joined(search.roughly_fitted(search.coarsely_fitted(derived_starts(search, basic))))
     candidates = candidates.chosen(np.array([search.shapes[kind].name in types for kind in candidates.kinds]))
     candidates = candidates.within(ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points))
     candidates = search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
-    candidates = search.that_gain(candidates).within(SLACK_NATS + SLACK_NATS_A_POINT * len(points))
+    candidates = search.that_gain(candidates).within(SLACK_NATS + SLACK_NATS_A_POINT * len(search.whole.points))
     candidates, noises = learn(search, candidates)
     winner, bics = choose(search, candidates, log_prior or {})
     return finish(search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus)
@@ -181,15 +198,15 @@ def needed_for(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
     return names, np.array([list(dict.fromkeys(families)).index(family) for family in families])
 
 
-def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool) -> Search:
-    """The problem of `points` (n, 4) and all shapes needed."""
+def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool, coarse_points: int) -> Search:
+    """The problem of `points` (n, 4), thinned to about `coarse_points`, and all shapes needed."""
     names, family = needed_for(types)
     z_low, z_high = height_range(points[:, 2])
     plan_area = (plan_extents(points[:, :2]) + 2 * OUTLIER_REACH_M).prod() if plan_is_free else 1.0
     log_background = -float(np.log(plan_area * (max(z_high - z_low, 1.0) + OUTLIER_REACH_M)))
     low, high = (bound.copy() for bound in bounds(names))
     low[:, Q0], high[:, Q0] = z_low - 1.0, z_high + 1.5
-    stride = max(1, round(len(points) / COARSE_POINTS))
+    stride = max(1, round(len(points) / coarse_points))
     whole = Problem(points, log_background, plan_is_free)
     thinned = whole._replace(points=np.ascontiguousarray(points[::stride]))
     return Search(whole, thinned, tables(names), variants(names), family, low, high)
@@ -249,7 +266,6 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
 def derived_starts(search: Search, basic: Candidates) -> Candidates:
     """Starts of the types that derive from simpler ones, from the best `basic` fit of each."""
     basic = search.best_of_type(basic, 1)
-    basic = basic.within(SOURCE_SLACK_NATS_A_POINT * len(search.thinned.points))
     theta_of = {search.shapes[kind].name: theta for kind, theta in zip(basic.kinds, basic.thetas, strict=True)}
     starts = [
         (t, start.theta(theta_of[start.source]))
