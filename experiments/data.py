@@ -43,7 +43,7 @@ def named_samples(options: Options) -> dict[str, list[RoofSample]]:
     if path.is_file():
         found["RoofN3D csv"] = list(roofn3d_roofs(path, 3 if options.quick else MOST_ROWS))
     elif (path / "roofn3d" / "nyc_roofs.npz").is_file():
-        found["New York roofs"] = list(new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 3 if options.quick else None))
+        found["New York roofs"] = list(new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 1 if options.quick else None))
     elif options.data is not None:
         raise InputError(f"expected a RoofN3D csv or a folder with roofn3d/nyc_roofs.npz, got {path}; check --data")
     found["simulated"] = list(simulated_roofs(options.seed, 1 if options.quick else 20, options.quick))

@@ -45,25 +45,30 @@ MODULES = {module(file): file for file in sorted(PACKAGE.rglob("*.py"))}
 
 
 @cache
-def imports(name):
-    """(module of the package, whether at the top of the file) of all imports of the module `name`, inside functions too."""
-    file = MODULES[name]
-    folder = file.parent.relative_to(PACKAGE).parts
-    tree = ast.parse(file.read_text(encoding="utf-8"))
+def statements(name):
+    """(import statement, whether at the top of the file) of all in the module `name`, inside functions too."""
+    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
     at_top = {id(node) for node in tree.body}
+    return [(node, id(node) in at_top) for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+
+
+@cache
+def imports(name):
+    """(module of the package, whether at the top of the file) of all that the module `name` imports of it."""
+    folder = MODULES[name].parent.relative_to(PACKAGE).parts
     found = set()
-    for node in ast.walk(tree):
+    for node, at_top in statements(name):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = (*folder[: len(folder) - node.level + 1], *(node.module.split(".") if node.module else ()))
             for imported in node.names:
                 target = (*base, imported.name) if (*base, imported.name) in MODULES else base
-                found.add((target, id(node) in at_top))
+                found.add((target, at_top))
     return found - {(name, True), (name, False)}
 
 
 def foreign(name):
     """Packages beside hiproof that the module `name` imports."""
-    nodes = list(ast.walk(ast.parse(MODULES[name].read_text(encoding="utf-8"))))
+    nodes = [node for node, _ in statements(name)]
     names = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
     names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     return {name.split(".")[0] for name in names}

@@ -12,17 +12,12 @@ from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, OutputError
 from run_records import records
 
-dask = pytest.importorskip("dask", reason="needs dask[distributed], the extra `city`")
 distributed = pytest.importorskip("distributed", reason="needs dask[distributed], the extra `city`")
 
 
 @pytest.fixture(scope="module")
 def cluster():
-    # one death is enough to blame a task here, so that quarantine is reached soon
-    with (
-        dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
-    ):
+    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
         # a worker that dies while its nanny still starts it is not started again by the nanny
         cluster.adapt(minimum=2, maximum=2)
         yield cluster
@@ -42,6 +37,8 @@ def test_a_cluster_whose_worker_is_killed_changes_no_byte(town_files, undisturbe
 
 def test_a_building_that_kills_dask_workers_is_left_out_alone(town_files, cluster, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_deadly)
+    # one death is enough to blame a task here: each costs the start of a worker
+    monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
     monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
     summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address))

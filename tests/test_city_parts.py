@@ -1,8 +1,5 @@
 """Laws of the pieces of a city run: tiles own each building once, the ledger keeps what is done, dead workers end nothing."""
 
-import os
-import signal
-
 import numpy as np
 import pytest
 import shapely
@@ -12,6 +9,7 @@ from hiproof.city.ground import BareAround, Cells, GroundAround, LowestAround, g
 from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
+from small_tasks import die_on_two, double
 
 
 def jobs_at(xy):
@@ -133,18 +131,6 @@ def test_the_ledger_remembers_after_being_closed(tmp_path):
     assert again.counts("status") == {"modelled": 1}
     reader = Ledger(path, read_only=True)
     assert reader.counts("type") == {"gable": 1}
-
-
-def double(x):
-    if x == 3:
-        raise ValueError("three")
-    return 2 * x
-
-
-def die_on_two(x):
-    if x == 2:
-        os.kill(os.getpid(), signal.SIGKILL)
-    return x
 
 
 @pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["in process", "processes"])

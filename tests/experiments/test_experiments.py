@@ -3,6 +3,7 @@
 import csv
 import importlib
 import math
+from functools import partial
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from experiments.output import Options, Table
 from experiments.ransac import available, detect_planes, match_faces
 from experiments.robust import with_outliers, without_strip
 from experiments.table3 import record_of, same_way_round
+from scipy import optimize
 
 from hiproof.errors import InputError
 from hiproof.primitives import CATALOGUE
@@ -23,8 +25,14 @@ pytest.importorskip("matplotlib", reason="the experiments draw with matplotlib (
 needs_ransac = pytest.mark.skipif(not available(), reason="pyransac3d is not installed (extra `experiments`)")
 
 
+@pytest.fixture
+def few_steps(monkeypatch):
+    """The paper's objective is followed for two steps alone: where it leads to is what tests/fit/test_paper.py asks."""
+    monkeypatch.setattr(optimize, "minimize", partial(optimize.minimize, options={"maxiter": 2}))
+
+
 @pytest.mark.parametrize("name", NAMES)
-def test_quick_form_writes_its_files(name, tmp_path, capsys):
+def test_quick_form_writes_its_files(name, few_steps, tmp_path, capsys):
     main([name, "--quick", "--out", str(tmp_path)])
     text = (tmp_path / f"{name}.md").read_text()
     assert text in capsys.readouterr().out
