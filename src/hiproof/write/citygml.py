@@ -11,12 +11,10 @@ import datetime
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..frames import METRES, Units
 from ..model import GROUND, Building, Face, Solid
 from ..settings import WriteSettings
 from .building_attributes import OWN, PREFIX, building_attributes, figures_of
@@ -35,7 +33,7 @@ from .head import FileHead
 from .naming import UniqueNames, gml_name, srs_name
 from .roof_codes import CODE_SPACES, roof_type_code
 from .roof_figures import RoofFigures, ground_height
-from .shapes import PartShape, Shapes, shapes_of
+from .shapes import PartShape
 from .writer import BuildingWriter
 from .xml_text import attribute_set, generic_attribute, xml_attribute, xml_text
 
@@ -82,10 +80,8 @@ class CityGMLWriter(BuildingWriter):
         write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
-        self.write = write or WriteSettings()
-        head = FileHead(crs, write=self.write)
-        self.srs_name, self.units = srs_name(head.crs_of_files), head.units.gml
-        self.prefix, self.creation_date = prefix, creation_date
+        self.head = FileHead(crs, write=write or WriteSettings(), prefix=prefix, creation_date=creation_date)
+        self.srs_name = srs_name(self.head.crs_of_files)
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.names = UniqueNames()
 
@@ -98,12 +94,10 @@ class CityGMLWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        attributes = building_attributes(building, figures, self.prefix, self.units, self.write.osm_tags)
+        osm = self.head.write.osm_tags
+        attributes = building_attributes(building, figures, self.head.prefix, self.head.units.gml, osm)
         name = self.names.take(gml_name(building.id))
-        shapes = shapes_of(building, figures, self.write, self.prefix)
-        date = self.creation_date
-        written = GmlBuilding(building, figures, shapes, attributes, name, self.units, self.write, date)
-        self.add_member(gml_member(written))
+        self.add_member(fragment(Sheet(building, figures, attributes, building.id, name, self.head)))
 
     def add_member(self, member: Fragment) -> None:
         """Write a building, told in CityGML 2.0."""
@@ -138,79 +132,51 @@ def writer(path: str | os.PathLike, head: FileHead) -> CityGMLWriter:
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """A building's part of a run's file."""
-    units, write = sheet.head.units.gml, sheet.head.write
-    return gml_member(
-        GmlBuilding(sheet.building, sheet.figures, sheet.shapes, sheet.attributes, sheet.gml_name, units, write)
-    )
-
-
-@dataclass(frozen=True)
-class GmlBuilding:
-    """A building with what is drawn and said of it, its `name` unique in the file, and how it is written."""
-
-    building: Building
-    figures: RoofFigures | None
-    shapes: Shapes
-    attributes: dict[str, Any]
-    name: str
-    units: Units = METRES
-    write: WriteSettings = field(default_factory=WriteSettings)
-    creation_date: datetime.date | None = None
-
-    @property
-    def solid(self) -> Solid | None:
-        """The solid that is the building's own: none where its parts have solids, or where none is asked for."""
-        is_own = "2.2" in self.write.lods and self.figures is not None and not self.shapes.parts
-        return self.building.solid if is_own else None
-
-
-def gml_member(drawn: GmlBuilding) -> Fragment:
     """The cityObjectMember of a building, whose gml:ids end in its name; the root's namespaces are taken as declared."""
-    text = f"<core:cityObjectMember>{building_element(drawn)}</core:cityObjectMember>".encode()
-    lines = terrain_lines(drawn)
-    if drawn.figures is not None:
-        lines = [*lines, drawn.units.from_metres(drawn.building.solid.vertices)]
+    text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
+    lines = terrain_lines(sheet)
+    if sheet.figures is not None:
+        lines = [*lines, sheet.head.units.gml.from_metres(sheet.building.solid.vertices)]
     if not lines:
         return Fragment(text)
     xyz = np.concatenate(lines)
     return Fragment(text, (*xyz.min(axis=0).tolist(), *xyz.max(axis=0).tolist()))
 
 
-def building_element(drawn: GmlBuilding) -> str:
+def building_element(sheet: Sheet) -> str:
     """One bldg:Building, its children in the schema's order; all its gml:ids end in its name."""
-    building, figures, name, write = drawn.building, drawn.figures, drawn.name, drawn.write
+    building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
-    if drawn.creation_date is not None:
-        text.append(f"<core:creationDate>{drawn.creation_date.isoformat()}</core:creationDate>")
-    text += [generic_attribute(key, value) for key, value in drawn.attributes.items()]
+    if sheet.head.creation_date is not None:
+        text.append(f"<core:creationDate>{sheet.head.creation_date.isoformat()}</core:creationDate>")
+    text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
         text.append(
             roof_and_height([part.type for part in building.parts], figures, ground_height(building, figures), write)
         )
-        text.append(level_surfaces(drawn))
-        text.append(lod1_solid(drawn.shapes.lod13 or drawn.shapes.lod12, drawn.units))
-    text.append(with_terrain(drawn))
-    if drawn.solid is not None and figures is not None:
-        text += boundary_surfaces(drawn.solid, figures, surface_ids(drawn.solid.faces, name), drawn.units)
-    text += [part_element(drawn, number, part) for number, part in enumerate(drawn.shapes.parts, 1)]
+        text.append(level_surfaces(sheet))
+        text.append(lod1_solid(sheet.shapes.lod13 or sheet.shapes.lod12, sheet.head.units.gml))
+    text.append(with_terrain(sheet))
+    if figures is not None and (solid := own_solid(sheet)) is not None:
+        text += boundary_surfaces(solid, figures, surface_ids(solid.faces, name), sheet.head.units.gml)
+    text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, "</bldg:Building>"])
 
 
-def part_element(drawn: GmlBuilding, number: int, part: PartShape) -> str:
+def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
     """One bldg:BuildingPart with its solid; its gml:ids have the part's number before the building's name."""
-    name, ground = f"{number}-{drawn.name}", ground_height(drawn.building, drawn.figures)
+    name, ground = f"{number}-{sheet.gml_name}", ground_height(sheet.building, sheet.figures)
     sets = part.attributes.get(f"{OWN}primitives", [])
     text = [f'<bldg:consistsOfBuildingPart><bldg:BuildingPart gml:id="part-{name}">']
     text += [generic_attribute(key, value) for key, value in part.attributes.items() if not isinstance(value, list)]
     text += [attribute_set(f"{OWN}primitive_{k}", values) for k, values in enumerate(sets)]
-    text.append(roof_and_height(part.types, part.figures, ground, drawn.write))
-    text.append(lod1_solid(part.block, drawn.units))
-    if "2.2" in drawn.write.lods:
-        ids = surface_ids(part.solid.faces, drawn.name, f"{number}.")
+    text.append(roof_and_height(part.types, part.figures, ground, sheet.head.write))
+    text.append(lod1_solid(part.block, sheet.head.units.gml))
+    if "2.2" in sheet.head.write.lods:
+        ids = surface_ids(part.solid.faces, sheet.gml_name, f"{number}.")
         text.append(lod2_solid(ids, f"shell-{name}"))
-        text += [lod2_surfaces(part.solid, drawn.units)] if drawn.write.gml_surfaces else []
-        text += boundary_surfaces(part.solid, part.figures, ids, drawn.units)
+        text += [lod2_surfaces(part.solid, sheet.head.units.gml)] if sheet.head.write.gml_surfaces else []
+        text += boundary_surfaces(part.solid, part.figures, ids, sheet.head.units.gml)
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
 
 
@@ -222,38 +188,44 @@ def roof_and_height(types: Iterable[str], figures: RoofFigures, z_ground: float,
     return f'{roof}<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>'
 
 
-def level_surfaces(drawn: GmlBuilding) -> str:
+def level_surfaces(sheet: Sheet) -> str:
     """LoD0, where asked for: footprint and roof edge."""
-    shapes, solid = drawn.shapes, drawn.building.solid
+    shapes, solid = sheet.shapes, sheet.building.solid
     if shapes.outline is None:
         return ""
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
-    unmoved = solid.vertices - np.array([*drawn.building.shift, 0.0])
-    low = multi_surface((upward,), positions(drawn.units.from_metres(unmoved)))
-    edge = multi_surface((upward,), positions(drawn.units.from_metres(shapes.edge_vertices(solid))))
+    unmoved = solid.vertices - np.array([*sheet.building.shift, 0.0])
+    low = multi_surface((upward,), positions(sheet.head.units.gml.from_metres(unmoved)))
+    edge = multi_surface((upward,), positions(sheet.head.units.gml.from_metres(shapes.edge_vertices(solid))))
     return f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint><bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
 
 
-def with_terrain(drawn: GmlBuilding) -> str:
+def with_terrain(sheet: Sheet) -> str:
     """The building's own solid of LoD2, its surfaces and the line along which it meets the terrain, as far as asked for.
 
     GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line, which is the same at all levels,
     stands before them as LoD1's; without LoD2 it would be the last, and is left out.
     """
-    lines, is_last = terrain_lines(drawn), not drawn.write.gml_surfaces
-    has_lod2 = "2.2" in drawn.write.lods
+    lines, is_last = terrain_lines(sheet), not sheet.head.write.gml_surfaces
+    has_lod2 = "2.2" in sheet.head.write.lods
     first = terrain_element(lines, 1) if lines and not is_last and has_lod2 else ""
     last = terrain_element(lines, 2 if has_lod2 else 1) if lines and is_last else ""
-    if drawn.solid is None:
+    if (solid := own_solid(sheet)) is None:
         return first + last
-    solid = lod2_solid(surface_ids(drawn.solid.faces, drawn.name), f"solid-{drawn.name}")
-    surfaces = lod2_surfaces(drawn.solid, drawn.units) if drawn.write.gml_surfaces else ""
-    return f"{first}{solid}{surfaces}{last}"
+    shell = lod2_solid(surface_ids(solid.faces, sheet.gml_name), f"solid-{sheet.gml_name}")
+    surfaces = lod2_surfaces(solid, sheet.head.units.gml) if sheet.head.write.gml_surfaces else ""
+    return f"{first}{shell}{surfaces}{last}"
 
 
-def terrain_lines(drawn: GmlBuilding) -> list[np.ndarray]:
+def terrain_lines(sheet: Sheet) -> list[np.ndarray]:
     """The terrain intersection's lines (m, 3) in the file's unit that are lines: two points at least, all known."""
-    if not drawn.write.terrain_intersection:
+    if not sheet.head.write.terrain_intersection:
         return []
-    lines = (line for line in drawn.building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
-    return [drawn.units.from_metres(line) for line in lines]
+    lines = (line for line in sheet.building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
+    return [sheet.head.units.gml.from_metres(line) for line in lines]
+
+
+def own_solid(sheet: Sheet) -> Solid | None:
+    """The solid that is the building's own: none where its parts have solids, or where none is asked for."""
+    is_own = "2.2" in sheet.head.write.lods and sheet.figures is not None and not sheet.shapes.parts
+    return sheet.building.solid if is_own else None

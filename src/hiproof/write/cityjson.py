@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterable
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from .head import FileHead
 from .json_text import dump
 from .naming import UniqueNames, reference_system
 from .roof_figures import RoofFigures
-from .shapes import PartShape, Shapes, shapes_of
+from .shapes import PartShape
 from .values import metres, plain_text
 from .writer import BuildingWriter
 
@@ -67,11 +66,10 @@ class CityJSONWriter(BuildingWriter):
         write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
-        self.write = write or WriteSettings()
-        head = FileHead(crs, write=self.write)
-        self.units, self.reference_system = head.units.cityjson, reference_system(head.crs_of_files)
+        self.head = FileHead(crs, write=write or WriteSettings(), prefix=prefix)
+        self.units, self.reference_system = self.head.units.cityjson, reference_system(self.head.crs_of_files)
         self.is_document = str(path).endswith(".json")
-        self.prefix, self.scale = prefix, scale
+        self.scale = scale
         self.translate = translate
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.ids = UniqueNames()
@@ -88,13 +86,12 @@ class CityJSONWriter(BuildingWriter):
         figures = figures or figures_of(building)
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale, self.units)
-        attributes = building_attributes(building, figures, self.prefix, self.units, self.write.osm_tags)
-        shapes = shapes_of(building, figures, self.write, self.prefix)
-        drawn = Drawn(building, figures, shapes, attributes, self.prefix, self.write.lods)
+        attributes = building_attributes(building, figures, self.head.prefix, self.units, self.head.write.osm_tags)
+        sheet = Sheet(building, figures, attributes, name, "", self.head)
         if self.is_document:
-            self.add_to_document(drawn.objects(name, vertices), vertices)
+            self.add_to_document(city_objects(sheet, vertices), vertices)
         else:
-            self.put(feature_line(drawn, name, vertices))
+            self.put(feature_line(sheet, vertices))
 
     def put(self, fragment: Fragment) -> None:
         """Write a building whose line is about this file's `translate`."""
@@ -163,8 +160,7 @@ def fragment(sheet: Sheet) -> Fragment:
     """A building's line in a run's file."""
     offset = np.zeros(3) if sheet.head.offset is None else sheet.head.offset
     vertices = Vertices(offset, SCALE, sheet.head.units.cityjson)
-    drawn = Drawn(sheet.building, sheet.figures, sheet.shapes, sheet.attributes, PREFIX, sheet.head.write.lods)
-    return feature_line(drawn, sheet.name, vertices)
+    return feature_line(sheet, vertices)
 
 
 def offset_of(corner_xy: np.ndarray) -> np.ndarray:
@@ -172,33 +168,24 @@ def offset_of(corner_xy: np.ndarray) -> np.ndarray:
     return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """A building with what is drawn and said of it."""
+def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
+    """CityObjects by id: the building and its parts; their vertices go to `vertices`."""
+    name, prefix, lods = sheet.name, sheet.head.prefix, sheet.head.write.lods
+    geometry = building_geometry(sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods)
+    whole: dict[str, Any] = {"type": "Building", "attributes": sheet.attributes}
+    parts = {f"{name}-part{k}": part_object(sheet, part, vertices) for k, part in enumerate(sheet.shapes.parts, 1)}
+    if geometry:
+        whole = {"type": "Building", "geographicalExtent": list(extent_of(vertices)), "attributes": sheet.attributes}
+        whole["geometry"] = geometry
+    if parts:
+        whole["children"] = list(parts)
+    return {name: whole, **parts}
 
-    building: Building
-    figures: RoofFigures | None
-    shapes: Shapes
-    attributes: dict[str, Any]
-    prefix: str
-    lods: tuple[str, ...]
 
-    def objects(self, name: str, vertices: Vertices) -> dict[str, dict[str, Any]]:
-        """CityObjects by id: the building, under `name`, and its parts; their vertices go to `vertices`."""
-        geometry = building_geometry(self.building, self.figures, self.shapes, vertices, self.prefix, self.lods)
-        whole: dict[str, Any] = {"type": "Building", "attributes": self.attributes}
-        parts = {f"{name}-part{k}": self.part(name, part, vertices) for k, part in enumerate(self.shapes.parts, 1)}
-        if geometry:
-            whole = {"type": "Building", "geographicalExtent": list(extent_of(vertices)), "attributes": self.attributes}
-            whole["geometry"] = geometry
-        if parts:
-            whole["children"] = list(parts)
-        return {name: whole, **parts}
-
-    def part(self, name: str, part: PartShape, vertices: Vertices) -> dict[str, Any]:
-        """The CityObject of a building part of the building `name`."""
-        geometry = part_geometry(self.building, part, vertices, self.prefix, self.lods)
-        return {"type": "BuildingPart", "parents": [name], "attributes": part.attributes, "geometry": geometry}
+def part_object(sheet: Sheet, part: PartShape, vertices: Vertices) -> dict[str, Any]:
+    """The CityObject of a part of the building."""
+    geometry = part_geometry(sheet.building, part, vertices, sheet.head.prefix, sheet.head.write.lods)
+    return {"type": "BuildingPart", "parents": [sheet.name], "attributes": part.attributes, "geometry": geometry}
 
 
 def extent_of(vertices: Vertices) -> tuple[float, ...]:
@@ -208,10 +195,10 @@ def extent_of(vertices: Vertices) -> tuple[float, ...]:
     return tuple(metres(v) for v in (*low, *high))
 
 
-def feature_line(drawn: Drawn, name: str, vertices: Vertices) -> Fragment:
-    """The CityJSONFeature of a building under the id `name`; `vertices` are empty, about the file's offset."""
-    objects = drawn.objects(name, vertices)
-    feature = {"type": "CityJSONFeature", "id": name, "CityObjects": objects, "vertices": vertices.grid}
+def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
+    """The CityJSONFeature of a building; `vertices` are empty, about the file's offset."""
+    objects = city_objects(sheet, vertices)
+    feature = {"type": "CityJSONFeature", "id": sheet.name, "CityObjects": objects, "vertices": vertices.grid}
     return Fragment(dump(feature) + b"\n", extent_of(vertices) if vertices.grid else None)
 
 

@@ -41,7 +41,7 @@ class Sheet:
     @functools.cached_property
     def shapes(self) -> Shapes:
         """What is drawn of the building beside its own solid."""
-        return shapes_of(self.building, self.figures, self.head.write)
+        return shapes_of(self.building, self.figures, self.head.write, self.head.prefix)
 
 
 @dataclass(frozen=True)

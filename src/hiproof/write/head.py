@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import functools
 from dataclasses import dataclass, field
 from typing import Any
@@ -9,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..settings import ComposeSettings, WriteSettings
+from .attribute_list import PREFIX
 from .naming import FileUnits
 
 
@@ -16,13 +18,16 @@ from .naming import FileUnits
 class FileHead:
     """What the files of a run have in common: the CRS (anything pyproj understands, or None), the unit of coordinates
     without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
-    settles it, how solids are composed and what is written of buildings."""
+    settles it, how solids are composed, what is written of buildings, what goes before roofer's attribute names, and the date
+    that CityGML gives its buildings, if any."""
 
     crs: Any = None
     unit: str = "auto"
     offset: np.ndarray | None = None
     compose: ComposeSettings = field(default_factory=ComposeSettings)
     write: WriteSettings = field(default_factory=WriteSettings)
+    prefix: str = PREFIX
+    creation_date: datetime.date | None = None
 
     @functools.cached_property
     def units(self) -> FileUnits:
