@@ -12,7 +12,8 @@ from ..errors import CompositionError
 from ..model import Roof, Solid
 from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
-from .check import check_solid
+from .check import check_solid, flattened
+from .check_kernel import enclosed_volume
 from .shell import Saddle, raise_shell
 
 # factor on the snap distance and whether straight walls become one, tried in turn until the solid is valid
@@ -76,13 +77,7 @@ def compose_at(
 
 def volume(solid: Solid) -> float:
     """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
-    vertices = solid.vertices - solid.vertices.mean(axis=0)
-    rings = [ring for face in solid.faces for ring in face.rings]
-    here = np.concatenate([np.asarray(ring) for ring in rings])
-    after = np.concatenate([np.roll(ring, -1) for ring in rings])
-    anchor = np.concatenate([np.full(sum(map(len, face.rings)), face.rings[0][0]) for face in solid.faces])
-    spans = np.cross(vertices[here], vertices[after])
-    return round(float((vertices[anchor] * spans).sum() / 6.0), 9)
+    return round(enclosed_volume(solid.vertices - solid.vertices.mean(axis=0), *flattened(solid)), 9)
 
 
 def terrain_intersection(
