@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ..classify.scene import NO_ROOFS
 from ..errors import InputError, InputWarning
 from ..read.pointcloud import iter_points
 from ..settings import ReadSettings, Settings
@@ -30,6 +29,8 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     counts = count_classes(clouds, read.building_classes if read.roofs == "auto" else ())
     if read.roofs == "auto" and (not counts or any(counts[c] for c in read.building_classes)):
         return settings
+    from ..classify.scene import NO_ROOFS  # with scipy.ndimage: not where the clouds have a building class
+
     others = tuple(sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes))
     present = ", ".join(f"{c} ({n:,} points)" for c, n in sorted(counts.items()))
     if not others:
