@@ -257,7 +257,7 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
 
 def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):
     runs = []
-    monkeypatch.setattr(warm, "compile_piece", lambda piece: not runs.append(piece))
+    monkeypatch.setattr(warm, "compiled_pieces", lambda left: (piece for piece in left if not runs.append(piece)))
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "kept",))
     kept.remove_outdated.cache_clear()
     for stamped in ("a", "a", "b", "b"):
@@ -270,11 +270,15 @@ def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypa
 
 def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
-    monkeypatch.setattr(warm, "compile_piece", lambda piece: pytest.fail("compiled for nothing"))
+    monkeypatch.setattr(warm, "compiled_pieces", lambda left: pytest.fail("compiled for nothing"))
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "file" / "folder",))
     kept.warn_not_kept.cache_clear()
     with pytest.warns(NotKeptWarning, match="NUMBA_CACHE_DIR"):
         warm.make_ready(["solid"])
+
+
+def test_a_piece_that_fails_leaves_the_others_to_be_compiled():
+    assert list(warm.compiled_pieces(iter(["no such piece", "points"]))) == ["points"]
 
 
 LONG = """

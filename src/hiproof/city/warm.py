@@ -1,7 +1,8 @@
 """Compile before any work starts, in as many processes as there are cores; later runs only look at a mark.
 
-The processes are fresh ones that run `warm_pieces` each for a piece of the code: where they cannot be started, or one
-fails, the functions are compiled when they are called. A mark a piece lies beside the compiled code.
+The processes are fresh ones that run `warm_pieces`, one piece of the code after the other, so that what pieces share of
+numba's own is compiled once a process: where they cannot be started, or one fails, the functions are compiled when they
+are called. A mark a piece lies beside the compiled code.
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -29,28 +30,39 @@ def make_ready(pieces: Sequence[str]) -> None:
     kept.remove_outdated(folder, "warm", stamp)
     news.processes = min(cores(), len(missing))
     news.tell()
+    left = iter(missing)
+
+    def work_off() -> None:
+        for piece in compiled_pieces(left):
+            (folder / mark(piece, stamp)).touch()
+
     with ThreadPoolExecutor(news.processes) as pool:
-        for piece, ready in zip(missing, pool.map(compile_piece, missing), strict=True):
-            if ready:
-                (folder / mark(piece, stamp)).touch()
+        for done in [pool.submit(work_off) for _ in range(news.processes)]:
+            done.result()
     news.processes = 1
 
 
-def compile_piece(piece: str) -> bool:
-    """Have a piece compiled by a process of its own, whose functions count as ready here too; whether it came to its end."""
-    command = [sys.executable, "-m", "hiproof.city.warm_pieces", piece]
-    silent: dict[str, Any] = {"stdin": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+def compiled_pieces(left: Iterator[str]) -> Iterator[str]:
+    """Have a process of its own compile pieces while any are `left`, which other threads take from as well; each that came
+    to its end. The process' functions count as ready here too."""
+    command = [sys.executable, "-m", "hiproof.city.warm_pieces"]
+    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
     try:
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment(), **silent) as at_work:
-            for line in at_work.stdout or ():
-                news.ready.add(line.strip())
-                news.tell()
+        with subprocess.Popen(command, text=True, bufsize=1, env=environment(), **pipes) as at_work:
+            assert at_work.stdin and at_work.stdout
+            for piece in left:
+                print(piece, file=at_work.stdin)
+                for line in map(str.strip, iter(at_work.stdout.readline, "")):
+                    if line == piece:
+                        yield piece
+                    if line in (piece, news.FAILED):
+                        break
+                    news.ready.add(line)
+                    news.tell()
+                else:
+                    raise OSError(f"the process ended while it compiled {piece}")
     except OSError as error:
-        LOGGER.debug("no process could be started to compile %s: %s", piece, error)
-        return False
-    if at_work.returncode:
-        LOGGER.debug("compiling %s beforehand ended with exit code %d", piece, at_work.returncode)
-    return at_work.returncode == 0
+        LOGGER.debug("not all could be compiled beforehand: %s", error)
 
 
 def environment() -> dict[str, str]:

@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from .stamp import count_compiled
 
+FAILED = "failed"  # what a process that compiles answers where a piece did not come to its end; else the piece's name
 SECONDS_A_FUNCTION = 0.6  # of one core, with everything that it stands on
 
 ready: set[str] = set()  # functions that were compiled or loaded in this process, or by those that it started
