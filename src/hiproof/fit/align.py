@@ -24,6 +24,7 @@ FARTHEST_M = 3.0  # a footprint is moved at most
 AROUND_M = 4.0  # of points that are asked for around it
 # m between the shifts tried first, and after that; m of half a cell of the raster of costs
 COARSE_M, FINE_M, PITCH_M = 0.5, 0.1, 0.1
+SLID_POINTS = 600  # that are slid over the footprint: a bound on time, for all that comes after looks at every point
 # m over which a side is soft, as in fit/outline; density outside over that inside: points of walls and neighbours
 BLUR_M, STRAY = 0.25, math.exp(-4.0)
 LEAST_POINTS, LEAST_SIDE_M = 20, 1.5  # points; with fewer every shift holds as many; m: shorter sides tell no offset
@@ -112,12 +113,13 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     nodes = low + 2 * PITCH_M * np.moveaxis(np.indices(tuple(count)), 0, -1).reshape(-1, 2)
     depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
     costs = -np.log(STRAY + (1.0 - STRAY) * normal_share(depth / BLUR_M)).reshape(count)
+    few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
     for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
         moves = np.arange(-reach, reach + 0.5 * step, step)
         tried = best + np.array(list(product(moves, moves)))
         tried = tried[np.hypot(*tried.T) <= FARTHEST_M]
-        cost = slid_costs(xy, costs, low, 2 * PITCH_M, tried) + 0.1 * (tried**2).sum(axis=1)
+        cost = slid_costs(few, costs, low, 2 * PITCH_M, tried) + 0.1 * (tried**2).sum(axis=1)
         best = tried[int(np.argmin(cost))]
     return best
 
@@ -144,7 +146,7 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
         normal = np.array([math.cos(azimuth), math.sin(azimuth)])
         ends = ring[[i, (i + 1) % len(ring)]] + start
         offset = free_side_offset(xy, normal, distance + normal @ start, ends, density)
-        if offset is not None:
+        if not math.isnan(offset):
             rows.append(
                 (*normal, 1.0, offset + normal @ start, SIDE_M * math.sqrt(SIDE_LENGTH_M / length[i]), length[i])
             )
@@ -164,15 +166,16 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
     )
 
 
-def free_side_offset(
-    xy: np.ndarray, normal: np.ndarray, distance: float, ends: np.ndarray, density: float
-) -> float | None:
-    """How far (m) outwards the roof's side lies of the footprint's, None where roofs go on before it or there is none."""
-    along, depth = xy @ [-normal[1], normal[0]], distance - xy @ normal
-    low, high = sorted(ends @ [-normal[1], normal[0]])
-    within = (along >= low) & (along <= high)
-    before = ((depth > -FREE_TO_M) & (depth < -FREE_FROM_M) & within).sum() / (FREE_TO_M - FREE_FROM_M)
-    behind = ((depth > FREE_FROM_M) & (depth < FREE_TO_M) & within).sum() / (FREE_TO_M - FREE_FROM_M)
-    if behind < 1.0 or before > FREE_SHARE * behind:
-        return None
+@compiled
+def free_side_offset(xy, normal, distance, ends, density):
+    """How far (m) outwards the roof's side lies of the footprint's, NaN where roofs go on before it or there is none."""
+    along, depth = normal[0] * xy[:, 1] - normal[1] * xy[:, 0], distance - xy[:, 0] * normal[0] - xy[:, 1] * normal[1]
+    (first, last), before, behind = normal[0] * ends[:, 1] - normal[1] * ends[:, 0], 0, 0
+    low, high = min(first, last), max(first, last)
+    for k in range(len(xy)):
+        if low <= along[k] <= high:
+            before += -FREE_TO_M < depth[k] < -FREE_FROM_M
+            behind += FREE_FROM_M < depth[k] < FREE_TO_M
+    if behind < FREE_TO_M - FREE_FROM_M or before > FREE_SHARE * behind:
+        return np.nan
     return side_offset(along, depth, low, high, density)

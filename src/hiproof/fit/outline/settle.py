@@ -29,6 +29,7 @@ DEEP_M, SHALLOW_M, OUTSIDE_M = (
 LEAST_DENSITY, STRAY = 0.3, 0.02  # shares of the outline's density
 END_M, LONG_M = 0.3, 1.0  # of a side longer than that, its ends do not count: points there may be another side's
 FEWEST, FARTHEST_M = 4, 0.4  # points across a side; fewer tell nothing; m that a side may be moved beyond the last row
+FAR_BLURS = 6.0  # so far from the line all of a blurred side's points are on one side of it, but for 1e-9
 ROW_M, MOSTLY = 0.1, 0.6  # points closer across the side are of one row where most of the depth is between rows
 
 
@@ -44,33 +45,59 @@ def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
     return moved if find_corners(moved, corners) else lines
 
 
-def side_offset(along: np.ndarray, depth: np.ndarray, low: float, high: float, density: float) -> float:
+@compiled
+def side_offset(along, depth, low, high, density):
     """How far (m) outwards a side from `low` to `high` lies of the line from which `depth` (n,) of points at `along` was measured."""
     if high - low > LONG_M:
         low, high = low + END_M, high - END_M
-    across = (along >= low) & (along <= high) & (depth < DEEP_M) & (depth > -OUTSIDE_M)
-    return offset(depth[across], high - low, density)
+    across = np.empty(len(depth))
+    count = 0
+    for k in range(len(depth)):
+        if low <= along[k] <= high and -OUTSIDE_M < depth[k] < DEEP_M:
+            across[count] = depth[k]
+            count += 1
+    return offset(across[:count], high - low, density)
 
 
-def offset(depth: np.ndarray, length: float, density: float) -> float:
+@compiled
+def offset(depth, length, density):
     """How far (m) outwards a side of `length` lies of where points `depth` (n,) were measured from."""
     if len(depth) < FEWEST:
         return 0.0
-    inside = (depth > SHALLOW_M).sum() / ((DEEP_M - SHALLOW_M) * length)
-    a_metre = max(inside, LEAST_DENSITY * density) * length
-    bearing = depth[depth < SHALLOW_M - OFFSETS_M[0]]  # deeper points are inside wherever the side lies
-    logs = []
-    for blur in BLURS_M:
-        away = (bearing[:, None] + OFFSETS_M) / blur
-        inner = normal_share(away.ravel()).reshape(away.shape)
-        wall = np.exp(-0.5 * away**2) / (blur * math.sqrt(2.0 * math.pi))
-        logs += [
-            np.log(a_metre * (inner + walls * wall + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
-            for walls in WALLS_M
-        ]
-    likely = np.exp(np.array(logs) - np.max(logs)).sum(axis=0)
-    mean = float((likely * OFFSETS_M).sum() / likely.sum())
-    return mean + min(max(half_gap(depth[depth + mean > -ROW_M]) - 1.0 / a_metre, 0.0), FARTHEST_M)
+    inside = 0
+    for d in depth:
+        inside += d > SHALLOW_M
+    a_metre = max(inside / ((DEEP_M - SHALLOW_M) * length), LEAST_DENSITY * density) * length
+    logs = log_likelihoods(depth, a_metre)
+    likely = np.exp(logs - logs.max())
+    mean = (likely.sum(axis=0) * OFFSETS_M).sum() / likely.sum()
+    behind = depth[depth + mean > -ROW_M]
+    return mean + min(max(half_gap(behind) - 1.0 / a_metre, 0.0), FARTHEST_M)
+
+
+@compiled
+def log_likelihoods(depth, a_metre):
+    """Log likelihoods (blurs x walls, offsets) of the points `depth` (n,) across a side with `a_metre` points a metre of depth."""
+    logs = np.empty((len(BLURS_M) * len(WALLS_M), len(OFFSETS_M)))
+    for m, walls in enumerate(WALLS_M):
+        for q in range(len(OFFSETS_M)):
+            logs[m :: len(WALLS_M), q] = -a_metre * (DEEP_M + OFFSETS_M[q] + walls)
+    far_in, far_out = math.log(a_metre * (1.0 + STRAY)), math.log(a_metre * STRAY)
+    for d in depth:
+        if d >= SHALLOW_M - OFFSETS_M[0]:  # inside wherever the side lies
+            continue
+        for b, blur in enumerate(BLURS_M):
+            for q in range(len(OFFSETS_M)):
+                away = (d + OFFSETS_M[q]) / blur
+                row = len(WALLS_M) * b
+                if abs(away) > FAR_BLURS:
+                    logs[row : row + len(WALLS_M), q] += far_in if away > 0.0 else far_out
+                    continue
+                inner = 0.5 * math.erfc(-away / math.sqrt(2.0))
+                wall = math.exp(-0.5 * away * away) / (blur * math.sqrt(2.0 * math.pi))
+                for m, walls in enumerate(WALLS_M):
+                    logs[row + m, q] += math.log(a_metre * (inner + walls * wall + STRAY))
+    return logs
 
 
 @compiled
@@ -87,14 +114,18 @@ def normal_share(x):
     return share
 
 
-def half_gap(depth: np.ndarray) -> float:
+@compiled
+def half_gap(depth):
     """Distance (m) from a line placed by chance to the next point behind it, or the next row where points lie in rows.
 
     That is half the mean gap, wide gaps being hit more often.
     """
+    if len(depth) < 2:
+        return 0.0
     depth = np.sort(depth)
     gaps = np.diff(depth)
     if gaps[gaps > ROW_M].sum() > MOSTLY * gaps.sum():
-        rows = np.split(depth, np.flatnonzero(gaps > ROW_M) + 1)
-        gaps = np.diff([row.mean() for row in rows])
-    return float((gaps**2).sum() / (2.0 * gaps.sum())) if len(gaps) > 1 and gaps.sum() > 0.0 else 0.0
+        starts = np.append(np.append(0, np.flatnonzero(gaps > ROW_M) + 1), len(depth))
+        rows = np.array([depth[starts[r] : starts[r + 1]].mean() for r in range(len(starts) - 1)])
+        gaps = np.diff(rows)
+    return (gaps**2).sum() / (2.0 * gaps.sum()) if len(gaps) > 1 and gaps.sum() > 0.0 else 0.0
