@@ -7,7 +7,7 @@ import pytest
 import shapely
 from benchmarks.delft import asked_footprints
 from benchmarks.judging import SHARED, raster, wireframe_figures
-from benchmarks.towns import TOWNS, chosen, composed, ground_of, read_town, touching, write_truth
+from benchmarks.towns import TOWNS, all_modelled, chosen, composed, ground_of, read_town, touching, write_truth
 
 from handmade import box
 from hiproof.compose import compose
@@ -125,3 +125,11 @@ def test_even_and_odd_footprints_are_all_footprints():
     path = SHARED / "data/delft/footprints.gpkg"
     even, odd, every = ({f.id for f in asked_footprints(path, parity)} for parity in ("even", "odd", None))
     assert even | odd == every and not even & odd and min(len(even), len(odd)) > 0.4 * len(every)
+
+
+@needs_towns
+@pytest.mark.parametrize("ending", ["j64", "j7G"])
+def test_two_or_three_points_of_its_walls_are_no_part_of_a_gable(ending):
+    building = next(b for b in read_town(TOWNS["nrw_5657"]) if b.id.endswith(ending))
+    (model,), _ = all_modelled([building], [building.scanned(2.0)], True)
+    assert [part.type for part in model.parts] == ["gable"]

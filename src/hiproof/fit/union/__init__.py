@@ -48,7 +48,7 @@ from .plan import Plan, lay_out_plan
 from .regions import polygons_of, regions_of
 from .search import find_volumes
 from .shown import that_show
-from .slivers import without_slivers
+from .slivers import without_slivers, without_specks
 from .unite import united
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -80,7 +80,7 @@ def fit_building(
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    volumes = told_apart(without_slivers(volumes, scene), scene)
+    volumes = told_apart(without_slivers(without_specks(volumes, scene), scene), scene)
     roof = united(volumes, plan, outline, scene)
     volumes, sides, planes = roof.volumes, roof.sides, roof.planes
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))

@@ -16,7 +16,11 @@ from ..direction import main_direction
 from .planes import Cloud, Ghosts, Grid
 
 MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
-BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0  # dense clouds lose the points this close to the border: facade returns
+# m from the border within which returns may be a facade's; dense clouds lose them all, and sparser ones, that need their roof
+# points, lose those below the nearest points further in by more than a steep roof falls
+BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0
+LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
+NEAREST, STEEPEST, FACADE_DROP_M = 2, 1.5, 0.3
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 # m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
 MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
@@ -88,11 +92,7 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     angle = main_direction(outline)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     depth = signed_depth(points_local[:, 0].copy(), points_local[:, 1].copy(), *ring_edges(outline))
-    inside = points_local[depth >= 0.0]
-    if len(inside) >= BORDER_MIN_DENSITY * outline.area:
-        away = points_local[depth >= BORDER_M]
-        if len(away) >= max(8, 0.5 * len(inside)):
-            inside = away
+    inside = without_facades(points_local[depth >= 0.0], depth[depth >= 0.0], outline.area)
     centroid = shapely.get_coordinates(outline.centroid)[0]
     middle = len(inside) // 2
     height = np.partition(inside[:, 2], middle)[middle] if len(inside) else 0.0
@@ -109,6 +109,22 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
     cloud = Cloud(u, v, z, cells_of(u_lines, u), cells_of(v_lines, v))
     return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density)
+
+
+def without_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
+    """Points (n, 3) at `depth` (n,) inside an outline less those near its border that a scanner may have had of the walls."""
+    near = depth < BORDER_M
+    away = points[~near]
+    if len(away) < max(LEAST_AWAY, LEAST_AWAY_SHARE * len(points)):
+        return points
+    if len(points) >= BORDER_MIN_DENSITY * area_m2:
+        return away
+    from scipy.spatial import cKDTree
+
+    distance, nearest = cKDTree(away[:, :2]).query(points[near, :2], NEAREST)
+    above = away[nearest, 2] - points[near, 2:]
+    near[near] = (above > STEEPEST * distance + FACADE_DROP_M).all(axis=1)
+    return points[~near]
 
 
 def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:

@@ -1,16 +1,32 @@
-"""Planes that show as slivers go: a strip at a volume's edge, however well it explains what a scanner saw of the wall there."""
+"""What shows as a speck or a sliver goes, however well it explains what a scanner saw of the wall there.
+
+That is a volume of a point or two, and a plane that is a strip at its volume's edge.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from .moves import refit_each
+from .moves import refit_each, without
 from .objective import objective
 from .scene import Scene, nodes
 from .volumes import DIRECTION, LEAN, OFFSET, PLANES, SIDES, SLOPE, distances_up, roof_heights
 
+FEWEST_SEEN = 3  # points over which a volume of several is the highest: two on a wall at one height are chance
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
 DEAREST_UNITS = 3.0  # what leaving a plane out may cost
+
+
+def without_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
+    """The volumes without those that hardly any point shows, the fewest first. One alone is all there is of its roof."""
+    while len(volumes) > 2:
+        _, top = roof_heights(volumes, scene.U, scene.V)
+        seen = np.bincount(top[: scene.n], minlength=len(volumes))[1:]
+        if seen.min() >= FEWEST_SEEN:
+            break
+        trial = without(volumes, 1 + int(np.argmin(seen)))
+        volumes, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
+    return volumes
 
 
 def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
