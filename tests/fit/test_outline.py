@@ -1,5 +1,7 @@
 """Outlines without footprints: no inward bias, straight edges, and sentences for points that are no roof."""
 
+from itertools import pairwise, product
+
 import numpy as np
 import pytest
 import shapely
@@ -9,6 +11,9 @@ from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline
 from hiproof.fit.outline.cost import Border, cost_of_change, drawing_of
 from hiproof.fit.outline.lines import dropped, lines_through, replaced
+from hiproof.fit.outline.spread import unevenness
+from hiproof.fit.outline.steps import best_levels
+from hiproof.fit.outline.walls import on_walls
 
 L_SHAPE = shapely.Polygon([(0, 0), (16, 0), (16, 8), (7, 8), (7, 18), (0, 18)])
 SHAPES = {
@@ -74,9 +79,66 @@ def test_an_oblique_wall_is_drawn_as_one():
     assert corner_count(outline) == 4 and iou(outline, truth) > 0.96
 
 
+def scanned_block(outline, seed=0, high=6.0, step_at=None):
+    """Points (n, 3), evenly spread, 5 a square metre, of a level roof with walls; beyond x = `step_at` three metres lower."""
+    rng = np.random.default_rng(seed)
+    x0, y0, x1, y1 = outline.bounds
+    xy = np.stack(np.meshgrid(np.arange(x0, x1, 0.45), np.arange(y0, y1, 0.45)), -1).reshape(-1, 2)
+    xy = xy + rng.uniform(-0.15, 0.15, xy.shape)
+    roof = xy[shapely.contains_xy(outline, *xy.T)]
+    border = outline.exterior
+    if step_at is not None:
+        border = border.union(shapely.LineString([(step_at, y0), (step_at, y1)]).intersection(outline))
+    places = [line.interpolate(rng.uniform(0, line.length, int(3 * line.length))) for line in shapely.get_parts(border)]
+    walls = shapely.get_coordinates(np.concatenate(places))
+    top = np.where(
+        np.concatenate([roof, walls])[:, 0] > (np.inf if step_at is None else step_at + 0.01), high - 3, high
+    )
+    z = top - np.r_[np.zeros(len(roof)), rng.uniform(0.0, 6.0, len(walls))]
+    return np.column_stack([np.concatenate([roof, walls]) + rng.normal(0, 0.05, (len(z), 2)), z])
+
+
+@pytest.mark.parametrize("depth", [0.6, -0.6])
+def test_a_shallow_bay_is_drawn_where_its_walls_are_seen(depth):
+    bay = shapely.box(4, 8 + min(depth, 0), 8, 8 + max(depth, 0))
+    truth = shapely.box(0, 0, 14, 8).symmetric_difference(bay)
+    outline = estimate_outline(scanned_block(truth), 0.0)
+    assert corner_count(outline) == 8 and iou(outline, truth) > 0.97
+
+
+def test_walls_of_a_step_inside_are_walls_but_no_outer_ones():
+    points = scanned_block(shapely.box(0, 0, 14, 8), step_at=9.0)
+    wall, outer = on_walls(points, 0.4, shapely.box(0, 0, 14, 8))
+    x, y = points[:, :2].T
+    inner = (abs(x - 9.0) < 0.2) & (abs(y - 4.0) < 3.0) & (points[:, 2] < 4.5) & (points[:, 2] > 3.3)
+    deep = (abs(x - 4.0) < 3.0) & (abs(y - 4.0) < 3.0)
+    assert wall[inner].mean() > 0.9 and not outer[inner].any() and not wall[deep].any()
+    assert outer[(x < 0.05) & (points[:, 2] < 4.5)].mean() > 0.8
+    assert corner_count(estimate_outline(points, 0.0)) == 4
+
+
+def test_levels_of_columns_are_the_cheapest_of_all():
+    rng = np.random.default_rng(7)
+    for _ in range(20):
+        costs, step = rng.exponential(2.0, (5, 4)), rng.uniform(0.5, 3.0)
+        price = {
+            levels: sum(costs[range(5), levels]) + step * sum(a != b for a, b in pairwise(levels))
+            for levels in product(range(4), repeat=5)
+        }
+        assert price[tuple(best_levels(costs, step))] == pytest.approx(min(price.values()))
+
+
+def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
+    rng, box = np.random.default_rng(2), shapely.box(0, 0, 30, 30)
+    assert unevenness(rng.uniform(0, 30, (4500, 2)), box, 0.45) == pytest.approx(1.0, abs=0.1)
+    assert unevenness(scanned_block(box)[:, :2], box, 0.45) < 0.7
+    assert unevenness(rng.uniform(0, 2, (20, 2)), shapely.box(0, 0, 2, 2), 0.45) == 1.0
+
+
 def test_the_price_of_a_change_is_that_of_drawing_anew():
     rng = np.random.default_rng(3)
-    border = Border(*rng.uniform(0, 10, (2, 300)), 3.0, 0.15, 0.02, 2.5, 3.0, 1.0)
+    x, y = rng.uniform(0, 10, (2, 300))
+    border = Border(np.sort(x), y, rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0)
     lines = lines_through(np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float))
     drawing = drawing_of(lines, 0.0, border)
     for i in range(len(lines)):

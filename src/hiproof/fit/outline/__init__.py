@@ -1,9 +1,12 @@
-"""The outline of a building without a footprint, from the plan positions of its points, as a draughtsman would draw it.
+"""The outline of a building without a footprint, from its points, as a draughtsman would draw it.
 
 rough   the points' alpha shape, pushed out and with few corners
+walls   which points lie on walls
+spread  how evenly points are spread, by which prices go
 lines   a polygon as the lines of its sides
 cost    how well an outline explains where points are and are not, and what its lines cost
 moves   lines dropped, joined, turned into common directions and moved until nothing is gained
+steps   bays and notches of a side, wherever points pay for them
 settle  each side to the place that the points across it give it, without the bias of outermost points
 """
 
@@ -15,52 +18,69 @@ import numpy as np
 import shapely
 
 from ..direction import outline_direction
-from .cost import Border, drawing_of
+from .cost import Border, Drawing, drawing_of
 from .lines import find_corners, lines_through, quarter_gap
 from .moves import redrawn
 from .rough import rough_outline
 from .settle import settled
+from .spread import unevenness
+from .steps import stepped
+from .walls import on_walls
 
 __all__ = ["estimate_outline", "iou"]
 
 # m over which a side is soft: the scanner's noise in plan; density outside over that inside: points of walls and trees
 BLUR_M, STRAY = 0.15, math.exp(-4.0)
-LINE, DIRECTION, SKEW = 2.5, 3.0, 1.0  # prices in nats
+PRICES = (
+    3.0,
+    3.0,
+    1.0,
+)  # nats: of a line, of a further direction, of a line in that, where points are spread by chance
 MOST_DENSE = (
     8.0  # points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them
 )
-REACH_M, REACH_SPACINGS = 2.0, 3.0  # of points that bear on the border
 SAME_DIRECTION_RAD = math.radians(1.5)  # rad; within it the direction of slopes and that of the outline are one
 STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
 
-def estimate_outline(xy: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
-    """Outline (a polygon without holes) of points `xy` (n, 2) in metres, mostly along `kappa` (rad) and across.
+def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
+    """Outline (a polygon without holes) of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and across.
 
-    Where the rough outline has another main direction, that is tried too, and the cheaper drawing taken; without `kappa` it
-    is the only one. Raises FitError for points that span no area.
+    With heights, points of walls are known, and the outline runs through them. Where the rough outline has another main direction
+    than `kappa`, that is tried too, and the cheaper drawing taken; without `kappa` it is the only one. Raises FitError for
+    points that span no area.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12, 0.5), np.arange(0.25, 7, 0.5)))
     >>> outline = estimate_outline(np.column_stack([x, y]))
     >>> len(outline.exterior.coords) - 1, bool(abs(outline.area - 84) < 4)
     (4, True)
     """
-    xy = np.asarray(xy, float)
-    corners, spacing = rough_outline(xy)
+    points = np.asarray(points, float)
+    corners, spacing, shape = rough_outline(points[:, :2])
     rough = shapely.Polygon(corners)
-    density = len(xy) / rough.area
-    near = xy[shapely.distance(shapely.points(xy), rough.exterior) < max(REACH_M, REACH_SPACINGS * spacing)]
-    few = near[:: math.ceil(density / MOST_DENSE)]
-    x, y = np.ascontiguousarray(few.T)
-    border = Border(x, y, density * len(few) / len(near), BLUR_M, STRAY, LINE, DIRECTION, SKEW)
     own = outline_direction(rough)
     directions = [own] if kappa is None else [kappa]
     if kappa is not None and abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD:
         directions.append(own)
-    lines = lines_through(corners)
-    drawings = [redrawn(drawing_of(lines, angle, border), border, STEP_SPACINGS * spacing) for angle in directions]
-    best = min(drawings, key=lambda drawing: drawing.cost)
-    place = settled(best.lines, near, density)
+    wall, outer = on_walls(points, spacing, shape) if points.shape[1] > 2 else np.zeros((2, len(points)), bool)
+    density = (~wall).sum() / rough.area
+    telling, dearness = ~wall | outer, unevenness(points[~wall, :2], shape, spacing)
+    border = border_of(points[telling, :2], wall[telling], density, dearness)
+    drawings = [drawn(lines_through(corners), angle, border, STEP_SPACINGS * spacing) for angle in directions]
+    place = settled(min(drawings, key=lambda drawing: drawing.cost).lines, points[:, :2], density)
     corners = np.empty_like(place)
     find_corners(place, corners)
     return shapely.Polygon(corners)
+
+
+def border_of(xy: np.ndarray, wall: np.ndarray, density: float, dearness: float) -> Border:
+    """What bears on the border: some of the points `xy` (n, 2), of which `wall` (n,) lie on outer walls; and the prices."""
+    step = math.ceil(density / MOST_DENSE)
+    order = np.argsort(xy[::step, 0], kind="stable") * step
+    x, y = np.ascontiguousarray(xy[order].T)
+    return Border(x, y, wall[order], density / step, BLUR_M, STRAY, *(dearness * price for price in PRICES))
+
+
+def drawn(lines: np.ndarray, kappa: float, border: Border, step_m: float) -> Drawing:
+    """The cheapest drawing found from `lines` (n, 2) on: few of them at first, then with what breaks them."""
+    return redrawn(stepped(redrawn(drawing_of(lines, kappa, border), border, step_m), border), border, step_m)

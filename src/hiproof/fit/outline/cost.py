@@ -1,11 +1,14 @@
 """What an outline costs: how badly it explains where points lie, and how many lines it is drawn with. Compiled.
 
-Points are spread evenly over a roof, so an outline of area A around points of `density` has the likelihood
+Points of the roof are spread evenly over it, those of its walls lie on the outline. So an outline of area A around roof points of
+`density` has the likelihood
 
-    exp(-density A)  times the product over points of  density (stray + (1 - stray) Phi(depth / blur))
+    exp(-density A)  times the product over points of  density (stray + (1 - stray) Phi(depth / blur))  of the roof,
+                                                       stray + (1 - stray) exp(-(depth / blur)^2 / 2)  of walls
 
-and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece. To this come the prices of
-lines (two for a notch), of directions besides the main one, and of lines that run in them. All are in nats.
+and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece, those of walls wherever the
+outline does not run through them. To this come the prices of lines (two for a notch), of directions besides the main one, and of
+lines that run in them. All are in nats.
 """
 
 from __future__ import annotations
@@ -21,9 +24,9 @@ from .lines import SAME_RAD, area_of, find_corners, quarter_gap
 
 SURE = 4.0  # blurs from the border beyond which a point is inside or outside for sure
 
-# x, y (m): points that may decide where the border runs; density: of such points a square metre.
+# x, y (m): points of the roof and of outer walls, ascending in x; wall: which are a wall's; density: of roof points a square metre.
 # blur (m), stray (share): see above. line, direction, skew: prices of a line, a further direction, a line in that.
-Border = namedtuple("Border", "x y density blur stray line direction skew")
+Border = namedtuple("Border", "x y wall density blur stray line direction skew")
 
 # lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, cost: all of it.
 Drawing = namedtuple("Drawing", "lines kappa corners own cost")
@@ -37,7 +40,7 @@ def drawing_of(lines, kappa, border):
         return Drawing(lines, kappa, corners, own, np.inf)
     sides = np.arange(len(lines))
     for k in range(len(own)):
-        own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.blur, border.stray)
+        own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.wall[k], border.blur, border.stray)
     misfit = border.density * area_of(corners) + own.sum()
     return Drawing(lines, kappa, corners, own, misfit + structure_cost(lines, kappa, border))
 
@@ -58,8 +61,11 @@ def structure_cost(lines, kappa, border):
 
 
 @compiled
-def point_cost(x, y, corners, sides, blur, stray):
-    """Minus the logarithm of how likely a point at x, y is, against one deep inside; `sides` are all that come near its y."""
+def point_cost(x, y, corners, sides, wall, blur, stray):
+    """Minus the logarithm of how likely a point at x, y is, against one deep inside; `sides` are all that come near its y.
+
+    That of a `wall` is compared with one on the border.
+    """
     inside, reach = False, SURE * blur
     nearest = reach * reach
     for i in sides:
@@ -77,9 +83,17 @@ def point_cost(x, y, corners, sides, blur, stray):
         squared = (x0 + t * dx - x) ** 2 + (y0 + t * dy - y) ** 2
         nearest = min(nearest, squared)
     depth = math.sqrt(nearest) / blur
-    if depth >= SURE:
-        return 0.0 if inside else -math.log(stray)
-    return -math.log(stray + (1.0 - stray) * 0.5 * math.erfc((-depth if inside else depth) / math.sqrt(2.0)))
+    return cost_at_depth(depth if inside else -depth, wall, stray)
+
+
+@compiled
+def cost_at_depth(depth, wall, stray):
+    """What a point so deep inside (blurs) costs, of a wall or of the roof."""
+    if wall:
+        return -math.log(stray + (1.0 - stray) * math.exp(-0.5 * depth * depth))
+    if abs(depth) >= SURE:
+        return 0.0 if depth > 0.0 else -math.log(stray)
+    return -math.log(stray + (1.0 - stray) * 0.5 * math.erfc(-depth / math.sqrt(2.0)))
 
 
 @compiled
@@ -114,9 +128,10 @@ def cost_of_change(lines, drawing, i, count, fresh, border):
     reach = SURE * border.blur
     sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
     misfit = border.density * (area - area_of(old))
-    for k in range(len(border.x)):
+    first, last = np.searchsorted(border.x, np.array([x_low - reach, x_high + reach]))
+    for k in range(first, last):
         x, y = border.x[k], border.y[k]
-        if x_low - reach < x < x_high + reach and y_low - reach < y < y_high + reach:
-            misfit += point_cost(x, y, corners, sides, border.blur, border.stray) - drawing.own[k]
+        if y_low - reach < y < y_high + reach:
+            misfit += point_cost(x, y, corners, sides, border.wall[k], border.blur, border.stray) - drawing.own[k]
     structure = structure_cost(lines, drawing.kappa, border) - structure_cost(drawing.lines, drawing.kappa, border)
     return drawing.cost + misfit + structure

@@ -102,3 +102,12 @@ def dropped(lines, i):
     for k in range(n - 1):
         result[k] = lines[(i + 1 + k) % n]
     return result
+
+
+@compiled
+def replaced_by(lines, i, flight):
+    """The lines with those of `flight` (m, 2) in place of line `i`."""
+    n, m = len(lines), len(flight)
+    result = np.empty((n + m - 1, 2))
+    result[:i], result[i : i + m], result[i + m :] = lines[:i], flight, lines[i + 1 :]
+    return result

@@ -19,4 +19,4 @@ def outline_of_points(points_local: np.ndarray) -> shapely.Polygon:
     """
     ascending = points_local[np.argsort(points_local[:, 0], kind="stable")]
     kappa, confidence = slope_direction(ascending, SLOPES, NEIGHBOURS)
-    return estimate_outline(points_local[:, :2], kappa if confidence > SURE else None)
+    return estimate_outline(points_local, kappa if confidence > SURE else None)

@@ -1,0 +1,103 @@
+"""Sides that become flights of steps where the points across them pay for it: bays, notches, porches. Compiled.
+
+A side is cut into columns, and each is given a level outwards or inwards, such that points and prices of lines together cost
+least: two lines a step. What a column's points say of a level does not depend on other columns, so the best
+levels are found exactly, column by column (Potts' model by dynamic programming).
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiled import compiled
+from .cost import cost_at_depth, drawing_of
+from .lines import quarter_gap, replaced_by
+from .moves import middle_of
+
+COLUMN_M, LEVEL_M = 0.25, 0.1  # m; along the side, across it: lines are moved more finely afterwards
+DEEPEST_M, FARTHEST_M = 2.0, 1.5  # levels inwards and outwards of the side; larger bays are the rough outline's
+LEVELS = round((DEEPEST_M + FARTHEST_M) / LEVEL_M) + 1
+INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
+
+
+@compiled
+def stepped(drawing, border):
+    """The drawing with each side a flight of steps where that is cheaper: along the side, or the main direction nearest to it."""
+    i = 0
+    while i < len(drawing.lines):
+        azimuth = drawing.lines[i, 0]
+        best, more = drawing, 0
+        for way in (azimuth, azimuth - quarter_gap(azimuth - drawing.kappa)):
+            flight = flight_of(drawing, i, way, border)
+            new = drawing_of(replaced_by(drawing.lines, i, flight), drawing.kappa, border)
+            if new.cost < best.cost:
+                best, more = new, len(flight) - 1
+        drawing, i = best, i + more + 1
+    return drawing
+
+
+@compiled
+def flight_of(drawing, i, azimuth, border):
+    """Lines (m, 2) in place of side `i`: of `azimuth` at one level or another, and what joins them at right angles."""
+    x, y = middle_of(drawing.corners, i, 1)
+    distance = x * math.cos(azimuth) + y * math.sin(azimuth)
+    low, high = along(azimuth, drawing.corners[i]), along(azimuth, drawing.corners[(i + 1) % len(drawing.lines)])
+    columns = max(int((high - low) / COLUMN_M), 1)
+    width = (high - low) / columns
+    levels = best_levels(column_costs(drawing, border, azimuth, distance, low, width, columns), 2.0 * border.line)
+    flight, m = np.empty((2 * columns, 2)), 0
+    for k in range(columns):
+        if k > 0 and levels[k] == levels[k - 1]:
+            continue
+        if k > 0:
+            turn = -1.0 if levels[k] > levels[k - 1] else 1.0
+            flight[m, 0], flight[m, 1] = azimuth + turn * 0.5 * math.pi, turn * (low + k * width)
+            m += 1
+        flight[m, 0], flight[m, 1] = azimuth, distance + LEVEL_M * levels[k] - DEEPEST_M
+        m += 1
+    return flight[:m]
+
+
+@compiled
+def along(azimuth, place):
+    """How far (m) `place` (2,) lies along lines whose normal has the `azimuth`."""
+    return place[1] * math.cos(azimuth) - place[0] * math.sin(azimuth)
+
+
+@compiled
+def column_costs(drawing, border, azimuth, distance, low, width, columns):
+    """What each of the `columns` (columns, LEVELS) along a line costs at each level."""
+    costs = np.empty((columns, LEVELS))
+    for level in range(LEVELS):
+        costs[:, level] = border.density * width * (LEVEL_M * level - DEEPEST_M)
+    for k in range(len(border.x)):
+        x, y, wall = border.x[k], border.y[k], border.wall[k]
+        depth = distance - (x * math.cos(azimuth) + y * math.sin(azimuth))
+        column = math.floor((y * math.cos(azimuth) - x * math.sin(azimuth) - low) / width)
+        if not 0 <= column < columns or not -FARTHEST_M < depth < DEEPEST_M:
+            continue
+        if depth < 0.0 and not wall and drawing.own[k] < INSIDE:  # beyond another side
+            continue
+        for level in range(LEVELS):
+            deep = (depth + LEVEL_M * level - DEEPEST_M) / border.blur
+            costs[column, level] += cost_at_depth(deep, wall, border.stray)
+    return costs
+
+
+@compiled
+def best_levels(costs, step):
+    """The level of each column (n,) such that `costs` (n, levels) and `step` for each change along them are least."""
+    n, levels = costs.shape
+    came, total = np.empty((n, levels), np.int64), costs[0].copy()
+    for k in range(1, n):
+        cheapest = int(np.argmin(total))
+        for level in range(levels):
+            came[k, level] = cheapest if total[cheapest] + step < total[level] else level
+        total = np.minimum(total, total[cheapest] + step) + costs[k]
+    best = np.empty(n, np.int64)
+    best[n - 1] = int(np.argmin(total))
+    for k in range(n - 1, 0, -1):
+        best[k - 1] = came[k, best[k]]
+    return best
