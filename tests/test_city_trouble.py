@@ -193,9 +193,9 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(undisturbed, 
 
 
 def test_models_by_work_tile_are_the_merged_ones_cut(town_files, undisturbed, tmp_path, monkeypatch):
-    monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     by_tile, out = Settings.from_dict({"city": {"models": "tiles"}}), tmp_path / "out"
-    reconstruct_area(Request((town_files[0],), out, town_files[1], processes=2, settings=by_tile))
+    reconstruct_area(Request((town_files[0],), out, town_files[1], settings=by_tile))
     files = sorted(path.name for path in (out / "models").iterdir())
     assert len(files) == 4 and not any(name.startswith(".") for name in files)
     assert not (out / "buildings.gml").exists() and not (out / "buildings.city.jsonl").exists()
