@@ -26,7 +26,8 @@ BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs b
 MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
 FINAL_ROUNDS = 3  # of all moves at the end
 STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
-SAME_UNITS = 0.1  # roofs of as many volumes that cost so nearly the same are one
+# roofs of as many volumes that cost so nearly the same are one; one whose last volume is not yet fitted in may cost so much more
+SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0
 MOST_REGROWN = 8  # of more volumes each is too little of the whole to be worth as much work
 HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED = 6.0, 1.0  # units above the best: of 334 best additions 324 are still found
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
@@ -89,8 +90,10 @@ def grown(
             break
         found = best_addition(volumes, value, ground, candidates)
         if found is not None:
+            if has_come_back(*found, known, scene, SAME_BEFORE_UNITS):
+                return found
             (volumes, value), fresh = improve(found[0], scene, found[1], ground.slopes, 1), False
-            if known is not None and len(volumes) == known[0] and abs(value - known[1]) < SAME_UNITS * scene.evidence:
+            if has_come_back(volumes, value, known, scene, SAME_UNITS):
                 return volumes, value
         elif fresh:
             break
@@ -101,6 +104,15 @@ def grown(
                 break
             candidates, fresh = candidates_of(scene, far, ground.grids, MOST_NEW_PLANES), True
     return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)
+
+
+def has_come_back(
+    volumes: np.ndarray, value: float, known: tuple[int, float] | None, scene: Scene, more_units: float
+) -> bool:
+    """Whether a `known` roof has as many volumes and costs as much, but for the `more_units` that fitting may still gain."""
+    if known is None or len(volumes) != known[0]:
+        return False
+    return -min(more_units, REGROWN_UNITS) < (value - known[1]) / scene.evidence < more_units
 
 
 def unexplained(volumes: np.ndarray, scene: Scene) -> np.ndarray:

@@ -16,10 +16,10 @@ from ..direction import main_direction
 from .planes import Cloud, Ghosts, Grid
 
 MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
-# m from the border within which returns may be a facade's; dense clouds lose them all, and sparser ones, that need their roof
-# points, lose those below the nearest points further in by more than a steep roof falls
+# m from the border within which returns may be a facade's; clouds of more points a square metre lose them all
 BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0
 LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
+# sparser ones lose those that lie below so many nearest points further in by more than a roof of this slope falls, and so much (m)
 NEAREST, STEEPEST, FACADE_DROP_M = 2, 1.5, 0.3
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 # m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
