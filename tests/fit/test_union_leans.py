@@ -66,6 +66,20 @@ def test_facing_walls_never_costs(seed):
         found, lower = face_walls(volumes.copy(), scene, value, k)
         assert lower <= value
         assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
+        assert np.isfinite(found[:, LEAN : LEAN + SIDES]).all()
+
+
+# The later seeds lost planes, to a wall that was none.
+@pytest.mark.parametrize("seed", [0, 1, 2, 68, 101, 281, 314, 360, 396, 399])
+def test_facing_walls_takes_no_plane_away(seed):
+    rng = np.random.default_rng(seed)
+    volumes, scene = random_volumes(rng), random_scene(rng)
+    scene = scene._replace(leans=np.where(np.arange(scene.leans.shape[2]) == 0, 0.1, np.full_like(scene.leans, np.inf)))
+    for k in range(1, len(volumes)):
+        found, _ = face_walls(volumes.copy(), scene, objective(volumes, scene, np.inf), k)
+        kept, given = (np.isfinite(rows[k, OFFSET : OFFSET + SIDES]) for rows in (found, volumes))
+        assert (kept == given).all()
+        assert np.isfinite(found[:, LEAN : LEAN + SIDES]).all()
 
 
 @pytest.mark.parametrize("seed", range(6))

@@ -201,8 +201,9 @@ def face_walls(volumes, scene, value, k):
             continue
         _, middles = turns_of_planes(volumes, scene, k)
         best, best_value = volumes, value - LEAST_GAIN
-        for a in range(-1, len(walls)):
-            for b in range(-1, len(walls)):
+        there = int(np.isfinite(walls).sum())
+        for a in range(-1, there):
+            for b in range(-1, there):
                 trial = volumes.copy()
                 for plane, wall in ((low, a), (high, b)):
                     lean = 0.0 if wall < 0 else walls[wall]
