@@ -17,10 +17,9 @@ import shapely
 
 from ..compiled import news
 
+# new objects between collections of garbage: at Python's own 700 a twelfth of compiling was spent on them
+RARELY = 50_000
 OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)  # m; a house small enough to be fitted while code compiles
-RARELY = (
-    50_000  # new objects between collections of garbage: at Python's own 700 a twelfth of compiling was spent on them
-)
 # m; and one with a corner that points inwards
 L_OUTLINE = shapely.box(0.0, 0.0, 6.0, 7.0) | shapely.box(6.0, 2.0, 9.0, 7.0)
 

@@ -28,9 +28,8 @@ from .kernel import Noise, Problem, Tables
 from .tables import bounds, tables, variants
 
 COARSE_POINTS = 120  # points that starts are judged on: a bound on time
-DOUBTFUL = Noise(
-    0.2, np.inf, 0.1
-)  # noise above which a fit is tried again on more points: twice a flight's, or ten times the outliers
+# noise from which on a fit is tried again on more points: twice that of a flight, or ten times its outliers
+DOUBTFUL = Noise(0.2, np.inf, 0.1)
 MORE_POINTS = 4  # times as many: on the few the right start of a saw-tooth is lost once in 300 fits
 OUTLIERS_AT_FIRST = 0.1  # share of the points; what is found replaces it in the first round of EM
 OUTLIER_REACH_M = 4.0  # outliers may lie anywhere in the points' extent and this far around

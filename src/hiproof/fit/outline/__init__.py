@@ -36,9 +36,8 @@ PRICES = (
     3.0,
     1.0,
 )  # nats: of a line, of a further direction, of a line in that, where points are spread by chance
-MOST_DENSE = (
-    8.0  # points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them
-)
+# points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them
+MOST_DENSE = 8.0
 SAME_DIRECTION_RAD = math.radians(1.5)  # rad; within it the direction of slopes and that of the outline are one
 STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 

@@ -7,9 +7,8 @@ import shapely
 
 REACH_SPACINGS, NEIGHBOURS = 1.2, 8  # how far around a point is looked, and at how many points at most
 STEEPEST = 2.0  # slope of a roof: 63 degrees
-OUTER_M = (
-    0.25  # m from the border of the points' shape within which a wall is an outer one: the scanner's noise, doubled
-)
+# m from the border of the points' shape within which a wall is an outer one: the scanner's noise, doubled
+OUTER_M = 0.25
 
 
 def on_walls(points: np.ndarray, spacing: float, shape: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
