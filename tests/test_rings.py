@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from hiproof.parity import flips
-from hiproof.rings import ring_normal
+from hiproof.rings import ring_normal, ring_normals
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -28,3 +28,9 @@ def test_a_normal_is_as_long_as_its_ring_is_large_and_turns_with_it():
     assert ring_normal(ring + 1e6) == pytest.approx(ring_normal(ring), abs=1e-6)
     assert ring_normal(ring @ turn.T) == pytest.approx(turn @ ring_normal(ring))
     assert np.linalg.norm(ring_normal(ring)) == pytest.approx(10.0)
+
+
+def test_many_normals_are_each_rings_own():
+    rng = np.random.default_rng(1)
+    rings = [rng.normal(size=(count, 3)) for count in (3, 4, 7, 3)]
+    np.testing.assert_allclose(ring_normals(rings), [ring_normal(ring) for ring in rings], atol=1e-12)

@@ -2,10 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 
 def ring_normal(ring: np.ndarray) -> np.ndarray:
     """Vector area (3,) of a closed ring (m, 3) without its repeated last vertex (Newell)."""
-    centred = ring - ring.mean(axis=0)
-    return np.cross(centred, np.roll(centred, -1, axis=0)).sum(axis=0) / 2
+    return ring_normals([ring])[0]
+
+
+def ring_normals(rings: Sequence[np.ndarray]) -> np.ndarray:
+    """Vector areas (n, 3) of n rings at once, each as `ring_normal` has it."""
+    sizes = np.array([len(ring) for ring in rings])
+    first = np.cumsum(sizes) - sizes
+    following = np.arange(1, sizes.sum() + 1)
+    following[first + sizes - 1] = first
+    vertices = np.concatenate(rings)
+    centre = np.add.reduceat(vertices, first) / sizes[:, None]
+    x, y, z = (vertices - np.repeat(centre, sizes, axis=0)).T
+    u, v, w = x[following], y[following], z[following]
+    return np.add.reduceat(np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1), first) / 2

@@ -15,7 +15,7 @@ from ..parametric.building import build
 from ..parametric.change import changed_part
 from ..parametric.edit import BY_HAND
 from ..parametric.record import building_of, list_at, mapping, number, place
-from ..parametric.refit import measured
+from ..parametric.refit import measured, refitted_parts, within
 from ..settings import Settings
 from ..status import Status
 
@@ -30,12 +30,10 @@ def edited(record: Record, asked: Any, points: np.ndarray, settings: Settings, i
     InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
     """
     action = mapping(asked, "an edit").get("action")
-    if action == "refit":
-        return build(by_hand(record), settings.compose).refit(points, held_of(asked), settings)
     if action not in ACTIONS:
-        raise InputError(f"expected an edit ({', '.join(ACTIONS)}, refit), got {action!r:.40}; choose one")
-    parts = list_at(record, "parts")
-    found = build(by_hand(record) | {"parts": ACTIONS[action](record, parts, asked)}, settings.compose)
+        raise InputError(f"expected an edit ({', '.join(ACTIONS)}), got {action!r:.40}; choose one")
+    parts = ACTIONS[action](record, list_at(record, "parts"), asked, points)
+    found = build(by_hand(record) | {"parts": parts}, settings.compose)
     found = dataclasses.replace(found, quality=Quality())  # no figure of the earlier model stays
     local = found.roof.frame.to_local(points)
     return measured(found, local, settings) if is_measured and len(local) else found
@@ -45,33 +43,33 @@ def by_hand(record: Record) -> dict[str, Any]:
     return {**record, "status": Status.MODELLED.code, "detail": BY_HAND}
 
 
-def shown(record: Record, parts: list, asked: Record) -> list:
+def shown(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """Nothing changed: the building as its parts say."""
     return parts
 
 
-def change(record: Record, parts: list, asked: Record) -> list:
+def change(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """Part `part` with the values of `change`, as `Building.with_part` takes them."""
     index = part_at(parts, asked, "part")
     changed = changed_part(parts[index], dict(mapping(asked.get("change"), "change")), record["origin"][2])
     return [*parts[:index], changed, *parts[index + 1 :]]
 
 
-def remove(record: Record, parts: list, asked: Record) -> list:
+def remove(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     index = part_at(parts, asked, "part")
     if len(parts) < 2:
         raise InputError("expected two or more parts to leave one out, got one; keep it, or change its type")
     return [*parts[:index], *parts[index + 1 :]]
 
 
-def split(record: Record, parts: list, asked: Record) -> list:
+def split(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """Part `part` cut across `side` at `share` of it."""
     index = part_at(parts, asked, "part")
     share = number(asked.get("share", 0.5), "share")
     return [*parts[:index], *split_part(parts[index], asked.get("side", "length"), share), *parts[index + 1 :]]
 
 
-def merge(record: Record, parts: list, asked: Record) -> list:
+def merge(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """Parts `part` and `other` as one, in the place of the first."""
     first, second = part_at(parts, asked, "part"), part_at(parts, asked, "other")
     if first == second:
@@ -80,7 +78,7 @@ def merge(record: Record, parts: list, asked: Record) -> list:
     return [merged if index == first else part for index, part in enumerate(parts) if index != second]
 
 
-def dormer(record: Record, parts: list, asked: Record) -> list:
+def dormer(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """A dormer on part `part` at `place`, [x, y, z] about the origin, or half-way up its slope."""
     index = part_at(parts, asked, "part")
     at = None if asked.get("place") is None else tuple(place(asked["place"], "place")[:2])
@@ -88,13 +86,20 @@ def dormer(record: Record, parts: list, asked: Record) -> list:
     return [*parts, dormer_on(roof, index, at)] if roof is not None else parts
 
 
-ACTIONS: dict[str, Callable[[Record, list, Record], list]] = {
+def refit(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
+    """All parts fitted to the points again but for what is `held`."""
+    roof = building_of(record)[1]
+    return parts if roof is None else refitted_parts(roof, parts, within(roof, points), held_of(asked))
+
+
+ACTIONS: dict[str, Callable[[Record, list, Record, np.ndarray], list]] = {
     "show": shown,
     "change": change,
     "remove": remove,
     "split": split,
     "merge": merge,
     "dormer": dormer,
+    "refit": refit,
 }
 
 

@@ -15,7 +15,7 @@ from ..draw.primitives import primitive_svg
 from ..errors import HiproofError, InputError
 from ..evaluate.run import run_record
 from ..parametric.building import build
-from ..parametric.record import building_of, list_at, number, text_at
+from ..parametric.record import list_at, number, outline_of, text_at
 from ..primitives.catalogue import CATALOGUE
 from ..write.page_mesh import packed
 from ..write.parameters import building_record
@@ -81,15 +81,18 @@ class Desk:
 
     def cloud(self, id: str) -> dict[str, Any]:
         """The points drawn of a building, about the origin of its roof; `missing` says why there are none."""
-        roof = building_of(self.record(id)[0])[1]
-        points = self.points.of(id, roof)
+        record = self.record(id)[0]
+        points = self.points.of(id, outline_of(record))
         missing = self.points.missing or ("" if len(points) else "the run has no points of this building")
-        places = "" if roof is None or not len(points) else packed(roof.frame.to_local(drawn(points)), "<f4")
+        places = packed(drawn(points) - record["origin"], "<f4") if len(points) else ""
         return {"places": places, "count": len(points), "missing": missing}
 
     def draft(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """A building's object as the page has it: with its `parts`, and with its `z_ground` where a person said one."""
-        record = self.record(id)[0] | {"parts": list_at(body, "parts")}
+        record = self.record(id)[0] | {
+            "parts": list_at(body, "parts"),
+            "terrain_line": [],
+        }  # which no edit changes or shows
         if body.get("z_ground") is None:
             return record | {"z_ground": self.run.record(id).get("z_ground")}
         return record | {"z_ground": number(body["z_ground"], "z_ground"), "ground_source": "override"}
@@ -97,14 +100,14 @@ class Desk:
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
         record = self.draft(id, body)
-        points = self.points.of(id, building_of(record)[1])
+        points = self.points.of(id, outline_of(record))
         found = edited(record, body.get("asked"), points, self.run.settings, not body.get("dragged"))
         return seen(found, drawn(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
         """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
         record = self.draft(id, body)
-        points, tried = self.points.of(id, building_of(record)[1]), []
+        points, tried = self.points.of(id, outline_of(record)), []
         for kind in CATALOGUE:
             asked = {"action": "change", "part": body.get("part"), "change": {"type": kind}}
             try:

@@ -16,7 +16,6 @@ from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
 from ..errors import HiproofError, InputError
 from ..evaluate.run import run_record
-from ..model import Roof
 from ..read.pointcloud import is_url
 from ..read.thin import thin_to_count
 
@@ -56,13 +55,12 @@ class RunPoints:
             raise InputError(self.missing)
         return self.known
 
-    def of(self, id: str, roof: Roof | None) -> np.ndarray:
-        """World points (n, 3) inside the `roof` of building `id`; (0, 3) where the run has none, or where its clouds cannot be read,
+    def of(self, id: str, outline: shapely.Polygon | None) -> np.ndarray:
+        """World points (n, 3) inside the `outline` of building `id`; (0, 3) where the run has none, or where its clouds cannot be read,
         which `missing` then says."""
         job = self.jobs.get(id)
-        if job is None or roof is None or self.missing:
+        if job is None or outline is None or self.missing:
             return np.zeros((0, 3))
-        outline = shapely.transform(roof.outline, roof.frame.to_world)
         try:
             with self.lock:  # one file is read once, however many windows ask
                 found = self.of_job(job.index)

@@ -171,6 +171,7 @@ class Handler(BaseHTTPRequestHandler):
     """A request and its answer; all that decides stands in `Service`."""
 
     protocol_version, timeout = "HTTP/1.1", QUIET_S
+    disable_nagle_algorithm = True  # else the body waits until the browser has said that the head came
     server: Server
 
     def do_GET(self) -> None:

@@ -70,6 +70,14 @@ def status_of(record: Mapping[str, Any], has_parts: bool) -> Status:
     return known[code]
 
 
+def outline_of(record: Mapping[str, Any]) -> shapely.Polygon | None:
+    """The outline, in world coordinates, of the roof that a building's object tells of; None where it tells of none."""
+    if not record.get("parts") or record.get("outline") is None or record.get("origin") is None:
+        return None
+    frame = LocalFrame(rounded(place(record["origin"], "origin"), DIGITS))
+    return shapely.transform(settled_outline(polygon(record["outline"], "outline")), frame.to_world)
+
+
 def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
     """The roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:

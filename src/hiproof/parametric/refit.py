@@ -17,7 +17,7 @@ import shapely
 
 from ..compose.settle import pieces_of
 from ..errors import FitError, InputError
-from ..model import Building, Part
+from ..model import Building, Part, Roof
 from ..settings import Settings
 from ..status import Status
 from ..write.parameters import building_record
@@ -55,23 +55,30 @@ def refit(
     settings: Settings | None = None,
 ) -> Building:
     """The building with its parts fitted to `points` again; see `Building.refit`."""
-    roof, record = building.roof, building_record(building)
+    record, local = building_record(building), within(building.roof, points)
+    parts = refitted_parts(building.roof, record["parts"], local, fixed or {})
+    return measured(built(building, {**record, "parts": parts}), local, settings or Settings())
+
+
+def within(roof: Roof, points: np.ndarray) -> np.ndarray:
+    """Those of the world `points` (n, 3) that are finite and lie inside the outline, about the origin of the roof."""
     local = roof.frame.to_local(np.asarray(points, float).reshape(-1, 3))
     local = local[np.isfinite(local).all(axis=1)]
-    local = local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
-    unknowns = unknowns_of(roof.parts, fixed or {})
-    if len(local) < max(FEWEST_POINTS, 1):
-        raise FitError(f"expected {FEWEST_POINTS} points or more inside the outline, got {len(local)}; add a cloud")
-    parts = record["parts"]
-    if unknowns.names:
-        values, sigma = fitted(roof.parts, off_the_walls(local, roof.outline), unknowns)
-        parts = [
-            with_values(
-                part, {n: v for (i, n), v in zip(unknowns.names, values, strict=True) if i == index}, sigma[index]
-            )
-            for index, part in enumerate(parts)
-        ]
-    return measured(built(building, {**record, "parts": parts}), local, settings or Settings())
+    return local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
+
+
+def refitted_parts(roof: Roof, parts: list, points: np.ndarray, fixed: Mapping[int, Collection[str]]) -> list:
+    """The objects `parts` that `roof` was made of, fitted to `points` (n, 3) about its origin. Raises FitError for fewer than three."""
+    unknowns = unknowns_of(roof.parts, fixed)
+    if len(points) < FEWEST_POINTS:
+        raise FitError(f"expected {FEWEST_POINTS} points or more inside the outline, got {len(points)}; add a cloud")
+    if not unknowns.names:
+        return parts
+    values, sigma = fitted(roof.parts, off_the_walls(points, roof.outline), unknowns)
+    return [
+        with_values(part, {n: v for (i, n), v in zip(unknowns.names, values, strict=True) if i == index}, sigma[index])
+        for index, part in enumerate(parts)
+    ]
 
 
 def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
@@ -122,52 +129,76 @@ def bounds_of(name: str, parameters: Mapping[str, float]) -> tuple[float, float]
     )
 
 
+@dataclasses.dataclass(frozen=True)
+class Surface:
+    """The roof over the points: their heights (n,) above it, the part (n,) that it is there and the row (n,) among that part's planes,
+    and all planes (k, 3) of every part."""
+
+    gaps: np.ndarray
+    part: np.ndarray
+    row: np.ndarray
+    planes: list[np.ndarray]
+
+
 class Heights:
-    """Heights of the roof at points (n, 3), as a function of the unknowns x (p,)."""
+    """The roof under points (n, 3) as a function of the unknowns x (p,)."""
 
     def __init__(self, parts: tuple[Part, ...], points: np.ndarray, unknowns: Unknowns) -> None:
-        self.parts, self.xy, self.z, self.unknowns = parts, points[:, :2], points[:, 2], unknowns
-        self.inside = [
-            [shapely.intersects_xy(piece.outline, points[:, 0], points[:, 1]) for piece in part.pieces]
-            for part in parts
-        ]
+        self.parts, self.z, self.unknowns = parts, points[:, 2], unknowns
+        self.terms = np.column_stack([points[:, :2], np.ones(len(points))])  # a plane's height is their product with it
+        self.columns = [[k for k, (i, _) in enumerate(unknowns.names) if i == index] for index in range(len(parts))]
         self.outlines = [[piece.outline for piece in part.pieces] for part in parts]
+        self.inside = [
+            [np.flatnonzero(shapely.intersects_xy(outline, points[:, 0], points[:, 1])) for outline in outlines]
+            for outlines in self.outlines
+        ]
 
-    def values_of(self, index: int, x: np.ndarray) -> dict[str, float]:
-        """The unknowns of one part by name."""
-        return {n: float(v) for (i, n), v in zip(self.unknowns.names, x, strict=True) if i == index}
-
-    def of_part(self, index: int, values: Mapping[str, float], chosen: np.ndarray) -> np.ndarray:
-        """Heights (m,) of a part with `values` at the `chosen` (m,) points, minus infinity where it covers nothing; NaN
-        where its parameters make no planes."""
+    def planes(self, index: int, x: np.ndarray) -> list[np.ndarray] | None:
+        """The planes (k, 3) of each piece of a part; None where its parameters make none."""
         part = self.parts[index]
+        values = {self.unknowns.names[column][1]: float(x[column]) for column in self.columns[index]}
         parameters = {name: values.get(name, value) for name, value in part.parameters.items()}
         translation = np.array([*part.translation[:2], values.get(Z, part.translation[2])])
         try:
             pieces = pieces_of(part.type, parameters, part.kappa, translation, self.outlines[index])
         except (FitError, ZeroDivisionError):
-            return np.full(len(chosen), np.nan)
-        xy, z = self.xy[chosen], np.full(len(chosen), -np.inf)
-        for piece, inside in zip(pieces, self.inside[index], strict=True):
-            z = np.where(inside[chosen], np.maximum(z, piece.height_at(xy)), z)
-        return z
+            return None
+        return [piece.planes for piece in pieces]
 
-    def gaps(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Heights (n,) of the points over the roof, and the part (n,) that is the roof there."""
-        everywhere = np.arange(len(self.xy))
-        layers = np.stack([self.of_part(i, self.values_of(i, x), everywhere) for i in range(len(self.parts))])
-        layers = np.where(np.isnan(layers), FAR_M, layers)
-        top = layers.argmax(axis=0)
-        return np.clip(self.z - layers[top, everywhere], -FAR_M, FAR_M), top
+    def at(self, x: np.ndarray) -> Surface:
+        """The roof that the unknowns make; far from all points where they make none."""
+        count = len(self.z)
+        top, part, row = np.full(count, -np.inf), np.zeros(count, int), np.zeros(count, int)
+        found: list[np.ndarray] = []
+        for index, inside in enumerate(self.inside):
+            planes, first = self.planes(index, x), 0
+            if planes is None:
+                return Surface(np.full(count, FAR_M), part, row, [])
+            for own, own_planes in zip(inside, planes, strict=True):
+                heights = self.terms[own] @ own_planes.T
+                lowest = heights.argmin(axis=1)
+                height = heights[np.arange(len(own)), lowest]
+                higher = height > top[own]
+                chosen = own[higher]
+                top[chosen], part[chosen], row[chosen] = height[higher], index, first + lowest[higher]
+                first += len(own_planes)
+            found.append(np.concatenate(planes))
+        return Surface(np.clip(self.z - top, -FAR_M, FAR_M), part, row, found)
 
-    def jacobian(self, x: np.ndarray, gaps: np.ndarray, top: np.ndarray) -> np.ndarray:
+    def jacobian(self, x: np.ndarray, surface: Surface) -> np.ndarray:
         """By how much the roof's height (n, p) at each point grows with each unknown."""
-        found = np.zeros((len(self.xy), len(x)))
-        for column, (index, name) in enumerate(self.unknowns.names):
-            own = np.flatnonzero((top == index) & (np.abs(gaps) < FAR_M))
-            step = STEP if x[column] + STEP < self.unknowns.high[column] else -STEP
-            moved = self.of_part(index, {**self.values_of(index, x), name: x[column] + step}, own)
-            found[own, column] = np.nan_to_num((moved - (self.z[own] - gaps[own])) / step, posinf=0.0, neginf=0.0)
+        found = np.zeros((len(self.z), len(x)))
+        covered = np.abs(surface.gaps) < FAR_M
+        for index, columns in enumerate(self.columns):
+            own = np.flatnonzero(covered & (surface.part == index))
+            terms, row = self.terms[own], surface.row[own]
+            for column in columns if len(own) else ():
+                moved, step = x.copy(), STEP if x[column] + STEP < self.unknowns.high[column] else -STEP
+                moved[column] += step
+                planes = self.planes(index, moved)
+                if planes is not None:
+                    change = (np.concatenate(planes) - surface.planes[index]) / step
+                    found[own, column] = np.einsum("ij,ij->i", terms, change[row])
         return found
 
 
@@ -176,16 +207,18 @@ def fitted(
 ) -> tuple[np.ndarray, list[dict[str, float]]]:
     """Values (p,) of the unknowns, and standard deviations by name of every part."""
     heights = Heights(parts, points[:: max(1, -(-len(points) // MOST_POINTS))], unknowns)
-    found = [unknowns.start, descended(heights, unknowns.start, SCALES_M[-1])]
-    if misfit(heights.gaps(found[1])[0], SCALES_M[-1]) > WELL * len(heights.z):
+    finest = SCALES_M[-1]
+    x = descended(heights, unknowns.start, finest)
+    surface = heights.at(x)
+    if misfit(surface.gaps, finest) > WELL * len(heights.z):
         coarse = unknowns.start
         for scale in SCALES_M:
             coarse = descended(heights, coarse, scale)
-        found.append(coarse)
-    x = min(found, key=lambda x: misfit(heights.gaps(x)[0], SCALES_M[-1]))
-    gaps, top = heights.gaps(x)
-    near = np.abs(gaps) < SCALES_M[-1]
-    deviations = np.sqrt(np.diag(covariance(heights.jacobian(x, gaps, top)[near], gaps[near])))
+        found = heights.at(coarse)
+        if misfit(found.gaps, finest) < misfit(surface.gaps, finest):
+            x, surface = coarse, found
+    near = np.abs(surface.gaps) < finest
+    deviations = np.sqrt(np.diag(covariance(heights.jacobian(x, surface)[near], surface.gaps[near])))
     sigma: list[dict[str, float]] = [{} for _ in parts]
     for (index, name), deviation in zip(unknowns.names, deviations, strict=True):
         if 0.0 < deviation < FAR_M:
@@ -196,22 +229,22 @@ def fitted(
 def descended(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
     """The unknowns at the foot of the hill: damped steps that each lessen the misfit at this scale."""
     unknowns, damping = heights.unknowns, 1e-3
-    gaps, top = heights.gaps(x)
-    cost = misfit(gaps, scale)
+    surface = heights.at(x)
+    cost, slopes = misfit(surface.gaps, scale), None
     for _ in range(ROUNDS):
-        jacobian = heights.jacobian(x, gaps, top)
-        weight = np.clip(1.0 - (gaps / scale) ** 2, 0.0, None) ** 2
-        normal, right = (jacobian * weight[:, None]).T @ jacobian, jacobian.T @ (weight * gaps)
+        slopes = heights.jacobian(x, surface) if slopes is None else slopes
+        weight = np.clip(1.0 - (surface.gaps / scale) ** 2, 0.0, None) ** 2
+        normal, right = (slopes * weight[:, None]).T @ slopes, slopes.T @ (weight * surface.gaps)
         scales = np.diag(normal) + 1e-9 * max(normal.max(initial=0.0), 1e-9)
         step = np.linalg.solve(normal + damping * np.diag(scales), right)
         tried = np.clip(x + step, unknowns.low, unknowns.high)
-        new_gaps, new_top = heights.gaps(tried)
-        new_cost = misfit(new_gaps, scale)
+        found = heights.at(tried)
+        new_cost = misfit(found.gaps, scale)
         if new_cost >= cost:
             damping *= 30.0
             continue
         gained = (cost - new_cost) / cost
-        x, gaps, top, cost, damping = tried, new_gaps, new_top, new_cost, 0.1 * damping
+        x, surface, cost, slopes, damping = tried, found, new_cost, None, 0.1 * damping
         if gained < 1e-4:
             break
     return x

@@ -246,13 +246,19 @@ class Primitive:
         strip = np.clip(np.floor((v + half_width) * self.strips / (2 * half_width)), 0, self.strips - 1)
         return heights[np.arange(len(u)), strip.astype(int)]
 
+    def planes_at(self, theta: np.ndarray) -> np.ndarray:
+        """Planes (k, 3) over x, y in theta's own frame, in the order of `faces`."""
+        c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
+        a, b, z = self.plane_values(theta).T
+        planes = np.stack([a * c - b * s, a * s + b * c, z], axis=1)
+        planes[:, 2] -= planes[:, :2] @ theta[[CX, CY]]
+        return planes
+
     def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
         """The roof part of `theta` (9,) in theta's own frame: plan rectangle (one a tooth) and planes over x, y."""
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
-        a, b, z = self.plane_values(theta).T
-        planes = np.stack([a * c - b * s, a * s + b * c, z], axis=1)
-        planes[:, 2] -= planes[:, :2] @ translation[:2]
+        planes = self.planes_at(theta)
         half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
         breaks = np.linspace(-half_width, half_width, self.strips + 1)
         groups = [planes] if self.strips == 1 else [plane[None] for plane in planes]

@@ -293,8 +293,7 @@ def planes_of(name: str, parameters: Mapping[str, float], kappa: float, translat
     """
     if name in CATALOGUE and not any(key.startswith("pitch_") for key in parameters):
         shape = get(name).variant(parameters)
-        theta = shape.to_theta(parameters, kappa, translation)
-        return np.concatenate([piece.planes for piece in shape.part(theta).pieces])
+        return shape.planes_at(shape.to_theta(parameters, kappa, translation))
     return member_of(name, parameters, kappa, translation).planes()
 
 

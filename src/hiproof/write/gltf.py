@@ -16,7 +16,7 @@ from ..model import GROUND, ROOF, WALL, Solid
 from ..rings import ring_normal
 from .colours import GROUND_COLOUR, WALL_COLOUR, linear_rgb, type_colour
 from .glb import GlbDocument, y_up
-from .triangles import face_triangles
+from .triangles import faces_triangles
 
 
 def write_models(
@@ -91,8 +91,8 @@ def material_table(key: str) -> dict[str, Any]:
 def flat_triangles(solid: Solid, kind: str, origin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Corners (3 t, 3) and face normals (3 t, 3) of the triangles of one kind of face, y up, about `origin`."""
     corners, normals = [np.empty((0, 3))], [np.empty((0, 3))]
-    for face in solid.of_kind(kind):
-        triangles = face_triangles(solid.vertices, face)
+    faces = solid.of_kind(kind)
+    for face, triangles in zip(faces, faces_triangles(solid.vertices, faces), strict=True):
         normal = ring_normal(solid.vertices[list(face.rings[0])])
         corners.append(solid.vertices[triangles.ravel()] - origin)
         normals.append(np.tile(normal / max(np.linalg.norm(normal), 1e-12), (triangles.size, 1)))

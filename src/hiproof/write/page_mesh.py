@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import ROOF, WALL, Solid
-from .triangles import face_triangles
+from .triangles import faces_triangles
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,8 @@ class Mesh:
 def solid_mesh(solid: Solid) -> Mesh:
     """The mesh of a solid, in its own frame; faces on the ground are left out."""
     corners, part, edges = [np.empty((0, 3, 3))], [], [np.empty((0, 2, 3))]
-    for face in solid.faces:
-        if face.kind not in (ROOF, WALL):
-            continue
-        triangles = face_triangles(solid.vertices, face)
+    faces = [face for face in solid.faces if face.kind in (ROOF, WALL)]
+    for face, triangles in zip(faces, faces_triangles(solid.vertices, faces), strict=True):
         corners.append(solid.vertices[triangles])
         part += [max(face.part, 0) if face.kind == ROOF else -1] * len(triangles)
         if face.kind == ROOF:

@@ -25,7 +25,7 @@ from ..read.crs import units_named
 from ..read.database import import_psycopg, refuse_half_a_password
 from ..rings import ring_normal
 from .attribute_list import OWN, PARTS_LAYER
-from .triangles import face_triangles
+from .triangles import faces_triangles
 
 PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
 MEASURES = ", ".join(f"{a.name} double precision" for a in PARTS_LAYER if a.kind == "number")
@@ -225,7 +225,7 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
 
 def polyhedral_wkt(row: Row) -> str | None:
     """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None without one."""
-    triangles = [t for face in row.faces for t in row.vertices[face_triangles(row.vertices, face)]]
+    triangles = [t for face in faces_triangles(row.vertices, row.faces) for t in row.vertices[face]]
     return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt([t]) for t in triangles)})" if triangles else None
 
 

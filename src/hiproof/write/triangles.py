@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import shapely
 
 from ..model import Face
-from ..rings import ring_normal
+from ..rings import ring_normals
 
 
 def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
@@ -18,23 +20,43 @@ def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
     >>> face_triangles(square, Face(((0, 1, 2, 3),), "RoofSurface")).shape
     (2, 3)
     """
-    outer = np.array(face.rings[0])
-    if len(outer) == 3 and len(face.rings) == 1:
-        return outer[None]
-    normal = ring_normal(vertices[outer])
+    return faces_triangles(vertices, [face])[0]
+
+
+def faces_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> list[np.ndarray]:
+    """The triangles of every face, as `face_triangles` has them, all cut by one call."""
+    found = [np.array(face.rings[:1], int) if is_triangle(face) else None for face in faces]
+    others = [index for index, triangles in enumerate(found) if triangles is None]
+    if others:
+        for index, triangles in zip(others, cut(vertices, [faces[index].rings for index in others]), strict=True):
+            found[index] = triangles
+    return found
+
+
+def is_triangle(face: Face) -> bool:
+    return len(face.rings) == 1 and len(face.rings[0]) == 3
+
+
+def cut(vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]]) -> list[np.ndarray]:
+    """Triangles (t, 3) of faces given by their rings of vertex indices, by constrained Delaunay."""
+    normals = ring_normals([vertices[list(rings[0])] for rings in faces])
     # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they name their vertex.
-    axis = int(np.argmax(np.abs(normal)))
-    axes = [(axis + 1) % 3, (axis + 2) % 3]
-    rings = [vertices[list(ring)][:, axes] for ring in face.rings]
-    index_of = {
-        tuple(xy): index
-        for ring, flat in zip(face.rings, rings, strict=True)
-        for index, xy in zip(ring, flat, strict=True)
-    }
-    tiles = shapely.constrained_delaunay_triangles(shapely.Polygon(rings[0], rings[1:]))
-    found = [[index_of[tuple(xy)] for xy in shapely.get_coordinates(tile)[:3]] for tile in shapely.get_parts(tiles)]
-    triangles = np.array(found, int).reshape(-1, 3)
-    a, b, c = (vertices[triangles[:, k]] for k in range(3))
-    turned = np.cross(b - a, c - a)[:, axis] * normal[axis] < 0
-    triangles[turned] = triangles[turned][:, ::-1]
-    return triangles
+    axes = np.abs(normals).argmax(axis=1)
+    drawn = [vertices[:, [(axis + 1) % 3, (axis + 2) % 3]] for axis in range(3)]
+    plans = [[drawn[axis][list(ring)] for ring in rings] for axis, rings in zip(axes, faces, strict=True)]
+    polygons = [shapely.Polygon(outer, holes) for outer, *holes in plans]
+    tiles, owner = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons), return_index=True)
+    corners = shapely.get_coordinates(tiles).reshape(-1, 4, 2)[:, :3]
+    (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
+    turned = (ax * by - ay * bx) * normals[owner, axes[owner]] < 0
+    corners[turned] = corners[turned][:, ::-1]
+    return [
+        named(corners[owner == number], np.concatenate(plan), [index for ring in rings for index in ring])
+        for number, (plan, rings) in enumerate(zip(plans, faces, strict=True))
+    ]
+
+
+def named(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
+    """Vertex indices (t, 3) of triangles' corners (t, 3, 2), which are among the vertices `plan` (m, 2) with these `indices`."""
+    index_at = dict(zip(map(tuple, plan.tolist()), indices, strict=True))
+    return np.array([index_at[tuple(xy)] for xy in corners.reshape(-1, 2).tolist()], int).reshape(-1, 3)

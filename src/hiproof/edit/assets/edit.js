@@ -42,12 +42,20 @@ function showList() {
     small.textContent = row.reasons.join(", ") || (row.share === null ? "no points" : `${Math.round(100 * row.share)} % within 0.2 m`);
     item.append(`${row.id} ${row.type || "no model"}`, small);
     item.dataset.id = row.id;
-    item.className = [now && row.id === now.id ? "current" : "", drafts.get(row.id)?.dirty ? "draft" : row.is_accepted ? "accepted" : ""].join(" ");
     item.addEventListener("click", () => inTurn(() => open(row.id)));
+    row.item = item;
+    mark(row);
     return item;
   }));
-  $("list").querySelector(".current")?.scrollIntoView({ block: "nearest" });
+  seeCurrent();
 }
+
+// What is said of a building by the look of its row.
+function mark(row) {
+  row.item.className = [now && row.id === now.id ? "current" : "", drafts.get(row.id)?.dirty ? "draft" : row.is_accepted ? "accepted" : ""].join(" ");
+}
+const markCurrent = () => rows.filter(row => row.id === now.id).forEach(mark);
+const seeCurrent = () => $("list").querySelector(".current")?.scrollIntoView({ block: "nearest" });
 
 // The next building that is not accepted yet, or the one before, whatever it is.
 function step(by) {
@@ -67,7 +75,7 @@ async function open(id) {
   clicked = null; merging = false; say(found.error || "", Boolean(found.error)); $("note").value = ""; $("tried").replaceChildren();
   if (!isKnown) now.part = largest(found.handles || []);
   show(now.model, true);
-  showList();
+  rows.forEach(mark); seeCurrent();
   if (!now.model.mesh) return;
   now.cloud = await ask("points", { id });
   if (now.cloud.missing) say(now.cloud.missing);
@@ -180,7 +188,7 @@ handles.ondrop = handle => inTurn(async () => {
   const model = await changed(done.parts, { action: "change", part: now.part, change: done.change });
   now.history.push(done.before); now.dirty = true;
   if (handle.name === "ridge" || handle.name === "eave") pin(now.part, heightsOf(now.model.parts[now.part]));
-  show(model); showList();
+  show(model); markCurrent();
 });
 
 // ---- edits
@@ -191,7 +199,7 @@ async function edit(asked, after = () => {}) {
   if (!now.model.parts?.length) return say("this building has no parts to change");
   if (now.left) return say("this building is left out; keep it in first");
   const before = snapshot(), began = performance.now(), model = await changed(now.model.parts, asked);
-  now.history.push(before); now.dirty = true; after(); say(""); show(model); showList();
+  now.history.push(before); now.dirty = true; after(); say(""); show(model); markCurrent();
   $("say").dataset.ms = (performance.now() - began).toFixed(1);
 }
 
@@ -229,7 +237,7 @@ async function mergeWith(other) {
 const undo = () => inTurn(() => {
   const { model, ...before } = now.history.pop() || {};
   if (!model) return say("nothing to undo");
-  Object.assign(now, before); say(""); show(model); showList();
+  Object.assign(now, before); say(""); show(model); markCurrent();
 });
 
 const setGround = height => inTurn(async () => {
@@ -237,13 +245,13 @@ const setGround = height => inTurn(async () => {
   now.ground = height;
   try {
     const model = await changed(now.model.parts, { action: "show" });
-    now.history.push(before); now.dirty = true; say(""); show(model); showList();
+    now.history.push(before); now.dirty = true; say(""); show(model); markCurrent();
   } catch (error) { now.ground = before.ground; show(now.model); throw error; }
 });
 
 const leaveOut = () => inTurn(() => {
   now.history.push(snapshot()); now.left = !now.left; now.dirty = true;
-  say(now.left ? "left out: once accepted, the next run makes no model of it" : ""); show(now.model); showList();
+  say(now.left ? "left out: once accepted, the next run makes no model of it" : ""); show(now.model); markCurrent();
 });
 
 async function tryTypes() {
