@@ -5,6 +5,8 @@ BIN := $(VENV)/bin
 # one thread for linear algebra: the work is many small buildings, and processes are how they share the cores
 export OPENBLAS_NUM_THREADS := 1
 export OMP_NUM_THREADS := 1
+# bytecode is kept, whatever the shell says: tests start a hundred processes, and each would compile every source anew
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test test-train lint docs bench clean
 

@@ -68,8 +68,12 @@ def solve_hungry(folder, tile, terrain=None, avoid=()):
         if id == DEADLY:
             import resource  # Windows has none
 
-            resource.setrlimit(resource.RLIMIT_AS, (4 << 30, resource.getrlimit(resource.RLIMIT_AS)[1]))
-            np.ones(1 << 30)
+            limits = resource.getrlimit(resource.RLIMIT_AS)
+            resource.setrlimit(resource.RLIMIT_AS, (4 << 30, limits[1]))
+            try:
+                np.ones(1 << 30)
+            finally:
+                resource.setrlimit(resource.RLIMIT_AS, limits)
         return counted(points, footprint, terrain, settings, id)
 
     return solve_with(reconstruct, folder, tile, terrain, avoid)

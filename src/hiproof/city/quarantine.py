@@ -16,31 +16,33 @@ from .plan import load_plan
 TRIES = 3  # deaths of its process, alone, until a task is taken for their cause: memory may run out by chance
 
 
-def run_alone(executor: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
-    """(result, error) of `function(*task)` with no other task beside it, tried again when its process dies."""
-    alone = executor.isolated()
-    try:
-        for _ in range(TRIES):
-            ((_, result, error),) = alone.run(function, [task])
-            if not isinstance(error, (WorkerLost, MemoryError)):
-                break
-        return result, error
-    finally:
-        alone.close()
+def run_alone(alone: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
+    """(result, error) of `function(*task)` in an isolated executor, tried again when its process dies."""
+    for _ in range(TRIES):
+        ((_, result, error),) = alone.run(function, [task])
+        if not is_loss(error):
+            break
+    return result, error
 
 
-def solve_in_quarantine(executor: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
+def is_loss(error: Exception | None) -> bool:
+    """Whether a task ended because its process died or had no memory left."""
+    return isinstance(error, (WorkerLost, MemoryError))
+
+
+def solve_in_quarantine(alone: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
     """The rows of `solve_tile` for its arguments `task` (folder, tile, terrain), without the buildings that kill their process: they become internal errors.
 
     Where the tile as a whole kills its process even alone, its buildings are tried one by one.
     """
-    result, error = run_alone(executor, function, task)
-    if not isinstance(error, (WorkerLost, MemoryError)):
+    result, error = run_alone(alone, function, task)
+    if not is_loss(error):
         return result, error
     folder, tile, _ = task
-    members, deadly = load_plan(Path(folder)).tiles[tile], []
-    for index in members:
+    members = load_plan(Path(folder)).tiles[tile]
+
+    def is_deadly(index: int) -> bool:
         others = tuple(i for i in members if i != index)
-        if isinstance(run_alone(executor, function, (*task, others))[1], (WorkerLost, MemoryError)):
-            deadly.append(index)
-    return run_alone(executor, function, (*task, tuple(deadly)))
+        return not others or is_loss(run_alone(alone, function, (*task, others))[1])
+
+    return run_alone(alone, function, (*task, tuple(filter(is_deadly, members))))

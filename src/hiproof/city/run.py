@@ -11,7 +11,7 @@ import sqlite3
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,14 +23,14 @@ from ..masking import masked, masked_values
 from ..status import Status
 from ..write.files import atomic
 from .checks import refuse_unusable
-from .executors import WorkerLost, make_executor
+from .executors import make_executor
 from .ledger import Failure, Ledger
 from .lock import held
 from .merge import merge, output_files
 from .outputs import claims
 from .overrides import REDO
 from .plan import WorkPlan
-from .quarantine import run_alone, solve_in_quarantine
+from .quarantine import is_loss, run_alone, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
 from .tasks import ALL, MAIN_JOB, solve_tile, sort_cloud
@@ -146,7 +146,7 @@ def work_off(
         tasks = started(ledger, [name for name in names if name not in set(suspects)], arguments)
         for task, result, error in executor.run(function, tasks):
             name = f"{kind}:{task[1]}"
-            if isinstance(error, (WorkerLost, MemoryError)):
+            if is_loss(error):
                 ledger.lose(name)
                 LOGGER.warning("%s was lost (%s) and is tried again", name, error or "out of memory")
                 continue
@@ -197,11 +197,9 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
 def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple) -> None:
     """A task whose process died again and again, in a process of its own; see quarantine.py."""
     LOGGER.warning("%s was lost %d times and is now tried alone", name, ledger.losses(name))
-    if kind == "solve":
-        result, error = solve_in_quarantine(executor, function, task)
-    else:
-        result, error = run_alone(executor, function, task)
-    if isinstance(error, (WorkerLost, MemoryError)):
+    with closing(executor.isolated()) as alone:
+        result, error = (solve_in_quarantine if kind == "solve" else run_alone)(alone, function, task)
+    if is_loss(error):
         died = "the process died each time it read this file; not enough memory, or a damaged file"
         ledger.finish(name, "failed", died)
     else:
