@@ -28,7 +28,7 @@ FINAL_ROUNDS = 3  # of all moves at the end
 STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
 # roofs of as many volumes that cost so nearly the same are one; one whose last volume is not yet fitted in may cost so much more
 SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0
-MOST_REGROWN = 8  # of more volumes each is too little of the whole to be worth as much work
+MOST_REGROWN = 3  # volumes, those that grew first: of 40 that were better anew none had grown later
 HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED = 6.0, 1.0  # units above the best: of 334 best additions 324 are still found
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
@@ -62,13 +62,13 @@ def ground_of(scene: Scene, grids: list[Grid], candidates: np.ndarray) -> Ground
 
 
 def regrown(volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray) -> tuple[np.ndarray, float]:
-    """The volumes with each in turn taken out and what is missing grown anew, where that is clearly better.
+    """The volumes with each of the first in turn taken out and what is missing grown anew, where that is clearly better.
 
     The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
     volume over both. Without it the others take the places that are theirs.
     """
-    k, scene = len(volumes) - 1, ground.scene
-    while k > 0 and 2 < len(volumes) <= MOST_REGROWN:
+    k, scene = min(len(volumes) - 1, MOST_REGROWN), ground.scene
+    while k > 0 and len(volumes) > 2:
         trial = without(volumes, k)
         trial, found = improve(trial, scene, objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS)
         trial, found = grown(trial, found, ground, candidates, (len(volumes), value))
