@@ -62,19 +62,21 @@ class Side:
     sigma: float = 0.0
 
 
-def sides_of(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: Scene) -> list[list[Side]]:
-    """The four sides (u low, u high, v low, v high) of every volume, on the outline's edges or chords where these are near.
+def lines_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[list[Lines]]:
+    """The lines that sides across u and across v may take, by direction."""
+    edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
+    return [[lines_across(edges, chords, turn, axis) for axis in (0, 1)] for turn in scene.turn]
+
+
+def sides_of(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> list[list[Side]]:
+    """The four sides (u low, u high, v low, v high) of every volume, on the `lines` of its direction where these are near.
 
     The sides of the base are far away.
     """
     sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
-    lines = [[lines_across(edges, chords, turn, axis) for axis in (0, 1)] for turn in scene.turn]
     for k in range(1, len(volumes)):
-        direction = int(volumes[k, DIRECTION])
-        everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
-        gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
-        uv = np.stack([scene.U[direction], scene.V[direction]])
-        sides.append([side_of(volumes[k], e, lines[direction][e // 2], uv, gain, scene.evidence) for e in range(4)])
+        at, lean, anchored, sigma = sides_of_volume(volumes, k, *lines[int(volumes[k, DIRECTION])], scene)
+        sides.append([Side(*side) for side in zip(at.tolist(), lean.tolist(), anchored.tolist(), sigma.tolist(), strict=True)])
     return [[shared(volumes, sides, k, edge) for edge in range(4)] for k in range(len(volumes))]
 
 
@@ -112,13 +114,21 @@ def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: 
     return Lines(start, lean, ends[:, :, 1 - axis], is_edge[kept], edges[:, :, axis], edges[:, :, 1 - axis])
 
 
-def side_of(volume: np.ndarray, edge: int, lines: Lines, uv: np.ndarray, gain: np.ndarray, evidence: float) -> Side:
-    """The cheapest line for one side of a volume; `gain` (n,) is what its points at `uv` (2, n) cost more within it."""
-    m = cheapest_line(volume, edge, lines, uv, gain, evidence)
-    sigma = float(sigma_of_side(volume, edge, lines, uv, gain, m >= 0))
-    if m < 0:
-        return Side(float(volume[U0 + edge]), sigma=sigma)
-    return Side(float(lines.start[m]), float(lines.lean[m]), True, sigma)
+@compiled
+def sides_of_volume(volumes, k, across_u, across_v, scene):
+    """What `Side` says of each side of volume k, on the cheapest of the lines `across_u` and `across_v`: four arrays (4,)."""
+    direction = int(volumes[k, DIRECTION])
+    everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+    gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
+    uv = scene.U[direction], scene.V[direction]
+    at, lean, anchored, sigma = volumes[k, U0 : V1 + 1].copy(), np.zeros(4), np.zeros(4, np.bool_), np.zeros(4)
+    for edge in range(4):
+        lines = across_u if edge < 2 else across_v
+        m = cheapest_line(volumes[k], edge, lines, uv, gain, scene.evidence)
+        if m >= 0:
+            at[edge], lean[edge], anchored[edge] = lines.start[m], lines.lean[m], True
+        sigma[edge] = sigma_of_side(volumes[k], edge, lines, uv, gain, m >= 0)
+    return at, lean, anchored, sigma
 
 
 @compiled

@@ -18,11 +18,12 @@ from .moves import refit_each, without
 from .objective import base_shows, edge_cost, objective, walls_of
 from .plan import Plan
 from .scene import Scene
-from .sides import Side, plan_chords, plan_edges, sides_of
+from .sides import Lines, Side, lines_of, sides_of
 from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, distances_up, volume_cost
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
+HOPELESS_UNITS = 20.0  # dearer along the axes, no roof is made cheaper by planes that face otherwise: of ten the most was 9
 
 
 @dataclass(frozen=True)
@@ -37,18 +38,20 @@ class Drawn:
 
 def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
     """The volumes along their sides, without those that do not pay once planes face as these do."""
-    lines = plan_edges(outline, plan), plan_chords(outline, plan)
-    best = drawn(volumes, *lines, scene)
+    lines, value = lines_of(outline, plan, scene), objective(volumes, scene, np.inf)
+    best = drawn(volumes, lines, scene)
     tried = True
     while tried:
         tried = False
         for trial in fewer(best):
             if base_shows(trial, scene) and not base_shows(best.volumes, scene):
                 continue
-            trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
-            found = drawn(trial, *lines, scene)
-            if found.cost < best.cost:
-                best, tried = found, True
+            trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
+            if found > value + HOPELESS_UNITS * scene.evidence:
+                continue
+            roof = drawn(trial, lines, scene)
+            if roof.cost < best.cost:
+                best, value, tried = roof, found, True
                 break
     return best
 
@@ -65,9 +68,9 @@ def fewer(roof: Drawn) -> Iterator[np.ndarray]:
             yield without(roof.volumes, k)
 
 
-def drawn(volumes: np.ndarray, edges: np.ndarray, chords: np.ndarray, scene: Scene) -> Drawn:
-    """The volumes with the sides and planes that suit them; `edges` and `chords` are those of the outline."""
-    sides = sides_of(volumes, edges, chords, scene)
+def drawn(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> Drawn:
+    """The volumes with the sides, on the outline's `lines` where these are near, and the planes that suit them."""
+    sides = sides_of(volumes, lines, scene)
     planes = finished(volumes, sides, scene)
     walls, units = walls_of(scene), sum(volume_cost(volume) for volume in volumes[1:])
     units += sum(edge_cost(volumes, walls, k, edge) for k in range(1, len(volumes)) for edge in range(4))
