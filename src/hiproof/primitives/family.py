@@ -38,6 +38,7 @@ QUARTER_TURN = [
     RIGHT,
     LEFT,
 ]  # which side becomes left, right, front, back when the axes turn by 90 degrees
+LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])  # the sign that their leans take then
 SAME = 1e-9  # m; numerically equal
 ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
 HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
@@ -131,14 +132,13 @@ class Member:
 
     def turned(self) -> Member:
         """The same surface with its axes turned by 90 degrees."""
-        return replace(
-            self,
-            kappa=math.remainder(self.kappa + 0.5 * math.pi, 2.0 * math.pi),
-            half=self.half[::-1].copy(),
-            eaves=self.eaves[QUARTER_TURN],
-            slopes=self.slopes[QUARTER_TURN],
-            leans=self.leans[QUARTER_TURN] * [-1.0, -1.0, 1.0, 1.0],
+        kappa = math.remainder(self.kappa + 0.5 * math.pi, 2.0 * math.pi)
+        eaves, slopes, leans = (
+            self.eaves[QUARTER_TURN],
+            self.slopes[QUARTER_TURN],
+            self.leans[QUARTER_TURN] * LEANS_TURN,
         )
+        return Member(kappa, self.centre, self.half[::-1].copy(), eaves, slopes, self.top, leans)
 
     def canonical(self) -> Member:
         """The same surface in the direction in which it is named: the ridge along u, planes on the sides that SHAPES says."""
@@ -150,34 +150,37 @@ class Member:
     @cached_property
     def quarter_turns(self) -> int:
         """How many turns lead to the canonical direction."""
-        along, across = int(self.has[:2].sum()), int(self.has[2:].sum())
-        _, sides = SHAPES[math.isfinite(self.top), min(along, across), max(along, across)]
-        wanted = [side in sides for side in range(4)]
-        turns = [self]
-        for _ in range(3):
-            turns.append(turns[-1].turned())
-        named = [k for k, member in enumerate(turns) if member.has.tolist() == wanted and member.lies_along()]
-        return min(named, key=lambda k: turns[k].order(), default=0)
+        has = self.has.tolist()
+        along, across = sorted((sum(has[:2]), sum(has[2:])))
+        _, sides = SHAPES[math.isfinite(self.top), along, across]
+        wanted, named, places = [side in sides for side in range(4)], [], [LEFT, RIGHT, FRONT, BACK]
+        for turns in range(4):
+            if [has[place] for place in places] == wanted and self.lies_along(turns % 2):
+                named.append((self.order(turns, places), turns))
+            places = [places[place] for place in QUARTER_TURN]
+        return min(named, default=((), 0))[1]
 
-    def order(self) -> tuple[float, ...]:
-        """Of members of the same surface the least comes first: steeper, then lower, in front and on the left."""
-        slopes, eaves = self.slopes, np.where(self.has, self.eaves, 0.0)
-        apart = [
+    def order(self, turns: int, places: list[int]) -> tuple[float, ...]:
+        """Of members of the same surface the least comes first: steeper, then lower, in front and on the left. Of this one after so
+        many `turns`, which bring its sides `places` to the left, right, front and back."""
+        slopes = [float(self.slopes[place]) for place in places]
+        eaves = [float(self.eaves[place]) if self.has[place] else 0.0 for place in places]
+        apart = (
             slopes[BACK] - slopes[FRONT],
             eaves[FRONT] - eaves[BACK],
             slopes[RIGHT] - slopes[LEFT],
             eaves[LEFT] - eaves[RIGHT],
-        ]
-        ahead = -0.5 * math.pi < self.kappa <= 0.5 * math.pi
-        return (*np.round(apart, 6).tolist(), not ahead)
+        )
+        ahead = -0.5 * math.pi < math.remainder(self.kappa + 0.5 * math.pi * turns, 2.0 * math.pi) <= 0.5 * math.pi
+        return (*(round(x, 6) for x in apart), not ahead)
 
-    def lies_along(self) -> bool:
-        """Whether the longer way is u: along the ridge of the sides that meet lower, else of the rectangle."""
-        low, high = self.apex(1), self.apex(0)
+    def lies_along(self, axis: int) -> bool:
+        """Whether `axis` is the longer way: along the ridge of the sides that meet lower, else of the rectangle."""
+        low, high = self.apex(1 - axis), self.apex(axis)
         if math.isfinite(low) and math.isfinite(high) and abs(low - high) > SAME:
             return low < high
         square_like = self.has.all() or not self.has.any()
-        return not square_like or self.half[0] >= self.half[1] - SAME
+        return not square_like or bool(self.half[axis] >= self.half[1 - axis] - SAME)
 
     @cached_property
     def name(self) -> str:
@@ -226,9 +229,12 @@ class Member:
 
     def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member in its canonical direction."""
-        member = self.canonical()
-        shape = member.in_catalogue if as_catalogue else None
-        return member.side_by_side() if shape is None else member.in_words_of(shape)
+        return self.canonical().in_words(as_catalogue)
+
+    def in_words(self, as_catalogue: bool) -> tuple[dict[str, float], float, np.ndarray]:
+        """`describe` of a member in its canonical direction."""
+        shape = self.in_catalogue if as_catalogue else None
+        return self.side_by_side() if shape is None else self.in_words_of(shape)
 
     def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member, each side's own."""
@@ -248,14 +254,14 @@ class Member:
         shape = self.in_catalogue if as_catalogue else None
         kappa = None if shape is None else shape.canonical_theta(self.theta(shape))[KAPPA]
 
-        def values(member: Member) -> np.ndarray:
-            described = member.side_by_side() if shape is None else member.in_words_of(shape, kappa)
-            return np.array([*described[0].values(), described[2][2]])
+        def values(member: Member) -> dict[str, float]:
+            parameters, _, translation = member.side_by_side() if shape is None else member.in_words_of(shape, kappa)
+            return {**parameters, "t_z": float(translation[2])}
 
-        centre = values(self)
-        variance = sum(((values(member) - centre) ** 2 for member in changes), np.zeros(len(centre)))
-        names = [*self.describe(as_catalogue)[0], "t_z"]
-        return {name: math.sqrt(v) for name, v in zip(names, variance.tolist(), strict=True) if v > 1e-18}
+        own = values(self)
+        moved = np.array([list(values(member).values()) for member in changes]).reshape(-1, len(own))
+        variance = ((moved - list(own.values())) ** 2).sum(axis=0)
+        return {name: math.sqrt(v) for name, v in zip(own, variance.tolist(), strict=True) if v > 1e-18}
 
     def part(
         self, outlines: list[shapely.Polygon], name: str | None = None, changes: list[Member] | None = None
@@ -265,7 +271,7 @@ class Member:
         `changes` are as in `sigma`, in the same direction as this member, which must be its canonical one.
         """
         as_catalogue = name in (None, self.name)
-        parameters, kappa, translation = self.describe(as_catalogue)
+        parameters, kappa, translation = self.in_words(as_catalogue)
         name = name or self.name
         planes = planes_of(name, parameters, kappa, translation)
         sigma = self.sigma(changes or [], as_catalogue)

@@ -36,45 +36,42 @@ def part_of(
 ) -> Part:
     """The volume over its `regions` (local coordinates) as a part of the family, called as `allowed` has it where that can be."""
     c, s = scene.turn[int(volume[DIRECTION])]
-    rotation = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
+    axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
     corners = np.concatenate([shapely.get_coordinates(region) for region in regions]) - plan.frame.origin[:2]
-    rows = np.where(showing(planes.rows, corners @ rotation.T)[:, None], planes.rows, np.nan)
+    rows = np.where(showing(planes.rows, corners @ axes.T)[:, None], planes.rows, np.nan)
     turn = common_lean(rows)
-    rotation = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ rotation
-    rows = turned(rows, turn)
+    axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
+    rows = turned(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]
     sides = [moved(side, k, turn) for k, side in enumerate(sides)]
-    low, high = rectangle_of(sides, corners @ rotation.T)
-    member = regular(rows, low, high)
-    kappa, turns = math.atan2(rotation[0, 1], rotation[0, 0]), 0
-
-    def in_place(change: Member) -> Member:
-        """The member, or one changed, where it stands and in its canonical direction."""
-        centre = plan.frame.xy_local((change.centre @ rotation @ plan.frame.rotation.T)[None])[0]
-        z = plan.frame.origin[2]
-        change = replace(change, kappa=kappa, centre=centre, eaves=change.eaves + z, top=change.top + z)
-        for _ in range(turns):
-            change = change.turned()
-        return change
-
-    turns = in_place(member).quarter_turns
-    loose, unknown = (
-        [in_place(regular(rows, *ends)) for ends in ends_moved(sides, low, high, known)] for known in (True, False)
+    low, high = rectangle_of(sides, corners @ axes.T)
+    kappa = math.atan2(axes[0, 1], axes[0, 0])
+    member = regular(rows, low, high, kappa)
+    modes = [*(turned(mode, turn) for mode in planes.modes), np.tile((0.0, 0.0, REGISTERED_M), (SIDES + 1, 1))]
+    loose = [regular(rows, *ends, kappa) for ends in ends_moved(sides, low, high, known=True)]
+    unknown = [regular(rows, *ends, kappa) for ends in ends_moved(sides, low, high, known=False)]
+    changes, unknown = (
+        alike_turned(own, member.quarter_turns) for own in (changed(member, np.array(modes)) + loose, unknown)
     )
-    lifted = np.tile((0.0, 0.0, REGISTERED_M), (SIDES + 1, 1))
-    changes = [in_place(changed(member, turned(mode, turn))) for mode in (*planes.modes, lifted)] + loose
-    member = in_place(member)
+    member = replace(member.canonical(), centre=member.centre @ axes + plan.frame.origin[:2])
     part = member.part(regions, name_among(member.name, allowed), changes)
     untold = member.sigma(unknown, part.type == member.name)
     return replace(part, sigma={name: value for name, value in part.sigma.items() if name not in untold})
+
+
+def alike_turned(members: list[Member], quarter_turns: int) -> list[Member]:
+    """The members seen from axes so many quarter turns on."""
+    for _ in range(quarter_turns):
+        members = [member.turned() for member in members]
+    return members
 
 
 def showing(rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Which planes (5,) are not everywhere above some single other one over the regions' `corners` (n, 2)."""
     there = np.isfinite(rows[:, 2])
     z = rows @ np.column_stack([corners, np.ones(len(corners))]).T
-    for k in np.nonzero(there)[0]:
-        if any(j != k and (z[j] <= z[k] + 1e-9).all() for j in np.nonzero(there)[0]):
-            there[k] = False
+    above = (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()  # [k][j]: plane k nowhere below plane j
+    for k in np.nonzero(there)[0].tolist():
+        there[k] = not any(above[k][j] for j in np.nonzero(there)[0].tolist() if j != k)
     return there
 
 
@@ -137,13 +134,13 @@ def ends_moved(
             yield ends[0], ends[1]
 
 
-def regular(rows: np.ndarray, low: np.ndarray, high: np.ndarray) -> Member:
+def regular(rows: np.ndarray, low: np.ndarray, high: np.ndarray, kappa: float) -> Member:
     """The member over a rectangle with planes `rows` (5, 3), with eaves and an apex in common where they nearly are."""
-    return with_one_apex(level(member_of(rows, low, high)))
+    return with_one_apex(level(member_of(rows, low, high, kappa)))
 
 
-def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray) -> Member:
-    """The member over the rectangle with planes `rows` (5, 3), in the axes they are given in."""
+def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray, kappa: float) -> Member:
+    """The member over the rectangle with planes `rows` (5, 3), in the axes they are given in, whose first is at `kappa`."""
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
     eaves, slopes, leans = np.full(SIDES, np.inf), np.zeros(SIDES), np.zeros(SIDES)
     for k in range(SIDES):
@@ -152,16 +149,19 @@ def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray) -> Member:
             leans[k] = rows[k, 1 - AXIS[k]] / slopes[k]
             eaves[k] = rows[k] @ (*centre, 1.0) - slopes[k] * half[AXIS[k]]
     top = float(rows[LEVEL, 2]) if np.isfinite(rows[LEVEL, 2]) else math.inf
-    return Member(0.0, centre, half, eaves, slopes, top, leans)
+    return Member(kappa, centre, half, eaves, slopes, top, leans)
 
 
-def changed(member: Member, change: np.ndarray) -> Member:
-    """The member with its planes changed by `change` (5, 3), its sides where they are."""
-    slopes = member.slopes + np.where(member.has, SIGN * change[np.arange(SIDES), AXIS], 0.0)
+def changed(member: Member, changes: np.ndarray) -> list[Member]:
+    """The member with its planes changed by each of `changes` (m, 5, 3), its sides where they are."""
+    sides = np.arange(SIDES)
+    slopes = member.slopes + np.where(member.has, SIGN * changes[:, sides, AXIS], 0.0)
     middles = np.tile(member.centre, (SIDES, 1))  # of the sides
-    middles[np.arange(SIDES), AXIS] -= SIGN * member.half[AXIS]
-    eaves = member.eaves + (change[:SIDES, :2] * middles).sum(axis=1) + change[:SIDES, 2]
-    return replace(member, eaves=eaves, slopes=slopes, top=member.top + change[LEVEL, 2])
+    middles[sides, AXIS] -= SIGN * member.half[AXIS]
+    eaves = member.eaves + (changes[:, :SIDES, :2] * middles).sum(axis=2) + changes[:, :SIDES, 2]
+    tops = member.top + changes[:, LEVEL, 2]
+    kappa, centre, half, leans = member.kappa, member.centre, member.half, member.leans
+    return [Member(kappa, centre, half, *own, leans) for own in zip(eaves, slopes, tops.tolist(), strict=True)]
 
 
 def level(member: Member) -> Member:
@@ -180,7 +180,7 @@ def level(member: Member) -> Member:
     for k in np.nonzero(member.has)[0]:
         rows[k, AXIS[k]], rows[k, 1 - AXIS[k]] = SIGN[k] * member.slopes[k], member.leans[k] * member.slopes[k]
         rows[k, 2] = member.eaves[k] + member.slopes[k] * member.half[AXIS[k]] - rows[k, :2] @ member.centre
-    again = member_of(rows, low, high)
+    again = member_of(rows, low, high, member.kappa)
     near = np.abs(again.eaves - lowest) < 1e-6
     return replace(member, centre=centre, half=half, eaves=np.where(near & member.has, lowest, again.eaves))
 

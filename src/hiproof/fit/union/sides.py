@@ -76,7 +76,9 @@ def sides_of(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> lis
     sides = [[Side(float(x)) for x in volumes[0, U0 : V1 + 1]]]
     for k in range(1, len(volumes)):
         at, lean, anchored, sigma = sides_of_volume(volumes, k, *lines[int(volumes[k, DIRECTION])], scene)
-        sides.append([Side(*side) for side in zip(at.tolist(), lean.tolist(), anchored.tolist(), sigma.tolist(), strict=True)])
+        sides.append(
+            [Side(*side) for side in zip(at.tolist(), lean.tolist(), anchored.tolist(), sigma.tolist(), strict=True)]
+        )
     return [[shared(volumes, sides, k, edge) for edge in range(4)] for k in range(len(volumes))]
 
 
