@@ -27,6 +27,7 @@ COARSE_M, FINE_M, PITCH_M = 0.5, 0.1, 0.1
 SLID_POINTS = 600  # that are slid over the footprint: a bound on time, for all that comes after looks at every point
 # m over which a side is soft, as in fit/outline; density outside over that inside: points of walls and neighbours
 BLUR_M, STRAY = 0.25, math.exp(-4.0)
+STRAY_FROM_M = 4.0 * BLUR_M  # outside, from where on all points cost the same
 LEAST_POINTS, LEAST_SIDE_M = 20, 1.5  # points; with fewer every shift holds as many; m: shorter sides tell no offset
 FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may be so many points of those behind it
 SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
@@ -108,8 +109,8 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
 
 def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     """The shift (2,) at which the footprint holds most of `xy`, the least of those that hold as many: coarse, then fine."""
-    low = np.array(footprint.bounds[:2]) - AROUND_M - FARTHEST_M
-    count = np.ceil((np.array(footprint.bounds[2:]) + AROUND_M + FARTHEST_M - low) / (2 * PITCH_M)).astype(int)
+    low = np.array(footprint.bounds[:2]) - STRAY_FROM_M
+    count = np.ceil((np.array(footprint.bounds[2:]) + STRAY_FROM_M - low) / (2 * PITCH_M)).astype(int)
     nodes = low + 2 * PITCH_M * np.moveaxis(np.indices(tuple(count)), 0, -1).reshape(-1, 2)
     depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
     costs = -np.log(STRAY + (1.0 - STRAY) * normal_share(depth / BLUR_M)).reshape(count)
