@@ -101,8 +101,7 @@ def single() -> None:
 
 def points() -> None:
     """Sorting points into work tiles, those of one building, the ground around it, whether its footprint lies off."""
-    from ..fit.align import free_side_offset
-    from ..fit.outline.settle import normal_share, side_offset
+    from ..fit.align import find_shift
     from ..read.assign import PointGrid
     from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
     from .sort import Reach
@@ -112,12 +111,7 @@ def points() -> None:
     PointGrid(xyz).inside(OUTLINE)
     GroundAround(ground_cells(xyz), boxes[0]).height_at(xyz[:, :2])
     LowestAround(Cells(lowest_in_cells(xyz)), boxes[0]).height_at(xyz[:, :2])
-    normal_share(np.linspace(-1.0, 1.0, 5))
-    along = np.linspace(0.0, 9.0, 50)
-    side_offset(along, along % 2.0, 0.0, 9.0, 5.0)
-    free_side_offset(
-        np.ascontiguousarray(xyz[:, :2]), np.array([0.0, -1.0]), 0.0, np.array([[0.0, 0.0], [9.0, 0.0]]), 5.0
-    )
+    find_shift(xyz[:, :2], shapely.box(1.0, 0.5, 10.0, 7.5))
 
 
 PIECES: dict[str, Callable[[], None]] = {

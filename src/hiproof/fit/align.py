@@ -44,20 +44,19 @@ LEAST_BEYOND_M = 0.3  # m that the roof's sides must lie off the footprint's to 
 class Shift:
     """Where a footprint's roof lies: `xy` (2,) m from it with standard deviations `sigma` (2,), infinite along which nothing is
     known; `beyond` (m) how far the roof reaches over the moved footprint, negative where it stays behind, and its `beyond_sigma`;
-    `disagreement` (m) of the sides; `free` the share of the footprint's border that told it."""
+    `disagreement` (m) of the sides."""
 
     xy: np.ndarray = field(default_factory=lambda: np.zeros(2))
     sigma: np.ndarray = field(default_factory=lambda: np.full(2, math.inf))
     beyond: float = 0.0
     beyond_sigma: float = math.inf
     disagreement: float = math.inf
-    free: float = 0.0
 
     @property
     def is_none(self) -> bool:
         """Whether the footprint is known to lie where its roof is."""
         small = float(np.hypot(*self.xy)) < NEAR_M and float(self.sigma.max()) < NEAR_M
-        return small and self.disagreement < MOST_DISAGREEMENT_M and self.free > LEAST_FREE
+        return small and self.disagreement < MOST_DISAGREEMENT_M
 
     @property
     def is_clear(self) -> bool:
@@ -68,13 +67,12 @@ class Shift:
             LEAST_SHIFT_M <= length <= FARTHEST_M
             and length > SIGMAS * known
             and self.disagreement < MOST_DISAGREEMENT_M
-            and self.free > LEAST_FREE
         )
 
     @property
     def is_size_clear(self) -> bool:
         """Whether the roof surely reaches beyond the footprint on all sides, or stays behind it."""
-        agreed = self.disagreement < MOST_DISAGREEMENT_M and self.free > LEAST_FREE
+        agreed = self.disagreement < MOST_DISAGREEMENT_M
         return bool(agreed and abs(self.beyond) > max(LEAST_BEYOND_M, SIGMAS * self.beyond_sigma))
 
 
@@ -138,23 +136,19 @@ def slid_costs(xy, costs, low, pitch, moves):
 
 
 def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray) -> Shift | None:
-    """The shift and the reach beyond that all free sides of the footprint, slid by `start`, agree on best."""
+    """The shift and the reach beyond that all free sides of the footprint, slid by `start`, agree on best; None of too few."""
     density = len(xy) / max(shapely.Polygon(ring).area, 1.0)
-    length = np.hypot(*(np.roll(ring, -1, axis=0) - ring).T)
-    rows = []
-    for i in np.flatnonzero(length >= LEAST_SIDE_M):
-        azimuth, distance = lines[i]
-        normal = np.array([math.cos(azimuth), math.sin(azimuth)])
-        ends = ring[[i, (i + 1) % len(ring)]] + start
-        offset = free_side_offset(xy, normal, distance + normal @ start, ends, density)
-        if not math.isnan(offset):
-            rows.append(
-                (*normal, 1.0, offset + normal @ start, SIDE_M * math.sqrt(SIDE_LENGTH_M / length[i]), length[i])
-            )
-    if len(rows) < LEAST_SIDES:
+    ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
+    length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
+    normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
+    distances, ends = lines[:, 1] + normals @ start, ends + start
+    free = free_sides(xy, normals, distances, ends) & (length >= LEAST_SIDE_M)
+    told = length[free]
+    if len(told) < LEAST_SIDES or told.sum() <= LEAST_FREE * length.sum():
         return None
-    told_of_each = np.array(rows)
-    design, (wanted, sigma, told) = told_of_each[:, :3], told_of_each[:, 3:].T
+    normals, sigma = normals[free], SIDE_M * np.sqrt(SIDE_LENGTH_M / told)
+    wanted = offsets_of(xy, normals, distances[free], ends[free], density) + normals @ start
+    design = np.column_stack([normals, np.ones(len(told))])
     weight = 1.0 / sigma**2
     prior = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
     inverse = np.linalg.inv((design.T * weight) @ design + prior)
@@ -162,21 +156,37 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
     gap = wanted - design @ solution
     disagreement = math.sqrt(float(np.average(gap**2, weights=told)))
     spread = np.sqrt(np.diag(inverse)) * max(1.0, math.sqrt(float((weight * gap**2).mean())))
-    return Shift(
-        solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement, told.sum() / length.sum()
-    )
+    return Shift(solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement)
 
 
 @compiled
-def free_side_offset(xy, normal, distance, ends, density):
-    """How far (m) outwards the roof's side lies of the footprint's, NaN where roofs go on before it or there is none."""
-    along, depth = normal[0] * xy[:, 1] - normal[1] * xy[:, 0], distance - xy[:, 0] * normal[0] - xy[:, 1] * normal[1]
-    (first, last), before, behind = normal[0] * ends[:, 1] - normal[1] * ends[:, 0], 0, 0
-    low, high = min(first, last), max(first, last)
-    for k in range(len(xy)):
-        if low <= along[k] <= high:
-            before += -FREE_TO_M < depth[k] < -FREE_FROM_M
-            behind += FREE_FROM_M < depth[k] < FREE_TO_M
-    if behind < FREE_TO_M - FREE_FROM_M or before > FREE_SHARE * behind:
-        return np.nan
-    return side_offset(along, depth, low, high, density)
+def free_sides(xy, normals, distances, ends):
+    """Which of the footprint's sides (m,) have points behind them and hardly any before, where roofs of neighbours would go on."""
+    before, behind = np.zeros(len(normals)), np.zeros(len(normals))
+    for m in range(len(normals)):
+        x, y = normals[m]
+        low, high = span_of(normals[m], ends[m])
+        for k in range(len(xy)):
+            depth = distances[m] - x * xy[k, 0] - y * xy[k, 1]
+            if -FREE_TO_M < depth < FREE_TO_M and low <= x * xy[k, 1] - y * xy[k, 0] <= high:
+                before[m] += depth < -FREE_FROM_M
+                behind[m] += depth > FREE_FROM_M
+    return (behind >= FREE_TO_M - FREE_FROM_M) & (before <= FREE_SHARE * behind)
+
+
+@compiled
+def offsets_of(xy, normals, distances, ends, density):
+    """How far (m,) outwards the roof's sides lie of the footprint's."""
+    offsets = np.empty(len(normals))
+    for m in range(len(normals)):
+        x, y = normals[m]
+        along, depth = x * xy[:, 1] - y * xy[:, 0], distances[m] - x * xy[:, 0] - y * xy[:, 1]
+        offsets[m] = side_offset(along, depth, *span_of(normals[m], ends[m]), density)
+    return offsets
+
+
+@compiled
+def span_of(normal, ends):
+    """From where to where a side with `ends` (2, 2) runs, square to its `normal`."""
+    first, last = normal[0] * ends[0, 1] - normal[1] * ends[0, 0], normal[0] * ends[1, 1] - normal[1] * ends[1, 0]
+    return min(first, last), max(first, last)
