@@ -71,7 +71,7 @@ def candidates_in(
     if len(pool) == 0:
         return []
     gables, counts = gable_pool(few, grid, pool, tolerance, evidence, MOST_GABLES)
-    middle = np.array([np.median(u), np.median(v)])
+    middle = np.array([np.sort(u)[len(u) // 2], np.sort(v)[len(v) // 2]])
     along = [facing for plane in pool for facing in facings(plane, middle, scene.leans[direction])]
     pairs = [list(g[:c]) for g, c in zip(gables, counts, strict=True)]
     pairs += [[p, q] for i, p in enumerate(along) for q in along[:i] if has_ridge(p, q, grid.u, grid.v)]
