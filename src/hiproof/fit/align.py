@@ -87,7 +87,7 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
     ring = shapely.get_coordinates(shapely.geometry.polygon.orient(shapely.simplify(footprint, PITCH_M)).exterior)[:-1]
     if len(xy) < LEAST_POINTS or len(ring) < 3:
         return Shift()
-    lines = lines_through(ring)
+    xy, lines = np.ascontiguousarray(xy), lines_through(ring)
     shift = by_sides(xy, ring, lines, np.zeros(2))
     if shift is not None and shift.is_none:
         return shift

@@ -132,7 +132,8 @@ def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
     count = np.zeros(expected.shape)
     np.add.at(count, (cloud.i, cloud.j), 1.0)
     (rows, columns), padded = expected.shape, np.pad([count, expected], ((0, 0), (1, 1), (1, 1)))
-    around = sum(padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3))
+    windows = [padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3)]
+    around = np.sum(windows, axis=0)
     return np.clip(1.0 - around[0] / np.maximum(0.5 * around[1], 1e-9), 0.0, 1.0)
 
 

@@ -113,7 +113,10 @@ def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: 
     kept = (np.abs(lean) < LEAN) & (np.hypot(*step.T) > SHORTEST_M)
     ends, lean = ends[:, kept], lean[kept]
     start = ends[0, :, axis] - lean * ends[0, :, 1 - axis]
-    return Lines(start, lean, ends[:, :, 1 - axis], is_edge[kept], edges[:, :, axis], edges[:, :, 1 - axis])
+    y, x_edges, y_edges = (
+        np.ascontiguousarray(x) for x in (ends[:, :, 1 - axis], edges[:, :, axis], edges[:, :, 1 - axis])
+    )
+    return Lines(start, lean, y, is_edge[kept], x_edges, y_edges)
 
 
 @compiled
