@@ -25,12 +25,9 @@ def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
 
 def faces_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> list[np.ndarray]:
     """The triangles of every face, as `face_triangles` has them, all cut by one call."""
-    found = [np.array(face.rings[:1], int) if is_triangle(face) else None for face in faces]
-    others = [index for index, triangles in enumerate(found) if triangles is None]
-    if others:
-        for index, triangles in zip(others, cut(vertices, [faces[index].rings for index in others]), strict=True):
-            found[index] = triangles
-    return found
+    others = [face.rings for face in faces if not is_triangle(face)]
+    tiles = iter(cut(vertices, others) if others else [])
+    return [np.array(face.rings[:1], int) if is_triangle(face) else next(tiles) for face in faces]
 
 
 def is_triangle(face: Face) -> bool:
