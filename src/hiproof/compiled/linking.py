@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 
 import llvmlite.binding as llvm
 from numba.core import bytecode, compiler, types
+from numba.core.codegen import JITCodeLibrary
 
 # numba numbers the functions of its own library from 1 in every process, and the numbers stand in their symbols: code that
 # two processes kept would meet in a third with one symbol for two functions.
@@ -34,6 +35,22 @@ class Callee(NamedTuple):
     def load(self) -> None:
         """Have its code in this process, from disk or compiled."""
         getattr(import_module(self.module), self.name).compile(self.signature)
+
+
+class Loaded(JITCodeLibrary):
+    """numba's library of a function that was compiled before: its machine code as it is; what callers would copy of it is
+    read when one is compiled."""
+
+    def __init__(self, codegen: Any, name: str, machine_code: bytes, bitcode: bytes):
+        super().__init__(codegen, name)
+        self.bitcode = bitcode
+        codegen._engine._ee.add_object_file(llvm.ObjectFileRef.from_data(machine_code))
+        self._finalized = self._disable_inspection = True
+
+    def _get_module_for_linking(self) -> Any:
+        if self._shared_module is None:
+            self._shared_module = llvm.parse_bitcode(self.bitcode)
+        return self._shared_module
 
 
 def pipeline_of(stamp: str) -> type[compiler.Compiler]:
@@ -91,10 +108,25 @@ def rebuilt(context: Any, code: tuple, calls: tuple[Callee, ...], is_called_as: 
     """The result of compiling from what was kept of it, after what it calls."""
     for callee in calls:
         callee.load()
-    names = code[1]
-    context.codegen()._engine._defined_symbols.update(
-        (names.llvm_func_name, names.llvm_cpython_wrapper_name, names.llvm_cfunc_wrapper_name)
+    (name, _, kept), described, constants, signature, objectmode, lifted, annotation, _, environments = code
+    codegen = context.codegen()
+    codegen._engine._defined_symbols.update(
+        (described.llvm_func_name, described.llvm_cpython_wrapper_name, described.llvm_cfunc_wrapper_name)
     )
-    result = compiler.CompileResult._rebuild(context, *code)
-    result.library.calls, result.library.is_called_as = calls, is_called_as
-    return result
+    library = Loaded(codegen, name, *kept)
+    library.calls, library.is_called_as = calls, is_called_as
+    for environment in environments:
+        codegen.set_env(environment.env_name, environment)
+    return compiler.compile_result(
+        target_context=context,
+        typing_context=context.typing_context,
+        library=library,
+        environment=constants,
+        entry_point=context.get_executable(library, described, constants),
+        fndesc=described,
+        signature=signature,
+        objectmode=objectmode,
+        lifted=lifted,
+        type_annotation=annotation,
+        referenced_envs=environments,
+    )
