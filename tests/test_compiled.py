@@ -387,13 +387,13 @@ def test_constants_in_a_call_compile_nothing_apart(town):
     assert len(sys.modules["town.inner"].number.signatures) == 1
 
 
-def test_the_pieces_compiled_beforehand_are_all_that_the_demo_calls(tmp_path):
-    """A piece that lacks a function would leave it to be compiled by every worker."""
+def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
+    """A piece that lacks a function would leave it to be compiled by every worker. With footprints, and without some for a few houses."""
     script = f"""
 import sys
 from pathlib import Path
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.tasks import MAIN_JOB
+from hiproof.city.tasks import ALL, MAIN_JOB
 from hiproof.city.warm_pieces import PIECES
 from hiproof.compiled import kept
 from hiproof.simulate import demo_files
@@ -403,13 +403,16 @@ def noted(self, signature, context):
     asked.add((self.name, str(signature)))
     return load(self, signature, context)
 kept.Kept.load_overload = noted
-for piece in MAIN_JOB:
-    PIECES[piece]()
-pieces, files = set(asked), {{name: str(path) for name, path in demo_files().items()}}
-reconstruct_area(Request((files["cloud"],), Path({str(tmp_path)!r}), files["footprints"], files["terrain"]))
-print(sorted(asked - pieces))
+files = {{name: str(path) for name, path in demo_files().items()}}
+with_footprints = dict(footprints=files["footprints"], terrain=files["terrain"])
+for pieces, given in ((MAIN_JOB, with_footprints), (ALL, dict(bbox=(91990, 451000, 92034, 451040)))):
+    for piece in pieces:
+        PIECES[piece]()
+    beforehand = set(asked)
+    assert reconstruct_area(Request((files["cloud"],), Path({str(tmp_path)!r}), restart=True, **given)).buildings > 3
+    print(sorted(asked - beforehand))
 """
-    assert run(tmp_path, "-c", script) == "[]\n"
+    assert run(tmp_path, "-c", script) == "[]\n[]\n"
 
 
 @pytest.mark.parametrize("total", [1, 7, 222])

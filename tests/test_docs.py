@@ -129,6 +129,7 @@ def test_snippets_run(page, at_hand, monkeypatch):
     names = dict(known)
     for number, block in enumerate(PAGES[page]):
         exec(compile(block, f"{page}, block {number}", "exec"), names)
+    assert names.keys() > known.keys(), "the page's blocks ran and left what they made"
 
 
 def test_the_sites_generated_pages_tell_every_command_option_and_setting():

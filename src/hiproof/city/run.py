@@ -33,7 +33,7 @@ from .plan import WorkPlan
 from .quarantine import is_loss, run_alone, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
-from .tasks import ALL, MAIN_JOB, solve_tile, sort_cloud
+from .tasks import ALL, MAIN_JOB, ONE_PRIMITIVE, solve_tile, sort_cloud
 
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 Progress = Callable[[str, int, int], None]
@@ -112,9 +112,10 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
 
 
 def pieces_of(request: Request) -> tuple[str, ...]:
-    """What of the compiled code the run needs: one primitive by itself only where no footprint says what a building is."""
-    alone = request.footprints is None or request.settings.fit.parts == "one"
-    return ALL if alone else MAIN_JOB
+    """What of the compiled code the run needs."""
+    if request.footprints is None:
+        return ALL
+    return ONE_PRIMITIVE if request.settings.fit.parts == "one" else MAIN_JOB
 
 
 class Clock:

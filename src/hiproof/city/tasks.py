@@ -10,8 +10,11 @@ from .ledger import Outcome
 MAIN_JOB = ("moves", "planes", "solid", "check", "points")
 """Pieces of compiled code (warm_pieces.py) that every run needs, the longest first."""
 
-ALL = (*MAIN_JOB, "single")
-"""All pieces: those that fit one primitive a building as well."""
+ONE_PRIMITIVE = (*MAIN_JOB, "single")
+"""Those of runs that fit one primitive a building."""
+
+ALL = (*ONE_PRIMITIVE, "outlines")
+"""All pieces: those of runs without footprints."""
 
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:

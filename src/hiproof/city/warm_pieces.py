@@ -99,6 +99,15 @@ def single() -> None:
     fit_roof(house())
 
 
+def outlines() -> None:
+    """What runs without footprints draw: touching houses told apart, the outline of each."""
+    from ..classify.houses import told_apart
+    from ..fit.outline import estimate_outline
+
+    told_apart(house(), OUTLINE, 1.0)
+    estimate_outline(house(), 0.3)
+
+
 def points() -> None:
     """Sorting points into work tiles, those of one building, the ground around it, whether its footprint lies off."""
     from ..fit.align import find_shift
@@ -115,7 +124,7 @@ def points() -> None:
 
 
 PIECES: dict[str, Callable[[], None]] = {
-    piece.__name__: piece for piece in (moves, planes, solid, check, points, single)
+    piece.__name__: piece for piece in (moves, planes, outlines, solid, check, points, single)
 }
 
 

@@ -41,6 +41,8 @@ class Loaded(JITCodeLibrary):
     """numba's library of a function that was compiled before: its machine code as it is; what callers would copy of it is
     read when one is compiled."""
 
+    _shared_module: Any
+
     def __init__(self, codegen: Any, name: str, machine_code: bytes, bitcode: bytes):
         super().__init__(codegen, name)
         self.bitcode = bitcode

@@ -162,11 +162,15 @@ def fit_likelihood(
     With an `outline` the plan is its rectangle in the roof's direction and only heights are fitted. `side_taus` are the
     softnesses (m) tried at last on the sides; `log_prior` by type is added to the evidence (nats).
     """
-    estimate = searched(new_search(points, types, outline is None, COARSE_POINTS), types, outline, side_taus, log_prior)
-    if all(np.less(estimate.noise, DOUBTFUL)) or len(points) <= COARSE_POINTS:
-        return estimate
-    larger = new_search(points, types, outline is None, MORE_POINTS * COARSE_POINTS)
-    return min(estimate, searched(larger, types, outline, side_taus, log_prior), key=lambda one: min(one.bics.values()))
+
+    def estimate(coarse_points: int) -> Estimate:
+        search = new_search(points, types, outline is None, coarse_points)
+        return searched(search, types, outline, side_taus, log_prior)
+
+    first = estimate(COARSE_POINTS)
+    if all(np.less(first.noise, DOUBTFUL)) or len(points) <= COARSE_POINTS:
+        return first
+    return min(first, estimate(MORE_POINTS * COARSE_POINTS), key=lambda one: min(one.bics.values()))
 
 
 def searched(

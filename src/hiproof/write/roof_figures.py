@@ -74,34 +74,32 @@ def roof_figures(solid: Solid) -> RoofFigures:
     >>> figures.volume_m3, figures.h_70p, figures.roofer_type
     (60.0, 3.0, 'horizontal')
     """
-    from .roof_levels import level_of_share  # compiled: a process that only joins files does without
+    from ..compose import volume  # both are compiled: a process that only joins files does without
+    from .roof_levels import level_of_share
 
     if not solid.of_kind(ROOF):
         raise ValueError("its solid has no RoofSurface")
     fan, face_of = face_fans(solid)
     origin = solid.vertices.mean(axis=0)
     corners = solid.vertices[fan] - origin  # (t, 3 corners, 3)
-    o = corners[:, 0]
-    normal = cross(corners[:, 1] - o, corners[:, 2] - o)
-    faces = len(solid.faces)
-    area = np.stack([np.bincount(face_of, normal[:, k], faces) for k in range(3)], axis=1) / 2
-
+    triangles = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # their vector areas
+    area = np.stack([np.bincount(face_of, along, len(solid.faces)) for along in triangles.T], axis=1)
     is_roof = np.array([face.kind == ROOF for face in solid.faces])
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     roof = is_roof[face_of]
-    z, plan = np.sort(corners[roof, :, 2], axis=1), normal[roof, 2] / 2
-    h_50p, h_70p = (level_of_share(share, z, plan) + origin[2] for share in (0.5, 0.7))
+    z, plan = np.sort(corners[roof, :, 2], axis=1), triangles[roof, 2]
+    edges = corners[roof, 1:], fan[roof, 1:], area[face_of[roof]]
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
         h_min=float(z[:, 0].min() + origin[2]),
-        h_50p=float(h_50p),
-        h_70p=float(h_70p),
+        h_50p=float(level_of_share(0.5, z, plan) + origin[2]),
+        h_70p=float(level_of_share(0.7, z, plan) + origin[2]),
         h_max=float(z[:, 2].max() + origin[2]),
-        h_ridge=ridge_height(corners[:, 1:][roof], fan[roof, 1:], area[face_of[roof]]) + float(origin[2]),
-        h_eave=eave_height(corners[:, 1:][roof], fan[roof, 1:], area[face_of[roof]]) + float(origin[2]),
+        h_ridge=ridge_height(*edges) + float(origin[2]),
+        h_eave=eave_height(*edges) + float(origin[2]),
         h_base=base_height(solid),
-        volume_m3=float((o * normal).sum() / 6),
+        volume_m3=volume(solid),
         plan_area_m2=float(plan.sum()),
         roof_area_m2=float(size.sum()),
         slope_deg=float(slope[largest]),

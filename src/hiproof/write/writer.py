@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from abc import abstractmethod
 from contextlib import AbstractContextManager, ExitStack
 from typing import BinaryIO
 
@@ -27,13 +28,13 @@ class BuildingWriter(AbstractContextManager):
     def begin(self, stack: ExitStack) -> None:
         """Write what comes before the first building; `stack` closes what the format opens beside the file."""
 
+    @abstractmethod
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         """Write one building; `figures` of its solid if the caller has them already."""
-        raise NotImplementedError
 
+    @abstractmethod
     def put(self, fragment: Fragment) -> None:
         """Write a building whose text the format's `fragment` made, here or in another process."""
-        raise NotImplementedError
 
     def finish(self) -> None:
         """Write what comes after the last building."""

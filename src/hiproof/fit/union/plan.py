@@ -119,12 +119,26 @@ def without_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np
         return points
     if len(points) >= BORDER_MIN_DENSITY * area_m2:
         return away
-    from scipy.spatial import cKDTree
-
-    distance, nearest = cKDTree(away[:, :2]).query(points[near, :2], NEAREST)
-    above = away[nearest, 2] - points[near, 2:]
-    near[near] = (above > STEEPEST * distance + FACADE_DROP_M).all(axis=1)
+    near[near] = far_below(points[near], away)
     return points[~near]
+
+
+@compiled
+def far_below(points, roof):
+    """Which of `points` (n, 3) lie below each of the nearest few of the `roof`'s (m, 3) by more than roofs fall on the way."""
+    below = np.empty(len(points), np.bool_)
+    for i in range(len(points)):
+        nearest, squares = np.zeros(NEAREST, np.int64), np.full(NEAREST, np.inf)
+        for j in range(len(roof)):
+            square = (roof[j, 0] - points[i, 0]) ** 2 + (roof[j, 1] - points[i, 1]) ** 2
+            k = NEAREST
+            while k > 0 and square < squares[k - 1]:
+                k -= 1
+            if k < NEAREST:
+                nearest[k + 1 :], squares[k + 1 :] = nearest[k:-1].copy(), squares[k:-1].copy()
+                nearest[k], squares[k] = j, square
+        below[i] = (roof[nearest, 2] - points[i, 2] > STEEPEST * np.sqrt(squares) + FACADE_DROP_M).all()
+    return below
 
 
 def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
