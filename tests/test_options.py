@@ -62,7 +62,7 @@ CONFIGURATIONS = {
     "a section that is none": ("read = 3", [], "[read]"),
     "no TOML": ("read = [", [], "expected a TOML settings file"),
     "unknown choice": ('[fit]\nobjective = "pretty"', [], "likelihood, paper, got 'pretty'"),
-    "unknown choice of an option": ("", ["--detail", "most"], "full, main, got 'most'"),
+    "unknown choice of an option": ("", ["--detail", "most"], "fine, full, main, got 'most'"),
     "unknown models": ("", ["--models", "none"], "merged, tiles, both, got 'none'"),
     "very long choice": ("", ["--parts", "x" * 5000], "xxx..."),
     "types": ("", ["--types", "gable, hip"], RUNS),

@@ -98,7 +98,10 @@ class CompoundSettings:
     """[compound] several parts chosen by evidence."""
 
     detail: str = setting(
-        "full", "main leaves out dormers and small parts", choices=("full", "main"), option="--detail"
+        "full",
+        "how much structure: fine keeps small dormers and steps, main leaves dormers and small parts out",
+        choices=("fine", "full", "main"),
+        option="--detail",
     )
     tolerance_m: float = setting(0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
     evidence_points: float = setting(1.1, "points that one unit of structure must explain at least", "", 0.1, 100.0)

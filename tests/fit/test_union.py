@@ -207,6 +207,16 @@ def test_detail_main_leaves_a_dormer_out():
     assert len(fit_building(points, HOUSE).roof_parts) > 1
 
 
+def test_detail_fine_keeps_a_dormer_that_is_too_small_otherwise():
+    def with_dormer(x, y):
+        return np.where((abs(x - 6) < 0.6) & (y > 1.0) & (y < 2.0), 6.9, 8.0 - 0.9 * np.abs(y - 3.5))
+
+    points = sampled(with_dormer, HOUSE)
+    fine = fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": "fine"}}))
+    assert len(fine.roof_parts) == 2
+    assert len(fit_building(points, HOUSE).roof_parts) == 1
+
+
 def test_without_an_outline_the_plan_is_estimated():
     points = sampled(gable_with_shed, HOUSE)
     fit = fit_building(points)

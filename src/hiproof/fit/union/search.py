@@ -17,7 +17,9 @@ from .trim import trim
 
 SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
 SETTLE_REACH_M = 0.7  # m that edges may move when all points settle them
-MAIN_ROOF_FACTOR = 4.0  # with detail "main": how much more area a part must explain
+# Price of structure by detail: the ends of the curve of share against parts that `benchmarks.curve` draws. Below a half every
+# chimney is a part, above four even wings go.
+DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
 COMMON_HOUSE_M2, LARGEST_FACTOR = 60.0, 16.0  # larger roofs ask more of each volume
 # What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
 LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
@@ -25,9 +27,8 @@ LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
 
 def evidence_per_unit(density: float, area_m2: float, settings) -> float:
     """Points that one unit of structure must explain: those of an area that grows with the roof's, and never too few."""
-    share = settings.evidence_area_m2 * (MAIN_ROOF_FACTOR if settings.detail == "main" else 1.0)
-    share *= math.sqrt(min(max(area_m2 / COMMON_HOUSE_M2, 1.0), LARGEST_FACTOR))
-    return float(max(settings.evidence_points, share * density))
+    share = settings.evidence_area_m2 * math.sqrt(min(max(area_m2 / COMMON_HOUSE_M2, 1.0), LARGEST_FACTOR))
+    return float(max(settings.evidence_points, share * density)) * DETAIL_FACTOR[settings.detail]
 
 
 def find_volumes(
