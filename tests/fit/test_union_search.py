@@ -21,7 +21,7 @@ from hiproof.fit.union.objective import (
 )
 from hiproof.fit.union.refit import refit
 from hiproof.fit.union.scene import nodes
-from hiproof.fit.union.trim import NEAR_EDGE_M, SLACK_UNITS, drawn_in, trim
+from hiproof.fit.union.trim import NEAR_EDGE_M, NEAR_VERTEX_M, SLACK_UNITS, drawn_in, drawn_out, trim
 from hiproof.fit.union.volumes import (
     BASE_COST,
     DIRECTION,
@@ -302,6 +302,29 @@ def test_a_hidden_edge_is_drawn_in_for_next_to_nothing_or_where_no_height_change
             assert is_true(trial, scene, found)
             same = (roof_heights(trial, U, V)[0] == roof_heights(volumes, U, V)[0]).all()
             assert same or found <= value + SLACK_UNITS * scene.evidence + 1e-6
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_an_edge_is_drawn_out_to_a_corners_line_for_next_to_nothing_or_stays(seed):
+    _, volumes, scene = drawn(seed)
+    value = objective(volumes, scene, np.inf)
+    outwards, found = drawn_out(volumes, scene, value)
+    assert is_true(outwards, scene, found) and found <= value + 4 * len(volumes) * SLACK_UNITS * scene.evidence
+    assert np.array_equal(np.delete(outwards, range(U0, V1 + 1), 1), np.delete(volumes, range(U0, V1 + 1), 1))
+    further = (outwards[1:, U0 : V1 + 1] - volumes[1:, U0 : V1 + 1]) * [-1.0, 1.0, -1.0, 1.0]
+    assert (further >= 0.0).all() and (further < NEAR_VERTEX_M).all()
+
+
+def test_a_rectangle_just_short_of_the_outline_is_drawn_out_to_it():
+    scene = random_scene(np.random.default_rng(0))
+    low, *_, high = sorted(x for x in scene.vertices[0, 0] if np.isfinite(x))
+    true = np.vstack([base_only(-50.0), tied_volume(np.random.default_rng(0))])
+    true[1, U0 : U0 + 2] = low, high
+    scene = scene._replace(z=heights(true, scene.U, scene.V)[0])
+    short = true.copy()
+    short[1, U0 : U0 + 2] += 0.2, -0.1
+    found, _ = drawn_out(short, scene, objective(short, scene, np.inf))
+    assert found[1, U0 : U0 + 2].tolist() == pytest.approx([low, high])
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -1,4 +1,7 @@
-"""What lies hidden of a volume is drawn in: no rectangle reaches further under another than it has to."""
+"""What lies hidden of a volume is drawn in: no rectangle reaches further under another than it has to.
+
+First sides next to a line of the outline's corners are drawn out to it, for what shows of others in between is no roof of theirs.
+"""
 
 from __future__ import annotations
 
@@ -17,6 +20,7 @@ SLACK_UNITS = 0.02  # units of evidence that drawing in may cost; what is hidden
 
 def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
     """The volumes without those that nowhere show, hidden edges drawn in to what shows of each; and the objective."""
+    volumes, value = drawn_out(volumes, scene, value)
     U, V = nodes(scene)
     _, top = roof_heights(volumes, U, V)
     shown = [top == k for k in range(len(volumes))]
@@ -34,6 +38,22 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
             for edge, seen_to in zip((U0, U1, V0, V1), (u.min(), u.max(), v.min(), v.max()), strict=True):
                 volumes, value = drawn_in(volumes, scene, value, k, edge, float(seen_to), U, V)
         k += 1
+    return volumes, value
+
+
+def drawn_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+    """The volumes with every edge at the line of corners that is next to it on its outer side, where that costs next to nothing."""
+    for k in range(1, len(volumes)):
+        for edge in (U0, U1, V0, V1):
+            outwards = -1.0 if edge in (U0, V0) else 1.0
+            beyond = outwards * (scene.vertices[int(volumes[k, DIRECTION]), (edge - U0) // 2] - volumes[k, edge])
+            near = beyond[(beyond > 0.0) & (beyond < NEAR_VERTEX_M)]
+            if len(near):
+                trial = volumes.copy()
+                trial[k, edge] += outwards * near.min()
+                found = objective(trial, scene, value + SLACK_UNITS * scene.evidence)
+                if np.isfinite(found):
+                    volumes, value = trial, found
     return volumes, value
 
 
