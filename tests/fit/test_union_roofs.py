@@ -11,6 +11,7 @@ from benchmarks.matching import hidden_end, right_types
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.names import REGISTERED_M
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import COMPONENTS, SHAPES, planes_of
@@ -230,7 +231,7 @@ def test_errors_are_about_as_large_as_the_deviations_say(shape):
         member = member_of_shape(rng, shape, regular=True)
         outline = shapely.Polygon(rectangle_of(member))
         xy = strewn(outline, rng)
-        z = lowest_of(member.planes(), xy) + rng.normal(0.0, 0.05, len(xy))
+        z = lowest_of(member.planes(), xy) + rng.normal(0.0, 0.05, len(xy)) + rng.normal(0.0, REGISTERED_M)
         (part,) = fit_building(np.column_stack([xy, z]), outline).roof_parts
         truth = member.canonical().part([outline])
         errors = {name: part.parameters[name] - value for name, value in truth.parameters.items()}
