@@ -75,7 +75,7 @@ def column_costs(drawing, border, azimuth, distance, low, width, columns):
     for k in range(len(border.x)):
         x, y, wall = border.x[k], border.y[k], border.wall[k]
         depth = distance - (x * math.cos(azimuth) + y * math.sin(azimuth))
-        column = math.floor((y * math.cos(azimuth) - x * math.sin(azimuth) - low) / width)
+        column = math.floor((along(azimuth, (x, y)) - low) / width)
         if not 0 <= column < columns or not -FARTHEST_M < depth < DEEPEST_M:
             continue
         if depth < 0.0 and not wall and drawing.own[k] < INSIDE:  # beyond another side
