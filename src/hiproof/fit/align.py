@@ -16,8 +16,9 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
+from .outline.cost import cost_at_depth
 from .outline.lines import lines_through
-from .outline.settle import normal_share, side_offset
+from .outline.settle import side_offset
 from .union.plan import ring_edges, signed_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
@@ -111,7 +112,7 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     count = np.ceil((np.array(footprint.bounds[2:]) + STRAY_FROM_M - low) / (2 * PITCH_M)).astype(int)
     nodes = low + 2 * PITCH_M * np.moveaxis(np.indices(tuple(count)), 0, -1).reshape(-1, 2)
     depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
-    costs = -np.log(STRAY + (1.0 - STRAY) * normal_share(depth / BLUR_M)).reshape(count)
+    costs = costs_at(depth / BLUR_M).reshape(count)
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
     for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
@@ -121,6 +122,15 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
         cost = slid_costs(few, costs, low, 2 * PITCH_M, tried) + 0.1 * (tried**2).sum(axis=1)
         best = tried[int(np.argmin(cost))]
     return best
+
+
+@compiled
+def costs_at(depth):
+    """What a point of the roof costs at each `depth` (n,) inside the footprint, in blurs."""
+    costs = np.empty(len(depth))
+    for k in range(len(depth)):
+        costs[k] = cost_at_depth(depth[k], False, STRAY)
+    return costs
 
 
 @compiled

@@ -21,8 +21,7 @@ import numpy as np
 from ...compiled import compiled
 from ...parity import flips
 from .lines import SAME_RAD, area_of, find_corners, quarter_gap
-
-SURE = 4.0  # blurs from the border beyond which a point is inside or outside for sure
+from .soft import SURE_BLURS, share_inside
 
 # x, y (m): points of the roof and of outer walls, ascending in x; wall: which are a wall's; density: of roof points a square metre.
 # blur (m), stray (share): see above. line, direction, skew: prices of a line, a further direction, a line in that.
@@ -66,7 +65,7 @@ def point_cost(x, y, corners, sides, wall, blur, stray):
 
     That of a `wall` is compared with one on the border.
     """
-    inside, reach = False, SURE * blur
+    inside, reach = False, SURE_BLURS * blur
     nearest = reach * reach
     for i in sides:
         k = i + 1 if i + 1 < len(corners) else 0
@@ -91,9 +90,9 @@ def cost_at_depth(depth, wall, stray):
     """What a point so deep inside (blurs) costs, of a wall or of the roof."""
     if wall:
         return -math.log(stray + (1.0 - stray) * math.exp(-0.5 * depth * depth))
-    if abs(depth) >= SURE:
+    if abs(depth) >= SURE_BLURS:
         return 0.0 if depth > 0.0 else -math.log(stray)
-    return -math.log(stray + (1.0 - stray) * 0.5 * math.erfc(-depth / math.sqrt(2.0)))
+    return -math.log(stray + (1.0 - stray) * share_inside(depth))
 
 
 @compiled
@@ -125,7 +124,7 @@ def cost_of_change(lines, drawing, i, count, fresh, border):
         ring, at = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
         x, y = ring[at, 0], ring[at, 1]
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
-    reach = SURE * border.blur
+    reach = SURE_BLURS * border.blur
     sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
     misfit = border.density * (area - area_of(old))
     first, last = np.searchsorted(border.x, np.array([x_low - reach, x_high + reach]))

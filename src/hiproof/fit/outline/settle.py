@@ -14,6 +14,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .lines import find_corners
+from .soft import SURE_BLURS, share_inside
 
 BLURS_M, WALLS_M = (
     (0.02, 0.06, 0.12),
@@ -29,7 +30,6 @@ DEEP_M, SHALLOW_M, OUTSIDE_M = (
 LEAST_DENSITY, STRAY = 0.3, 0.02  # shares of the outline's density
 END_M, LONG_M = 0.3, 1.0  # of a side longer than that, its ends do not count: points there may be another side's
 FEWEST, FARTHEST_M = 4, 0.4  # points across a side; fewer tell nothing; m that a side may be moved beyond the last row
-FAR_BLURS = 6.0  # so far from the line all of a blurred side's points are on one side of it, but for 1e-9
 ROW_M, MOSTLY = 0.1, 0.6  # points closer across the side are of one row where most of the depth is between rows
 
 
@@ -90,28 +90,14 @@ def log_likelihoods(depth, a_metre):
             for q in range(len(OFFSETS_M)):
                 away = (d + OFFSETS_M[q]) / blur
                 row = len(WALLS_M) * b
-                if abs(away) > FAR_BLURS:
+                if abs(away) > SURE_BLURS:
                     logs[row : row + len(WALLS_M), q] += far_in if away > 0.0 else far_out
                     continue
-                inner = 0.5 * math.erfc(-away / math.sqrt(2.0))
+                inner = share_inside(away)
                 wall = math.exp(-0.5 * away * away) / (blur * math.sqrt(2.0 * math.pi))
                 for m, walls in enumerate(WALLS_M):
                     logs[row + m, q] += math.log(a_metre * (inner + walls * wall + STRAY))
     return logs
-
-
-@compiled
-def normal_share(x):
-    """The share (n,) of a standard normal distribution below each of `x` (n,)."""
-    share = np.empty(len(x))
-    for i in range(len(x)):
-        z = x[i] / math.sqrt(2.0)
-        if abs(z) < 1.0:
-            share[i] = 0.5 + 0.5 * math.erf(z)
-        else:  # keeps its digits where hardly anything is beyond
-            beyond = 0.5 * math.erfc(abs(z))
-            share[i] = 1.0 - beyond if z > 0.0 else beyond
-    return share
 
 
 @compiled
