@@ -198,7 +198,7 @@ def directions_of(area: shapely.Geometry, surfaces: Surfaces) -> np.ndarray:
     support = support_of(tried, angle, weight, math.radians(DIRECTION_DEG))
     found: list[float] = []
     for k in np.argsort(-support):
-        far = all(abs(quarter_gap(tried[k], other)) > math.radians(APART_DEG) for other in found)
+        far = all(abs(quarter_gap(tried[k] - other)) > math.radians(APART_DEG) for other in found)
         if far and support[k] > LEAST_SUPPORT * weight.sum() and len(found) < MOST_DIRECTIONS:
             found.append(tried[k])
     return np.array([turned for angle in found for turned in (angle, angle + 0.5 * math.pi)])

@@ -128,9 +128,9 @@ def rectangle_in_direction(points, kappa, trim):
     return np.array([c * u - s * v, s * u + c * v, kappa, 0.5 * (high_v - low_v), 0.5 * (high_u - low_u)])
 
 
-def quarter_gap(one, other):
-    """Angles between directions modulo 90 degrees, in [-45, 45] degrees (rad)."""
-    return np.angle(np.exp(4j * (one - other))) / 4.0
+def quarter_gap(angle):
+    """How far each `angle` (rad) is from the nearest quarter turn, in [-45, 45) degrees: of arrays, or compiled, of one."""
+    return angle - np.floor(angle / (0.5 * math.pi) + 0.5) * (0.5 * math.pi)
 
 
 def support_of(tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float) -> np.ndarray:
@@ -139,7 +139,7 @@ def support_of(tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_
     >>> support_of(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0, 3.0, 1.0]), 0.01)
     array([5., 1.])
     """
-    gaps = quarter_gap(angle[None, :], tried[:, None])
+    gaps = quarter_gap(angle[None, :] - tried[:, None])
     return (weight * np.exp(-0.5 * (gaps / spread_rad) ** 2)).sum(axis=1)
 
 
@@ -155,17 +155,9 @@ def main_direction(outline: shapely.Polygon) -> float:
     if len(candidates) > 200:
         candidates = np.radians(np.arange(0.0, 90.0, 0.5))
     peak = candidates[np.argmax(support_of(candidates, angle, length, PEAK_RAD))]
-    off = quarter_gap(angle, peak)
+    off = quarter_gap(angle - peak)
     weight = length * (np.abs(off) < NEAR_PEAK_RAD)
     return float(peak + (weight * off).sum() / max(weight.sum(), 1e-12))
-
-
-def outline_direction(outline: shapely.Polygon) -> float:
-    """Four-fold direction (rad) of an outline: its edges' azimuths, weighted by their lengths."""
-    edges = np.diff(np.asarray(outline.exterior.coords)[:, :2], axis=0)
-    azimuth = np.arctan2(edges[:, 1], edges[:, 0])
-    harmonic = (np.hypot(*edges.T) * np.exp(4j * azimuth)).sum()
-    return float(np.angle(harmonic)) / 4
 
 
 def outline_rectangle(outline: shapely.Polygon, kappa: float) -> np.ndarray:

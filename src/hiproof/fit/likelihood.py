@@ -18,7 +18,7 @@ from ..primitives import CATALOGUE, Primitive
 from ..primitives.contract import HALF_LENGTH, HALF_WIDTH, KAPPA, Q0
 from . import kernel
 from .direction import (
-    outline_direction,
+    main_direction,
     outline_rectangle,
     rectangle_direction,
     rectangle_in_direction,
@@ -257,7 +257,7 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
     if outline is None:
         by_plan = rectangle_direction(search.thinned.points, 0.015, 30)
     else:
-        by_plan = outline_direction(outline)
+        by_plan = main_direction(outline)
     if confidence <= 0.15:
         return [by_plan]
     turn = (by_slope - by_plan + np.pi / 4) % (np.pi / 2) - np.pi / 4

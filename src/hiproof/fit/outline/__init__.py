@@ -3,6 +3,7 @@
 rough   the points' alpha shape, pushed out and with few corners
 walls   which points lie on walls
 spread  how evenly points are spread, by which prices go
+soft    how soft a side is
 lines   a polygon as the lines of its sides
 cost    how well an outline explains where points are and are not, and what its lines cost
 moves   lines dropped, joined, turned into common directions and moved until nothing is gained
@@ -17,7 +18,7 @@ import math
 import numpy as np
 import shapely
 
-from ..direction import outline_direction
+from ..direction import main_direction
 from .cost import Border, Drawing, drawing_of
 from .lines import find_corners, lines_through, quarter_gap
 from .moves import redrawn
@@ -57,7 +58,7 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     points = np.asarray(points, float)
     corners, spacing, shape = rough_outline(points[:, :2])
     rough = shapely.Polygon(corners)
-    own = outline_direction(rough)
+    own = main_direction(rough)
     directions = [own] if kappa is None else [kappa]
     if kappa is not None and abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD:
         directions.append(own)

@@ -11,9 +11,12 @@ import math
 import numpy as np
 
 from ...compiled import compiled
+from .. import direction
 
 SHARPEST = 0.15  # sine of the angle between neighbours: lines closer to parallel have no corner to speak of
 SAME_RAD = 1e-6  # rad; numerically parallel
+
+quarter_gap = compiled(direction.quarter_gap)
 
 
 def lines_through(corners: np.ndarray) -> np.ndarray:
@@ -75,12 +78,6 @@ def area_of(corners):
     for i in range(len(corners)):
         doubled += corners[i - 1, 0] * corners[i, 1] - corners[i, 0] * corners[i - 1, 1]
     return 0.5 * doubled
-
-
-@compiled
-def quarter_gap(angle):
-    """The angle (rad) from the nearest quarter turn."""
-    return angle - math.floor(angle / (0.5 * math.pi) + 0.5) * (0.5 * math.pi)
 
 
 @compiled

@@ -48,7 +48,7 @@ def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
     length, angle = np.hypot(step[:, 0], step[:, 1]), np.arctan2(step[:, 1], step[:, 0]) % (math.pi / 2)
     found = [0.0]
     while len(found) < MOST_DIRECTIONS:
-        new = np.all([np.abs(quarter_gap(angle, other)) > APART_RAD for other in found], axis=0)
+        new = np.all([np.abs(quarter_gap(angle - other)) > APART_RAD for other in found], axis=0)
         if not new.any():
             break
         support = support_of(angle[new], angle, length, NEAR_RAD)
