@@ -12,8 +12,8 @@ from hiproof.fit.outline import estimate_outline
 from hiproof.fit.outline.cost import Border, cost_of_change, drawing_of
 from hiproof.fit.outline.lines import dropped, lines_through, replaced
 from hiproof.fit.outline.spread import unevenness
-from hiproof.fit.outline.steps import best_levels
-from hiproof.fit.outline.walls import on_walls
+from hiproof.fit.outline.steps import RUN, best_levels, stepped
+from hiproof.fit.walls import on_walls
 
 L_SHAPE = shapely.Polygon([(0, 0), (16, 0), (16, 8), (7, 8), (7, 18), (0, 18)])
 SHAPES = {
@@ -106,15 +106,28 @@ def test_a_shallow_bay_is_drawn_where_its_walls_are_seen(depth):
     assert corner_count(outline) == 8 and iou(outline, truth) > 0.97
 
 
-def test_walls_of_a_step_inside_are_walls_but_no_outer_ones():
+def test_walls_of_a_step_inside_are_walls_but_draw_no_side():
     points = scanned_block(shapely.box(0, 0, 14, 8), step_at=9.0)
-    wall, outer = on_walls(points, 0.4, shapely.box(0, 0, 14, 8))
+    wall = on_walls(points, points, 0.4)
     x, y = points[:, :2].T
     inner = (abs(x - 9.0) < 0.2) & (abs(y - 4.0) < 3.0) & (points[:, 2] < 4.5) & (points[:, 2] > 3.3)
     deep = (abs(x - 4.0) < 3.0) & (abs(y - 4.0) < 3.0)
-    assert wall[inner].mean() > 0.9 and not outer[inner].any() and not wall[deep].any()
-    assert outer[(x < 0.05) & (points[:, 2] < 4.5)].mean() > 0.8
+    assert wall[inner].mean() > 0.9 and not wall[deep].any()
+    assert wall[(x < 0.05) & (points[:, 2] < 4.5)].mean() > 0.8
     assert corner_count(estimate_outline(points, 0.0)) == 4
+
+
+def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
+    truth = shapely.box(0, 0, 14, 8) - shapely.box(5, 6.5, 8, 8)
+    x, y = points_in(truth, 8.0, angle=0.0)[0].T
+    order = np.argsort(y)
+    border = Border(x[order], y[order], np.zeros(len(x), bool), 8.0, 0.15, 0.02, 3.0, 3.0, 1.0)
+    wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
+    drawing = drawing_of(lines_through(np.array(wedge, float)), 0.0, border)
+    assert len(stepped(drawing, border, 1).lines) == 7  # no matter of single sides
+    found = stepped(drawing, border, RUN)
+    assert len(found.lines) == 8 and found.cost < drawing.cost
+    assert iou(shapely.Polygon(found.corners), truth) > 0.96
 
 
 def test_levels_of_columns_are_the_cheapest_of_all():
@@ -138,7 +151,7 @@ def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
 def test_the_price_of_a_change_is_that_of_drawing_anew():
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
-    border = Border(np.sort(x), y, rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0)
+    border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0)
     lines = lines_through(np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float))
     drawing = drawing_of(lines, 0.0, border)
     for i in range(len(lines)):

@@ -5,12 +5,11 @@ import math
 import numpy as np
 import pytest
 import shapely
-from scipy.spatial import cKDTree
 
 from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.finish import cost_of, finished, inverse_of, least_squares, weighted_moments
 from hiproof.fit.union.larger import put_together
-from hiproof.fit.union.plan import FACADE_DROP_M, NEAREST, STEEPEST, far_below, lay_out_plan
+from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
 from hiproof.fit.union.scene import scene_of
 from hiproof.fit.union.sides import Side, corners_of, lines_of, sides_of
@@ -279,13 +278,3 @@ def test_the_inverse_of_a_symmetric_matrix_is_numpys(size):
     root = np.random.default_rng(size).normal(size=(size, size))
     matrix = root @ root.T
     assert inverse_of(matrix, 0.1) == pytest.approx(np.linalg.inv(matrix + 0.1 * np.eye(size)), rel=1e-9)
-
-
-def test_what_hangs_below_the_roof_is_told_by_the_nearest_points_in_plan():
-    """Against scipy's tree of points."""
-    rng = np.random.default_rng(8)
-    roof, points = (rng.uniform((0, 0, 5), (9, 7, 9), (n, 3)) for n in (120, 60))
-    distance, nearest = cKDTree(roof[:, :2]).query(points[:, :2], NEAREST)
-    told = (roof[nearest, 2] - points[:, 2:] > STEEPEST * distance + FACADE_DROP_M).all(axis=1)
-    assert 0 < told.sum() < len(told)
-    assert far_below(points, roof).tolist() == told.tolist()

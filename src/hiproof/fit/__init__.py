@@ -3,6 +3,7 @@
 single         `fit_roof`: one primitive by all points, the door to both objectives
 likelihood     the default objective: starts, annealing, the choice of type, what is known of the result
 direction      plan directions before any fit
+walls          which points lie on walls
 tables         the catalogue as arrays
 kernel         the likelihood with gradient and Hessian, minimised; compiled
 paper          the objective of the paper, as published

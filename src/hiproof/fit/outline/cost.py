@@ -20,10 +20,12 @@ import numpy as np
 
 from ...compiled import compiled
 from ...parity import flips
-from .lines import SAME_RAD, area_of, find_corners, quarter_gap
+from .lines import SAME_RAD, area_of, find_corners, quarter_gap, shares_direction
 from .soft import SURE_BLURS, share_inside
 
-# x, y (m): points of the roof and of outer walls, ascending in x; wall: which are a wall's; density: of roof points a square metre.
+TOGETHER = 16  # points next to each other in y for which sides are looked up once
+
+# x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
 # blur (m), stray (share): see above. line, direction, skew: prices of a line, a further direction, a line in that.
 Border = namedtuple("Border", "x y wall density blur stray line direction skew")
 
@@ -37,9 +39,12 @@ def drawing_of(lines, kappa, border):
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or area_of(corners) <= 0.0:
         return Drawing(lines, kappa, corners, own, np.inf)
-    sides = np.arange(len(lines))
-    for k in range(len(own)):
-        own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.wall[k], border.blur, border.stray)
+    reach = SURE_BLURS * border.blur
+    for first in range(0, len(own), TOGETHER):
+        last = min(first + TOGETHER, len(own))
+        sides = sides_near(corners, border.y[first] - reach, border.y[last - 1] + reach)
+        for k in range(first, last):
+            own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.wall[k], border.blur, border.stray)
     misfit = border.density * area_of(corners) + own.sum()
     return Drawing(lines, kappa, corners, own, misfit + structure_cost(lines, kappa, border))
 
@@ -51,11 +56,7 @@ def structure_cost(lines, kappa, border):
     for i in range(len(lines)):
         if abs(quarter_gap(lines[i, 0] - kappa)) < SAME_RAD:
             continue
-        cost += border.skew + border.direction
-        for j in range(i):
-            if abs(quarter_gap(lines[i, 0] - lines[j, 0])) < SAME_RAD:
-                cost -= border.direction
-                break
+        cost += border.skew if shares_direction(lines, i) else border.skew + border.direction
     return cost
 
 
@@ -127,10 +128,10 @@ def cost_of_change(lines, drawing, i, count, fresh, border):
     reach = SURE_BLURS * border.blur
     sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
     misfit = border.density * (area - area_of(old))
-    first, last = np.searchsorted(border.x, np.array([x_low - reach, x_high + reach]))
+    first, last = np.searchsorted(border.y, np.array([y_low - reach, y_high + reach]))
     for k in range(first, last):
         x, y = border.x[k], border.y[k]
-        if y_low - reach < y < y_high + reach:
+        if x_low - reach < x < x_high + reach:
             misfit += point_cost(x, y, corners, sides, border.wall[k], border.blur, border.stray) - drawing.own[k]
     structure = structure_cost(lines, drawing.kappa, border) - structure_cost(drawing.lines, drawing.kappa, border)
     return drawing.cost + misfit + structure

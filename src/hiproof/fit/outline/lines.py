@@ -81,6 +81,15 @@ def area_of(corners):
 
 
 @compiled
+def shares_direction(lines, i):
+    """Whether a line before line `i` has its direction."""
+    for j in range(i):
+        if abs(quarter_gap(lines[j, 0] - lines[i, 0])) < SAME_RAD:
+            return True
+    return False
+
+
+@compiled
 def replaced(lines, i, count, azimuth, distance):
     """The lines with one in place of `count` from `i` on; it comes first."""
     n = len(lines)

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .cost import cost_of_change, drawing_of
-from .lines import SAME_RAD, dropped, quarter_gap, replaced
+from .lines import SAME_RAD, dropped, quarter_gap, replaced, shares_direction
 
 LONGEST_RUN = 3  # lines that become one
 TURN_RAD = math.radians(35.0)  # of a line, at most
@@ -169,6 +169,8 @@ def shifted(drawing, border, step, upto, rounds):
 def turned(drawing, border, step):
     """All lines of each direction turned about their middles by multiples of `step` (rad) for as long as that is cheaper."""
     for i in range(len(drawing.lines)):
+        if shares_direction(drawing.lines, i):  # turned already
+            continue
         for sign in (1.0, -1.0):
             moved = False
             while True:

@@ -1,8 +1,8 @@
-"""Sides that become flights of steps where the points across them pay for it: bays, notches, porches. Compiled.
+"""Runs of sides that become flights of steps where the points across them pay for it: bays, notches, porches. Compiled.
 
-A side is cut into columns, and each is given a level outwards or inwards, such that points and prices of lines together cost
-least: two lines a step. What a column's points say of a level does not depend on other columns, so the best
-levels are found exactly, column by column (Potts' model by dynamic programming).
+A run of sides is made one straight side at first. This is cut into columns, and each is given a level outwards or inwards, such
+that points and prices of lines together cost least: two lines a step. What a column's points say of a level does not depend
+on other columns, so the best levels are found exactly, column by column (Potts' model by dynamic programming).
 """
 
 from __future__ import annotations
@@ -13,36 +13,52 @@ import numpy as np
 
 from ...compiled import compiled
 from .cost import cost_at_depth, drawing_of
-from .lines import quarter_gap, replaced_by
-from .moves import middle_of
+from .lines import quarter_gap, replaced, replaced_by
+from .moves import GAIN, TURN_RAD
 
 COLUMN_M, LEVEL_M = 0.25, 0.1  # m; along the side, across it: lines are moved more finely afterwards
 DEEPEST_M, FARTHEST_M = 2.0, 1.5  # levels inwards and outwards of the side; larger bays are the rough outline's
 LEVELS = round((DEEPEST_M + FARTHEST_M) / LEVEL_M) + 1
+RUN = 5  # sides that become one flight, at most
 INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
 
 
 @compiled
-def stepped(drawing, border):
-    """The drawing with each side a flight of steps where that is cheaper: along the side, or the main direction nearest to it."""
+def stepped(drawing, border, longest):
+    """The drawing with runs of up to `longest` sides as flights of steps where that is cheaper."""
     i = 0
     while i < len(drawing.lines):
-        azimuth = drawing.lines[i, 0]
-        best, more = drawing, 0
-        for way in (azimuth, azimuth - quarter_gap(azimuth - drawing.kappa)):
-            flight = flight_of(drawing, i, way, border)
-            new = drawing_of(replaced_by(drawing.lines, i, flight), drawing.kappa, border)
-            if new.cost < best.cost:
-                best, more = new, len(flight) - 1
-        drawing, i = best, i + more + 1
+        best = drawing
+        for count in range(min(longest, len(drawing.lines) - 2) + 1):
+            new = with_flight(drawing, i, count, border)
+            if new.cost < best.cost - GAIN:
+                best = new
+        i = 0 if best.cost < drawing.cost else i + 1
+        drawing = best
     return drawing
 
 
 @compiled
-def flight_of(drawing, i, azimuth, border):
-    """Lines (m, 2) in place of side `i`: of `azimuth` at one level or another, and what joins them at right angles."""
-    x, y = middle_of(drawing.corners, i, 1)
-    distance = x * math.cos(azimuth) + y * math.sin(azimuth)
+def with_flight(drawing, i, count, border):
+    """The drawing with `count` sides from `i` on as one flight along the main direction nearest to their chord; with a count of
+    0, side `i` along its own direction. The drawing itself where there is no such side to begin with."""
+    if count == 0:
+        return drawing_of(replaced_by(drawing.lines, i, flight_of(drawing, i, border)), drawing.kappa, border)
+    start, end = drawing.corners[i], drawing.corners[(i + count) % len(drawing.lines)]
+    chord = math.atan2(start[0] - end[0], end[1] - start[1])
+    way = chord - quarter_gap(chord - drawing.kappa)
+    x, y = 0.5 * (start + end)
+    joint = replaced(drawing.lines, i, count, way, x * math.cos(way) + y * math.sin(way))
+    joined = drawing_of(joint, drawing.kappa, border)
+    if joined.cost == np.inf or math.cos(way - chord) < math.cos(TURN_RAD):
+        return drawing
+    return drawing_of(replaced_by(joint, 0, flight_of(joined, 0, border)), drawing.kappa, border)
+
+
+@compiled
+def flight_of(drawing, i, border):
+    """Lines (m, 2) in place of side `i`: along it at one level or another, and what joins them at right angles."""
+    azimuth, distance = drawing.lines[i]
     low, high = along(azimuth, drawing.corners[i]), along(azimuth, drawing.corners[(i + 1) % len(drawing.lines)])
     columns = max(int((high - low) / COLUMN_M), 1)
     width = (high - low) / columns

@@ -13,14 +13,14 @@ from ...compiled import compiled
 from ...frames import PlanFrame
 from ...parity import flips
 from ..direction import main_direction
+from ..walls import on_walls
 from .planes import Cloud, Ghosts, Grid
 
 MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
-# m from the border within which returns may be a facade's; clouds of more points a square metre lose them all
+# m from the border within which returns may be a facade's; clouds of more points a square metre lose them all, sparser
+# ones those that lie on walls
 BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0
 LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
-# sparser ones lose those that lie below so many nearest points further in by more than a roof of this slope falls, and so much (m)
-NEAREST, STEEPEST, FACADE_DROP_M = 2, 1.5, 0.3
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 # m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
 MERGE_LINES_M, CELL_M, CELL_SPACINGS, MAX_CELLS = 0.2, 0.5, 0.6, 22
@@ -119,26 +119,8 @@ def without_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np
         return points
     if len(points) >= BORDER_MIN_DENSITY * area_m2:
         return away
-    near[near] = far_below(points[near], away)
+    near[near] = on_walls(points[near], points, math.sqrt(area_m2 / len(points)))
     return points[~near]
-
-
-@compiled
-def far_below(points, roof):
-    """Which of `points` (n, 3) lie below each of the nearest few of the `roof`'s (m, 3) by more than roofs fall on the way."""
-    below = np.empty(len(points), np.bool_)
-    for i in range(len(points)):
-        nearest, squares = np.zeros(NEAREST, np.int64), np.full(NEAREST, np.inf)
-        for j in range(len(roof)):
-            square = (roof[j, 0] - points[i, 0]) ** 2 + (roof[j, 1] - points[i, 1]) ** 2
-            k = NEAREST
-            while k > 0 and square < squares[k - 1]:
-                k -= 1
-            if k < NEAREST:
-                nearest[k + 1 :], squares[k + 1 :] = nearest[k:-1].copy(), squares[k:-1].copy()
-                nearest[k], squares[k] = j, square
-        below[i] = (roof[nearest, 2] - points[i, 2] > STEEPEST * np.sqrt(squares) + FACADE_DROP_M).all()
-    return below
 
 
 def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
