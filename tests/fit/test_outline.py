@@ -9,7 +9,7 @@ import shapely
 from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline
-from hiproof.fit.outline.cost import Border, cost_of_change, drawing_of
+from hiproof.fit.outline.cost import Border, cost_of_change, drawing_of, structure_cost
 from hiproof.fit.outline.lines import dropped, lines_through, replaced
 from hiproof.fit.outline.spread import unevenness
 from hiproof.fit.outline.steps import RUN, best_levels, stepped
@@ -121,7 +121,7 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     truth = shapely.box(0, 0, 14, 8) - shapely.box(5, 6.5, 8, 8)
     x, y = points_in(truth, 8.0, angle=0.0)[0].T
     order = np.argsort(y)
-    border = Border(x[order], y[order], np.zeros(len(x), bool), 8.0, 0.15, 0.02, 3.0, 3.0, 1.0)
+    border = Border(x[order], y[order], np.zeros(len(x), bool), 8.0, 0.15, 0.02, 3.0, 3.0, 1.0, 6.0)
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
     drawing = drawing_of(lines_through(np.array(wedge, float)), 0.0, border)
     assert len(stepped(drawing, border, 1).lines) == 7  # no matter of single sides
@@ -151,7 +151,7 @@ def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
 def test_the_price_of_a_change_is_that_of_drawing_anew():
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
-    border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0)
+    border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0, 6.0)
     lines = lines_through(np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float))
     drawing = drawing_of(lines, 0.0, border)
     for i in range(len(lines)):
@@ -160,6 +160,14 @@ def test_the_price_of_a_change_is_that_of_drawing_anew():
         new = dropped(lines, i)
         expected = drawing_of(new, 0.0, border).cost
         assert cost_of_change(new, drawing, i, 1, 1, border) in (pytest.approx(expected), np.inf)
+
+
+def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
+    border = Border(*np.zeros((3, 0)), 3.0, 0.15, 0.02, 3.0, 5.0, 1.0, 7.0)
+    rings = {"square": [(0, 0), (8, 0), (8, 6), (0, 6)], "wedge": [(0, 0), (12, 0), (0, 5)]}
+    rings |= {"slant": [(0, 0), (9, 0), (7, 6), (-2, 6)]}
+    costs = {k: structure_cost(lines_through(np.array(ring, float)), 0.0, border) for k, ring in rings.items()}
+    assert costs == {"square": 12.0, "wedge": 9.0 + 5.0 + 1.0 + 7.0, "slant": 12.0 + 5.0 + 2 * 1.0}
 
 
 def test_the_given_direction_is_that_of_the_edges():

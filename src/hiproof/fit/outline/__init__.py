@@ -31,11 +31,8 @@ __all__ = ["estimate_outline", "iou"]
 
 # m over which a side is soft: the scanner's noise in plan; density outside over that inside: points of walls and trees
 BLUR_M, STRAY = 0.15, math.exp(-4.0)
-PRICES = (
-    3.0,
-    3.0,
-    1.0,
-)  # nats: of a line, of a further direction, of a line in that, where points are spread by chance
+# nats: of a line, of a further direction, of a line in that, of a sharp corner, where points are spread by chance
+PRICES = (3.0, 3.0, 1.0, 6.0)
 # m from the border of the points' shape within which a wall is an outer one: the scanner's noise, doubled
 OUTER_M = 0.25
 # points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them

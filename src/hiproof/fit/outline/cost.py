@@ -7,8 +7,8 @@ Points of the roof are spread evenly over it, those of its walls lie on the outl
                                                        stray + (1 - stray) exp(-(depth / blur)^2 / 2)  of walls
 
 and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece, those of walls wherever the
-outline does not run through them. To this come the prices of lines (two for a notch), of directions besides the main one, and of
-lines that run in them. All are in nats.
+outline does not run through them. To this come the prices of lines (two for a notch), of directions besides the main one, of
+lines that run in them, and of sharp corners. All are in nats.
 """
 
 from __future__ import annotations
@@ -23,11 +23,12 @@ from ...parity import flips
 from .lines import SAME_RAD, area_of, find_corners, quarter_gap, shares_direction
 from .soft import SURE_BLURS, share_inside
 
+SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
 TOGETHER = 16  # points next to each other in y for which sides are looked up once
 
 # x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
-# blur (m), stray (share): see above. line, direction, skew: prices of a line, a further direction, a line in that.
-Border = namedtuple("Border", "x y wall density blur stray line direction skew")
+# blur (m), stray (share): see above. line, direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
+Border = namedtuple("Border", "x y wall density blur stray line direction skew sharp")
 
 # lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, cost: all of it.
 Drawing = namedtuple("Drawing", "lines kappa corners own cost")
@@ -51,9 +52,11 @@ def drawing_of(lines, kappa, border):
 
 @compiled
 def structure_cost(lines, kappa, border):
-    """Price of the lines, of directions other than the main one, and of lines in these."""
+    """Price of the lines, of directions other than the main one, of lines in these, and of sharp corners."""
     cost = border.line * len(lines)
     for i in range(len(lines)):
+        if math.cos(lines[i, 0] - lines[i - 1, 0]) < SHARP:
+            cost += border.sharp
         if abs(quarter_gap(lines[i, 0] - kappa)) < SAME_RAD:
             continue
         cost += border.skew if shares_direction(lines, i) else border.skew + border.direction
