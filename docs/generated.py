@@ -7,7 +7,7 @@ import dataclasses
 import io
 import tokenize
 from collections.abc import Iterator
-from itertools import groupby, zip_longest
+from itertools import groupby, takewhile, zip_longest
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -93,15 +93,14 @@ def constants() -> list[Constant]:
 def constants_of(file: Path) -> Iterator[Constant]:
     text = file.read_text(encoding="utf-8")
     statements = ast.parse(text).body
-    if not any(map(names_of, statements)):  # finding comments takes ten times as long
-        return
-    tokens = tokenize.generate_tokens(io.StringIO(text).readline)
+    numbers = [s for s in statements if names_of(s) and is_number(s.value)]  # type: ignore[attr-defined]
+    last = max((s.end_lineno or 0 for s in numbers), default=0)  # finding comments in all of a file takes long
+    tokens = takewhile(lambda token: token.start[0] <= last, tokenize.generate_tokens(io.StringIO(text).readline))
     said = {token.start[0]: token.string.lstrip("# ") for token in tokens if token.type == tokenize.COMMENT}
     lines = text.splitlines()
     whole = {line for line in said if lines[line - 1].startswith("#")}
     for statement, after in zip_longest(statements, statements[1:]):
-        names = names_of(statement)
-        if not names or not is_number(statement.value):  # type: ignore[attr-defined]
+        if statement not in numbers:
             continue
         above, first = [], statement.lineno - 1
         while first in whole:
@@ -111,7 +110,7 @@ def constants_of(file: Path) -> Iterator[Constant]:
         below = [after.value.value] if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else []
         place = file.relative_to(PACKAGE).as_posix()
         why = " ".join(map(str, [*above, *behind, *below]))
-        yield Constant(place, names, ast.unparse(statement.value), why)  # type: ignore[attr-defined]
+        yield Constant(place, names_of(statement), ast.unparse(statement.value), why)
 
 
 def names_of(statement: ast.stmt) -> tuple[str, ...]:
