@@ -1,9 +1,12 @@
 """Laws of the pieces of a city run: tiles own each building once, the ledger keeps what is done, dead workers end nothing."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 import shapely
 
+from hiproof.city import quarantine
 from hiproof.city.executors import InProcess, Processes, WorkerLost
 from hiproof.city.ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
 from hiproof.city.ledger import Ledger, Outcome, Task
@@ -157,3 +160,21 @@ def test_a_killed_worker_loses_its_tasks_but_not_the_others():
     executor.close()
     assert seen == {0, 1, 3, 4, 5}
     assert 2 in lost
+
+
+@pytest.mark.parametrize("members", [(1, 2, 3), (2,)], ids=["among others", "alone"])
+def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypatch):
+    """Building 2 ends its process; no task is tried more often than may be chance, and none that is known to be deadly."""
+    monkeypatch.setattr(quarantine, "load_plan", lambda folder: SimpleNamespace(tiles={"tile": members}))
+    tried = []
+
+    def run(function, tasks):
+        for task in tasks:
+            tried.append(task[3:])
+            died = None if tried[-1] and 2 in tried[-1][0] else WorkerLost("died")
+            yield task, None if died else task[3], died
+
+    alone = SimpleNamespace(run=run)
+    assert quarantine.solve_in_quarantine(alone, None, ("folder", "tile", None)) == ((2,), None)
+    by_one = [((2, 3),), *[((1, 3),)] * quarantine.TRIES, ((1, 2),)] if len(members) > 1 else []
+    assert tried == [*[()] * quarantine.TRIES, *by_one, ((2,),)]
