@@ -5,7 +5,8 @@ usage: python -m benchmarks.edit_page RUN [--buildings 60] [--mend 12] [--rounds
 RUN is the folder of a finished run whose clouds are still there; edits.jsonl in it is replaced. Prints the median and the 95th percentile
 of an edit (a ridge raised, measured) and of a refit, from the request's bytes to the answer's, and with --browser from the
 key to the model shown in Chromium (needs playwright). Then each of the most doubtful buildings is mended by a script
-that does what a person does, without eyes: other types, cuts, parts left out, dormers and blocks where points crowd above the roof, each refitted; the first that raises the share of points
+that does what a person does, without eyes: other types, cuts, parts left out, edges dragged, dormers and blocks drawn around points
+that crowd above the roof and recesses around those below, each refitted; the first that raises the share of points
 within 0.2 m by a hundredth is kept, else the best, round by round. What comes of it is accepted, and the run done again with it.
 """
 
@@ -24,12 +25,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.edits import FILE
 from hiproof.edit.server import Server, Service
+from hiproof.evaluate.metrics import FACADE_M
 from hiproof.evaluate.run import run_record
 from hiproof.parametric.file import read_parameters
 from hiproof.read.solids import read_solids
@@ -38,8 +43,17 @@ from hiproof.settings import Settings
 TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "side_hip", "asymmetric_gable", "mansard")
 SHARES = (0.35, 0.5, 0.65)
 PARTS = 3  # of a building, the largest, that the script tries to change
-ABOVE_M, SPOTS, SPOT_M = (0.3, 4.0), 3, 1.5  # points so far above the roof, gathered in so many places of this radius
-SIZES = ((1.8, 2.5), (2.5, 2.5), (2.5, 4.0), (4.0, 2.5), (4.0, 4.0))  # m, of a dormer or a block
+ABOVE_M, BELOW_M = (
+    (0.25, 4.0),
+    (-7.0, -0.25),
+)  # heights of points above or below the roof that a part of their own may explain
+CROWDS_M, CROWD, CROWDS = (
+    (0.7, 0.45),
+    5,
+    4,
+)  # points so near each other in space, at least so many, are a crowd; so many are tried
+DRAGS_M = (0.4, -0.4)  # of an edge
+LEAST_M = 0.6  # side of a part drawn around a crowd
 ENOUGH = 0.01  # gain of share at which the script stops looking for a better one
 
 
@@ -122,46 +136,99 @@ def tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
             yield from ({"action": "split", "part": part, "side": side, "share": share} for share in SHARES)
         if len(areas) > 1:
             yield {"action": "remove", "part": part}
+            yield from drags(model, part)
+
+
+def drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
+    """Each edge of a part moved out and in, as a hand drags its handle."""
+    h, z = model["handles"][part], model["parts"][part]["position"][2]
+    for side, turn in (("length", 0.0), ("width", 0.5 * np.pi)) if h else ():
+        axis = np.array([np.cos(h["turn"] + turn), np.sin(h["turn"] + turn)])
+        for sign in (-1.0, 1.0):
+            for drag in (d for d in DRAGS_M if h[side] + d > LEAST_M):
+                x, y = (np.array(h["place"]) + 0.5 * sign * drag * axis).tolist()
+                yield {"action": "change", "part": part, "change": {side: h[side] + drag, "position": [x, y, z]}}
 
 
 def tried(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, Any]]:
     """The models that the tries make, refitted where that can be."""
+    for action, heights in (("dormer", ABOVE_M), ("recess", BELOW_M)):
+        for crowd in crowds(window, id, model, heights):
+            yield from drawn_around(window, id, model, crowd, action)
     for asked in tries(model):
-        made = window.change(id, model["parts"], **asked)
-        if made is not None:
-            yield window.change(id, made["parts"], action="refit") or made
-    for place in crowded(window, id, model):
-        yield from raised(window, id, model, place)
+        yield from refitted(window, id, window.change(id, model["parts"], **asked))
 
 
-def crowded(window: Window, id: str, model: dict[str, Any]) -> list[list[float]]:
-    """Places [x, y, z] where most points lie above the roof by what a dormer or a block would: a click goes there."""
+def refitted(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dict[str, Any]]:
+    """The model with its heights fitted to the points, itself where they cannot be; nothing of none."""
+    if model is not None:
+        yield window.change(id, model["parts"], action="refit") or model
+
+
+def crowds(window: Window, id: str, model: dict[str, Any], heights: tuple[float, float]) -> list[np.ndarray]:
+    """The largest crowds of points (n, 3) whose heights over the roof lie within two: what a person sees stand out of it."""
     cloud = window.ask("GET", f"points?id={id}")[1]
-    places = np.frombuffer(base64.b64decode(cloud["places"]), "<f4").reshape(-1, 3)
+    places = np.frombuffer(base64.b64decode(cloud["places"]), "<f4").reshape(-1, 3).astype(float)
     gaps = np.frombuffer(base64.b64decode(model["gaps"]), "<f4")
-    above, found = places[(gaps > ABOVE_M[0]) & (gaps < ABOVE_M[1])], []
-    while len(above) and len(found) < SPOTS:
-        near = np.hypot(*(above[:, None, :2] - above[None, :, :2]).transpose(2, 0, 1)) < SPOT_M
-        best = int(near.sum(axis=1).argmax())
-        found.append(above[near[best]].mean(axis=0).tolist())
-        above = above[~near[best]]
-    return found
+    roofed = shapely.union_all([shapely.Polygon(*o[:1]) for part in model["parts"] for o in part["outlines"]])
+    counts = shapely.intersects_xy(shapely.buffer(roofed, -FACADE_M), *places[:, :2].T)
+    off = places[(gaps > heights[0]) & (gaps < heights[1]) & counts]
+    if not len(off):
+        return []
+    tree, found = cKDTree(off), {}
+    for reach in CROWDS_M:
+        crowd = connected_components(tree.sparse_distance_matrix(tree, reach))[1]
+        members = (np.flatnonzero(crowd == k) for k in range(crowd.max() + 1))
+        largest = sorted((m for m in members if len(m) >= CROWD), key=len, reverse=True)[:CROWDS]
+        found |= {m.tobytes(): off[m] for m in largest}
+    return list(found.values())
 
 
-def raised(window: Window, id: str, model: dict[str, Any], place: list[float]) -> Iterator[dict[str, Any]]:
-    """The models with a dormer or a block at a place, its edges dragged to a few sizes, refitted."""
-    owners = [
+def drawn_around(
+    window: Window, id: str, model: dict[str, Any], crowd: np.ndarray, action: str
+) -> Iterator[dict[str, Any]]:
+    """The models with a dormer, a block or a recess drawn around a crowd, refitted, its edges dragged while that helps."""
+    middle = crowd.mean(axis=0)
+    for part in owners_of(model, middle)[:PARTS]:
+        made = window.change(id, model["parts"], action=action, part=part, place=middle.tolist())
+        if made is None:
+            continue
+        last = len(made["parts"]) - 1
+        for kind in dict.fromkeys((made["parts"][last]["type"], "flat")):
+            change = {"type": kind} | box_around(
+                crowd, made["handles"][last]["turn"], made["parts"][last]["position"][2]
+            )
+            best = window.change(id, made["parts"], action="change", part=last, change=change)
+            best = next(refitted(window, id, best), None)
+            yield from () if best is None else dragged(window, id, best, last)
+
+
+def box_around(crowd: np.ndarray, turn: float, z: float) -> dict[str, Any]:
+    """Width, length and position of the rectangle around a crowd, its length turned so."""
+    axes = np.array([[np.cos(turn), np.sin(turn)], [-np.sin(turn), np.cos(turn)]])
+    uv = crowd[:, :2] @ axes.T
+    length, width = np.maximum(np.ptp(uv, axis=0), LEAST_M).tolist()
+    x, y = (0.5 * (uv.min(axis=0) + uv.max(axis=0)) @ axes).tolist()
+    return {"width": width, "length": length, "position": [x, y, z]}
+
+
+def dragged(window: Window, id: str, model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
+    """The model, and whatever dragging edges of a part makes better."""
+    yield model
+    for asked in drags(model, part):
+        for found in refitted(window, id, window.change(id, model["parts"], **asked)):
+            if share_of(found) > share_of(model):
+                yield from dragged(window, id, found, part)
+                return
+
+
+def owners_of(model: dict[str, Any], place: np.ndarray) -> list[int]:
+    """The parts in whose reach a place lies."""
+    return [
         index
         for index, h in enumerate(model["handles"])
         if h and np.hypot(h["place"][0] - place[0], h["place"][1] - place[1]) < 0.5 * max(h["width"], h["length"])
     ]
-    for part in owners[:PARTS]:
-        made = window.change(id, model["parts"], action="dormer", part=part, place=place)
-        for size in SIZES if made is not None else ():
-            change = {"width": size[0], "length": size[1]}
-            sized = window.change(id, made["parts"], action="change", part=len(made["parts"]) - 1, change=change)
-            if sized is not None:
-                yield window.change(id, sized["parts"], action="refit") or sized
 
 
 def share_of(model: dict[str, Any] | None) -> float:
@@ -224,7 +291,7 @@ def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
     run_again(folder)
     after = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
     up = sum(share_in(after[id]) > share_in(before[id]) for id in ids)
-    solids = dict(read_solids(folder / "buildings.gml"))
+    solids = dict(read_solids(folder / "buildings.city.jsonl"))
     valid = sum(not check_solid(solids[id], planarity_m=0.01) for id in ids)
     others = [id for id in before if id not in ids]
     same = sum(after[id] == before[id] for id in others)

@@ -1,4 +1,5 @@
-"""Random edits of generated buildings: each becomes a valid solid or one sentence. And: how long an edit takes.
+"""Random edits of generated buildings, by their parameters and by what the page's buttons do: each becomes a valid solid or one
+sentence. And: how long an edit takes.
 
 python -m benchmarks edits [EDITS] [BUILDINGS]
 """
@@ -8,17 +9,25 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from hiproof.compose import check_solid
 from hiproof.compose.settle import settled_roof
+from hiproof.edit.actions import edited
 from hiproof.errors import HiproofError
 from hiproof.model import Building
 from hiproof.parametric.building import with_model
+from hiproof.settings import Settings
 from hiproof.simulate import random_building, random_compound
 from hiproof.simulate.edits import KINDS, random_edit
 from hiproof.status import Status
+from hiproof.write.parameters import building_record
+
+PRESSES = ("split", "merge", "dormer", "recess")
+PRESSED = 0.3  # of the edits
 
 
 def generated(count: int, seed: int = 0) -> list[Building]:
@@ -31,19 +40,41 @@ def generated(count: int, seed: int = 0) -> list[Building]:
     ]
 
 
+def random_press(rng: np.random.Generator, building: Building) -> dict[str, Any]:
+    """What one of the page's buttons asks for, at any part and any place about the roof."""
+    part, other = (int(k) for k in rng.integers(len(building.parts), size=2))
+    x0, y0, x1, y1 = building.roof.outline.bounds
+    place = [rng.uniform(x0 - 1.0, x1 + 1.0), rng.uniform(y0 - 1.0, y1 + 1.0), 0.0]
+    asked: list[dict[str, Any]] = [
+        {"action": "split", "side": str(rng.choice(["length", "width"])), "share": rng.uniform(-0.1, 1.1)},
+        {"action": "merge", "other": other},
+        {"action": "dormer", "place": place if rng.random() < 0.9 else None},
+        {"action": "recess", "place": place if rng.random() < 0.9 else None},
+    ]
+    return {"part": part, **asked[rng.integers(len(asked))]}
+
+
+def one_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[], Building]]:
+    """A random edit's kind, and what does it."""
+    if rng.random() < PRESSED:
+        asked = random_press(rng, house)
+        return asked["action"], lambda: edited(building_record(house), asked, np.zeros((0, 3)), Settings(), False)
+    kind, index, change = random_edit(rng, house)
+    return kind, lambda: house.without_part(index) if kind == "remove" else house.with_part(index, **change)
+
+
 def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, Counter]:
     """Each building is edited again and again, an edit standing on those before it that made a building."""
     rng, houses = np.random.default_rng(seed), generated(buildings)
-    outcomes = {kind: Counter() for kind in KINDS}
+    outcomes = {kind: Counter() for kind in (*KINDS, *PRESSES)}
     sentences: Counter = Counter()
     seconds = []
     for number in range(edits):
         place = number % buildings
-        kind, index, change = random_edit(rng, houses[place])
+        kind, edit = one_edit(rng, houses[place])
         start = time.perf_counter()
         try:
-            house = houses[place]
-            found = house.without_part(index) if kind == "remove" else house.with_part(index, **change)
+            found = edit()
             valid = not check_solid(found.solid, planarity_m=0.01)
             outcomes[kind]["valid" if valid else "INVALID"] += 1
             houses[place] = found if len(found.parts) < 12 else houses[place]

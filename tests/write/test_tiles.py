@@ -3,6 +3,7 @@
 import json
 import shutil
 import subprocess
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,6 +14,7 @@ from glb_files import accessor_values, parse_glb, view_bytes
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.read.crs import units_of
+from hiproof.write.naming import FileUnits
 from hiproof.write.tiles import Globe, write_models
 from hiproof.write.tiles.properties import NO_NUMBER, Found
 from hiproof.write.tiles.quadtree import quadtree
@@ -117,6 +119,32 @@ def test_every_building_stands_in_one_tile_at_its_place_within_a_centimetre(tile
             volume = np.einsum("ij,ij->", own[:, 0], np.cross(own[:, 1], own[:, 2])) / 6
             assert volume > 10  # the triangles close it, and face outwards
     assert sorted(found) == sorted(expected)
+
+
+def boxes_on_earth(folder):
+    """The least and the largest Earth-centred coordinates (2, 3) of every building."""
+    tileset, found = json.loads((folder / "tileset.json").read_text()), {}
+    transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
+    for tile, _ in tiles_below(tileset["root"]):
+        places, ids, rows = content_of(folder, tile)
+        earth = places @ transform[:3, :3].T + transform[:3, 3]
+        found |= {
+            row["id"]: np.array([f(earth[ids == k], axis=0) for f in (np.min, np.max)]) for k, row in enumerate(rows)
+        }
+    return found
+
+
+@pytest.mark.parametrize("out", ["EPSG:25831", "EPSG:25832", "EPSG:3857"])
+def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled, tmp_path, out):
+    """Whatever the frames of the tilesets, which may lie half a metre apart."""
+    way = FileUnits.of("EPSG:7415", out_crs=out).gml
+    moved = (
+        (id, kind, replace(solid, vertices=way.from_metres(solid.vertices)), told) for id, kind, solid, told in town()
+    )
+    write_models(tmp_path / "there.3dtiles", moved, f"{out}+5709", GEOID_M)
+    here, there = boxes_on_earth(tiled[0]), boxes_on_earth(tmp_path / "there.3dtiles")
+    assert here.keys() == there.keys()
+    assert max(np.abs(here[id] - there[id]).max() for id in here) < 0.01
 
 
 def test_attributes_are_those_of_the_building(tiled):

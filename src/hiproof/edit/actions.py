@@ -14,6 +14,7 @@ from ..parametric.arrange import dormer_on, merged_parts, split_part
 from ..parametric.building import build
 from ..parametric.change import changed_part
 from ..parametric.edit import BY_HAND
+from ..parametric.recess import placed, with_recess
 from ..parametric.record import building_of, list_at, mapping, number, place
 from ..parametric.refit import measured, refitted_parts, within
 from ..settings import Settings
@@ -51,8 +52,9 @@ def shown(record: Record, parts: list, asked: Record, points: np.ndarray) -> lis
 def change(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """Part `part` with the values of `change`, as `Building.with_part` takes them."""
     index = part_at(parts, asked, "part")
-    changed = changed_part(parts[index], dict(mapping(asked.get("change"), "change")), record["origin"][2])
-    return [*parts[:index], changed, *parts[index + 1 :]]
+    return placed(
+        parts, index, changed_part(parts[index], dict(mapping(asked.get("change"), "change")), record["origin"][2])
+    )
 
 
 def remove(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
@@ -81,9 +83,23 @@ def merge(record: Record, parts: list, asked: Record, points: np.ndarray) -> lis
 def dormer(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """A dormer on part `part` at `place`, [x, y, z] about the origin, or half-way up its slope."""
     index = part_at(parts, asked, "part")
-    at = None if asked.get("place") is None else tuple(place(asked["place"], "place")[:2])
     roof = building_of(record)[1]
-    return [*parts, dormer_on(roof, index, at)] if roof is not None else parts
+    return [*parts, dormer_on(roof, index, clicked(asked))] if roof is not None else parts
+
+
+def recess(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
+    """A recess in part `index` at `place`, or in its middle."""
+    index = part_at(parts, asked, "part")
+    roof = building_of(record)[1]
+    return with_recess(parts, roof, index, clicked(asked)) if roof is not None else parts
+
+
+def clicked(asked: Record) -> tuple[float, float] | None:
+    """Where the roof was clicked, x and y about the origin."""
+    if asked.get("place") is None:
+        return None
+    x, y, _ = place(asked["place"], "place").tolist()
+    return x, y
 
 
 def refit(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
@@ -99,6 +115,7 @@ ACTIONS: dict[str, Callable[[Record, list, Record, np.ndarray], list]] = {
     "split": split,
     "merge": merge,
     "dormer": dormer,
+    "recess": recess,
     "refit": refit,
 }
 

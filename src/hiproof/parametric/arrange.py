@@ -148,5 +148,5 @@ def polygons_of(geometry: shapely.Geometry) -> list:
     return [
         [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]
         for polygon in shapely.get_parts(geometry)
-        if polygon.geom_type == "Polygon"
+        if polygon.geom_type == "Polygon" and not polygon.is_empty
     ]

@@ -11,6 +11,7 @@ from ..status import Status
 from ..write.parameters import building_record
 from .building import build
 from .change import changed_part
+from .recess import placed
 
 BY_HAND = "changed by hand"
 
@@ -24,7 +25,7 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
     if index == len(parts):
         parts = [*parts, new_part(change, z_origin)]
     else:
-        parts = [*parts[:index], changed_part(parts[index], change, z_origin), *parts[index + 1 :]]
+        parts = placed(parts, index, changed_part(parts[index], change, z_origin))
     return built(building, {**record, "parts": parts})
 
 

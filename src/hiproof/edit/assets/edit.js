@@ -215,10 +215,12 @@ const refit = () => inTurn(() => {
 });
 const split = side => inTurn(() => edit({ action: "split", part: now.part, side }, forgetPins));
 const remove = () => inTurn(() => edit({ action: "remove", part: now.part }, forgetPins));
-const dormer = () => inTurn(async () => {
-  await edit({ action: "dormer", part: now.part, place: clicked });
-  now.part = now.model.parts.length - 1; show(now.model);
+const added = action => () => inTurn(async () => {
+  const before = now.model;
+  await edit({ action, part: now.part, place: clicked });
+  if (now.model !== before) { now.part = now.model.parts.length - 1; show(now.model); }
 });
+const dormer = added("dormer"), recess = added("recess");
 
 function merge() {
   const count = now.model.parts?.length || 0;
@@ -367,8 +369,8 @@ function numberRow(title, field, unit = "", sigma = undefined, pinned = null) {
 
 const next = () => inTurn(() => step(1)), previous = () => inTurn(() => step(-1)), acceptNow = () => inTurn(() => accept());
 const tryNow = () => inTurn(tryTypes), across = () => split("length"), along = () => split("width"), leave = () => { merging = false; say(""); };
-const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: across, "split-width": along, merge, dormer, remove, try: tryNow, "leave-out": leaveOut };
-const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: across, m: merge, d: dormer, Delete: remove, t: tryNow, o: leaveOut, Escape: leave };
+const BUTTONS = { next, previous, refit, undo, accept: acceptNow, split: across, "split-width": along, merge, dormer, recess, remove, try: tryNow, "leave-out": leaveOut };
+const KEYS = { n: next, p: previous, r: refit, u: undo, a: acceptNow, s: across, m: merge, d: dormer, e: recess, Delete: remove, t: tryNow, o: leaveOut, Escape: leave };
 const act = action => now || action === next || action === previous ? action() : say("no building is chosen");
 for (const [id, action] of Object.entries(BUTTONS)) $(id).addEventListener("click", event => { event.currentTarget.blur(); act(action); });
 $("ground").addEventListener("change", event => { const height = event.target.valueAsNumber; event.target.blur(); if (Number.isFinite(height)) setGround(height); else showWhole(); });

@@ -1,0 +1,88 @@
+"""A recess: a level part lower than what it lies in, whose parts leave its place to it. Parts are JSON objects here, as in change.py.
+
+A roof is its highest part, so a light well, a roof terrace or a lower corner shows only where the parts around it do not roof it:
+their outlines leave it out. Where a recess is moved or resized, they take back its old place and leave out the new one.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from ..model import Roof
+from .arrange import BLOCK_HEIGHT_M, BLOCK_M, GRID_M, corners_of, polygons_of
+from .change import with_sizes
+from .record import list_at, number, numbers_by_name, place, polygon, valid
+
+LEAST_M2 = 0.1  # m2 that two rectangles share; less is a sliver along an edge
+CLEAR = 0.02  # of what they share: a part that roofs no more of it leaves it to the other
+
+
+def with_recess(parts: list, roof: Roof, index: int, at: tuple[float, float] | None = None) -> list:
+    """The parts with a recess at `at` (x, y about the roof's origin), else in the middle of part `index`, turned as that part is.
+
+    Raises InputError for a part of which nothing is left.
+    """
+    around = with_sizes(parts[index])
+    x, y = around["position"][:2] if at is None else at
+    height = max(float(piece.height_at(np.array([[x, y]]))[0]) for piece in roof.parts[index].pieces)
+    recess = {
+        "type": "flat",
+        "parameters": {"width": BLOCK_M, "length": BLOCK_M},
+        "position": [float(x), float(y), height - BLOCK_HEIGHT_M],
+        "rotation": around.get("rotation", 0.0),
+    }
+    return [*(leaving_out(part, covered(recess)) for part in parts), recess]
+
+
+def placed(parts: list, index: int, changed: dict[str, Any]) -> list:
+    """The parts with `changed` in place of part `index`; those that left out its old place leave out its new one instead."""
+    old = area_of(parts[index])
+    own = covered(changed) if "outlines" not in changed else area_of(changed)
+    others = [part if k == index else moved_along(part, old, own) for k, part in enumerate(parts)]
+    return [*others[:index], changed, *others[index + 1 :]]
+
+
+def moved_along(part: dict[str, Any], old: shapely.Geometry, new: shapely.Geometry) -> dict[str, Any]:
+    """The part, which leaves out `new` in place of `old` if it left that out."""
+    if "outlines" not in part or old.equals(new):
+        return part
+    shared = with_area(shapely.intersection(covered(with_sizes(part)), old, grid_size=GRID_M))
+    if shared.area < LEAST_M2 or area_of(part).intersection(shared).area > CLEAR * shared.area:
+        return part
+    whole = shapely.union(area_of(part), shared, grid_size=GRID_M)
+    return leaving_out({**part, "outlines": polygons_of(whole)}, new)
+
+
+def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
+    """The part without what it roofs of `area`. Raises InputError where nothing is left of it."""
+    if not area_of(part).intersection(area).area > 0.0:
+        return part
+    left = polygons_of(shapely.difference(area_of(part), area, grid_size=GRID_M))
+    if not left:
+        raise InputError("expected a recess smaller than the part it lies in, got one that covers it; delete the part")
+    return {**part, "outlines": left}
+
+
+def area_of(part: dict[str, Any]) -> shapely.Geometry:
+    """What a part roofs in plan: its outlines, else its rectangle."""
+    if part.get("outlines") is None:
+        return covered(part)
+    outlines = [valid(polygon(outline, "an outline")) for outline in list_at(part, "outlines")]
+    return with_area(shapely.union_all(outlines, grid_size=GRID_M))
+
+
+def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
+    """What of a geometry has an area."""
+    return shapely.MultiPolygon([part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"])
+
+
+def covered(part: dict[str, Any]) -> shapely.Polygon:
+    """The rectangle of a part in plan. Raises InputError for numbers that are none."""
+    numbers_by_name(part.get("parameters") or {}, "the parameters")
+    place(part.get("position"), "position")
+    number(part.get("rotation", 0.0), "rotation")
+    return shapely.Polygon(corners_of(part))
