@@ -113,6 +113,22 @@ def test_the_command_writes_both_tables(run_folder, tmp_path):
     assert json.loads((tmp_path / "evaluation.json").read_text())["summary"]["all"]["buildings"] == 3
 
 
+def test_the_clouds_are_the_runs_own_where_none_are_named(run_folder, tmp_path):
+    write_sample_run(tmp_path)
+    record = json.loads((tmp_path / "run.json").read_text())
+    cloud = str(run_folder / "points.xyz")
+    (tmp_path / "run.json").write_text(json.dumps({**record, "inputs": {"clouds": [cloud]}}))
+    evaluate(tmp_path, out=tmp_path / "own")
+    evaluate(tmp_path, [cloud], out=tmp_path / "named")
+    assert (tmp_path / "own" / "evaluation.csv").read_text() == (tmp_path / "named" / "evaluation.csv").read_text()
+
+
+def test_no_cloud_to_measure_against_is_refused(tmp_path):
+    write_sample_run(tmp_path)
+    with pytest.raises(HiproofError, match="expected point files to measure"):
+        evaluate(tmp_path)
+
+
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(HiproofError, match="hiproof reconstruct"):
         evaluate_run(tmp_path)

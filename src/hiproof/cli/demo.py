@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import typer
+
 from ..city.run import Request
 from .reconstruct import run_request
 
@@ -19,4 +21,7 @@ def run(folder: Path) -> int:
         terrain=str(files["terrain"]),
         restart=True,
     )
-    return run_request(request)
+    code = run_request(request)
+    if code == 0:
+        typer.echo(f"look at them: hiproof view {folder}; a page about them: hiproof report {folder}")
+    return code

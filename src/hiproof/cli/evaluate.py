@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..errors import InputError
+
 SHOWN = {
     "psd_mean": "PSD",
     "psd_std": "std",
@@ -21,7 +23,9 @@ COMPARED = {"ref_ridge_height_m": "ridge", "ref_slope_deg": "slope", "ref_volume
 
 def evaluate(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
-    clouds: Annotated[list[str], typer.Argument(help="point files to measure against")],
+    clouds: Annotated[
+        list[str] | None, typer.Argument(help="point files to measure against [default: those of the run]")
+    ] = None,
     footprints: Annotated[str | None, typer.Option(help="building polygons; else the models' own outlines")] = None,
     layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
     reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
@@ -29,10 +33,15 @@ def evaluate(
 ) -> None:
     """Measure the models of a run: distances of points, shares, IoU and volume per building, per type and overall."""
     from ..evaluate.evaluation import summarise, to_csv, to_json
-    from ..evaluate.run import evaluate_run
+    from ..evaluate.run import evaluate_run, run_inputs
     from ..write.files import atomic_file
 
-    run = evaluate_run(folder, clouds, footprints, reference, layer)
+    points = clouds or run_inputs(folder)[0]
+    if not points:
+        raise InputError(
+            f"expected point files to measure {folder} against, got none, nor are the run's there; name them"
+        )
+    run = evaluate_run(folder, points, footprints, reference, layer)
     place = Path(out or folder)
     for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
         with atomic_file(place / name) as file:

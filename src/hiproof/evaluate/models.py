@@ -48,7 +48,10 @@ def run_models(folder: Path) -> Path:
     """Path of the models in the output folder of a run. Raises InputError where there are none."""
     path = Path(folder) / RUN_MODELS
     if not path.is_file():
-        raise InputError(f"expected the output folder of `hiproof reconstruct`, got {folder} without {RUN_MODELS}")
+        raise InputError(
+            f"expected the output folder of `hiproof reconstruct`, got {folder} without {RUN_MODELS}; "
+            "give what --out named"
+        )
     return path
 
 

@@ -33,7 +33,8 @@ def parse_crs(value: Any) -> CRS | None:
     except CRSError as error:
         text = str(value)[:60]
         raise InputError(
-            f'expected a coordinate reference system such as "EPSG:7415", got {text!r}; {error}'
+            f'expected a coordinate reference system such as "EPSG:7415", got {text!r} ({error}); '
+            "give its EPSG code or its WKT"
         ) from error
 
 

@@ -149,7 +149,9 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
         if info is None or "SQL" not in str(error):
             raise unreadable(path, error) from error
         told, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
-        raise InputError(f"expected --where in SQL on the attributes of {path} ({names}), got: {told}") from error
+        raise InputError(
+            f"expected --where in SQL on the attributes of {path} ({names}), got: {told}; use these names"
+        ) from error
     except DataLayerError as error:
         layers = ", ".join(str(name) for name, _ in pyogrio.list_layers(str(path)))
         raise InputError(f"expected a layer of {path} (it has {layers}), got: {error}; use one of these") from error
@@ -158,8 +160,9 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
 
 
 def unreadable(path: str | Path, error: Exception) -> InputError:
+    told = str(error).partition("; It might help")[0].rstrip(".")  # what follows is advice on GDAL's own options
     return InputError(
-        f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, got: {error}; "
+        f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, got: {told}; "
         "check the file, or convert it with ogr2ogr"
     )
 

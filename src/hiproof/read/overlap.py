@@ -57,7 +57,8 @@ def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tupl
     yield "their x and y look swapped: swap them, in the footprints or in the cloud", reprojected(swapped, own, target)
     if target is not None:
         if not same_horizontal(own, target):
-            yield f"their coordinates look like the cloud's {described(target)}: name that CRS in the footprints", xy
+            text = f"their coordinates look like the cloud's {described(target)}: name that CRS in the footprints"
+            yield f"{text}, or the cloud's own with --crs if it is another", xy
         degrees = parse_crs("EPSG:4326")
         for what, pairs in (("longitude and latitude", xy), ("latitude and longitude", swapped)):
             if (np.abs(pairs) <= (180, 90)).all():
