@@ -244,6 +244,11 @@ def test_a_stamp_does_not_change_with_what_is_imported_inside_functions(tmp_path
     assert tmp_path / "late.py" not in stamp.closure(tmp_path / "user.py")
 
 
+def test_every_stamp_stands_on_how_code_is_linked(tmp_path):
+    (tmp_path / "alone.py").write_text("import math\n")
+    assert {stamp.HERE / "__init__.py", stamp.HERE / "linking.py"} <= stamp.closure(tmp_path / "alone.py")
+
+
 def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, monkeypatch):
     files = {name: town / "town" / f"{name}.py" for name in ("outer", "middle", "inner")}
 

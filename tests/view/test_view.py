@@ -93,7 +93,7 @@ def document_of(page, folder, serving, profile):
     port = serving(LoopbackServer(partial(Handler, directory=str(folder), page=page)))
     command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
     command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={profile}"]
-    command += ["--window-size=900,700", "--virtual-time-budget=8000", "--dump-dom", f"http://{LOOPBACK}:{port}/"]
+    command += ["--window-size=900,700", "--virtual-time-budget=60000", "--dump-dom", f"http://{LOOPBACK}:{port}/"]
     return subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
 
 

@@ -75,10 +75,10 @@ def text_of(file: Path) -> bytes:
 def closure(file: Path) -> set[Path]:
     """The file and all files that its imports lead to, within its own package and hiproof.
 
-    How code is kept changes nothing of it, so of this folder only the decorator and the linking count.
+    How code is kept changes nothing of it, so of this folder only the decorator and the linking count, which no import names.
     """
     found: set[Path] = set()
-    open_ends = [file]
+    open_ends = [file, *(HERE / name for name in DECIDING)]
     while open_ends:
         at = open_ends.pop()
         if at not in found and (at.parent != HERE or at.name in DECIDING):
