@@ -95,5 +95,6 @@ def test_a_roof_type_that_looks_like_markup_is_shown_as_it_is(tmp_path, capsys):
     attributes = (1, "CityObjects", ..., "attributes")
     marked = changed(lines, *attributes, by=lambda known: known | {"hiproof_roof_type": "[/red]"})
     (tmp_path / "buildings.city.jsonl").write_bytes(marked)
-    evaluate(tmp_path, None, None, None, None, None)
+    (tmp_path / "points.xyz").write_text("85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n")
+    evaluate(tmp_path, [str(tmp_path / "points.xyz")], None, None, None, None)
     assert "[/red]" in capsys.readouterr().out
