@@ -23,9 +23,8 @@ from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
-HOPELESS_UNITS = (
-    20.0  # dearer along the axes, no roof is made cheaper by planes that face otherwise: of ten the most was 9
-)
+# so much dearer along the axes, no roof is made cheaper by planes that face otherwise: of ten the most was 9
+HOPELESS_UNITS = 20.0
 
 
 @dataclass(frozen=True)
