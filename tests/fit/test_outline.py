@@ -9,8 +9,8 @@ import shapely
 from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline
-from hiproof.fit.outline.cost import Border, cost_of_change, drawing_of, structure_cost
-from hiproof.fit.outline.lines import dropped, lines_through, replaced
+from hiproof.fit.outline.cost import Border, changed, cost_of_change, drawing_of, structure_cost
+from hiproof.fit.outline.lines import dropped, lines_through, replaced, replaced_by
 from hiproof.fit.outline.spread import unevenness
 from hiproof.fit.outline.steps import RUN, best_levels, stepped
 from hiproof.fit.walls import on_walls
@@ -148,18 +148,27 @@ def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
     assert unevenness(rng.uniform(0, 2, (20, 2)), shapely.box(0, 0, 2, 2), 0.45) == 1.0
 
 
-def test_the_price_of_a_change_is_that_of_drawing_anew():
+def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew():
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
     border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0, 6.0)
     lines = lines_through(np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float))
     drawing = drawing_of(lines, 0.0, border)
+    priced = 0
     for i in range(len(lines)):
-        new = replaced(lines, i, 1, lines[i, 0] + 0.05, lines[i, 1] + 0.3)
-        assert cost_of_change(new, drawing, i, 1, 2, border) == pytest.approx(drawing_of(new, 0.0, border).cost)
-        new = dropped(lines, i)
-        expected = drawing_of(new, 0.0, border).cost
-        assert cost_of_change(new, drawing, i, 1, 1, border) in (pytest.approx(expected), np.inf)
+        notch = lines[[i] * 3] + [(0.0, 0.0), (np.pi / 2, 0.0), (0.0, -0.8)]
+        middle = drawing.corners[[i, (i + 1) % len(lines)]].mean(axis=0)
+        notch[1, 1] = middle @ [np.cos(notch[1, 0]), np.sin(notch[1, 0])]
+        changes = [(replaced(lines, i, 1, lines[i, 0] + 0.05, lines[i, 1] + 0.3), 2)]
+        changes += [(dropped(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
+        for new, fresh in changes:
+            found, anew = changed(new, drawing, i, 1, fresh, border), drawing_of(new, 0.0, border)
+            assert cost_of_change(new, drawing, i, 1, fresh, border) == found.cost
+            if np.isfinite(anew.cost):
+                assert found.cost == pytest.approx(anew.cost) and found.structure == anew.structure
+                assert found.own == pytest.approx(anew.own) and found.corners == pytest.approx(anew.corners)
+                priced += 1
+    assert priced >= 12
 
 
 def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():

@@ -18,7 +18,7 @@ import shapely
 from ..compiled import compiled
 from .outline.cost import cost_at_depth
 from .outline.lines import lines_through
-from .outline.settle import side_offset
+from .outline.settle import side_offsets, span_of
 from .union.plan import ring_edges, signed_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
@@ -157,7 +157,7 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
     if len(told) < LEAST_SIDES or told.sum() <= LEAST_FREE * length.sum():
         return None
     normals, sigma = normals[free], SIDE_M * np.sqrt(SIDE_LENGTH_M / told)
-    wanted = offsets_of(xy, normals, distances[free], ends[free], density) + normals @ start
+    wanted = side_offsets(xy, normals, distances[free], ends[free], density) + normals @ start
     design = np.column_stack([normals, np.ones(len(told))])
     weight = 1.0 / sigma**2
     prior = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
@@ -182,21 +182,3 @@ def free_sides(xy, normals, distances, ends):
                 before[m] += depth < -FREE_FROM_M
                 behind[m] += depth > FREE_FROM_M
     return (behind >= FREE_TO_M - FREE_FROM_M) & (before <= FREE_SHARE * behind)
-
-
-@compiled
-def offsets_of(xy, normals, distances, ends, density):
-    """How far (m,) outwards the roof's sides lie of the footprint's."""
-    offsets = np.empty(len(normals))
-    for m in range(len(normals)):
-        x, y = normals[m]
-        along, depth = x * xy[:, 1] - y * xy[:, 0], distances[m] - x * xy[:, 0] - y * xy[:, 1]
-        offsets[m] = side_offset(along, depth, *span_of(normals[m], ends[m]), density)
-    return offsets
-
-
-@compiled
-def span_of(normal, ends):
-    """From where to where a side with `ends` (2, 2) runs, square to its `normal`."""
-    first, last = normal[0] * ends[0, 1] - normal[1] * ends[0, 0], normal[0] * ends[1, 1] - normal[1] * ends[1, 0]
-    return min(first, last), max(first, last)

@@ -27,7 +27,7 @@ from .settle import settled
 from .spread import unevenness
 from .steps import RUN, stepped
 
-__all__ = ["estimate_outline", "iou"]
+__all__ = ["estimate_outline"]
 
 # m over which a side is soft: the scanner's noise in plan; density outside over that inside: points of walls and trees
 BLUR_M, STRAY = 0.15, math.exp(-4.0)
@@ -61,7 +61,8 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     if kappa is not None and abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD:
         directions.append(own)
     wall = on_walls(points, points, spacing) if points.shape[1] > 2 else np.zeros(len(points), bool)
-    outer = wall & shapely.dwithin(shape.exterior, shapely.points(points[:, :2]), OUTER_M)
+    outer = wall.copy()
+    outer[wall] = shapely.dwithin(shape.exterior, shapely.points(points[wall, :2]), OUTER_M)
     density = (~wall).sum() / rough.area
     telling, dearness = ~wall | outer, unevenness(points[~wall, :2], shape, spacing)
     border = border_of(points[telling, :2], wall[telling], density, dearness)

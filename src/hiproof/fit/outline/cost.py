@@ -30,8 +30,9 @@ TOGETHER = 16  # points next to each other in y for which sides are looked up on
 # blur (m), stray (share): see above. line, direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
 Border = namedtuple("Border", "x y wall density blur stray line direction skew sharp")
 
-# lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, cost: all of it.
-Drawing = namedtuple("Drawing", "lines kappa corners own cost")
+# lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, structure: the price of
+# the lines, cost: all of it.
+Drawing = namedtuple("Drawing", "lines kappa corners own structure cost")
 
 
 @compiled
@@ -39,15 +40,15 @@ def drawing_of(lines, kappa, border):
     """The drawing of `lines`; its cost is infinite where they are no polygon."""
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or area_of(corners) <= 0.0:
-        return Drawing(lines, kappa, corners, own, np.inf)
+        return Drawing(lines, kappa, corners, own, np.inf, np.inf)
     reach = SURE_BLURS * border.blur
     for first in range(0, len(own), TOGETHER):
         last = min(first + TOGETHER, len(own))
         sides = sides_near(corners, border.y[first] - reach, border.y[last - 1] + reach)
         for k in range(first, last):
             own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.wall[k], border.blur, border.stray)
-    misfit = border.density * area_of(corners) + own.sum()
-    return Drawing(lines, kappa, corners, own, misfit + structure_cost(lines, kappa, border))
+    misfit, structure = border.density * area_of(corners) + own.sum(), structure_cost(lines, kappa, border)
+    return Drawing(lines, kappa, corners, own, structure, misfit + structure)
 
 
 @compiled
@@ -113,16 +114,32 @@ def sides_near(corners, low, high):
 
 @compiled
 def cost_of_change(lines, drawing, i, count, fresh, border):
-    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on.
+    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on."""
+    return change_of(lines, drawing, i, count, fresh, border)[0].cost
 
-    Points away from these corners cost what they did.
+
+@compiled
+def changed(lines, drawing, i, count, fresh, border):
+    """The drawing of `lines` that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on."""
+    new, first = change_of(lines, drawing, i, count, fresh, border)
+    own = drawing.own.copy()
+    own[first : first + len(new.own)] = new.own
+    return Drawing(new.lines, new.kappa, new.corners, own, new.structure, new.cost)
+
+
+@compiled
+def change_of(lines, drawing, i, count, fresh, border):
+    """The drawing of `changed` with the costs of some points alone, next to each other in y, and which is the first of them.
+
+    Points away from the corners that come and go cost what they did.
     """
     corners, old = np.empty((len(lines), 2)), drawing.corners
-    if len(lines) < 3 or not find_corners(lines, corners, 2):
-        return np.inf
-    area = area_of(corners)
+    for k in range(fresh, len(lines)):
+        corners[k] = old[(i + count + 1 + k - fresh) % len(old)]
+    possible = len(lines) >= 3 and find_corners(lines, corners, fresh)
+    area = area_of(corners) if possible else 0.0
     if area <= 0.0:
-        return np.inf
+        return Drawing(lines, drawing.kappa, corners, np.empty(0), np.inf, np.inf), 0
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
     for k in range(count + 1 + fresh):
         ring, at = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
@@ -132,9 +149,12 @@ def cost_of_change(lines, drawing, i, count, fresh, border):
     sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
     misfit = border.density * (area - area_of(old))
     first, last = np.searchsorted(border.y, np.array([y_low - reach, y_high + reach]))
+    own = drawing.own[first:last].copy()
     for k in range(first, last):
         x, y = border.x[k], border.y[k]
         if x_low - reach < x < x_high + reach:
-            misfit += point_cost(x, y, corners, sides, border.wall[k], border.blur, border.stray) - drawing.own[k]
-    structure = structure_cost(lines, drawing.kappa, border) - structure_cost(drawing.lines, drawing.kappa, border)
-    return drawing.cost + misfit + structure
+            own[k - first] = point_cost(x, y, corners, sides, border.wall[k], border.blur, border.stray)
+            misfit += own[k - first] - drawing.own[k]
+    structure = structure_cost(lines, drawing.kappa, border)
+    cost = drawing.cost + misfit + structure - drawing.structure
+    return Drawing(lines, drawing.kappa, corners, own, structure, cost), first

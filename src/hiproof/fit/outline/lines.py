@@ -31,27 +31,28 @@ def lines_through(corners: np.ndarray) -> np.ndarray:
 def find_corners(lines, corners, fresh=-1):
     """Write the corners (n, 2) of `lines`; False where they are no simple polygon run through in order.
 
-    With `fresh`, only the last side and the first `fresh` are asked whether they cross others: the rest did not before.
+    With `fresh`, only the first so many: the others are there, and the sides between them run on and cross none of each other.
     """
     n = len(lines)
-    for i in range(n):
+    fresh = n if fresh < 0 else min(fresh, n)
+    for i in range(fresh):
         before, r_before, after, r_after = lines[i - 1, 0], lines[i - 1, 1], lines[i, 0], lines[i, 1]
         sine = math.sin(after - before)
         if abs(sine) < SHARPEST:
             return False
         corners[i, 0] = (r_before * math.sin(after) - r_after * math.sin(before)) / sine
         corners[i, 1] = (r_after * math.cos(before) - r_before * math.cos(after)) / sine
-    for i in range(n):
-        k = (i + 1) % n
+    asked = min(fresh + 1, n)
+    for k in range(asked):
+        i = (k - 1) % n
         along = math.cos(lines[i, 0]) * (corners[k, 1] - corners[i, 1])
         if along - math.sin(lines[i, 0]) * (corners[k, 0] - corners[i, 0]) < -1e-9:
             return False
-    asked = n if fresh < 0 else min(fresh + 1, n)
     for k in range(asked):
         i = (k - 1) % n
         for j in range(n):
             apart = (j - i) % n
-            if 1 < apart < n - 1 and cross(corners, i, (i + 1) % n, j, (j + 1) % n):
+            if 1 < apart < n - 1 and cross(corners, i, k, j, (j + 1) % n):
                 return False
     return True
 
@@ -92,28 +93,21 @@ def shares_direction(lines, i):
 @compiled
 def replaced(lines, i, count, azimuth, distance):
     """The lines with one in place of `count` from `i` on; it comes first."""
-    n = len(lines)
-    result = np.empty((n - count + 1, 2))
-    result[0, 0], result[0, 1] = azimuth, distance
+    return replaced_by(lines, i, count, np.array([[azimuth, distance]]))
+
+
+@compiled
+def replaced_by(lines, i, count, flight):
+    """The lines with those of `flight` (m, 2) in place of `count` from `i` on; these come first."""
+    n, m = len(lines), len(flight)
+    result = np.empty((m + n - count, 2))
+    result[:m] = flight
     for k in range(n - count):
-        result[k + 1] = lines[(i + count + k) % n]
+        result[m + k] = lines[(i + count + k) % n]
     return result
 
 
 @compiled
 def dropped(lines, i):
     """The lines without line `i`; the one after it comes first."""
-    n = len(lines)
-    result = np.empty((n - 1, 2))
-    for k in range(n - 1):
-        result[k] = lines[(i + 1 + k) % n]
-    return result
-
-
-@compiled
-def replaced_by(lines, i, flight):
-    """The lines with those of `flight` (m, 2) in place of line `i`."""
-    n, m = len(lines), len(flight)
-    result = np.empty((n + m - 1, 2))
-    result[:i], result[i : i + m], result[i + m :] = lines[:i], flight, lines[i + 1 :]
-    return result
+    return replaced_by(lines, i, 1, lines[:0])

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from .cost import cost_of_change, drawing_of
+from .cost import Drawing, changed, cost_of_change, drawing_of
 from .lines import SAME_RAD, dropped, quarter_gap, replaced, shares_direction
 
 LONGEST_RUN = 3  # lines that become one
@@ -19,7 +19,7 @@ TURN_RAD = math.radians(35.0)  # of a line, at most
 APART = (0.0, 1.0, 1.5, 0.7)  # turns by which the first and last of so many lines may differ to become one
 # m and rad that lines are moved and turned by, coarse to fine
 STEPS_M, TURNS_RAD = (0.3, 0.1, 0.05), (0.03, 0.01, 0.003)
-# of all moves; of shifts in each; changes of one kind at most, which ends what would go in circles
+# of all moves; of shifts by one step; changes of one kind at most, which ends what would go in circles
 ROUNDS, SHIFT_ROUNDS, MOST_CHANGES = 3, 3, 400
 REACHED = LONGEST_RUN  # lines on either side of a change whose own changes it concerns
 GAIN = 1e-6  # nats; numerically none
@@ -32,7 +32,7 @@ def redrawn(drawing, border, step_m):
     for _ in range(ROUNDS):
         before = drawing.cost
         for step in STEPS_M:
-            drawing = shifted(drawing, border, step, len(drawing.lines), SHIFT_ROUNDS)
+            drawing = shifted(drawing, border, step)
         for turn in TURNS_RAD:
             drawing = turned(drawing, border, turn)
         drawing = simplified(drawing, border, step_m)
@@ -52,32 +52,33 @@ def simplified(drawing, border, step_m):
         i = int(np.argmax(gains))
         if gains[i] <= GAIN:
             break
-        cost, lines, following = best_change(drawing, i, border)
+        cost, lines, count, fresh = best_change(drawing, i, border)
         gains[i] = max(drawing.cost - cost, -1e9)  # those of lines far off may be of an earlier drawing
         if gains[i] <= GAIN:
             continue
         known, gains = gains, np.full(len(lines), np.inf)
         for k in range(REACHED + 1, len(lines) - REACHED):
-            gains[k] = known[(following + k - 1) % len(known)]
-        drawing = shifted(drawing_of(lines, drawing.kappa, border), border, step_m, 1, 1)
+            gains[k] = known[(i + count + 1 - fresh + k) % len(known)]
+        drawing = first_shifted(changed(lines, drawing, i, count, fresh, border), border, step_m)
     return drawing
 
 
 @compiled
 def best_change(drawing, i, border):
-    """The cheapest change that begins at line `i`: its cost, the lines, and which of the old ones is their second."""
+    """The cheapest change that begins at line `i`: its cost and the lines, with how many of the old ones the first of them is
+    come in place of, and how many corners are new."""
     n = len(drawing.lines)
-    best, lines, following = np.inf, drawing.lines, 0
+    best, lines, gone, fresh = np.inf, drawing.lines, 1, 1
     if n > 3:
-        lines, following = dropped(drawing.lines, i), (i + 2) % n
+        lines = dropped(drawing.lines, i)
         best = cost_of_change(lines, drawing, i, 1, 1, border)
     for count in range(1, min(LONGEST_RUN, n - 2) + 1):
         for azimuth, distance in joint_lines(drawing, i, count):
             new = replaced(drawing.lines, i, count, azimuth, distance)
             cost = cost_of_change(new, drawing, i, count, 2, border)
             if cost < best:
-                best, lines, following = cost, new, (i + count) % n
-    return best, lines, following
+                best, lines, gone, fresh = cost, new, count, 2
+    return best, lines, gone, fresh
 
 
 @compiled
@@ -143,24 +144,31 @@ def middle_of(corners, i, count):
 
 
 @compiled
-def shifted(drawing, border, step, upto, rounds):
-    """Each of the first `upto` lines moved by multiples of `step` (m) for as long as that is cheaper."""
-    for _ in range(rounds):
+def shifted(drawing, border, step):
+    """Each line moved by multiples of `step` (m) for as long as that is cheaper."""
+    for _ in range(SHIFT_ROUNDS):
         before = drawing.cost
-        for i in range(upto):
-            for sign in (1.0, -1.0):
-                moved = False
-                while True:
-                    azimuth, distance = drawing.lines[i, 0], drawing.lines[i, 1] + sign * step
-                    new = replaced(drawing.lines, i, 1, azimuth, distance)
-                    if not cost_of_change(new, drawing, i, 1, 2, border) < drawing.cost - GAIN:
-                        break
-                    lines = drawing.lines.copy()
-                    lines[i, 1] = distance
-                    drawing, moved = drawing_of(lines, drawing.kappa, border), True
-                if moved:
-                    break
+        for _ in range(len(drawing.lines)):
+            drawing = first_shifted(drawing, border, step)
+            lines, corners = np.roll(drawing.lines, -2), np.roll(drawing.corners, -2)  # a line on
+            drawing = Drawing(lines, drawing.kappa, corners, drawing.own, drawing.structure, drawing.cost)
         if drawing.cost >= before - GAIN:
+            break
+    return drawing
+
+
+@compiled
+def first_shifted(drawing, border, step):
+    """The first line moved by multiples of `step` (m) for as long as that is cheaper."""
+    for sign in (1.0, -1.0):
+        moved = False
+        while True:
+            lines = drawing.lines.copy()
+            lines[0, 1] += sign * step
+            if not cost_of_change(lines, drawing, 0, 1, 2, border) < drawing.cost - GAIN:
+                break
+            drawing, moved = changed(lines, drawing, 0, 1, 2, border), True
+        if moved:
             break
     return drawing
 

@@ -37,26 +37,42 @@ def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
     """The `lines` (n, 2) of an outline, each moved to where the points `xy` (m, 2) across it put it."""
     corners, moved = np.empty_like(lines), lines.copy()
     find_corners(lines, corners)
-    for i, (azimuth, distance) in enumerate(lines):
-        normal = np.array([math.cos(azimuth), math.sin(azimuth)])
-        along = xy @ [-normal[1], normal[0]]
-        low, high = sorted(corners[k % len(lines)] @ [-normal[1], normal[0]] for k in (i, i + 1))
-        moved[i, 1] += side_offset(along, distance - xy @ normal, low, high, density)
+    normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
+    ends = np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
+    moved[:, 1] += side_offsets(xy, normals, lines[:, 1], ends, density)
     return moved if find_corners(moved, corners) else lines
 
 
 @compiled
-def side_offset(along, depth, low, high, density):
-    """How far (m) outwards a side from `low` to `high` lies of the line from which `depth` (n,) of points at `along` was measured."""
-    if high - low > LONG_M:
-        low, high = low + END_M, high - END_M
-    across = np.empty(len(depth))
-    count = 0
-    for k in range(len(depth)):
-        if low <= along[k] <= high and -OUTSIDE_M < depth[k] < DEEP_M:
-            across[count] = depth[k]
+def side_offsets(xy, normals, distances, ends, density):
+    """How far (m,) outwards the points `xy` (n, 2) put sides that have `normals` (m, 2), lie `distances` (m,) from the origin along
+    these and run between `ends` (m, 2, 2)."""
+    offsets = np.empty(len(normals))
+    for m in range(len(normals)):
+        low, high = span_of(normals[m], ends[m])
+        if high - low > LONG_M:
+            low, high = low + END_M, high - END_M
+        offsets[m] = offset(depths_across(xy, normals[m], distances[m], low, high), high - low, density)
+    return offsets
+
+
+@compiled
+def span_of(normal, ends):
+    """From where to where a side with `ends` (2, 2) runs, square to its `normal`."""
+    first, last = normal[0] * ends[0, 1] - normal[1] * ends[0, 0], normal[0] * ends[1, 1] - normal[1] * ends[1, 0]
+    return min(first, last), max(first, last)
+
+
+@compiled
+def depths_across(xy, normal, distance, low, high):
+    """How deep (k,) inside a side those of the points lie that tell where it is: across it from `low` to `high`, near enough."""
+    depths, count = np.empty(len(xy)), 0
+    for k in range(len(xy)):
+        depth = distance - normal[0] * xy[k, 0] - normal[1] * xy[k, 1]
+        if -OUTSIDE_M < depth < DEEP_M and low <= normal[0] * xy[k, 1] - normal[1] * xy[k, 0] <= high:
+            depths[count] = depth
             count += 1
-    return offset(across[:count], high - low, density)
+    return depths[:count]
 
 
 @compiled

@@ -23,7 +23,9 @@ def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
     counts = np.zeros(index.max(axis=0) - low + 1)
     np.add.at(counts, tuple((index - low).T), 1)
     centres = shapely.points((np.moveaxis(np.indices(counts.shape), 0, -1) + low + 0.5) * cell)
-    inside = counts[shapely.contains(shape, centres) & ~shapely.dwithin(shape.exterior, centres, cell)]
+    ring = shape.exterior
+    shapely.prepare([shape, ring])
+    inside = counts[shapely.contains(shape, centres) & ~shapely.dwithin(ring, centres, cell)]
     if len(inside) < FEWEST_CELLS or not inside.any():
         return 1.0
     return float(np.clip(np.sqrt(inside.var(ddof=1) / inside.mean()), LEAST, MOST))

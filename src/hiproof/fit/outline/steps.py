@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from .cost import cost_at_depth, drawing_of
+from .cost import changed, cost_at_depth
 from .lines import quarter_gap, replaced, replaced_by
 from .moves import GAIN, TURN_RAD
 
@@ -25,12 +25,14 @@ INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
 
 @compiled
 def stepped(drawing, border, longest):
-    """The drawing with runs of up to `longest` sides as flights of steps where that is cheaper."""
+    """The drawing with sides, and runs of up to `longest` of them, as flights of steps where that is cheaper."""
     i = 0
     while i < len(drawing.lines):
-        best = drawing
-        for count in range(min(longest, len(drawing.lines) - 2) + 1):
-            new = with_flight(drawing, i, count, border)
+        best = side_as_flight(drawing, i, border)
+        if not best.cost < drawing.cost - GAIN:
+            best = drawing
+        for count in range(1, min(longest, len(drawing.lines) - 2) + 1):
+            new = run_as_flight(drawing, i, count, border)
             if new.cost < best.cost - GAIN:
                 best = new
         i = 0 if best.cost < drawing.cost else i + 1
@@ -39,20 +41,26 @@ def stepped(drawing, border, longest):
 
 
 @compiled
-def with_flight(drawing, i, count, border):
-    """The drawing with `count` sides from `i` on as one flight along the main direction nearest to their chord; with a count of
-    0, side `i` along its own direction. The drawing itself where there is no such side to begin with."""
-    if count == 0:
-        return drawing_of(replaced_by(drawing.lines, i, flight_of(drawing, i, border)), drawing.kappa, border)
+def side_as_flight(drawing, i, border):
+    """The drawing with side `i` as a flight of steps along its own direction."""
+    flight = flight_of(drawing, i, border)
+    lines = replaced_by(drawing.lines, i, 1, flight)
+    return changed(lines, drawing, i, 1, len(flight) + 1, border)
+
+
+@compiled
+def run_as_flight(drawing, i, count, border):
+    """The drawing with `count` sides from `i` on as one flight along the main direction nearest to their chord; itself where they
+    make no such side to begin with."""
     start, end = drawing.corners[i], drawing.corners[(i + count) % len(drawing.lines)]
     chord = math.atan2(start[0] - end[0], end[1] - start[1])
     way = chord - quarter_gap(chord - drawing.kappa)
+    if math.cos(way - chord) < math.cos(TURN_RAD):
+        return drawing
     x, y = 0.5 * (start + end)
     joint = replaced(drawing.lines, i, count, way, x * math.cos(way) + y * math.sin(way))
-    joined = drawing_of(joint, drawing.kappa, border)
-    if joined.cost == np.inf or math.cos(way - chord) < math.cos(TURN_RAD):
-        return drawing
-    return drawing_of(replaced_by(joint, 0, flight_of(joined, 0, border)), drawing.kappa, border)
+    joined = changed(joint, drawing, i, count, 2, border)
+    return drawing if joined.cost == np.inf else side_as_flight(joined, 0, border)
 
 
 @compiled
