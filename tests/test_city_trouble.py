@@ -176,7 +176,7 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tm
 
 def test_an_index_beside_the_file_saves_points_and_changes_no_byte(undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
-    monkeypatch.setattr("hiproof.read.lax.JOINED_POINTS", 50)
+    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
     town = make_town()
     along = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz[along], town.classification[along])

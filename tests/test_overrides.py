@@ -9,6 +9,8 @@ import shapely
 import hiproof
 from hiproof.city import run as city_run
 from hiproof.city import solve
+from hiproof.city.ledger import Ledger
+from hiproof.city.noted import noted_file, save_noted
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.override import overridden, override_of
@@ -16,6 +18,7 @@ from hiproof.settings import Settings
 from hiproof.status import Status
 from hiproof.write.parameters import building_record
 from run_records import by_id, records
+from tiny_town import make_town, write_cloud, write_footprints
 
 PLAIN = Settings.from_dict({"segment": {"enabled": False}})
 
@@ -169,6 +172,35 @@ def test_a_run_with_other_overrides_redoes_those_buildings_alone(town_files, tmp
     assert counted == ["house-2"] and records(out) == plain
     run(request(town_files, tmp_path / "new", path, {"id": "house-2", "leave_out": True}))
     assert records(tmp_path / "new") == together
+
+
+def points_read(out):
+    """How many points the last run in `out` read."""
+    return sum(
+        json.loads(t.message)["points"] for t in Ledger(out / ".hiproof/ledger.sqlite").tasks() if t.kind == "sort"
+    )
+
+
+@pytest.mark.parametrize("kept", ["noted", "lost", "of another file"])
+def test_what_is_redone_reads_the_points_near_it_alone(kept, tmp_path, monkeypatch):
+    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
+    town, out, path = make_town(), tmp_path / "out", tmp_path / "o.jsonl"
+    flown = np.argsort(town.xyz[:, 0].round(-1), kind="stable")
+    cloud = str(write_cloud(tmp_path / "cloud.laz", town.xyz[flown], town.classification[flown]))
+    files = cloud, str(write_footprints(tmp_path / "footprints.geojson", town.footprints))
+    city_run.reconstruct_area(request(files, out, None))
+    assert points_read(out) == len(town.xyz)
+    noted = noted_file(out / ".hiproof", 0)
+    if kept == "lost":
+        noted.unlink()
+    elif kept == "of another file":
+        save_noted(noted, [np.zeros((3, 4))], 150)
+    lines = ({"id": "house-0", "ridge_height": 8.0},)
+    city_run.reconstruct_area(request(files, out, path, *lines))
+    again = points_read(out)
+    assert again < 0.7 * len(town.xyz) if kept == "noted" else again == len(town.xyz)
+    city_run.reconstruct_area(request(files, tmp_path / "new", path, *lines))
+    assert records(out) == records(tmp_path / "new")
 
 
 def test_a_run_killed_while_it_redoes_goes_on(town_files, tmp_path, counted, monkeypatch):

@@ -236,7 +236,7 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     """COPC and `.lax` save points, but none that a building needs."""
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
-    monkeypatch.setattr("hiproof.read.lax.JOINED_POINTS", 50)
+    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
     xyz, classes, origin = FEET.from_metres(TOWN.xyz[along]), TOWN.classification[along], FEET.from_metres(ORIGIN)
     alone = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}

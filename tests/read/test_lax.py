@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from hiproof.errors import InputWarning
-from hiproof.read.lax import joined, read_lax
+from hiproof.read.lax import read_lax
 from hiproof.read.pointcloud import iter_points
+from hiproof.read.runs import joined
 from read.test_pointcloud import write_las
 
 POINTS = 4000
@@ -77,7 +78,7 @@ def indexed(tmp_path):
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_runs_hold_every_point_of_any_boxes(indexed, seed, monkeypatch):
-    monkeypatch.setattr("hiproof.read.lax.JOINED_POINTS", 10)
+    monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 10)
     path, xyz = indexed
     rng = np.random.default_rng(seed)
     low = rng.uniform((610990, 6269990), (611380, 6270280), (3, 2))

@@ -15,6 +15,7 @@ from ..errors import OutputError, OutputWarning
 from ..log import LOGGER
 from ..masking import masked_values
 from ..write.files import atomic
+from . import noted
 from .changed import take_over
 from .ledger import Ledger, Task
 from .marks import choice_of, inputs_of, mark_of
@@ -140,6 +141,6 @@ def forget(state: Path, ledger: Ledger) -> None:
     remove_tiles(state.parent)
     ledger.forget()
     (state / REDO).unlink(missing_ok=True)
-    for name in ("tiles", "points"):
+    for name in ("tiles", "points", noted.FOLDER):
         shutil.rmtree(state / name, ignore_errors=True)
         (state / name).mkdir()

@@ -208,13 +208,18 @@ def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Cal
 
 
 def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
-    """A clear sentence when no file could be read, or none holds a point of the building classes."""
+    """A clear sentence when no file could be read, or none holds a point of the building classes.
+
+    A run that goes on is past the second: it may have read a few runs of points alone, near what it does again.
+    """
     tasks = [task for task in ledger.tasks() if task.kind == "sort"]
     failed = [task.message for task in tasks if task.state == "failed"]
     if tasks and len(failed) == len(tasks):
         raise InputError(
             failed[0] if len(failed) == 1 else f"none of the {len(tasks)} point files could be read; first: {failed[0]}"
         )
+    if ledger.counts("status"):
+        return
     classes: Counter[int] = Counter()
     for task in tasks:
         if task.state == "done":

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import functools
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +29,7 @@ from ..read.pointcloud import as_input_error, file_kind, iter_points, read_heade
 from ..settings import ReadSettings
 from ..write.files import atomic_file
 from .ground import lowest_in_cells
+from .noted import load_noted, noted_file, save_noted
 from .overrides import REDO, load_redo
 from .plan import PLAN_FILE, WorkPlan, load_plan
 
@@ -69,9 +70,12 @@ class Reach:
 
 
 class Reaches:
-    """Reach of every work tile, or of those in `only`, that has an area to gather points for, found by place; made once a process."""
+    """Reach of every work tile that has an area to gather points for, found by place; made once a process.
 
-    def __init__(self, plan: WorkPlan, only: Sequence[str] | None = None):
+    Where `only` names tiles, and of each the buildings that points are wanted for, it is the reach of these alone.
+    """
+
+    def __init__(self, plan: WorkPlan, only: Mapping[str, Sequence[int]] | None = None):
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
         low, high = bounds[:, :2], bounds[:, 2:]
         # a border on a whole metre belongs to the area: one metre more on the upper sides
@@ -80,7 +84,7 @@ class Reaches:
         self.terrain_boxes = np.hstack([np.floor(low - reach_m), np.ceil(high + reach_m)])
         has_area = np.isfinite(bounds[:, 0])
         self.is_partial = only is not None
-        wanted = plan.tiles if only is None else {tile: plan.tiles[tile] for tile in only}
+        wanted = plan.tiles if only is None else only
         members = {tile: [i for i in own if has_area[i]] for tile, own in wanted.items()}
         self.members = {tile: own for tile, own in members.items() if own}
         self.names = list(self.members)
@@ -104,8 +108,8 @@ class Reaches:
 
 @functools.lru_cache(maxsize=1)
 def reaches_of(root: Path, stamp: int) -> Reaches:
-    """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone, of their tiles."""
-    return Reaches(load_plan(root), tuple(load_redo(root)) or None)
+    """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone, theirs alone."""
+    return Reaches(load_plan(root), load_redo(root) or None)
 
 
 class Gatherer:
@@ -181,8 +185,10 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     root = Path(folder)
     plan, reaches = load_plan(root), reaches_of(root, newest(root / PLAN_FILE, root / REDO))
     gatherer = Gatherer(reaches, plan.settings.read, root / "points", number)
+    noted = noted_file(root, number)
+    found: list[np.ndarray] = []
     try:
-        for cloud in wanted_points(address, reaches, plan.units):
+        for cloud in wanted_points(address, reaches, plan.units, noted, found):
             gatherer.add(cloud)
     except (MemoryError, OutputError):
         raise
@@ -190,6 +196,8 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
         gatherer.discard()
         raise as_input_error(error, address) from error
     gatherer.flush()
+    if found:
+        save_noted(noted, found, read_header(address).count)
     return {"points": gatherer.points, "classes": dict(gatherer.classes)}
 
 
@@ -198,19 +206,26 @@ def newest(*paths: Path) -> int:
     return max(path.stat().st_mtime_ns for path in paths if path.exists())
 
 
-def wanted_points(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
-    """All chunks of a file in `units`; of one with a spatial index only what holds buildings' surroundings."""
+def wanted_points(
+    path: str, reaches: Reaches, units: Units, noted: Path, found: list[np.ndarray] | None = None
+) -> Iterator[PointCloud]:
+    """All chunks of a file in `units`; of one with a spatial index, or where a part of the area is wanted and `noted` is the file
+    that tells where its points lie, only what holds buildings' surroundings. Where it is read from end to end, `found` is
+    told so (noted.py)."""
     if file_kind(path) != "las":
         return iter_points(path, units=units)
-    west, south, _, east, north, _ = read_header(path).bounds
+    header = read_header(path)
+    west, south, _, east, north, _ = header.bounds
     box = units.to_metres(np.array([[west, south], [east, north]], float)).ravel()
     if reaches.is_partial and np.isfinite(box).all() and not reaches.near(box):
         return iter(())
     if is_copc(path):
         return points_by_squares(path, reaches, units)
-    index = read_lax(path)
+    index = read_lax(path) or (load_noted(noted, header.count) if reaches.is_partial else None)
+    if index is None:
+        return iter_points(path, units=units, noted=found)
     boxes = units.from_metres(reaches.bounds.reshape(-1, 2)).reshape(-1, 4)
-    return iter_points(path, runs=None if index is None else index.runs_meeting(boxes), units=units)
+    return iter_points(path, runs=index.runs_meeting(boxes), units=units)
 
 
 def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from .. import stages
+from ..city.noted import noted_file
 from ..city.plan import PLAN_FILE, Job, WorkPlan
 from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
@@ -32,7 +33,8 @@ class RunPoints:
         self.of_job = lru_cache(maxsize=KEPT_BUILDINGS)(self.read_job)
         inputs = run_record(folder).get("inputs") or {}
         self.clouds, self.terrain = [str(cloud) for cloud in inputs.get("clouds") or []], inputs.get("terrain")
-        plan = folder / ".hiproof" / PLAN_FILE
+        self.state = folder / ".hiproof"
+        plan = self.state / PLAN_FILE
         gone = [cloud for cloud in self.clouds if not is_url(cloud) and not Path(cloud).is_file()]
         if not plan.is_file() or not self.clouds:
             self.missing = "no run of `hiproof reconstruct` in this folder: its points are not known, refitting is off"
@@ -77,12 +79,13 @@ class RunPoints:
         return found if len(found) <= most else thin_to_count(stages.distinct(found), most)
 
     def read_tile(self, tile: str) -> Surroundings:
-        """All points that the buildings of a work tile may need; of files with a spatial index only these are read."""
-        reaches = Reaches(self.plan, [tile])
+        """All points that the buildings of a work tile may need; of files of which it is known where their points lie only these are
+        read."""
+        reaches = Reaches(self.plan, {tile: self.plan.tiles[tile]})
         with tempfile.TemporaryDirectory(prefix="hiproof-edit-") as folder:
             for number, cloud in enumerate(self.clouds):
                 gatherer = Gatherer(reaches, self.plan.settings.read, Path(folder) / "points", number)
-                for chunk in wanted_points(cloud, reaches, self.plan.units):
+                for chunk in wanted_points(cloud, reaches, self.plan.units, noted_file(self.state, number)):
                     gatherer.add(chunk)
                 gatherer.flush()
             points = load_points(Path(folder), tile)

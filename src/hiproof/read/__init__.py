@@ -6,6 +6,7 @@ las           LAS, LAZ and COPC: laspy's points
 las_header    whether what such a file says of itself is possible
 geokeys       the height system of its GeoTIFF keys
 copc          nodes of a COPC file that meet a box
+runs          where the points of a file lie, run by run
 lax           LAStools' index beside a file
 ply           PLY files
 text          XYZ, CSV and the like

@@ -22,6 +22,7 @@ from .geokeys import heights_of_keys
 from .las_header import LasFacts, check_all_points, check_points, read_facts
 from .plausible import Implausible
 from .remote import is_url, opened
+from .runs import boxes_of_runs
 
 Chunk = tuple[np.ndarray, np.ndarray | None]  # xyz (n, 3) float64, classification (n,) uint8 or None
 FIELDS = laspy.DecompressionSelection
@@ -87,10 +88,12 @@ def las_chunks(
     chunk_points: int,
     box: tuple[float, float, float, float] | None = None,
     runs: np.ndarray | None = None,
+    noted: list[np.ndarray] | None = None,
 ) -> Iterator[Chunk]:
     """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the box are decoded.
 
-    `runs` (k, 2) of points, [first, end), limit what is read of another file.
+    `runs` (k, 2) of points, [first, end), limit what is read of another file. To `noted` go the boxes (k, 4) of the runs
+    of each chunk (runs.py), of all its points.
     """
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
@@ -99,8 +102,10 @@ def las_chunks(
     with explained(path):
         for record in records(path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()):
             xyz = coordinates(record)
-            check_points(xyz, facts)
-            low, high = np.minimum(low, xyz.min(axis=0)), np.maximum(high, xyz.max(axis=0))
+            lowest, highest = check_points(xyz, facts)
+            low, high = np.minimum(low, lowest), np.maximum(high, highest)
+            if noted is not None:
+                noted.append(boxes_of_runs(xyz))
             yield present(xyz, record, path)
         if runs is None and facts.count:
             check_all_points(low, high, facts)
@@ -134,10 +139,10 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
             raise Implausible("its first record says that it is COPC, and none tells of an octree; it is damaged")
         nodes, record = copc_record(file, facts, facts.octree, box, WANTED)
         xyz = coordinates(record)
-        check_points(xyz, facts)
+        low, high = check_points(xyz, facts)
         check_nodes(xyz, nodes, facts, facts.octree)
         if 0 < len(xyz) == facts.count:
-            check_all_points(xyz.min(axis=0), xyz.max(axis=0), facts)
+            check_all_points(low, high, facts)
         return present(xyz, record, path)
 
 

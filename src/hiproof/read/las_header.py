@@ -15,7 +15,7 @@ from typing import BinaryIO, NamedTuple
 import lazrs
 import numpy as np
 
-from .plausible import MOST_HEIGHT, MOST_PLAN, Implausible
+from .plausible import MOST_HEIGHT, MOST_PLAN, Implausible, bounds_of
 
 HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}  # by minor version
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # by point format, without extra bytes
@@ -274,16 +274,18 @@ def nodes_of_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) 
     return np.concatenate(found)
 
 
-def check_points(xyz: np.ndarray, facts: LasFacts) -> None:
-    """Raise Implausible where decoded points (n, 3) lie outside the header's bounds."""
-    if not len(xyz):
-        return
-    low, high = xyz.min(axis=0), xyz.max(axis=0)
+def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:
+    """The lowest and highest coordinates, (3,) each, of decoded points (n, 3), those of the header where there is none.
+
+    Raises Implausible where points lie outside the header's bounds.
+    """
+    low, high = bounds_of(xyz) if len(xyz) else (facts.mins, facts.maxs)
     if not ((low >= facts.mins - facts.rounding) & (high <= facts.maxs + facts.rounding)).all():
         raise Implausible(
             f"it has points from ({listed(low)}) to ({listed(high)}), outside its header's bounds "
             f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its header or its points are damaged"
         )
+    return low, high
 
 
 def check_all_points(low: np.ndarray, high: np.ndarray, facts: LasFacts) -> None:

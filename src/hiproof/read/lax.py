@@ -11,36 +11,17 @@ A run may hold points of other cells, too. The layout is that of LASlib's lasind
 from __future__ import annotations
 
 import warnings
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import shapely
 
 from ..errors import InputWarning
 from .las import read_las_header
 from .remote import is_url
-
-JOINED_POINTS = 50_000  # LAZ is decoded by chunks of so many: skipping less costs as much as reading on
-
-
-@dataclass(frozen=True)
-class LaxIndex:
-    """`boxes` (c, 4) of the cells (xmin, ymin, xmax, ymax); `runs` (r, 2) of points, [first, end), of cells `cell_of` (r,)."""
-
-    boxes: np.ndarray
-    cell_of: np.ndarray
-    runs: np.ndarray
-
-    def runs_meeting(self, boxes: np.ndarray) -> np.ndarray:
-        """Runs (k, 2) in ascending order that hold every point inside any of `boxes` (m, 4), and others."""
-        cells = shapely.STRtree(shapely.box(*self.boxes.T))
-        met = np.zeros(len(self.boxes), bool)
-        met[cells.query(shapely.box(*boxes.T))[1]] = True
-        return joined(self.runs[met[self.cell_of]])
+from .runs import RunIndex
 
 
-def read_lax(path: str | Path) -> LaxIndex | None:
+def read_lax(path: str | Path) -> RunIndex | None:
     """The index beside the LAS or LAZ file at `path`; None where there is none.
 
     One that cannot be understood, or that tells of another number of points than the file, is left aside with an
@@ -62,7 +43,7 @@ def read_lax(path: str | Path) -> LaxIndex | None:
     return index
 
 
-def parsed(words: np.ndarray) -> tuple[LaxIndex, int]:
+def parsed(words: np.ndarray) -> tuple[RunIndex, int]:
     """The index in a file's words, and how many points its cells hold; ValueError or IndexError for another file."""
     for place, mark in ((0, b"LASX"), (2, b"LASS"), (4, b"LASQ"), (13, b"LASV")):
         if words[place : place + 1].tobytes() != mark:
@@ -80,7 +61,7 @@ def parsed(words: np.ndarray) -> tuple[LaxIndex, int]:
         told, at = told + held, at + 3 + 2 * count
     if not boxes:
         raise ValueError("it has no cells")
-    return LaxIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), told
+    return RunIndex(np.array(boxes), np.concatenate(cell_of), np.concatenate(runs)), told
 
 
 def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
@@ -96,13 +77,3 @@ def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, fl
             (low if index >> 2 * step & 1 + axis else high)[axis] = middle
     blur = 2 * float(np.spacing(np.abs(np.array(root)).max()))
     return float(low[0]) - blur, float(low[1]) - blur, float(high[0]) + blur, float(high[1]) + blur
-
-
-def joined(runs: np.ndarray) -> np.ndarray:
-    """Runs (k, 2) in ascending order, those that overlap or are less than JOINED_POINTS apart made one."""
-    if not len(runs):
-        return runs
-    runs = runs[np.argsort(runs[:, 0], kind="stable")]
-    reached = np.maximum.accumulate(runs[:, 1])
-    first = np.flatnonzero(np.r_[True, runs[1:, 0] - reached[:-1] >= JOINED_POINTS])
-    return np.column_stack([runs[first, 0], np.maximum.reduceat(runs[:, 1], first)])

@@ -18,8 +18,9 @@ from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
 from .crs import described, parse_crs, same_heights, same_horizontal, units_of, vertical_crs
-from .plausible import MOST_HEIGHT, MOST_PLAN, is_plausible
+from .plausible import MOST_HEIGHT, MOST_PLAN, bounds_of, is_plausible
 from .remote import is_url
+from .runs import RUN_POINTS
 
 
 class Reader(NamedTuple):
@@ -43,7 +44,7 @@ READERS = {
 POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
 FORMATS = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
 PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
-CHUNK_POINTS = 250_000  # five of LASzip's own chunks, and 30 MB while they are sorted
+CHUNK_POINTS = 5 * RUN_POINTS  # 30 MB while they are sorted
 
 Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
 
@@ -86,18 +87,19 @@ def iter_points(
     box: Box | None = None,
     runs: np.ndarray | None = None,
     units: Units = METRES,
+    noted: list[np.ndarray] | None = None,
 ) -> Iterator[PointCloud]:
     """Yield the points of one file, at most `chunk_points` (CHUNK_POINTS) at a time, without their CRS: memory stays bounded.
 
     `units` are those of the file's coordinates; the points, and `box`, are in world metres.
 
     Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Of LAS and LAZ only the
-    `runs` (k, 2) of points, [first, end), are read where they are given (see lax.py). Raises InputError as
-    `read_points` does, an empty file excepted, which yields nothing.
+    `runs` (k, 2) of points, [first, end), are read where they are given, and where these lie goes to `noted` (see runs.py).
+    Raises InputError as `read_points` does, an empty file excepted, which yields nothing.
     """
     kind, most = file_kind(path), chunk_points or CHUNK_POINTS
     if kind == "las":
-        chunks = las.las_chunks(path, most, None if box is None else box_in_file(box, units), runs)
+        chunks = las.las_chunks(path, most, None if box is None else box_in_file(box, units), runs, noted)
     else:
         chunks = READERS[kind].chunks(path, most)
     dropped = 0
@@ -129,6 +131,8 @@ def as_input_error(error: Exception, path: str | Path) -> InputError:
 
 def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
     """Raise InputError for finite coordinates (n, 3) that no place on Earth has."""
+    if not len(xyz) or is_plausible(bounds_of(xyz)).all():
+        return
     beyond = ~is_plausible(np.nan_to_num(xyz, posinf=0.0, neginf=0.0))
     if beyond.any():
         point = ", ".join(f"{value:g}" for value in xyz[np.argmax(beyond)])
@@ -149,7 +153,8 @@ def read_header(path: str | Path) -> PointFileHeader:
     count, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
     for cloud in iter_points(path):
         count += len(cloud)
-        low, high = np.minimum(low, cloud.xyz.min(axis=0)), np.maximum(high, cloud.xyz.max(axis=0))
+        lowest, highest = bounds_of(cloud.xyz)
+        low, high = np.minimum(low, lowest), np.maximum(high, highest)
     return PointFileHeader(str(path), (*low.tolist(), *high.tolist()), count)
 
 
