@@ -35,7 +35,6 @@ def draw(service: Service, path: Path) -> None:
         page.keyboard.press("t")
         page.evaluate("() => queue")
         page.fill("#note", "ridge as surveyed")
-        page.evaluate("() => { viewer.distance *= 0.85; viewer.draw(); }")
         page.wait_for_timeout(500)
         page.screenshot(path=path)
         browser.close()

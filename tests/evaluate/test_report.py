@@ -186,3 +186,9 @@ def test_residual_colours_begin_at_their_stops():
 @pytest.mark.parametrize("values", [[], [np.nan], [1.0], [2.0, 2.0]])
 def test_histograms_of_next_to_nothing(values):
     assert histogram(np.array(values), "x", "m").startswith("<figure>")
+
+
+def test_a_histogram_of_one_value_is_told_and_one_that_is_cut_says_so():
+    assert histogram(np.array([0.99998, 1.0]), "IoU", "") == "<figure><figcaption>IoU: 1 for all</figcaption></figure>"
+    assert "and more" in histogram(np.array([*range(100), 1000.0]), "x", "m")
+    assert "and more" not in histogram(np.array([1.0, 2.0, 2.0, 2.0]), "x", "m")

@@ -17,6 +17,8 @@ RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "
 MOST_POINTS = 400  # dots in a small picture; more would cover the model
 WIDTH, HEIGHT = 300, 210  # pixels; three pictures stand side by side on a laptop
 
+NARROWEST = 1e-3  # of all quantities shown, below what they are known by: values so near each other are one
+
 
 def residual_bins(distances: np.ndarray) -> np.ndarray:
     """Index (n,) of the residual colour of each distance in metres."""
@@ -30,8 +32,10 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     heading = f"{title} ({unit})" if unit else title
     if not len(values):
         return f"<figure><figcaption>{escape(heading)}: no figures</figcaption></figure>"
+    if np.ptp(values) < NARROWEST:
+        return f"<figure><figcaption>{escape(heading)}: {short(values.mean())} for all</figcaption></figure>"
     low, high = float(values.min()), float(np.percentile(values, 98))
-    high = max(high, low + 1e-3)
+    high = max(high, low + NARROWEST)
     counts, edges = np.histogram(np.clip(values, low, high), bins=bins, range=(low, high))
     step, top = WIDTH / bins, HEIGHT - 40
     bars = "".join(
@@ -44,7 +48,7 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     x = WIDTH * (np.clip(middle, low, high) - low) / (high - low)
     axis = (
         f'<text x="0" y="{top + 16}">{short(low)}</text>'
-        f'<text x="{WIDTH}" y="{top + 16}" text-anchor="end">{short(high)}</text>'
+        f'<text x="{WIDTH}" y="{top + 16}" text-anchor="end">{short(high)}{" and more" if values.max() > high else ""}</text>'
         f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{top}" class="median"/>'
         f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, mean {short(values.mean())}</text>'
     )

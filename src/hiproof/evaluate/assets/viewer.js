@@ -35,8 +35,14 @@ class Viewer {
     }
     const empty = !isFinite(low[0]);
     this.target = empty ? [0, 0, 0] : low.map((v, k) => (v + high[k]) / 2);
-    this.distance = empty ? 10 : Math.max(8, 0.9 * Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]));
+    this.distance = this.showing(empty ? 0 : Math.hypot(high[0] - low[0], high[1] - low[1], high[2] - low[2]) / 2);
     this.azimuth = -0.6; this.elevation = 0.75;
+  }
+
+  // How far off a scene of this radius fills the canvas: seen aslant it is lower than wide, so a narrow canvas needs more.
+  showing(radius) {
+    const aspect = (this.canvas.clientWidth || 1) / (this.canvas.clientHeight || 1);
+    return Math.max(8, radius * Math.max(1.8, 2.3 / aspect));
   }
 
   // kind: "TRIANGLES", "LINES" or "POINTS"; colours: Uint8Array, four a vertex; the layer returned can be recoloured.

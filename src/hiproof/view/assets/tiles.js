@@ -15,7 +15,7 @@ class TileScene extends Viewer {
   home() {
     if (!this.root) return super.home();
     const { middle, radius } = sphere(this.root);
-    Object.assign(this, { target: middle, distance: Math.max(8, 1.8 * radius), azimuth: -0.6, elevation: 0.75 });
+    Object.assign(this, { target: middle, distance: this.showing(radius), azimuth: -0.6, elevation: 0.75 });
   }
 
   paint() { this.choose(); super.paint(); }
