@@ -36,6 +36,7 @@ from ...errors import FitError
 from ...model import Part, Piece
 from ...primitives.family import name_among
 from ...settings import Settings
+from .agree import agreed
 from .apart import told_apart
 from .clamp import clamped
 from .fit import BuildingFit
@@ -82,7 +83,8 @@ def fit_building(
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
     volumes = told_apart(without_slivers(without_specks(volumes, scene), scene), scene)
     roof = united(volumes, plan, outline, scene)
-    volumes, sides, planes = roof.volumes, roof.sides, roof.planes
+    volumes, sides = roof.volumes, roof.sides
+    planes = agreed(volumes, sides, roof.planes, scene)
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
         part_of(volume, fitted, edges, own, plan, scene, types)

@@ -12,12 +12,12 @@ import shapely
 from ..direction import quarter_gap, support_of
 from .plan import Plan, grid_lines, ring_edges, signed_depth
 
-MOST_DIRECTIONS = 2  # of a building that volumes may follow, the main one first
+MOST_DIRECTIONS = 2  # of a building that volumes may follow along walls, the main one first
 APART_RAD, NEAR_RAD = math.radians(7.0), math.radians(3.0)  # directions differ by more; edges support one within
 LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE = 4.0, 0.06  # of the outline's edges, for a further direction
 RASTER_M, RASTER_CELLS = 0.2, 120  # m of a cell of the outline's depth, and cells a side at most
 MOST_LEAN, LEANS_APART, MOST_LEANS, WALL_M = (
-    0.45,
+    0.6,
     0.035,
     3,
     2.0,
@@ -43,7 +43,11 @@ EDGE_PRICES = EdgePrices(0.7, 0.08, 0.15, 0.5, 0.6, 0.5)  # by the names above: 
 
 
 def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
-    """Angles (rad) of the building's directions from the plan's own, which comes first: those its outline's edges have."""
+    """Angles (rad) of the building's directions from the plan's own, which comes first: those its outline's edges have.
+
+    Between two of them comes a third: where a house bends, its wings end on one line, square to neither, and from there their planes
+    lean to either side.
+    """
     step = np.diff(shapely.get_coordinates(outline.exterior), axis=0) @ plan.frame.rotation.T
     length, angle = np.hypot(step[:, 0], step[:, 1]), np.arctan2(step[:, 1], step[:, 0]) % (math.pi / 2)
     found = [0.0]
@@ -56,7 +60,7 @@ def directions_of(outline: shapely.Polygon, plan: Plan) -> list[float]:
         if support[best] < max(LEAST_SUPPORT_M, LEAST_SUPPORT_SHARE * length.sum()):
             break
         found.append(float(angle[new][best]))
-    return found
+    return [*found, 0.5 * float(quarter_gap(np.array(found[1])))] if len(found) == 2 else found
 
 
 def scene_of(

@@ -19,7 +19,7 @@ from .plan import Plan
 from .scene import Scene
 from .volumes import DIRECTION, U0, V0, V1, with_and_without
 
-LEAN = 0.35  # of a line that a side may take
+LEAN = 0.5  # of a line that a side may take
 GAP_M = 1.0  # how far off it may be, in the middle of the side and at the ends
 ALONG_M, BESIDE_M, SHORTEST_M = 0.12, 6.0, 0.7  # outline so near a line lies along it; edges so far beside carry on
 CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line between corners may be
