@@ -66,3 +66,12 @@ def test_the_shape_is_the_same_far_from_the_origin(seed):
     here, there = alpha_shape(xy), alpha_shape(xy + far)
     assert there.area == pytest.approx(here.area, rel=1e-6)
     assert shapely.transform(there, lambda corners: corners - far).hausdorff_distance(here) < 1e-6
+
+
+@pytest.mark.parametrize("holes", [True, False])
+def test_a_court_is_kept_or_filled(holes):
+    xy = np.stack(np.meshgrid(np.arange(0, 10.1, 0.5), np.arange(0, 10.1, 0.5)), axis=-1).reshape(-1, 2)
+    xy = xy[np.abs(xy - 5.0).max(axis=1) > 2.4]
+    shape = alpha_shape(xy, 1.0, holes=holes)
+    assert len(shape.interiors) == holes
+    assert shape.area == pytest.approx(100 - 25 * holes, abs=2.5)  # corners of the court are rounded off

@@ -34,18 +34,26 @@ def alpha_shape(xy: np.ndarray, radius: float | None = None, holes: bool = False
 
     xy = np.asarray(xy, float).reshape(-1, 2)
     origin = np.floor(xy.mean(axis=0)) if len(xy) else np.zeros(2)
-    xy = xy - origin  # far from the origin rounding lets triangles overlap
+    xy = xy - origin  # far from the origin rounding turns triangles over
     try:
-        triangles = xy[Delaunay(xy).simplices]
+        mesh = Delaunay(xy)
     except (QhullError, ValueError) as error:
         raise FitError(f"expected points that span an area, got {len(xy)} in one place or on one line") from error
-    a, b, c = (np.linalg.norm(triangles[:, i] - triangles[:, j], axis=1) for i, j in ((1, 2), (0, 2), (0, 1)))
-    half = (a + b + c) / 2
-    area = np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 1e-18))
     radius = default_radius(xy) if radius is None else radius
-    kept = triangles[a * b * c / (4 * area) < radius]
-    if len(kept) == 0:
+    kept = circumradii(xy[mesh.simplices]) < radius
+    if not kept.any():
         raise FitError(f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger one")
-    shape = shapely.coverage_union_all(shapely.polygons(kept))
+    outside = np.where(mesh.neighbors < 0, True, ~kept[mesh.neighbors])
+    triangle, opposite = np.nonzero(kept[:, None] & outside)
+    sides = xy[mesh.simplices[triangle[:, None], np.stack([(opposite + 1) % 3, (opposite + 2) % 3], axis=1)]]
+    shape = shapely.build_area(shapely.multilinestrings(sides))
     largest = max(shapely.get_parts(shape), key=lambda polygon: polygon.area)
     return shapely.transform(largest if holes else shapely.Polygon(largest.exterior), lambda corners: corners + origin)
+
+
+def circumradii(triangles: np.ndarray) -> np.ndarray:
+    """The radii (n,) of the circles through the corners of `triangles` (n, 3, 2)."""
+    a, b, c = (np.hypot(*(triangles[:, i] - triangles[:, j]).T) for i, j in ((1, 2), (0, 2), (0, 1)))
+    half = (a + b + c) / 2
+    area = np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 1e-18))
+    return a * b * c / (4 * area)

@@ -1,6 +1,6 @@
 """The outline of a building without a footprint, from its points, as a draughtsman would draw it.
 
-rough   the points' alpha shape, pushed out and with few corners
+rough   the points' alpha shape, pushed out, with few corners and with more
 spread  how evenly points are spread, by which prices go
 soft    how soft a side is
 lines   a polygon as the lines of its sides
@@ -13,6 +13,7 @@ settle  each side to the place that the points across it give it, without the bi
 from __future__ import annotations
 
 import math
+from operator import itemgetter
 
 import numpy as np
 import shapely
@@ -22,7 +23,7 @@ from ..walls import on_walls
 from .cost import Border, Drawing, drawing_of
 from .lines import find_corners, lines_through, quarter_gap
 from .moves import redrawn
-from .rough import rough_outline
+from .rough import rough_outlines
 from .settle import settled
 from .spread import unevenness
 from .steps import RUN, stepped
@@ -44,9 +45,9 @@ STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
     """Outline (a polygon without holes) of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and across.
 
-    With heights, points of walls are known, and the outline runs through them. Where the rough outline has another main direction
-    than `kappa`, that is tried too, and the cheaper drawing taken; without `kappa` it is the only one. Raises FitError for
-    points that span no area.
+    With heights, points of walls are known, and the outline runs through them. It is the cheaper of two drawings, one from few
+    corners on and one from more, along another main direction where the corners have one; without `kappa` both are along theirs.
+    Raises FitError for points that span no area.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12, 0.5), np.arange(0.25, 7, 0.5)))
     >>> outline = estimate_outline(np.column_stack([x, y]))
@@ -54,22 +55,25 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     (4, True)
     """
     points = np.ascontiguousarray(points, float)
-    corners, spacing, shape = rough_outline(points[:, :2])
-    rough = shapely.Polygon(corners)
+    starts, spacing, shape = rough_outlines(points[:, :2])
+    rough = shapely.Polygon(starts[0])
     own = main_direction(rough)
-    directions = [own] if kappa is None else [kappa]
-    if kappa is not None and abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD:
-        directions.append(own)
+    kappa = own if kappa is None else kappa
+    ways = (kappa, own if abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD else kappa)
     wall = on_walls(points, points, spacing) if points.shape[1] > 2 else np.zeros(len(points), bool)
     outer = wall.copy()
     outer[wall] = shapely.dwithin(shape.exterior, shapely.points(points[wall, :2]), OUTER_M)
     density = (~wall).sum() / rough.area
     telling, dearness = ~wall | outer, unevenness(points[~wall, :2], shape, spacing)
-    border = border_of(points[telling, :2], wall[telling], density, dearness)
-    drawings = [drawn(lines_through(corners), angle, border, STEP_SPACINGS * spacing) for angle in directions]
-    place = settled(min(drawings, key=lambda drawing: drawing.cost).lines, points[:, :2], density)
-    corners = np.empty_like(place)
-    find_corners(place, corners)
+    drawings = []
+    for corners, angle in zip(starts, ways, strict=True):
+        border = border_of(turned_back(points[telling, :2], angle), wall[telling], density, dearness)
+        found = drawn(lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * spacing)
+        drawings.append((found.cost, found.lines + [angle, 0.0]))
+    _, lines = min(drawings, key=itemgetter(0))
+    lines = settled(lines, points[:, :2], density)
+    corners = np.empty_like(lines)
+    find_corners(lines, corners)
     return shapely.Polygon(corners)
 
 
@@ -81,9 +85,15 @@ def border_of(xy: np.ndarray, wall: np.ndarray, density: float, dearness: float)
     return Border(x, y, wall[order], density / step, BLUR_M, STRAY, *(dearness * price for price in PRICES))
 
 
-def drawn(lines: np.ndarray, kappa: float, border: Border, step_m: float) -> Drawing:
-    """The cheapest drawing found from `lines` (n, 2) on: few of them at first, then with what breaks them."""
-    drawing = redrawn(drawing_of(lines, kappa, border), border, step_m)
+def turned_back(xy: np.ndarray, angle: float) -> np.ndarray:
+    """Places (n, 2) in axes turned by `angle` (rad): along these a side is near few points only, and what it costs soon known."""
+    c, s = math.cos(angle), math.sin(angle)
+    return xy @ np.array([[c, -s], [s, c]])
+
+
+def drawn(lines: np.ndarray, border: Border, step_m: float) -> Drawing:
+    """The cheapest drawing found from `lines` (n, 2) on, mostly along the axes: few of them at first, then with what breaks them."""
+    drawing = redrawn(drawing_of(lines, 0.0, border), border, step_m)
     for longest in (1, RUN):  # bays of single sides come first: fewer runs go wrong
         drawing = redrawn(stepped(drawing, border, longest), border, step_m)
     return drawing

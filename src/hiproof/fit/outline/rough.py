@@ -1,4 +1,4 @@
-"""A first outline to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners."""
+"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners and with more."""
 
 from __future__ import annotations
 
@@ -11,26 +11,40 @@ from ..alpha_shape import alpha_shape, default_radius
 from .lines import SHARPEST, find_corners, lines_through
 
 NARROWER = 0.8  # of the usual radius of alpha shapes: bays of two spacings stay open
-# spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points, corners dropped
-CLOSING_SPACINGS, PUSH_SPACINGS, SIMPLIFY_SPACINGS = 1.0, 0.5, 0.7
+# spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points
+CLOSING_SPACINGS, PUSH_SPACINGS = 1.0, 0.5
+SIMPLIFY_SPACINGS = (0.7, 0.45)  # spacings of points within which corners are dropped, of few and of more
 COARSER, TRIES = 1.3, 12  # factor between tries at few corners, and how many tries
 MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 
-def rough_outline(xy: np.ndarray) -> tuple[np.ndarray, float, shapely.Polygon]:
-    """Corners (n, 2), counter-clockwise, of a simple polygon about points `xy` (m, 2), no two neighbouring sides parallel;
+def rough_outlines(xy: np.ndarray) -> tuple[list[np.ndarray], float, shapely.Polygon]:
+    """Corners (n, 2), counter-clockwise, of simple polygons about points `xy` (m, 2), no two neighbouring sides parallel, few first;
     the points' spacing (m); and their alpha shape. Raises FitError for points that span no area."""
     shape = alpha_shape(xy, NARROWER * default_radius(xy))
     spacing = math.sqrt(shape.area / len(xy))
     closed = shapely.buffer(shape, CLOSING_SPACINGS * spacing, join_style="mitre")
     closed = largest(shapely.buffer(closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre"))
-    filled = shapely.Polygon(closed.exterior)
+    filled = from_farthest_corner(closed)
+    return [corners_of(filled, spacings * spacing) for spacings in SIMPLIFY_SPACINGS], spacing, shape
+
+
+def corners_of(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray:
+    """Its corners less those within so much of a straight line, or within more where they are too many."""
     for k in range(TRIES):
-        tolerance = SIMPLIFY_SPACINGS * spacing * COARSER**k
-        corners = without_straight_corners(counter_clockwise(largest(shapely.simplify(filled, tolerance))))
+        simple = largest(shapely.simplify(polygon, tolerance_m * COARSER**k))
+        corners = without_straight_corners(counter_clockwise(simple))
         if 3 < len(corners) <= MOST_CORNERS and find_corners(lines_through(corners), np.empty_like(corners)):
-            return corners, spacing, shape
-    return counter_clockwise(shapely.minimum_rotated_rectangle(filled)), spacing, shape
+            return corners
+    return counter_clockwise(shapely.minimum_rotated_rectangle(polygon))
+
+
+def from_farthest_corner(polygon: shapely.Polygon) -> shapely.Polygon:
+    """The polygon without holes, its ring beginning at the corner farthest from its middle, which is one however it is turned:
+    what is simplified keeps its first corner."""
+    ring = counter_clockwise(polygon)
+    first = int(np.argmax(np.hypot(*(ring - shapely.get_coordinates(polygon.centroid)).T)))
+    return shapely.Polygon(np.roll(ring, -first, axis=0))
 
 
 def largest(geometry: shapely.Geometry) -> shapely.Polygon:

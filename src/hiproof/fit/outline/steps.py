@@ -15,6 +15,7 @@ from ...compiled import compiled
 from .cost import changed, cost_at_depth
 from .lines import quarter_gap, replaced, replaced_by
 from .moves import GAIN, TURN_RAD
+from .soft import SURE_BLURS
 
 COLUMN_M, LEVEL_M = 0.25, 0.1  # m; along the side, across it: lines are moved more finely afterwards
 DEEPEST_M, FARTHEST_M = 2.0, 1.5  # levels inwards and outwards of the side; larger bays are the rough outline's
@@ -93,20 +94,23 @@ def along(azimuth, place):
 @compiled
 def column_costs(drawing, border, azimuth, distance, low, width, columns):
     """What each of the `columns` (columns, LEVELS) along a line costs at each level."""
-    costs = np.empty((columns, LEVELS))
+    costs, far_out = np.empty((columns, LEVELS)), cost_at_depth(-SURE_BLURS, False, border.stray)
     for level in range(LEVELS):
         costs[:, level] = border.density * width * (LEVEL_M * level - DEEPEST_M)
+    c, s = math.cos(azimuth), math.sin(azimuth)
     for k in range(len(border.x)):
         x, y, wall = border.x[k], border.y[k], border.wall[k]
-        depth = distance - (x * math.cos(azimuth) + y * math.sin(azimuth))
-        column = math.floor((along(azimuth, (x, y)) - low) / width)
+        depth, column = distance - (x * c + y * s), math.floor((y * c - x * s - low) / width)
         if not 0 <= column < columns or not -FARTHEST_M < depth < DEEPEST_M:
             continue
         if depth < 0.0 and not wall and drawing.own[k] < INSIDE:  # beyond another side
             continue
         for level in range(LEVELS):
             deep = (depth + LEVEL_M * level - DEEPEST_M) / border.blur
-            costs[column, level] += cost_at_depth(deep, wall, border.stray)
+            if wall or abs(deep) < SURE_BLURS:
+                costs[column, level] += cost_at_depth(deep, wall, border.stray)
+            elif deep < 0.0:
+                costs[column, level] += far_out
     return costs
 
 
