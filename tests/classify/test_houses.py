@@ -85,3 +85,13 @@ def test_every_point_of_a_split_cloud_is_one_house_s():
     assert np.array_equal(np.sort(np.concatenate([house.index for house in houses])), np.arange(len(points)))
     assert all(shapely.intersects_xy(house.area, *points[house.index, :2].T).all() for house in houses)
     assert len(split_buildings(cloud, Settings.from_dict({"read": {"split_houses": False}}))) == 1
+
+
+@pytest.mark.parametrize(("width", "count"), [(0.8, 2), (3.0, 1)])
+def test_a_neck_of_returns_joins_no_houses_but_a_wing_does(width, count):
+    area = shapely.union_all([shapely.box(0, 0, 8, 9), shapely.box(10, 0, 18, 9), shapely.box(8, 4, 10, 4 + width)])
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 18, 0.4), np.arange(0.2, 9, 0.4)))
+    xy = np.column_stack([x, y])[shapely.contains_xy(area, x, y)]
+    houses = told_apart(np.column_stack([xy, np.full(len(xy), 6.0)]), area, 1.0)
+    assert len(houses) == count
+    assert sum(house.area for house in houses) == pytest.approx(area.area)

@@ -10,7 +10,7 @@ from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline
 from hiproof.fit.outline.cost import Border, changed, cost_of_change, drawing_of, structure_cost
-from hiproof.fit.outline.lines import dropped, lines_through, replaced, replaced_by
+from hiproof.fit.outline.lines import BACK, dropped, find_corners, lines_through, replaced, replaced_by
 from hiproof.fit.outline.spread import unevenness
 from hiproof.fit.outline.steps import RUN, best_levels, stepped
 from hiproof.fit.walls import on_walls
@@ -128,6 +128,17 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     found = stepped(drawing, border, RUN)
     assert len(found.lines) == 8 and found.cost < drawing.cost
     assert iou(shapely.Polygon(found.corners), truth) > 0.96
+
+
+def test_an_outline_ends_in_no_spike():
+    xy, truth = points_in(shapely.box(0, 0, 14, 8), 8.0, angle=0.0)
+    trail = np.column_stack([np.linspace(14, 20, 13), 8.0 + np.linspace(0.0, 0.4, 13)])
+    outline = estimate_outline(np.concatenate([xy, trail]))
+    azimuth = lines_through(shapely.get_coordinates(shapely.geometry.polygon.orient(outline).exterior)[:-1])[:, 0]
+    assert np.cos(azimuth - np.roll(azimuth, 1)).min() > BACK
+    assert iou(outline, truth) > 0.95
+    spike = np.array([(0, 0), (14, 0), (20, 8.2), (13.8, 7.7), (0, 8)], float)
+    assert not find_corners(lines_through(spike), np.empty_like(spike))
 
 
 def test_levels_of_columns_are_the_cheapest_of_all():

@@ -36,6 +36,7 @@ LEAST_APART, LEAST_GAIN, LEAST_LENGTH_M = (
 )  # of a run: share of stretches that nothing holds; gain a metre
 COARSE = 0.5  # of these two for lines that are not yet in their place
 LEAST_HOUSE_M2, LEAST_DEPTH_M = 25.0, 4.0  # of roof on either side, and by the metre of the cut
+NECK_M = 1.5  # what is narrower joins no houses
 TRIES = 20  # cuts tried of an area, the best first
 LIKE_DEG, LIKE_M = 12.0, 1.0  # degrees and m within which two cuts are one
 # degrees within which edges and slopes support a direction, and between two directions; how many at most; least share of all support
@@ -115,11 +116,26 @@ def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[sh
     """
     origin = np.floor(xyz.min(axis=0))
     surfaces = surfaces_of(xyz - origin)
-    local = shapely.transform(area, lambda xy: xy - origin[:2])
-    houses = houses_in(shapely.buffer(local, gap_m, join_style="mitre"), surfaces, bonds_of(surfaces))
-    if len(houses) == 1:
-        return [area]
-    return [shapely.transform(shapely.intersection(house, local), lambda xy: xy + origin[:2]) for house in houses]
+    bonds, local = bonds_of(surfaces), shapely.transform(area, lambda xy: xy - origin[:2])
+    houses = [
+        shapely.intersection(house, block)
+        for block in without_necks(local, gap_m, surfaces)
+        for house in houses_in(shapely.buffer(block, gap_m, join_style="mitre"), surfaces, bonds)
+    ]
+    return [area] if len(houses) == 1 else [shapely.transform(house, lambda xy: xy + origin[:2]) for house in houses]
+
+
+def without_necks(area: shapely.Geometry, gap_m: float, surfaces: Surfaces) -> list[shapely.Geometry]:
+    """`area` in parts where hardly more than a few returns of what stands between two houses joins them: a gutter, a tree."""
+    wide = shapely.buffer(
+        shapely.buffer(area, 0.5 * gap_m, join_style="mitre"), -0.5 * (gap_m + NECK_M), join_style="mitre"
+    )
+    sides, rest = [], area
+    for part in shapely.get_parts(wide):
+        side = shapely.buffer(part, 0.5 * NECK_M, join_style="mitre")
+        sides.append(shapely.intersection(rest, side))
+        rest = shapely.difference(rest, side)
+    return with_crumbs([*sides, *shapely.get_parts(rest)], surfaces)
 
 
 def houses_in(area: shapely.Geometry, surfaces: Surfaces, bonds: Bonds) -> list[shapely.Geometry]:

@@ -14,6 +14,7 @@ from ...compiled import compiled
 from .. import direction
 
 SHARPEST = 0.15  # sine of the angle between neighbours: lines closer to parallel have no corner to speak of
+BACK = math.cos(math.radians(155.0))  # of the turn at a corner: what ends in a wedge of less than 25 degrees is no roof
 SAME_RAD = 1e-6  # rad; numerically parallel
 
 quarter_gap = compiled(direction.quarter_gap)
@@ -38,7 +39,7 @@ def find_corners(lines, corners, fresh=-1):
     for i in range(fresh):
         before, r_before, after, r_after = lines[i - 1, 0], lines[i - 1, 1], lines[i, 0], lines[i, 1]
         sine = math.sin(after - before)
-        if abs(sine) < SHARPEST:
+        if abs(sine) < SHARPEST or math.cos(after - before) < BACK:
             return False
         corners[i, 0] = (r_before * math.sin(after) - r_after * math.sin(before)) / sine
         corners[i, 1] = (r_after * math.cos(before) - r_before * math.cos(after)) / sine

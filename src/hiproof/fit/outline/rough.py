@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from ..alpha_shape import alpha_shape, default_radius
-from .lines import SHARPEST, find_corners, lines_through
+from .lines import BACK, SHARPEST, find_corners, lines_through
 
 NARROWER = 0.8  # of the usual radius of alpha shapes: bays of two spacings stay open
 # spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points
@@ -59,7 +59,8 @@ def without_straight_corners(corners: np.ndarray) -> np.ndarray:
     """The corners less those at which the outline all but goes straight on, or back, the straightest first."""
     while len(corners) > 4:
         azimuth = lines_through(corners)[:, 0]
-        bend = np.abs(np.sin(azimuth - np.roll(azimuth, 1)))
+        turn = azimuth - np.roll(azimuth, 1)
+        bend = np.where(np.cos(turn) < BACK, 0.0, np.abs(np.sin(turn)))
         if bend.min() > SHARPEST + 0.02:
             break
         corners = np.delete(corners, bend.argmin(), axis=0)
