@@ -18,8 +18,8 @@ from .planes import Cloud, Ghosts, Grid
 
 MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
 # m from the border within which returns may be a facade's; clouds of more points a square metre lose them all, sparser
-# ones those that lie on walls
-BORDER_M, BORDER_MIN_DENSITY = 0.15, 4.0
+# ones those that lie on walls; m for each of these points: a bay half a metre deep must keep some of its few
+BORDER_M, BORDER_MIN_DENSITY, BORDER_M_A_POINT = 0.15, 4.0, 0.02
 LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 # m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
@@ -113,13 +113,15 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
 
 def without_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
     """Points (n, 3) at `depth` (n,) inside an outline less those near its border that a scanner may have had of the walls."""
-    near = depth < BORDER_M
+    density = len(points) / area_m2
+    dense = density >= BORDER_MIN_DENSITY
+    near = depth < (min(BORDER_M, BORDER_M_A_POINT * density) if dense else BORDER_M)
     away = points[~near]
     if len(away) < max(LEAST_AWAY, LEAST_AWAY_SHARE * len(points)):
         return points
-    if len(points) >= BORDER_MIN_DENSITY * area_m2:
+    if dense:
         return away
-    near[near] = on_walls(points[near], points, math.sqrt(area_m2 / len(points)))
+    near[near] = on_walls(points[near], points, 1.0 / math.sqrt(density))
     return points[~near]
 
 
