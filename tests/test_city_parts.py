@@ -136,6 +136,16 @@ def test_the_ledger_remembers_after_being_closed(tmp_path):
     assert reader.counts("type") == {"gable": 1}
 
 
+def test_a_ledger_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypatch):
+    path = tmp_path / "ledger.sqlite"
+    ledger = Ledger(path)
+    ledger.set(merged="yes")
+    ledger.close()
+    monkeypatch.setattr("hiproof.city.ledger.os.access", lambda *_: False)
+    reader = Ledger(path, read_only=True)
+    assert reader.get("merged") == "yes" and list(tmp_path.iterdir()) == [path]
+
+
 @pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["in process", "processes"])
 def test_executors_return_every_task_with_result_or_error(executor):
     got = {task[0]: (result, type(error)) for task, result, error in executor.run(double, [(i,) for i in range(6)])}

@@ -12,7 +12,7 @@ from hiproof.city import run as city_run
 from hiproof.city.ledger import Ledger, Task
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.sort import Gatherer
-from hiproof.errors import OutputError
+from hiproof.errors import InputError, InputWarning, OutputError
 from hiproof.read.thin import thin_to_count, without_repeats
 from hiproof.settings import Settings
 from hiproof.write import files as output_files
@@ -108,6 +108,16 @@ def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(town_files, tm
     with pytest.raises(OutputError, match="--restart"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
     assert reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True)).buildings == 4
+
+
+def test_files_without_points_are_said_and_harm_none(town_files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    empty = str(write_cloud(tmp_path / "empty.laz", np.zeros((0, 3)), np.zeros(0, np.uint8)))
+    with pytest.raises(InputError, match=r"expected points in .*empty\.laz, got none"):
+        reconstruct_area(Request((empty,), tmp_path / "none", town_files[1]))
+    with pytest.warns(InputWarning, match=r"empty\.laz: holds no points"):
+        reconstruct_area(Request((empty, town_files[0]), tmp_path / "out", town_files[1]))
+    assert by_id(tmp_path / "out") == by_id(undisturbed)
 
 
 def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_path, monkeypatch):

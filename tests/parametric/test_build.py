@@ -176,7 +176,11 @@ def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"hiproof_parameters": 1}\n\n{"id": "a", "parts": [}\n', r"line 3 of .* column 23 .*beside"),
+        ('{"hiproof_parameters": 1}\n\n{"id": "a", "parts": [}\n', r"line 3 of .* column 23 .*beside.*mend it there"),
+        (
+            '{"hiproof_parameters": 1}\n{"id": "a",\n "parts": []}\n',
+            r"line 2 of .* column 12 .*an object stands on one line",
+        ),
         ('{"hiproof_parameters": 2}\n', "version 1 .* got version 2"),
         ('{"id": "a"}\n', "first line"),
         ("", "first line"),

@@ -19,6 +19,7 @@ from hiproof.settings import Settings
 
 pytestmark = pytest.mark.filterwarnings("ignore:'crs' was not provided", "ignore:invalid value encountered")
 SQUARE = shapely.box(85000, 446000, 85010, 446010)
+RD, UTM31, UTM32, WGS84 = (CRS.from_epsg(code) for code in (28992, 25831, 25832, 4326))
 HOLED = shapely.Polygon(SQUARE.exterior, [[(85002, 446002), (85004, 446002), (85004, 446004), (85002, 446004)]])
 
 
@@ -105,8 +106,10 @@ def test_ids_come_from_a_usual_attribute_without_gaps_or_repeats(tmp_path):
     geometries = [SQUARE, shifted(SQUARE, 20)]
     path = write(tmp_path / "a.gpkg", geometries, id=twins, Identificatie=np.array([7.0, 9.0]))
     assert [f.id for f in read_footprints(path)] == ["7", "9"]
-    path = write(tmp_path / "b.gpkg", geometries, id=twins)
-    assert [f.id for f in read_footprints(path)] == ["1", "2"]
+    for name, ids in (("b", twins), ("c", np.array(["x", " "], object)), ("d", np.array([None, "x"], object))):
+        path = write(tmp_path / f"{name}.gpkg", geometries, id=ids)
+        with pytest.warns(InputWarning, match="id repeats or is missing, so buildings go by their number"):
+            assert [f.id for f in read_footprints(path)] == ["1", "2"]
 
 
 def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
@@ -184,7 +187,6 @@ def moved(xy, source, target):
     return np.column_stack(Transformer.from_crs(source, target, always_xy=True).transform(*xy.T))
 
 
-RD, UTM31, UTM32, WGS84 = (CRS.from_epsg(code) for code in (28992, 25831, 25832, 4326))
 HERE = np.array([[85005.0, 446005.0], [85035.0, 446005.0]])
 IN_UTM = moved(HERE, RD, UTM31)
 SLIPS = {
@@ -236,6 +238,15 @@ def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
 def test_coordinates_far_from_where_their_crs_is_used_are_told(code, xy, expected):
     told = doubtful_place(CRS.from_epsg(code), xy)
     assert told is None if expected is None else expected in told
+
+
+@pytest.mark.parametrize("crs", [None, "EPSG:28992"])
+def test_footprints_in_degrees_that_name_another_crs_are_refused(crs, tmp_path):
+    path = write(tmp_path / "a.gpkg", [shapely.box(4.36, 51.99, 4.3602, 51.9901)], crs)
+    with pytest.raises(
+        InputError, match=r"a\.gpkg, which names .*, in metres, got .* look like degrees; name their CRS"
+    ):
+        read_footprints(path, target_crs=RD)
 
 
 def test_what_names_no_crs_and_counts_in_degrees_is_refused():

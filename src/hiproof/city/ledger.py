@@ -6,6 +6,7 @@ while the run writes. Only the main process writes; a row changes after its task
 
 from __future__ import annotations
 
+import os
 import sqlite3
 import time
 from collections.abc import Iterable
@@ -65,6 +66,14 @@ class Claim(NamedTuple):
     digest: str
 
 
+def how_to_look(path: Path) -> str:
+    """How SQLite is to open a ledger that is only read. It wants to make a file beside one in WAL mode: where another person's folder
+    allows none, and no run is at work, the ledger is read as it stands."""
+    beside = path.with_name(path.name + "-wal")
+    at_rest = not beside.exists() or beside.stat().st_size == 0
+    return "?mode=ro&immutable=1" if at_rest and not os.access(path.parent, os.W_OK) else "?mode=ro"
+
+
 TABLES = ("run", "task", "building", "override", "output")
 
 
@@ -75,7 +84,7 @@ class Ledger:
     """
 
     def __init__(self, path: Path, read_only: bool = False):
-        address = Path(path).absolute().as_uri() + ("?mode=ro" if read_only else "")
+        address = Path(path).absolute().as_uri() + (how_to_look(Path(path)) if read_only else "")
         self.database = sqlite3.connect(address, uri=True, isolation_level=None, timeout=60)
         if not read_only:
             self.database.execute("pragma journal_mode=wal")

@@ -71,8 +71,8 @@ def most_buildings_a_tile(settings: Settings) -> int:
 
 
 def read_headers(clouds: tuple[str, ...]) -> list:
-    """Headers of the readable point files; one unreadable file does not end the run."""
-    from ..read.pointcloud import as_input_error, read_header
+    """Headers of the point files that can be read and hold points; one that does not ends no run."""
+    from ..read.pointcloud import and_others, as_input_error, read_header
 
     headers, errors = [], []
     for name in clouds:
@@ -82,9 +82,12 @@ def read_headers(clouds: tuple[str, ...]) -> list:
             raise
         except Exception as error:
             errors.append(as_input_error(error, name))
-    if not headers:
-        raise errors[0]
-    return headers
+    empty = [header.path for header in headers if not header.count]
+    if len(empty) == len(headers):
+        raise errors[0] if errors else InputError(f"expected points in {', '.join(empty)}, got none; check the files")
+    if empty:
+        warnings.warn(f"{empty[0]}{and_others(empty)}: holds no points", InputWarning)
+    return [header for header in headers if header.count]
 
 
 def jobs_from_footprints(request, headers: list, frame) -> tuple[Job, ...]:

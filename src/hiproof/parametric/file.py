@@ -46,11 +46,13 @@ def objects(file: Any, path: str | os.PathLike) -> Iterator[tuple[int, Any]]:
     for number, line in enumerate(file, 1):
         if line.strip():
             try:
-                yield number, json.loads(line)
+                yield number, json.loads(line.rstrip())
             except json.JSONDecodeError as error:
+                is_cut = error.pos >= len(line.rstrip())
                 raise InputError(
                     f"expected a JSON object in line {number} of {os.fspath(path)}, got a syntax error at column "
-                    f"{error.colno} ({error.msg}), beside {around(line, error.pos)!r}; mend it there"
+                    f"{error.colno} ({error.msg}), beside {around(line, error.pos)!r}; "
+                    + ("an object stands on one line" if is_cut else "mend it there")
                 ) from error
             except (ValueError, RecursionError) as error:  # a number of 5,000 digits, nested without end
                 raise InputError(

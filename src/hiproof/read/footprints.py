@@ -198,28 +198,38 @@ def feature_ids(
                 f"expected the attribute {id_attribute!r} in {path}, got {', '.join(names.values()) or 'none at all'}; "
                 "name one of these with --id-attribute"
             )
-        missing = sum(name not in row for row in rows)
+        ids = [id_text(row.get(name)) for row in rows]
+        missing = ids.count("")
         if missing:
             warnings.warn(f"{path}: {missing} features have no {name}; they go by their number", InputWarning)
-        return [id_text(row.get(name, number)) for row, number in zip(rows, by_number, strict=True)]
-    for usual in ID_NAMES:
-        name = names.get(usual)
-        if name and all(name in row for row in rows) and len({id_text(row[name]) for row in rows}) == len(rows):
-            return [id_text(row[name]) for row in rows]
+        return [id or number for id, number in zip(ids, by_number, strict=True)]
+    usual = [names[name] for name in ID_NAMES if name in names]
+    for name in usual:
+        ids = [id_text(row.get(name)) for row in rows]
+        if all(ids) and len(set(ids)) == len(ids):
+            return ids
+    if usual:
+        warnings.warn(
+            f"{path}: {usual[0]} repeats or is missing, so buildings go by their number; --id-attribute {usual[0]} takes it all the same",
+            InputWarning,
+        )
     return by_number
 
 
 def id_text(value: Any) -> str:
-    """An id as text; whole numbers that a format stores as floats lose their decimal point."""
+    """An id as text, empty where there is none; whole numbers that a format stores as floats lose their decimal point."""
+    if value is None or not str(value).strip():
+        return ""
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
 def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path) -> np.ndarray:
     """Geometries in plan in the target CRS. Raises InputError where that is impossible or leads to no numbers."""
     geometries = shapely.force_2d(geometries)
-    if source is None:
+    if source is None or source.is_projected:
         advice = "name their CRS in the file (`ogr2ogr -a_srs EPSG:4326`), or reproject them"
-        refuse_degrees(shapely.bounds(geometries), f"the footprints of {path}, which names no CRS,", advice)
+        named = "no CRS" if source is None else described(source)
+        refuse_degrees(shapely.bounds(geometries), f"the footprints of {path}, which names {named},", advice)
     if source is None and target is not None:
         warnings.warn(f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning)
     if source is None or target is None or same_horizontal(source, target):
