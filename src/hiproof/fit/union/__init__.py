@@ -18,6 +18,7 @@ apart       volumes that show in several places
 sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
 unite       volumes that only skewed walls keep apart, made one
+agree       planes, slopes, ridges and eaves that volumes have in common
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
 larger      saw-teeth and gambrels put together

@@ -20,7 +20,7 @@ from .scene import Scene
 from .volumes import DIRECTION, U0, V0, V1, with_and_without
 
 LEAN = 0.5  # of a line that a side may take
-GAP_M = 1.0  # how far off it may be, in the middle of the side and at the ends
+GAP_M = 1.0  # how far off it may be in the middle of the side; a line that leans is further off at its ends
 ALONG_M, BESIDE_M, SHORTEST_M = 0.12, 6.0, 0.7  # outline so near a line lies along it; edges so far beside carry on
 CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line between corners may be
 SHARED_M = 0.3  # m within which a side takes its neighbour's line
@@ -211,12 +211,7 @@ def may_be_side(lines, m, at, low, high):
         near = last > low - BESIDE_M and first < high + BESIDE_M
     else:
         near = first > low - CHORD_END_M and last < high + CHORD_END_M
-    if not near:
-        return False
-    for y in (0.5 * (low + high), min(max(first, low), high), min(max(last, low), high)):
-        if abs(start + lean * y - at) >= GAP_M:
-            return False
-    return True
+    return near and abs(start + lean * 0.5 * (low + high) - at) < GAP_M
 
 
 @compiled
