@@ -21,6 +21,8 @@ from .sides import Side
 from .volumes import DIRECTION, LEVEL, PARAMETER_COST, SIDES, roof_heights
 
 NEAR_M = 0.2  # heights further apart are not tried as one
+# m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
+LEVELLED_M, SIGMAS = 0.01, 2.5
 SLACK = 0.004  # of the points of both: what agreeing may leave unexplained besides the parameters it saves
 RIDGE = 1e-9  # of the mean diagonal of the normal equations: what no point tells stays as it was
 LEVEL_FALL = 1e-9  # rise over run; numerically level
@@ -61,22 +63,31 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
         return planes
     known = list(members.values())
     start = unknowns_of(known)
-    held, best = np.zeros((0, len(start))), None
-    for _, two, equation in sorted(likely(known, start), key=lambda one: one[0]):
+    nearly = sorted(likely(known, start), key=lambda one: one[0])
+    if not nearly:
+        return planes
+    held = np.zeros((0, len(start)))
+    best = free = fitted(known, held, start, scene)
+    for gap, two, equation in nearly:
         saved = int(np.linalg.matrix_rank(equation @ null_space(held), tol=HELD))
-        if saved == 0:
+        if saved == 0 or (gap > LEVELLED_M and not may_hold(equation, start, free.covariance)):
             continue
-        best = best or fitted(known, held, start, scene)
         found = fitted(known, np.vstack([held, equation]), start, scene)
         spared = scene.evidence * PARAMETER_COST * saved + SLACK * sum(known[k].points.shape[1] for k in two)
         if found.cost <= best.cost + spared:
             held, best = np.vstack([held, equation]), found
-    if best is None or len(held) == 0:
+    if len(held) == 0:
         return planes
     agreed_planes = list(planes)
     for k, member, rows in zip(members, known, best.rows, strict=True):
         agreed_planes[k] = replace(planes[k], rows=rows, design=member.own, covariance=best.covariance)
     return agreed_planes
+
+
+def may_hold(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray) -> bool:
+    """Whether `equation` (m, p) is no further from holding than the points leave open."""
+    sigma = np.sqrt(np.clip(np.einsum("ij,jk,ik->i", equation, covariance, equation), 0.0, None))
+    return bool((np.abs(equation @ unknowns) < SIGMAS * sigma).all())
 
 
 def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> dict[int, Member]:

@@ -19,7 +19,7 @@ from .planes import Cloud, Ghosts, Grid
 MIN_STRUCTURE_POINTS = 4  # points; with fewer a building is one level block at their median
 # m from the border within which returns may be a facade's; clouds of more points a square metre lose them all, sparser
 # ones those that lie on walls; m for each of these points: a bay half a metre deep must keep some of its few
-BORDER_M, BORDER_MIN_DENSITY, BORDER_M_A_POINT = 0.15, 4.0, 0.02
+BORDER_M, BORDER_MIN_DENSITY, BORDER_M_A_POINT = 0.15, 4.0, 0.025
 LEAST_AWAY, LEAST_AWAY_SHARE = 8, 0.5  # points further in, and of all; with fewer none is lost
 COVERED_SHARE = 0.8  # of the outline that points usually cover, when density is told from area
 # m within which lines of the grid are one; m of a cell, in spacings of points where these are larger; cells a side at most
