@@ -15,10 +15,20 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .finish import FEWEST_POINTS, ROUNDS, SIGN, Planes, cost_of, normal_equations, proper, weighted_moments
+from .finish import (
+    FEWEST_POINTS,
+    ROUNDS,
+    SIGN,
+    Planes,
+    cost_of,
+    normal_equations,
+    proper,
+    shown_points,
+    weighted_moments,
+)
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, LEVEL, PARAMETER_COST, SIDES, roof_heights
+from .volumes import DIRECTION, LEVEL, PARAMETER_COST, SIDES
 
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
@@ -92,10 +102,7 @@ def may_hold(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray)
 
 def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> dict[int, Member]:
     """The volumes whose planes points tell, by their number."""
-    n = scene.n
-    U, V = np.ascontiguousarray(scene.U[:, :n]), np.ascontiguousarray(scene.V[:, :n])
-    _, top = roof_heights(volumes, U, V)
-    shown = [np.nonzero(top == k)[0] for k in range(len(volumes))]
+    shown = shown_points(volumes, scene)
     free = [k for k, own in enumerate(planes) if own.design.shape[2] and len(shown[k]) >= FEWEST_POINTS]
     size, start, found = sum(planes[k].design.shape[2] for k in free), 0, {}
     for k in free:
@@ -106,10 +113,10 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         c, s = scene.turn[direction]
         common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
         one = np.ones(len(shown[k]))
-        points = np.stack([U[direction][shown[k]], V[direction][shown[k]], scene.z[shown[k]]])
+        points = np.stack([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
         z = rows @ np.stack([points[0], points[1], one])
         plane = np.argmin(np.where(np.isfinite(z), z, np.inf), axis=0)
-        places = np.stack([U[0][shown[k]], V[0][shown[k]], one])
+        places = np.stack([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
         found[k] = Member(rows, own, common, points, places, plane, sides[k])
     return found
 

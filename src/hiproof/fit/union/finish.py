@@ -60,12 +60,17 @@ class Planes:
 
 def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene) -> list[Planes]:
     """The planes of every volume, in its direction's axes."""
+    return [
+        finished_volume(volume, own, scene, members)
+        for volume, own, members in zip(volumes, sides, shown_points(volumes, scene), strict=True)
+    ]
+
+
+def shown_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
+    """The points (m,) over which each volume shows, by their numbers."""
     n = scene.n
     _, top = roof_heights(volumes, np.ascontiguousarray(scene.U[:, :n]), np.ascontiguousarray(scene.V[:, :n]))
-    return [
-        finished_volume(volume, own, scene, np.nonzero(top == k)[0])
-        for k, (volume, own) in enumerate(zip(volumes, sides, strict=True))
-    ]
+    return [np.nonzero(top == k)[0] for k in range(len(volumes))]
 
 
 def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members: np.ndarray) -> Planes:
