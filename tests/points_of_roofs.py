@@ -1,6 +1,7 @@
 """Roofs and points for the tests of fitting, drawn from seeded generators."""
 
 import numpy as np
+import shapely
 
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.contract import HALF_LENGTH, HALF_WIDTH
@@ -28,3 +29,12 @@ def points_on(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=0,
     outlier = rng.random(len(points)) < outlier_share
     points[outlier] = rng.uniform(points.min(axis=0) - 1, points.max(axis=0) + 1, (outlier.sum(), 3))
     return points
+
+
+def sampled(height, outline, density=8.0, noise=0.03, seed=0):
+    """Points (n, 3) at random over `outline` on the surface `height(x, y)`."""
+    rng = np.random.default_rng(seed)
+    x0, y0, x1, y1 = outline.bounds
+    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
+    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    return np.column_stack([xy, height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, noise, len(xy))])

@@ -10,15 +10,7 @@ from hiproof.fit import fit_roof
 from hiproof.fit.union import fit_building
 from hiproof.model import Roof
 from hiproof.settings import Settings
-
-
-def sampled(height, outline, density=8.0, noise=0.03, seed=0):
-    """Points (n, 3) at random over `outline` on the surface `height(x, y)`."""
-    rng = np.random.default_rng(seed)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
-    return np.column_stack([xy, height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, noise, len(xy))])
+from points_of_roofs import sampled
 
 
 def gable_with_shed(x, y):

@@ -6,17 +6,9 @@ import shapely
 
 from hiproof.fit.union import fit_building
 from hiproof.model import Roof
+from points_of_roofs import sampled
 
 L_SHAPE = shapely.Polygon([(0, 0), (14, 0), (14, 6), (6, 6), (6, 15), (0, 15)])
-
-
-def sampled(height, outline, density=10.0, noise=0.02, seed=0):
-    """Points (n, 3) at random over `outline` on the surface `height(x, y)`."""
-    rng = np.random.default_rng(seed)
-    x0, y0, x1, y1 = outline.bounds
-    xy = rng.uniform((x0, y0), (x1, y1), (int(density * (x1 - x0) * (y1 - y0)), 2))
-    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
-    return np.column_stack([xy, height(xy[:, 0], xy[:, 1]) + rng.normal(0.0, noise, len(xy))])
 
 
 def two_wings(lower):
@@ -39,7 +31,7 @@ def tops(fit):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_wings_of_one_height_have_one_ridge_height(seed):
-    fit = fit_building(sampled(two_wings(0.0), L_SHAPE, seed=seed), L_SHAPE)
+    fit = fit_building(sampled(two_wings(0.0), L_SHAPE, 10.0, 0.02, seed), L_SHAPE)
     low, high = tops(fit)
     assert high - low < 1e-4
     assert high == pytest.approx(8.0, abs=0.05)
@@ -47,7 +39,7 @@ def test_wings_of_one_height_have_one_ridge_height(seed):
 
 @pytest.mark.parametrize("lower", [0.15, 0.4])
 def test_wings_of_two_heights_keep_them(lower):
-    low, high = tops(fit_building(sampled(two_wings(lower), L_SHAPE), L_SHAPE))
+    low, high = tops(fit_building(sampled(two_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE))
     assert high - low == pytest.approx(lower, abs=0.04)
 
 
@@ -74,7 +66,7 @@ def bent(angle_deg):
 @pytest.mark.parametrize("angle", [20.0, 32.0, 44.0])
 def test_a_bent_house_is_two_wings_that_meet_on_one_line(angle):
     outline, height = bent(angle)
-    fit = fit_building(sampled(height, outline, 8.0), outline)
+    fit = fit_building(sampled(height, outline, 8.0, 0.02), outline)
     assert [part.type for part in fit.roof_parts] == ["gable", "gable"]
     xy = shapely.get_coordinates(shapely.intersection(outline.buffer(-0.1), shapely.MultiPoint(grid_over(outline))))
     error = Roof(fit.roof_parts, fit.outline, None).height_at(xy) - height(xy[:, 0], xy[:, 1])
