@@ -17,6 +17,7 @@ import numpy as np
 
 from .finish import (
     FEWEST_POINTS,
+    LEVEL_SLACK,
     ROUNDS,
     SIGN,
     Planes,
@@ -33,7 +34,6 @@ from .volumes import DIRECTION, LEVEL, PARAMETER_COST, SIDES
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
 LEVELLED_M, SIGMAS = 0.01, 2.5
-SLACK = 0.004  # of the points of both: what agreeing may leave unexplained besides the parameters it saves
 RIDGE = 1e-9  # of the mean diagonal of the normal equations: what no point tells stays as it was
 LEVEL_FALL = 1e-9  # rise over run; numerically level
 HELD = 1e-6  # an equation that the others leave so little of holds by them
@@ -83,7 +83,7 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
         if saved == 0 or (gap > LEVELLED_M and not may_hold(equation, start, free.covariance)):
             continue
         found = fitted(known, np.vstack([held, equation]), start, scene)
-        spared = scene.evidence * PARAMETER_COST * saved + SLACK * sum(known[k].points.shape[1] for k in two)
+        spared = scene.evidence * PARAMETER_COST * saved + LEVEL_SLACK * sum(known[k].points.shape[1] for k in two)
         if found.cost <= best.cost + spared:
             held, best = np.vstack([held, equation]), found
     if len(held) == 0:
