@@ -15,6 +15,7 @@ import shapely
 
 from ..compiled import compiled
 from ..fit.direction import quarter_gap, support_of
+from ..rings import GRID_M
 from .surfaces import Surfaces, surfaces_of
 
 REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
@@ -352,4 +353,4 @@ def with_crumbs(sides: list[shapely.Geometry], surfaces: Surfaces) -> list[shape
 
 def joined(areas: list[shapely.Geometry]) -> shapely.Geometry:
     """The union of polygons that share nothing but border."""
-    return shapely.union_all(areas) if len(areas) > 1 else areas[0]
+    return shapely.union_all(areas, grid_size=GRID_M) if len(areas) > 1 else areas[0]

@@ -11,6 +11,7 @@ import shapely
 from ..model import ROOF, Fit, Quality, Solid
 from ..read.cell_kernel import cell_keys
 from ..read.thin import cell_range, occupied_cells
+from ..rings import GRID_M
 from .distance import point_surface_distances, surface_and_vertical_distances
 
 NEAR_M = 0.2
@@ -46,7 +47,7 @@ def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
         shapely.polygons(outer[:, :2], holes=[shapely.linearrings(hole[:, :2]) for hole in holes] or None)
         for outer, *holes in roof_polygons(model)
     ]
-    return shapely.union_all([p if p.is_valid else p.buffer(0) for p in polygons])
+    return shapely.union_all([p if p.is_valid else p.buffer(0) for p in polygons], grid_size=GRID_M)
 
 
 def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:

@@ -21,7 +21,8 @@ unite       volumes that only skewed walls keep apart, made one
 agree       planes, slopes, ridges and eaves that volumes have in common
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
-larger      saw-teeth and gambrels put together
+teeth       rows of equal monopitches as saw-teeth
+larger      gambrels put together
 own         shapes of your own in place of neighbours
 shown       parts that show nowhere go
 clamp       no height far beyond those of the points
@@ -47,7 +48,7 @@ from .objective import base_shows
 from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
-from .regions import polygons_of, regions_of
+from .regions import places_of, polygons_of, regions_of
 from .search import find_volumes
 from .shown import that_show
 from .slivers import without_slivers, without_specks
@@ -88,9 +89,7 @@ def fit_building(
     planes = agreed(volumes, sides, roof.planes, scene)
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
-        part_of(volume, fitted, edges, own, plan, scene, types)
-        for volume, fitted, edges, own in zip(volumes, planes, sides, regions, strict=True)
-        if own
+        part_of(volumes[k], planes[k], sides[k], own, plan, scene, types) for k, own in places_of(regions, outline)
     ]
     parts = that_show(parts, plan, scene)
     parts = in_own_shapes(put_together(parts, types), points_local, settings)

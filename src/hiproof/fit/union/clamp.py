@@ -8,7 +8,8 @@ import numpy as np
 import shapely
 
 from ...model import Part, Piece
-from .regions import GRID_M, polygons_of
+from ...rings import GRID_M
+from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
 
@@ -26,7 +27,8 @@ def clamped_part(part: Part, low: float, high: float) -> list[Part]:
         if z.min() >= low and z.max(axis=0).min() <= high:
             kept.append(piece)
             continue
-        sunken = shapely.union_all([half_plane([0.0, 0.0, low] - plane, piece.outline) for plane in piece.planes])
+        beneath_low = [half_plane([0.0, 0.0, low] - plane, piece.outline) for plane in piece.planes]
+        sunken = shapely.union_all(beneath_low, grid_size=GRID_M)
         risen = shapely.intersection_all(
             [half_plane(plane - [0.0, 0.0, high], piece.outline) for plane in piece.planes]
         )

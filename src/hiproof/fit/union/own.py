@@ -15,8 +15,9 @@ from ...model import Part, Piece
 from ...primitives.catalogue import CATALOGUE
 from ...primitives.contract import Primitive
 from ...primitives.family import COMPONENTS
+from ...rings import GRID_M
 from ...settings import Settings
-from .regions import GRID_M, polygons_of
+from .regions import polygons_of
 
 MOST_PARTS = 3  # that one shape may take the place of
 RECTANGULAR = 0.9  # share of the smallest rectangle around them that the parts roof together

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 import shapely
 
+from ...rings import GRID_M
 from .finish import Planes
 from .plan import Plan
 from .scene import Scene
 from .sides import Side, corners_of
 from .volumes import DIRECTION, LEVEL, OFFSET, REPLACES, U0, V1
 
-GRID_M = 1e-6  # of the polygons' coordinates: overlays of snapped polygons do not fail
 THICK_M = 0.25  # a gap may be the base's where a disc of this radius fits
 SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
+# of the base apart from the rest of it, from which on that is a part; of what lies between, that is roofed where it runs on
+PLACE_M2, ROOFED = 1.0, 0.5
 SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
 
 
@@ -43,6 +47,29 @@ def regions_of(
             regions[0] = [q for p in regions[0] for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
         regions.append(polygons_of(own))
     return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, quads, outline, plan, scene)
+
+
+def places_of(
+    regions: list[list[shapely.Polygon]], outline: shapely.Polygon
+) -> Iterator[tuple[int, list[shapely.Polygon]]]:
+    """Which volume roofs which polygons, each to be one part: what lies apart of the base are several, such as two wings."""
+    places: list[list[shapely.Polygon]] = []
+    for polygon in sorted(polygons_of(shapely.union_all(regions[0], grid_size=GRID_M)), key=lambda p: -p.area):
+        alike = places if polygon.area < PLACE_M2 else (own for own in places if runs_on(own[0], polygon, outline))
+        own = next(iter(alike), None)
+        if own is None:
+            places.append([polygon])
+        else:
+            own.append(polygon)
+    yield from ((0, own) for own in places)
+    yield from ((k, own) for k, own in enumerate(regions) if k > 0 and own)
+
+
+def runs_on(one: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polygon) -> bool:
+    """Whether a roof may run on from one place to another under what stands between, and not across a yard."""
+    both = shapely.union(one, other, grid_size=GRID_M)
+    between = shapely.difference(shapely.convex_hull(both), both)
+    return shapely.intersection(between, outline).area > ROOFED * between.area
 
 
 def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> shapely.Polygon:
@@ -85,13 +112,15 @@ def gaps_filled(
     scene: Scene,
 ) -> list[list]:
     """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
-    rest = shapely.difference(outline, shapely.union_all(quads[1:]), grid_size=GRID_M)
+    rest = shapely.difference(outline, shapely.union_all(quads[1:], grid_size=GRID_M), grid_size=GRID_M)
     xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
     for gap in polygons_of(rest):
         near, shared, k, q = shares_most(gap, [[], *regions[1:]])
         if shared > 0.0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], xy, plan, scene)):
             merged = polygons_of(
-                shapely.intersection(shapely.union_all([regions[k][q], near]), outline, grid_size=GRID_M)
+                shapely.intersection(
+                    shapely.union_all([regions[k][q], near], grid_size=GRID_M), outline, grid_size=GRID_M
+                )
             )
             if len(merged) == 1:
                 regions[k][q] = merged[0]
@@ -99,7 +128,7 @@ def gaps_filled(
                     p for own in regions[0] for p in polygons_of(shapely.difference(own, near, grid_size=GRID_M))
                 ]
                 continue
-        if not regions[0] or not shapely.covers(shapely.union_all(regions[0]).buffer(1e-3), gap):
+        if not regions[0] or not shapely.covers(shapely.union_all(regions[0], grid_size=GRID_M).buffer(1e-3), gap):
             regions[0].append(gap)
     return regions
 

@@ -9,8 +9,9 @@ import numpy as np
 import shapely
 
 from ...model import Part, Piece
+from ...rings import GRID_M
 from .plan import Plan
-from .regions import GRID_M, polygons_of, shares_most
+from .regions import polygons_of, shares_most
 from .scene import Scene, nodes
 
 BORDER_M = 0.1  # a part shows that is the highest somewhere so far inside the outline
@@ -40,8 +41,8 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
         return None
     for sliver in bare:
         near, _, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
-        grown = shapely.union(pieces[k][q].outline, shapely.intersection(near, own), grid_size=GRID_M)
-        merged = polygons_of(shapely.union(grown, sliver, grid_size=GRID_M))
+        seam = polygons_of(shapely.intersection(near, own, grid_size=GRID_M))
+        merged = polygons_of(shapely.union_all([pieces[k][q].outline, *seam, sliver], grid_size=GRID_M))
         if len(merged) != 1:
             return None
         pieces[k][q] = Piece(merged[0], pieces[k][q].planes)

@@ -1,0 +1,247 @@
+"""Rows of equal monopitches as saw-teeth ("shed").
+
+Where a tooth ends is seen only by the points beside a step as high as the tooth. That all are alike tells it better: planes of one
+slope so far apart have teeth so wide.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import shapely
+
+from ...model import Part, Piece
+from ...primitives import get
+from ...primitives.shed import TEETH
+from ...rings import GRID_M
+from .regions import polygons_of
+from .shown import with_slivers
+
+# rise over run; m; share of a size; rad: within which teeth, or the halves of a gambrel, are alike
+SLOPE_ALIKE, HEIGHT_ALIKE_M, SIZE_ALIKE, TURN_ALIKE_RAD = 0.05, 0.25, 0.2, 0.03
+UNEVEN_M = 0.1  # heights of teeth, were they equally wide, that differ by more: they are not
+NEARLY, GRID_STEP_M = 0.8, 0.4  # of a tooth's area, at places so close, that a part must show as
+# m within which a row ends at a wall of the roof, of its length that must, and m between parts that are beside each other
+AT_WALL_M, AT_WALL, CRACK_M = 0.05, 0.5, 0.02
+
+
+def with_saw_teeth(parts: list[Part]) -> list[Part]:
+    """`parts` with every row of equal monopitches replaced by one saw-tooth ("shed")."""
+    for row, others in rows_of(parts):
+        united = saw_tooth(row, others)
+        if united is not None:
+            return with_saw_teeth(united)
+    return parts
+
+
+def rows_of(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
+    """Every row of equal monopitches, in order from the lowest v to the highest, and the parts beside it."""
+    teeth = [part for part in parts if is_tooth(part)]
+    while teeth:
+        row = [teeth.pop(0)]
+        grown = True
+        while grown and len(row) < max(TEETH):
+            neighbour = next((part for part in teeth if follows(row[-1], part) or follows(part, row[0])), None)
+            grown = neighbour is not None
+            if neighbour is not None:
+                teeth = [part for part in teeth if part is not neighbour]
+                row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
+        if len(row) >= min(TEETH):
+            yield carried_on(row, [part for part in parts if not any(part is tooth for tooth in row)])
+
+
+def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:
+    """The row with parts of the others that show as its next tooth although they are more than that, and the others without them."""
+    parts = [*row, *others]
+    for step in 1.0, -1.0:
+        while len(row) < max(TEETH):
+            place = next_tooth(row, row[-1] if step > 0.0 else row[0], step)
+            part = next((p for p in others if shows_as(p, place, [q for q in parts if q is not p])), None)
+            if part is None:
+                break
+            tooth = as_high(place, part)
+            row = [*row, tooth] if step > 0.0 else [tooth, *row]
+            others = [other for other in others if other is not part]
+    return row, others
+
+
+def next_tooth(row: list[Part], last: Part, step: float) -> Part:
+    """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
+    width = float(np.mean([part.parameters["width"] for part in row]))
+    across = step * width * np.array([-math.sin(last.kappa), math.cos(last.kappa)])
+    piece = last.pieces[0]
+    planes = piece.planes.copy()
+    planes[:, 2] -= planes[:, :2] @ across
+    return replace(
+        last,
+        pieces=(Piece(shapely.affinity.translate(piece.outline, *across), planes),),
+        translation=last.translation + np.array([*across, 0.0]),
+    )
+
+
+def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
+    """Whether what shows of a part under `others` is the `tooth`: there as high nearly everywhere, and nowhere else."""
+    if len(part.pieces) != 1 or not shapely.intersects(part.pieces[0].outline, tooth.pieces[0].outline):
+        return False
+    x0, y0, x1, y1 = part.pieces[0].outline.bounds
+    xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+    z, wanted = part.height_at(xy), tooth.height_at(xy)
+    beneath = np.max([other.height_at(xy) for other in others], axis=0)
+    shows = z > beneath + 1e-6
+    alike = np.abs(z[shows] - wanted[shows]) < HEIGHT_ALIKE_M
+    covered = alike.sum() * GRID_STEP_M**2 > NEARLY * tooth.area
+    return bool(covered and alike.sum() > NEARLY * shows.sum())
+
+
+def as_high(tooth: Part, part: Part) -> Part:
+    """The `tooth` over what a part covers of it and near it, as high there as that part."""
+    (piece,) = tooth.pieces
+    around = shapely.buffer(piece.outline, SIZE_ALIKE * tooth.parameters["width"], join_style="mitre")
+    outline = shapely.intersection(part.pieces[0].outline, around)
+    middle = shapely.get_coordinates(shapely.point_on_surface(shapely.intersection(outline, piece.outline)))
+    rise = np.array([0.0, 0.0, float((part.height_at(middle) - piece.height_at(middle))[0])])
+    pieces = tuple(Piece(polygon, piece.planes + rise) for polygon in polygons_of(outline))
+    return replace(tooth, pieces=pieces, translation=tooth.translation + rise)
+
+
+def is_tooth(part: Part) -> bool:
+    return part.type == "monopitch" and len(part.pieces) == 1 and "height" in part.parameters
+
+
+def follows(tooth: Part, next_tooth: Part) -> bool:
+    """Whether `next_tooth` is the like of `tooth` and lies right behind its upper edge, as high there as that was before."""
+    one, other = tooth.parameters, next_tooth.parameters
+    turn = math.remainder(next_tooth.kappa - tooth.kappa, 2.0 * math.pi)
+    slopes = [p["height"] / p["width"] for p in (one, other)]
+    same_size = all(
+        abs(one[name] - other[name]) < SIZE_ALIKE * max(one[name], other[name]) for name in ("width", "length")
+    )
+    step = next_tooth.translation - tooth.translation
+    across = np.array([-math.sin(tooth.kappa), math.cos(tooth.kappa)]) @ step[:2]
+    along = np.array([math.cos(tooth.kappa), math.sin(tooth.kappa)]) @ step[:2]
+    spacing = 0.5 * (one["width"] + other["width"])
+    rise = step[2] + 0.5 * (other["height"] - one["height"]) - slopes[0] * (across - spacing)
+    return (
+        abs(turn) < TURN_ALIKE_RAD
+        and abs(slopes[0] - slopes[1]) < SLOPE_ALIKE
+        and same_size
+        and abs(rise) < HEIGHT_ALIKE_M
+        and abs(across - spacing) < SIZE_ALIKE * spacing
+        and abs(along) < SIZE_ALIKE * one["length"]
+    )
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Where a row stands: u along the teeth and v across them are `axes` (2, 2) about `origin` (2,), teeth reach from `left` to
+    `right` along u, the row was seen from `first` to `last` along v, and covers `covered`; `roof` is all that is roofed."""
+
+    origin: np.ndarray
+    axes: np.ndarray
+    left: float
+    right: float
+    first: float
+    last: float
+    covered: shapely.Geometry
+    roof: shapely.Geometry
+
+    def strip(self, foot: float, top: float) -> shapely.Polygon:
+        """From v = `foot` to `top` as long as the teeth; nothing where `top` is not above."""
+        box = shapely.box(self.left, foot, self.right, top) if top > foot else shapely.Polygon()
+        return shapely.transform(box, lambda uv: uv @ self.axes + self.origin)
+
+    def is_wall(self, at: float) -> bool:
+        """Whether the roof's outline runs along v = `at`; cracks between its parts are no walls."""
+        walls = shapely.buffer(self.roof, CRACK_M, join_style="mitre").boundary
+        along = shapely.intersection(walls, self.strip(at - AT_WALL_M, at + AT_WALL_M))
+        return along.length > AT_WALL * (self.right - self.left)
+
+
+def area_of(parts: list[Part]) -> shapely.Geometry:
+    """What parts cover together."""
+    return shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M)
+
+
+def ground_of(row: list[Part], others: list[Part]) -> Ground:
+    """Where a row of teeth stands among the other parts."""
+    origin, kappa = row[0].translation[:2], row[0].kappa
+    axes = np.array([[math.cos(kappa), math.sin(kappa)], [-math.sin(kappa), math.cos(kappa)]])
+    covered, beside = (area_of(own) for own in (row, others))
+    uv = (shapely.get_coordinates(covered) - origin) @ axes.T
+    (left, first), (right, last) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
+    roof = shapely.MultiPolygon(polygons_of(shapely.union(covered, beside, grid_size=GRID_M)))
+    return Ground(origin, axes, left, right, first, last, covered, roof)
+
+
+def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
+    """The other parts and one shed of the row; None where some of its teeth are wider than others.
+
+    What a tooth reaches further than it was seen it takes from the others, and leaves them what it reaches less.
+    """
+    others, splinters = without_splinters(row, others)
+    ground = ground_of([*row, *splinters], others)
+    centres = (np.array([part.translation[:2] for part in row]) - ground.origin) @ ground.axes.T
+    slopes = np.array([part.parameters["height"] / part.parameters["width"] for part in row])
+    heights = np.array([part.translation[2] + 0.5 * part.parameters["height"] for part in row])
+    breaks = laid_out(centres[:, 1] - heights / slopes.mean(), ground)
+    heights = heights + slopes * (0.5 * (breaks[:-1] + breaks[1:]) - centres[:, 1])
+    if np.ptp(heights) > UNEVEN_M:
+        return None
+    length, width = float(np.mean([part.parameters["length"] for part in row])), float(breaks[-1] - breaks[0])
+    rise = float(slopes.mean() * width / len(row))
+    parameters = {"width": width, "length": length, "height": rise, "teeth": float(len(row))}
+    centre = np.array([centres[:, 0].mean(), breaks[0] + 0.5 * width]) @ ground.axes + ground.origin
+    translation = np.array([*centre, heights.mean() - 0.5 * rise])
+    shape = get("shed").variant(parameters)
+    whole = shape.part(shape.to_theta(parameters, row[0].kappa, translation))
+    shed = replace(whole, pieces=cut(whole.pieces, breaks, ground))
+    rest = shapely.difference(ground.covered, ground.strip(breaks[0], breaks[-1]), grid_size=GRID_M)
+    left_over = replace(shed, pieces=tuple(Piece(polygon, shed.pieces[0].planes) for polygon in polygons_of(rest)))
+    beside = with_slivers(others, left_over, math.inf) if left_over.pieces else others
+    return None if beside is None else [*beside, shed]
+
+
+def without_splinters(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:
+    """The other parts, and those that are narrow strips between the teeth: what a scanner saw of a tooth's wall."""
+    covered = area_of(row)
+    narrow = SIZE_ALIKE * min(part.parameters["width"] for part in row)
+    between = shapely.buffer(shapely.buffer(covered, narrow, join_style="mitre"), -narrow, join_style="mitre")
+    splinters = [
+        part
+        for part in others
+        if part.parameters.get("width", math.inf) < narrow
+        and all(shapely.intersection(between, p.outline).area > NEARLY * p.outline.area for p in part.pieces)
+    ]
+    return [part for part in others if not any(part is one for one in splinters)], splinters
+
+
+def laid_out(feet: np.ndarray, ground: Ground) -> np.ndarray:
+    """Where the teeth of a row begin and the last one ends (n + 1,), v in metres, all equally wide.
+
+    Their planes would be at height 0 at `feet` (n,). Ends at walls are where the outline has them.
+    """
+    count, first, last = len(feet), ground.first, ground.last
+    numbers = np.arange(count) - 0.5 * (count - 1)
+    width = float(numbers @ feet / (numbers @ numbers))
+    starts, ends = ground.is_wall(first), ground.is_wall(last)
+    if starts and ends:
+        width = (last - first) / count
+    low = first if starts else last - count * width if ends else 0.5 * (first + last - count * width)
+    return low + width * np.arange(count + 1)
+
+
+def cut(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: Ground) -> tuple[Piece, ...]:
+    """The pieces of a saw-tooth, a tooth each, over what its row covers and reaches further."""
+    further = [ground.strip(breaks[0], ground.first), ground.strip(ground.last, breaks[-1])]
+    more = shapely.union_all(further, grid_size=GRID_M)
+    over = shapely.union(ground.covered, shapely.intersection(ground.roof, more), grid_size=GRID_M)
+    strips = [ground.strip(foot, top) for foot, top in pairwise(breaks.tolist())]
+    return tuple(
+        Piece(polygon, piece.planes)
+        for strip, piece in zip(strips, pieces, strict=True)
+        for polygon in polygons_of(shapely.intersection(over, strip, grid_size=GRID_M))
+    )

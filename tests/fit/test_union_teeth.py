@@ -1,0 +1,71 @@
+"""Laws of saw-teeth: their planes tell how wide they are, what a scanner saw of their walls does not, and nothing is left bare."""
+
+import math
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.fit.union import fit_building
+from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.teeth import area_of
+from hiproof.primitives import get
+from points_of_roofs import sampled
+
+SLOPE, WIDTH, LENGTH, LOW = 0.5, 5.0, 12.0, 4.0  # of every tooth; the height at which each begins
+
+
+def placed(name, theta_p, kappa, across, z):
+    """A part of the catalogue whose rectangle's middle lies so far `across` the row."""
+    shape = get(name)
+    place = np.array([-math.sin(kappa) * across + 40.0, math.cos(kappa) * across - 7.0, z])
+    return shape.part(shape.to_theta(theta_p, kappa, place))
+
+
+def seen_tooth(number, start, end, kappa):
+    """The tooth of that number from the row's foot on, seen from `start` to `end`."""
+    size = {"width": end - start, "length": LENGTH, "height": SLOPE * (end - start)}
+    return placed("monopitch", size, kappa, 0.5 * (start + end), LOW + SLOPE * (start - number * WIDTH))
+
+
+def seen_row(count, kappa, rng):
+    """Teeth whose steps were seen up to 0.2 m from where they are, and the level annex behind the last; where that begins."""
+    ends = WIDTH * np.arange(count + 1) + np.r_[0.0, rng.uniform(-0.2, 0.2, count)]
+    teeth = [seen_tooth(k, *ends[k : k + 2], kappa) for k in range(count)]
+    behind = count * WIDTH + 6.0
+    annex = {"width": behind - ends[-1], "length": LENGTH}
+    return [*teeth, placed("flat", annex, kappa, 0.5 * (ends[-1] + behind), 3.0)]
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("count", [2, 4, 6])
+def test_planes_tell_how_wide_teeth_are(count, seed):
+    rng = np.random.default_rng(seed)
+    parts = seen_row(count, rng.uniform(-3.0, 3.0), rng)
+    found = {part.type: part for part in put_together([parts[k] for k in rng.permutation(len(parts))])}
+    assert set(found) == {"shed", "flat"}
+    assert found["shed"].parameters["width"] == pytest.approx(count * WIDTH, abs=1e-6)
+    assert found["shed"].area == pytest.approx(count * WIDTH * LENGTH, abs=1e-3)
+    assert found["shed"].translation[2] == pytest.approx(LOW, abs=1e-6)
+    assert area_of(list(found.values())).area == pytest.approx((count * WIDTH + 6.0) * LENGTH, abs=1e-3)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 0.7, -2.5])
+def test_a_strip_between_teeth_is_no_roof_of_its_own(kappa):
+    before, behind = seen_tooth(0, 0.0, WIDTH - 0.4, kappa), seen_tooth(1, WIDTH, 2.0 * WIDTH, kappa)
+    strip = placed("flat", {"width": 0.4, "length": LENGTH}, kappa, WIDTH - 0.2, 5.0)
+    (shed,) = put_together([before, strip, behind])
+    assert shed.type == "shed"
+    assert shed.area == pytest.approx(2.0 * WIDTH * LENGTH, abs=1e-3)
+
+
+def test_wings_beside_a_yard_are_two_and_what_crosses_a_roof_is_one():
+    def z(x, y):
+        return np.where(np.abs(y) < 4.0, 9.0, 6.0)
+
+    across = shapely.union(shapely.box(-12, -4, 12, 4), shapely.box(-3, -11, 3, 11))
+    beside = shapely.union_all([shapely.box(-12, -4, 12, 4), shapely.box(-12, 4, -6, 11), shapely.box(6, 4, 12, 11)])
+    for outline, count in ((across, 2), (beside, 3)):
+        parts = fit_building(sampled(z, outline), outline).roof_parts
+        assert [part.type for part in parts] == ["flat"] * count
+        assert sorted(round(part.translation[2], 1) for part in parts) == [6.0] * (count - 1) + [9.0]
