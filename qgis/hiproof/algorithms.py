@@ -1,6 +1,7 @@
 """The algorithms: what each asks for, the command that it becomes, and what it gives back."""
 
 import functools
+import inspect
 import os
 
 from qgis.core import (
@@ -38,7 +39,7 @@ class Algorithm(QgsProcessingAlgorithm):
         return type(self).__name__.lower()
 
     def shortHelpString(self):
-        return self.__doc__
+        return " ".join(inspect.cleandoc(self.__doc__).split())
 
     def add_program(self):
         self.add(QgsProcessingParameterString("PROGRAM", "Program", os.environ.get("HIPROOF_PROGRAM", "hiproof")))
@@ -46,12 +47,8 @@ class Algorithm(QgsProcessingAlgorithm):
     def add(self, parameter):
         self.addParameter(parameter)
 
-    def add_clouds(self):
-        self.add(
-            QgsProcessingParameterMultipleLayers(
-                "CLOUDS", "Point clouds (LAS, LAZ, COPC, text, PLY)", QgsProcessing.TypeFile
-            )
-        )
+    def add_clouds(self, label="Point clouds (LAS, LAZ, COPC, text, PLY)", optional=False):
+        self.add(QgsProcessingParameterMultipleLayers("CLOUDS", label, QgsProcessing.TypeFile, optional=optional))
 
     def call(self, command, feedback, progress=None):
         """Run a command, its lines into the feedback; the user's Cancel ends it."""
@@ -144,14 +141,15 @@ def tell(program, folder, feedback):
 
 
 class Evaluate(Algorithm):
-    """Measures a run's models against points: distances, shares, overlaps and volumes, a row a building in evaluation.csv."""
+    """Measures a run's models against points, its own where none are named: distances, shares, overlaps and volumes, a row
+    a building in evaluation.csv."""
 
     def displayName(self):
         return "Evaluate models"
 
     def initAlgorithm(self, configuration=None):
         self.add(QgsProcessingParameterFile("FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder))
-        self.add_clouds()
+        self.add_clouds("Point clouds, where not those of the run", optional=True)
         polygons = [QgsProcessing.TypeVectorPolygon]
         self.add(QgsProcessingParameterVectorLayer("FOOTPRINTS", "Footprints", polygons, optional=True))
         self.add_program()
@@ -159,7 +157,7 @@ class Evaluate(Algorithm):
 
     def processAlgorithm(self, parameters, context, feedback):
         folder = self.parameterAsString(parameters, "FOLDER", context)
-        clouds = self.parameterAsFileList(parameters, "CLOUDS", context)
+        clouds = [cloud for cloud in self.parameterAsFileList(parameters, "CLOUDS", context) if cloud]
         footprints, layer, _ = self.source_of(parameters, "FOOTPRINTS", context)
         program = self.parameterAsString(parameters, "PROGRAM", context)
         self.call(commands.evaluate(program, folder, clouds, footprints, layer), feedback)

@@ -50,6 +50,7 @@ def run(command, say, cancelled, progress=None):
             asked = time.monotonic()
         time.sleep(POLL_S)
     reader.join()
+    process.stdout.close()
     if process.returncode not in (0, 1):
         raise Failed("\n".join(said[-3:]) or f"{command[0]} ended with exit code {process.returncode}")
     return process.returncode

@@ -5,24 +5,11 @@ from typing import ClassVar
 
 from qgis.core import (
     Qgs25DRenderer,
-    QgsCategorizedSymbolRenderer,
     QgsExpressionContextUtils,
-    QgsFillSymbol,
     QgsProcessingLayerPostProcessorInterface,
-    QgsRendererCategory,
     QgsVectorLayer,
 )
 
-# the colours of roof types, as the figures of the documentation have them
-COLOURS = {
-    "flat": "#9e9e9e",
-    "monopitch": "#f6c85f",
-    "gable": "#d1495b",
-    "hip": "#3a7ca5",
-    "pyramid": "#6f4e7c",
-    "mansard": "#5b8c5a",
-}
-OTHERS = "#c9a27e"
 HEIGHT = 'coalesce("rf_h_roof_max" - "rf_h_ground", 0)'
 
 
@@ -37,10 +24,8 @@ def layers_of(folder):
 
 
 def style_of(name, raised):
-    """A function that styles a layer: buildings raised to their height, or everything coloured by its roof type."""
-    if raised and name == "buildings":
-        return raise_buildings
-    return colour_by_type("hiproof_roof_type" if name == "buildings" else "type")
+    """A function that styles a layer: buildings raised to their height, or as the file itself keeps it, by roof type."""
+    return raise_buildings if raised and name == "buildings" else QgsVectorLayer.loadDefaultStyle
 
 
 def raise_buildings(layer):
@@ -48,23 +33,6 @@ def raise_buildings(layer):
     QgsExpressionContextUtils.setLayerVariable(layer, "qgis_25d_height", HEIGHT)
     QgsExpressionContextUtils.setLayerVariable(layer, "qgis_25d_angle", 70)
     layer.setRenderer(Qgs25DRenderer())
-
-
-def colour_by_type(field):
-    """A styling function that colours by the roof type in `field`; a style that the file itself keeps goes before."""
-
-    def colour(layer):
-        _, told = layer.loadDefaultStyle()
-        if told and layer.renderer().type() != "singleSymbol":
-            return
-        symbol = {
-            name: QgsFillSymbol.createSimple({"color": c, "outline_color": "#404040"}) for name, c in COLOURS.items()
-        }
-        categories = [QgsRendererCategory(name, symbol[name], name) for name in symbol]
-        rest = QgsFillSymbol.createSimple({"color": OTHERS, "outline_color": "#404040"})
-        layer.setRenderer(QgsCategorizedSymbolRenderer(field, [*categories, QgsRendererCategory(None, rest, "other")]))
-
-    return colour
 
 
 class Styled(QgsProcessingLayerPostProcessorInterface):

@@ -104,9 +104,14 @@ class Roof:
     frame: LocalFrame
 
     @property
+    def largest(self) -> Part:
+        """The part with the largest area: whose type is the building's, and along whose rectangle it is looked at."""
+        return max(self.parts, key=lambda part: part.area)
+
+    @property
     def type(self) -> str:
         """Type of the part with the largest area."""
-        return max(self.parts, key=lambda part: part.area).type
+        return self.largest.type
 
     @property
     def pieces(self) -> tuple[Piece, ...]:
@@ -273,6 +278,21 @@ the footprint; add a cloud that covers it); `built` is None there
     def parts(self) -> tuple[Part, ...]:
         """The parts of the roof, none without a model."""
         return () if self.built is None else self.built.roof.parts
+
+    @property
+    def volume(self) -> float:
+        """Volume of the solid [m3]. Raises NoModelError without a model.
+
+        >>> import hiproof
+        >>> x, y = np.meshgrid(np.arange(0.25, 10, 0.5), np.arange(0.25, 6, 0.5))
+        >>> box = shapely.box(0, 0, 10, 6)
+        >>> level = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 5.0)]), box)
+        >>> round(level.volume / (5.0 - level.z_ground))
+        60
+        """
+        from .compose.solid import volume
+
+        return volume(self.solid)
 
     def with_part(self, index: int, **change: Any) -> Building:
         """The building with part `index` changed, or with one more part where `index` is the number of parts.

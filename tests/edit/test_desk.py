@@ -5,6 +5,7 @@ import json
 import shutil
 from concurrent.futures import ProcessPoolExecutor
 from multiprocessing import get_context
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,8 @@ from hiproof.compose import check_solid
 from hiproof.edit.desk import Desk
 from hiproof.edit.doubt import doubt_of
 from hiproof.edit.edits import FILE, UNTOUCHED, Edits, OtherVersion
-from hiproof.errors import HiproofError, InputError
+from hiproof.errors import HiproofError, InputError, InputWarning
+from hiproof.evaluate.run import evaluate_run
 from hiproof.read.solids import read_solids
 from run_records import by_id
 
@@ -243,6 +245,46 @@ def test_without_its_points_all_but_refitting_works(town_files, tmp_path):
         edited(desk, gable["parts"], action="refit")
     desk.accept(ID, {"parts": gable["parts"], "version": start["version"]})
     assert (tmp_path / "run" / FILE).exists()
+
+
+@pytest.fixture
+def run_by_relative_names(town_files, tmp_path, monkeypatch):
+    """A project folder in which a run was made by names that hold only there; the present folder is another afterwards."""
+    project = tmp_path / "project"
+    project.mkdir()
+    cloud, footprints = (Path(shutil.copy(file, project)).name for file in town_files)
+    (project / "known.jsonl").write_text(json.dumps({"id": "house-1", "ridge_height": 9.5}) + "\n")
+    monkeypatch.chdir(project)
+    hiproof.reconstruct_area(request_over([cloud, footprints], Path("run"), "known.jsonl"))
+    monkeypatch.chdir(tmp_path)
+    return project
+
+
+def test_a_run_made_by_relative_names_is_known_from_anywhere(run_by_relative_names):
+    desk = Desk(run_by_relative_names / "run", "anna")
+    assert desk.cloud(ID)["missing"] == "" and desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"])
+    assert desk.edits.of("house-1")[0] == {"id": "house-1", "ridge_height": 9.5}
+    run = evaluate_run(run_by_relative_names / "run")
+    assert len(run.clouds) == 1 and sum(map(len, run.points)) and None not in run.footprints
+
+
+def test_the_same_run_from_elsewhere_redoes_nothing(town_files, run_by_relative_names):
+    was = (run_by_relative_names / "run/buildings.gml").stat().st_ino
+    there = [str(run_by_relative_names / Path(file).name) for file in town_files]
+    known = run_by_relative_names / "known.jsonl"
+    hiproof.reconstruct_area(request_over(there, run_by_relative_names / "run", known))
+    assert (run_by_relative_names / "run/buildings.gml").stat().st_ino == was
+
+
+def test_files_that_moved_are_found_in_the_folder_that_a_person_names(run_by_relative_names, tmp_path):
+    run = (run_by_relative_names / "run").rename(tmp_path / "run")
+    files = run_by_relative_names.rename(tmp_path / "archive")
+    with pytest.warns(InputWarning, match=r"overrides .* gone \(known\.jsonl\).*--clouds FOLDER"):
+        assert "--clouds FOLDER" in Desk(run, "anna").cloud(ID)["missing"]
+    with pytest.warns(InputWarning, match="points are gone"):
+        assert evaluate_run(run).clouds == ()
+    desk = Desk(run, "anna", files)
+    assert desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"]) and desk.edits.of("house-1")[0]
 
 
 def test_points_that_can_no_longer_be_read_are_said_once(town_files, tmp_path):

@@ -279,6 +279,7 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
             "bbox": request.bbox,
             "terrain": request.terrain,
             "overrides": request.overrides,
+            "started_in": str(Path.cwd()),  # what is not an address or absolute is meant from there
         },
         "crs": plan.crs_wkt,
         "units": plan.head.units.told(),

@@ -13,6 +13,12 @@ import typer
 def edit(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     who: Annotated[str | None, typer.Option(help="name under which edits are kept [default: the user's]")] = None,
+    clouds: Annotated[
+        Path | None,
+        typer.Option(
+            exists=True, file_okay=False, help="folder in which the run's files lie now, where they were moved"
+        ),
+    ] = None,
     port: Annotated[int, typer.Option(min=0, max=65535, help="port of the page [default: any that is free]")] = 0,
 ) -> None:
     """Open a page on this machine to go through doubtful buildings, mend and accept them.
@@ -23,7 +29,7 @@ def edit(
     from ..edit.edits import FILE
     from ..edit.server import Server, Service
 
-    service = Service(Desk(folder, who or user_name()))
+    service = Service(Desk(folder, who or user_name(), clouds))
     with Server(service, port) as server:
         desk = service.desk
         typer.echo(f"{len(desk.run.rows)} buildings, the most doubtful first; edits go into {folder / FILE}")

@@ -26,22 +26,23 @@ def evaluate(
     clouds: Annotated[
         list[str] | None, typer.Argument(help="point files to measure against [default: those of the run]")
     ] = None,
-    footprints: Annotated[str | None, typer.Option(help="building polygons; else the models' own outlines")] = None,
+    footprints: Annotated[
+        str | None, typer.Option(help="building polygons [default: those of the run, else the models' own outlines]")
+    ] = None,
     layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
     reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
     out: Annotated[Path | None, typer.Option(help="folder for evaluation.csv and .json [default: the run's]")] = None,
 ) -> None:
     """Measure the models of a run: distances of points, shares, IoU and volume per building, per type and overall."""
     from ..evaluate.evaluation import summarise, to_csv, to_json
-    from ..evaluate.run import evaluate_run, run_inputs
+    from ..evaluate.run import evaluate_run
     from ..write.files import atomic_file
 
-    points = clouds or run_inputs(folder)[0]
-    if not points:
+    run = evaluate_run(folder, clouds or (), footprints, reference, layer)
+    if not run.clouds:
         raise InputError(
             f"expected point files to measure {folder} against, got none, nor are the run's there; name them"
         )
-    run = evaluate_run(folder, points, footprints, reference, layer)
     place = Path(out or folder)
     for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
         with atomic_file(place / name) as file:
@@ -53,10 +54,12 @@ def evaluate(
 def print_summary(summary: dict, has_reference: bool) -> None:
     """A line a roof type, means of the figures over its buildings."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.table import Column, Table
 
     columns = SHOWN | (COMPARED if has_reference else {})
-    table = Table("type", "buildings", *columns.values(), title="mean over buildings")
+    table = Table(
+        Column("type", no_wrap=True), "buildings", *columns.values(), title="mean over buildings", pad_edge=False
+    )
     table.caption = CAPTION
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]

@@ -19,12 +19,9 @@ def report(
 ) -> None:
     """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings, settings."""
     from ..evaluate.report import write_report
-    from ..evaluate.run import evaluate_run, run_inputs
+    from ..evaluate.run import evaluate_run
 
     path = out or Path(folder) / "report.html"
-    known_clouds, known_footprints, known_layer = run_inputs(folder)
-    if footprints is None:
-        footprints, layer = known_footprints, layer or known_layer
-    run = evaluate_run(folder, clouds or known_clouds, footprints, layer=layer)
+    run = evaluate_run(folder, clouds or (), footprints, layer=layer)
     write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
     typer.echo(f"{path}: {len(run.models)} buildings, {path.stat().st_size / 1e6:.1f} MB")

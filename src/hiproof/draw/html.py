@@ -10,7 +10,7 @@ from importlib.resources import files
 import numpy as np
 
 from ..model import Building
-from .view import TILT_DEG, TURN_DEG, colours_of, lightness, seen_faces, shaded
+from .view import TILT_DEG, colours_of, lightness, seen_faces, shaded, turn_of
 
 SIZE = (360, 260)  # pixels, width and height: beside a notebook's table
 MARGIN = 12  # pixels left free on each side
@@ -27,17 +27,17 @@ def html_of(building: Building) -> str:
 
 def view_of(building: Building) -> str:
     """The solid as SVG, and the script that turns it."""
-    solid, colours = building.solid, colours_of(building)
+    solid, colours, turn = building.solid, colours_of(building), turn_of(building)
     corners = np.round(solid.vertices - solid.vertices.mean(axis=0), MM)
     scale = (min(SIZE) - 2 * MARGIN) / max(float(np.ptp(corners, axis=0).max()), 1e-6)
     faces = [
         {"r": [list(ring) for ring in face.rings], "c": shaded(colour, lightness(solid, face))}
         for face, colour in zip(solid.faces, colours, strict=True)
     ]
-    data = json.dumps({"v": corners.tolist(), "f": faces, "s": scale, "t": [TURN_DEG, TILT_DEG]}, separators=(",", ":"))
+    data = json.dumps({"v": corners.tolist(), "f": faces, "s": scale, "t": [turn, TILT_DEG]}, separators=(",", ":"))
     name = "hiproof-" + hashlib.sha256((building.id + data).encode()).hexdigest()[:12]
     polygons = "".join(
-        path_of(face.rings, shaded(face.colour, face.light), scale) for face in seen_faces(solid, colours)
+        path_of(face.rings, shaded(face.colour, face.light), scale) for face in seen_faces(solid, colours, turn)
     )
     box = f"{-SIZE[0] / 2} {-SIZE[1] / 2} {SIZE[0]} {SIZE[1]}"
     script = (files("hiproof.draw") / "turn.js").read_text(encoding="utf-8")
@@ -57,12 +57,17 @@ def path_of(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
 def parts_table(building: Building) -> str:
     """A row a part: number, type, parameters with their standard deviations."""
     rows = "".join(
-        f"<tr><td>{number}</td><td>{escape(part.type)}</td><td>{parameters_text(part)}</td></tr>"
+        table_row(str(number), escape(part.type), parameters_text(part))
         for number, part in enumerate(building.parts[:SHOWN_PARTS])
     )
     more = len(building.parts) - SHOWN_PARTS
-    rest = f"<tr><td></td><td>and {more} more</td><td></td></tr>" if more > 0 else ""
+    rest = table_row("", f"and {more} more", "") if more > 0 else ""
     return f'<table style="font-size:12px">{rows}{rest}</table>' if rows else ""
+
+
+def table_row(*cells: str) -> str:
+    """A row of HTML; notebooks set cells of tables to the right, which is for numbers."""
+    return "<tr>" + "".join(f'<td style="text-align:left">{cell}</td>' for cell in cells) + "</tr>"
 
 
 def parameters_text(part) -> str:

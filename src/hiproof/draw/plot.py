@@ -8,7 +8,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..model import Building
-from .view import colours_of, lightness, shaded
+from .view import TILT_DEG, colours_of, lightness, shaded, turn_of
 
 NEAR_M = 0.2  # m; within it a point counts as explained, as in share_within_20cm
 MOST_POINTS = 5000  # points drawn; more make a black patch
@@ -21,7 +21,7 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     Raises NoModelError for a building without a model, InputError where matplotlib (extra `report`) is missing.
     """
     model = building.model
-    ax = ax if ax is not None else new_axes()
+    ax = ax if ax is not None else new_axes(turn_of(building))
     from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
     origin = model.roof.frame.origin
@@ -48,9 +48,12 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     return ax
 
 
-def new_axes() -> Any:
+def new_axes(turn_deg: float) -> Any:
+    """Three-dimensional axes in a figure of their own, seen as the view of a notebook is."""
     try:
         import matplotlib.pyplot as plt
     except ImportError as error:
         raise InputError("expected matplotlib for plots, got none; try: pip install 'hiproof[report]'") from error
-    return plt.figure(figsize=(7, 6)).add_subplot(projection="3d")
+    ax = plt.figure(figsize=(7, 6)).add_subplot(projection="3d")
+    ax.view_init(elev=TILT_DEG, azim=-90.0 - turn_deg)  # seen from the south where nothing is turned
+    return ax

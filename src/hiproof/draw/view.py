@@ -33,6 +33,11 @@ def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
     return np.column_stack([x, -(y * math.sin(t) + xyz[:, 2] * math.cos(t)), xyz[:, 2] * math.sin(t) - y * math.cos(t)])
 
 
+def turn_of(building: Building) -> float:
+    """Degrees to turn a building by, so that it is seen from a corner whichever way its largest part stands."""
+    return TURN_DEG - math.degrees(building.roof.largest.kappa)
+
+
 def colours_of(building: Building) -> list[str]:
     """A colour a face: that of its part's type for roofs."""
     return [

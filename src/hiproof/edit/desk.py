@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import functools
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ import numpy as np
 
 from ..city.overrides import read_overrides
 from ..draw.primitives import primitive_svg
-from ..errors import HiproofError, InputError
+from ..errors import HiproofError, InputError, InputWarning
+from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
 from ..parametric.building import build
 from ..parametric.record import list_at, number, outline_of, text_at
@@ -33,11 +35,11 @@ SAID = ("z_ground", "leave_out")  # of the building as a whole, by a person
 
 
 class Desk:
-    """The buildings of the run in `folder`, and the edits that `who` accepts."""
+    """The buildings of the run in `folder`, and the edits that `who` accepts; the run's files may have `moved_to` another folder."""
 
-    def __init__(self, folder: Path, who: str) -> None:
+    def __init__(self, folder: Path, who: str, moved_to: Path | None = None) -> None:
         self.run, self.who = RunFolder(folder), plain_text(who)[:MOST_NOTE]
-        self.edits, self.points = Edits(folder, obeyed_by(folder)), RunPoints(folder)
+        self.edits, self.points = Edits(folder, obeyed_by(folder, moved_to)), RunPoints(folder, moved_to)
 
     def buildings(self, find: str = "") -> dict[str, Any]:
         """The most doubtful buildings, of those whose id holds `find`."""
@@ -156,9 +158,20 @@ def number_or_none(value: float) -> float | None:
     return round(float(value), 4) if np.isfinite(value) else None
 
 
-def obeyed_by(folder: Path) -> dict[str, dict[str, Any]]:
-    """The overrides that the run in `folder` obeyed, so that one file holds them and the edits; none if they are gone."""
-    path = (run_record(folder).get("inputs") or {}).get("overrides")
-    if not isinstance(path, str) or not Path(path).is_file() or Path(path).name == FILE:
+def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str, Any]]:
+    """The overrides that the run in `folder` obeyed, so that one file holds them and the edits.
+
+    Where edits were accepted already, these hold them.
+    """
+    record = run_record(folder)
+    told, path = (record.get("inputs") or {}).get("overrides"), found_inputs(record, moved_to).overrides
+    if not told or (folder / FILE).exists():
+        return {}
+    if path is None:
+        warnings.warn(
+            f"{folder}: the overrides that the run obeyed are gone ({told}): a run with {FILE} will do without them; bring them back, "
+            "or say with --clouds FOLDER where the run's files lie now",
+            InputWarning,
+        )
         return {}
     return dict(read_overrides(path))

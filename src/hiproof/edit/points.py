@@ -16,8 +16,8 @@ from ..city.plan import PLAN_FILE, Job, WorkPlan
 from ..city.solve import Surroundings, terrain_model
 from ..city.sort import Gatherer, Reaches, load_points, wanted_points
 from ..errors import HiproofError, InputError
+from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
-from ..read.pointcloud import is_url
 from ..read.thin import thin_to_count
 
 # work tiles and buildings whose points stay in memory: those a person goes back and forth between
@@ -25,25 +25,21 @@ KEPT_TILES, KEPT_BUILDINGS = 3, 64
 
 
 class RunPoints:
-    """Points of the run in `folder`; `missing` is a sentence where they cannot be had, empty otherwise."""
+    """Points of the run in `folder`, whose files may have `moved_to` another; `missing` is a sentence where they cannot be had,
+    empty otherwise."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, moved_to: Path | None = None) -> None:
         self.lock, self.missing = threading.Lock(), ""
         self.surroundings = lru_cache(maxsize=KEPT_TILES)(self.read_tile)
         self.of_job = lru_cache(maxsize=KEPT_BUILDINGS)(self.read_job)
-        inputs = run_record(folder).get("inputs") or {}
-        self.clouds, self.terrain = [str(cloud) for cloud in inputs.get("clouds") or []], inputs.get("terrain")
+        inputs = found_inputs(run_record(folder), moved_to)
+        self.clouds, self.terrain = inputs.clouds, inputs.terrain
         self.state = folder / ".hiproof"
         plan = self.state / PLAN_FILE
-        gone = [cloud for cloud in self.clouds if not is_url(cloud) and not Path(cloud).is_file()]
-        if not plan.is_file() or not self.clouds:
+        if not plan.is_file() or not (inputs.clouds or inputs.gone):
             self.missing = "no run of `hiproof reconstruct` in this folder: its points are not known, refitting is off"
-        elif gone:
-            more = f" and {len(gone) - 1} more" if len(gone) > 1 else ""
-            self.missing = (
-                f"the run's points are gone ({gone[0]}{more} is not there): all but refitting works; start where the run "
-                "was started, or bring them back"
-            )
+        elif inputs.gone:
+            self.missing = f"{inputs.told_gone}: all but refitting works; say with --clouds FOLDER where they lie now"
         self.known = None if self.missing else WorkPlan.load(plan)
         jobs = self.known.jobs if self.known else ()
         self.jobs = {job.id: job for job in reversed(jobs)}

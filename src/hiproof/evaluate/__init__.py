@@ -4,6 +4,7 @@ models             finished models read back from CityJSON
 distance           exact distances from points to polygons; compiled
 metrics            residuals, shares within a tolerance, IoU: the quality of one model
 evaluation         a row of figures a building, and summaries
+inputs             where the files that a run was made from lie now
 run                a finished run with its points: what the commands start from
 report             the page about a run: map, distributions, the worst twenty, 3D
 report_data        what that page draws, packed

@@ -149,7 +149,7 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
     origin = model.solid.vertices.min(axis=0)
     pictures = building_pictures(model.solid.moved(-origin), points - origin, psd(model.solid, points), model.roof_type)
     text = (
-        f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, RMSE {quality.rmse:.2f} m, "
-        f"{100 * quality.share_within_20cm:.0f} % of the points inside the outline within 0.2 m of the roof"
+        f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, {100 * quality.share_within_20cm:.0f} % of the points "
+        f"inside the outline within 0.2 m of the roof; RMSE of all, facades included, {quality.rmse:.2f} m"
     )
     return f'<figure class="worst" data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,12 +11,13 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import InputError
+from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..read.cityjson import parsed, read_text
 from ..settings import Settings
 from ..write.naming import FileUnits
 from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
+from .inputs import found_inputs
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
 
@@ -30,6 +32,9 @@ RECORD: dict[tuple[str, ...], Any] = {
     ("inputs", "clouds"): list,
     ("inputs", "footprints"): str,
     ("inputs", "layer"): (str, int),
+    ("inputs", "terrain"): str,
+    ("inputs", "overrides"): str,
+    ("inputs", "started_in"): str,
     ("crs",): str,
 }
 """What of run.json is used, and what it must be where it is there."""
@@ -39,7 +44,7 @@ RECORD: dict[tuple[str, ...], Any] = {
 class EvaluatedRun:
     """Models in the run's order, the points (n, 3) of each in world metres, and their figures; `record` is run.json.
 
-    `footprints` are plan polygons in world metres, None where a building has none.
+    `footprints` are plan polygons in world metres, None where a building has none; `clouds` the files measured against.
     """
 
     models: tuple[BuildingModel, ...]
@@ -47,12 +52,14 @@ class EvaluatedRun:
     figures: tuple[BuildingFigures, ...]
     record: dict[str, Any]
     footprints: tuple[shapely.Geometry | None, ...]
+    clouds: tuple[str, ...] = ()
 
     def only(self, indices: Sequence[int]) -> EvaluatedRun:
         """The same run with only these buildings."""
         models = tuple(self.models[i] for i in indices)
         points, figures = tuple(self.points[i] for i in indices), tuple(self.figures[i] for i in indices)
-        return EvaluatedRun(models, points, figures, self.record, tuple(self.footprints[i] for i in indices))
+        footprints = tuple(self.footprints[i] for i in indices)
+        return EvaluatedRun(models, points, figures, self.record, footprints, self.clouds)
 
 
 def evaluate_run(
@@ -62,12 +69,19 @@ def evaluate_run(
     reference: str | None = None,
     layer: str | None = None,
 ) -> EvaluatedRun:
-    """Read the models of `folder` and measure them against `clouds`; without clouds no residual figures come out.
+    """Read the models of `folder` and measure them against `clouds` and `footprints`; where none are named, against those that
+    the run was made from, as far as they are there. Without any clouds no residual figures come out.
 
     The building classes, the CRS and the units are those the run was made with; `layer` is that of the footprints.
     Raises InputError for what cannot be read.
     """
     record = run_record(folder)
+    known = found_inputs(record)
+    if not clouds and known.gone:
+        warnings.warn(f"{folder}: {known.told_gone}; name them after the folder", InputWarning)
+    clouds = clouds or known.files
+    if footprints is None:
+        footprints, layer = known.footprint_file, layer or known.layer
     models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record)))
     outlines = footprint_of_each(models, footprints, layer, record)
     areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
@@ -77,7 +91,7 @@ def evaluate_run(
         points = [np.empty((0, 3))] * len(models)
     references = reference_of_each(models, reference)
     figures = [evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)]
-    return EvaluatedRun(models, tuple(points), tuple(figures), record, tuple(outlines))
+    return EvaluatedRun(models, tuple(points), tuple(figures), record, tuple(outlines), tuple(clouds))
 
 
 def run_record(folder: Path) -> dict[str, Any]:
@@ -94,18 +108,6 @@ def run_record(folder: Path) -> dict[str, Any]:
                 "run `hiproof reconstruct` again"
             )
     return record
-
-
-def run_inputs(folder: Path) -> tuple[list[str], str | None, str | None]:
-    """Clouds, footprints and their layer that a run was made from, as far as they are still where they were."""
-    inputs = run_record(folder).get("inputs") or {}
-    clouds = [path for path in inputs.get("clouds") or [] if isinstance(path, str) and exists(path)]
-    footprints = inputs.get("footprints")
-    return clouds, footprints if footprints and exists(footprints) else None, inputs.get("layer")
-
-
-def exists(path: str) -> bool:
-    return "\0" not in path and Path(path).exists()
 
 
 def run_settings(record: dict[str, Any]) -> Settings:

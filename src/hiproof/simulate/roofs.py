@@ -37,11 +37,11 @@ class SimBuilding:
     @property
     def parameters(self) -> dict[str, float]:
         """theta_p of the largest part, metres."""
-        return max(self.roof.parts, key=lambda part: part.area).parameters
+        return self.roof.largest.parameters
 
     @property
     def kappa(self) -> float:
-        return max(self.roof.parts, key=lambda part: part.area).kappa
+        return self.roof.largest.kappa
 
     @property
     def footprint(self) -> shapely.Polygon:

@@ -1,0 +1,80 @@
+"""Where what a run was made from lies now: run.json keeps names as they were typed, and the folder in which they were."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..read.remote import is_url
+
+
+@dataclass(frozen=True)
+class RunInputs:
+    """What a run was made from, each where it lies now, None for what was not asked for or is not there.
+
+    `gone` are those of the clouds that are not there, as the run named them.
+    """
+
+    clouds: tuple[str, ...] = ()
+    gone: tuple[str, ...] = ()
+    footprints: str | None = None
+    layer: str | int | None = None
+    terrain: str | None = None
+    overrides: str | None = None
+
+    @property
+    def files(self) -> list[str]:
+        """The clouds that are files of this machine."""
+        return [cloud for cloud in self.clouds if not is_url(cloud)]
+
+    @property
+    def footprint_file(self) -> str | None:
+        """The footprints, where they are a file of this machine: an address in run.json has lost its password."""
+        return None if self.footprints is None or is_url(self.footprints) else self.footprints
+
+    @property
+    def told_gone(self) -> str:
+        """A sentence about clouds that are gone, empty where none is."""
+        if not self.gone:
+            return ""
+        more = f" and {len(self.gone) - 1} more" if len(self.gone) > 1 else ""
+        return f"the run's points are gone ({self.gone[0]}{more} is not there)"
+
+
+def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInputs:
+    """The inputs told of in run.json's `record`; files in the folder `moved_to` go before those where the run found them.
+
+    >>> found_inputs({"inputs": {"clouds": ["no/such.laz", "https://example.org/a.laz"]}})
+    RunInputs(clouds=('https://example.org/a.laz',), gone=('no/such.laz',), footprints=None, layer=None, terrain=None, overrides=None)
+    """
+    told = record.get("inputs") or {}
+    started_in = told.get("started_in")
+
+    def place(path: Any) -> str | None:
+        return place_of(path, started_in, moved_to) if path and isinstance(path, str) else None
+
+    named = [cloud for cloud in told.get("clouds") or [] if isinstance(cloud, str)]
+    clouds = [(cloud, place(cloud)) for cloud in named]
+    return RunInputs(
+        tuple(found for _, found in clouds if found),
+        tuple(cloud for cloud, found in clouds if not found),
+        place(told.get("footprints")),
+        told.get("layer"),
+        place(told.get("terrain")),
+        place(told.get("overrides")),
+    )
+
+
+def place_of(path: str, started_in: str | None, moved_to: Path | None) -> str | None:
+    """Where a file lies that a run started in the folder `started_in` called `path`; None where it is not there.
+
+    A whole project may have moved, and be worked in as before: so names are also tried as they stand.
+    """
+    if is_url(path):
+        return path
+    if "\0" in path:
+        return None
+    places = [moved_to / Path(path).name] if moved_to else []
+    places += [Path(started_in) / path] if started_in else []
+    return next((str(place) for place in (*places, Path(path)) if place.exists()), None)
