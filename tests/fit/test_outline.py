@@ -6,15 +6,18 @@ import numpy as np
 import pytest
 import shapely
 
+from hiproof import Status, reconstruct
+from hiproof.compose import check_solid
 from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
-from hiproof.fit.outline import estimate_outline
+from hiproof.fit.outline import estimate_outline, with_courts
 from hiproof.fit.outline.cost import Border, changed, cost_of_change, drawing_of, structure_cost
 from hiproof.fit.outline.lines import BACK, dropped, find_corners, lines_through, replaced, replaced_by
 from hiproof.fit.outline.spread import unevenness
 from hiproof.fit.outline.steps import RUN, best_levels, stepped
 from hiproof.fit.walls import on_walls
 
+ANYWHERE = (-np.inf, np.inf, -np.inf, np.inf)
 L_SHAPE = shapely.Polygon([(0, 0), (16, 0), (16, 8), (7, 8), (7, 18), (0, 18)])
 SHAPES = {
     "rectangle": shapely.box(0, 0, 14, 8),
@@ -86,7 +89,7 @@ def scanned_block(outline, seed=0, high=6.0, step_at=None):
     xy = np.stack(np.meshgrid(np.arange(x0, x1, 0.45), np.arange(y0, y1, 0.45)), -1).reshape(-1, 2)
     xy = xy + rng.uniform(-0.15, 0.15, xy.shape)
     roof = xy[shapely.contains_xy(outline, *xy.T)]
-    border = outline.exterior
+    border = outline.boundary
     if step_at is not None:
         border = border.union(shapely.LineString([(step_at, y0), (step_at, y1)]).intersection(outline))
     places = [line.interpolate(rng.uniform(0, line.length, int(3 * line.length))) for line in shapely.get_parts(border)]
@@ -121,7 +124,7 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     truth = shapely.box(0, 0, 14, 8) - shapely.box(5, 6.5, 8, 8)
     x, y = points_in(truth, 8.0, angle=0.0)[0].T
     order = np.argsort(y)
-    border = Border(x[order], y[order], np.zeros(len(x), bool), 8.0, 0.15, 0.02, 3.0, 3.0, 1.0, 6.0)
+    border = Border(x[order], y[order], np.zeros(len(x), bool), 8.0, False, ANYWHERE, 0.15, 0.02, 3.0, 3.0, 1.0, 6.0)
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
     drawing = drawing_of(lines_through(np.array(wedge, float)), 0.0, border)
     assert len(stepped(drawing, border, 1).lines) == 7  # no matter of single sides
@@ -139,6 +142,39 @@ def test_an_outline_ends_in_no_spike():
     assert iou(outline, truth) > 0.95
     spike = np.array([(0, 0), (14, 0), (20, 8.2), (13.8, 7.7), (0, 8)], float)
     assert not find_corners(lines_through(spike), np.empty_like(spike))
+
+
+@pytest.mark.parametrize("name", ["rectangle", "l"])
+def test_a_court_is_drawn_as_the_outline_is(name):
+    court = {
+        "rectangle": shapely.box(5, 5, 10, 9),
+        "l": shapely.Polygon([(4, 4), (14, 4), (14, 7), (7, 7), (7, 10), (4, 10)]),
+    }[name]
+    truth = shapely.box(0, 0, 18, 14) - court
+    outline = estimate_outline(scanned_block(truth), 0.0)
+    assert len(outline.interiors) == 1 and corner_count(outline) == 4
+    assert corner_count(shapely.Polygon(outline.interiors[0])) == corner_count(court)
+    assert iou(shapely.Polygon(outline.interiors[0]), court) > 0.95
+
+
+def test_a_gap_in_a_roof_that_is_smaller_than_a_building_is_no_court():
+    truth = shapely.box(0, 0, 14, 10)
+    assert not estimate_outline(scanned_block(truth - shapely.box(6, 4, 7.7, 5.7)), 0.0).interiors
+
+
+def test_a_block_with_a_court_has_a_valid_solid_with_one():
+    building = reconstruct(scanned_block(shapely.box(0, 0, 18, 14) - shapely.box(5, 5, 10, 9)))
+    assert building.status is Status.MODELLED and not check_solid(building.solid)
+    assert len(building.roof.outline.interiors) == 1
+    assert building.roof.outline.area == pytest.approx(18 * 14 - 20, rel=0.03)
+
+
+def test_courts_that_are_bays_already_or_would_cut_a_roof_in_two_are_left_out():
+    outline = shapely.box(0, 0, 20, 10)
+    inside, bay, across = shapely.box(4, 4, 7, 7), shapely.box(9, 9, 12, 14), shapely.box(9, -1, 11, 11)
+    assert with_courts(outline, [inside, bay]).equals(outline - inside)
+    assert with_courts(outline, [across]).equals(outline)
+    assert with_courts(outline, [shapely.box(9, 1, 12, 10.2)]).area == pytest.approx(outline.area - 27)
 
 
 def test_levels_of_columns_are_the_cheapest_of_all():
@@ -159,11 +195,13 @@ def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
     assert unevenness(rng.uniform(0, 2, (20, 2)), shapely.box(0, 0, 2, 2), 0.45) == 1.0
 
 
-def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew():
+@pytest.mark.parametrize("court", [False, True])
+def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
-    border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, 0.15, 0.02, 2.5, 3.0, 1.0, 6.0)
-    lines = lines_through(np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float))
+    border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, court, ANYWHERE, 0.15, 0.02, 2.5, 3.0, 1.0, 6.0)
+    ring = np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float)
+    lines = lines_through(ring[::-1] if court else ring)
     drawing = drawing_of(lines, 0.0, border)
     priced = 0
     for i in range(len(lines)):
@@ -183,7 +221,7 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew():
 
 
 def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
-    border = Border(*np.zeros((3, 0)), 3.0, 0.15, 0.02, 3.0, 5.0, 1.0, 7.0)
+    border = Border(*np.zeros((3, 0)), 3.0, False, ANYWHERE, 0.15, 0.02, 3.0, 5.0, 1.0, 7.0)
     rings = {"square": [(0, 0), (8, 0), (8, 6), (0, 6)], "wedge": [(0, 0), (12, 0), (0, 5)]}
     rings |= {"slant": [(0, 0), (9, 0), (7, 6), (-2, 6)]}
     costs = {k: structure_cost(lines_through(np.array(ring, float)), 0.0, border) for k, ring in rings.items()}

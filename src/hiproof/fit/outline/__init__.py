@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -21,9 +22,9 @@ import shapely
 from ..direction import main_direction
 from ..walls import on_walls
 from .cost import Border, Drawing, drawing_of
-from .lines import find_corners, lines_through, quarter_gap
+from .lines import area_of, find_corners, lines_through, quarter_gap
 from .moves import redrawn
-from .rough import rough_outlines
+from .rough import LEAST_COURT_M2, Rough, largest, rough_outline
 from .settle import settled
 from .spread import unevenness
 from .steps import RUN, stepped
@@ -39,13 +40,15 @@ OUTER_M = 0.25
 # points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them
 MOST_DENSE = 8.0
 SAME_DIRECTION_RAD = math.radians(1.5)  # rad; within it the direction of slopes and that of the outline are one
+AROUND_M = 2.0  # m around a court's first drawing in which its corners lie; points of twice that bear on it
+MOSTLY_INSIDE = 0.8  # of a court's area
 STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
 
 def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
-    """Outline (a polygon without holes) of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and across.
+    """Outline, with courts, of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and across.
 
-    With heights, points of walls are known, and the outline runs through them. It is the cheaper of two drawings, one from few
+    With heights, points of walls are known, and the outline runs through them. Each ring is the cheaper of two drawings, one from few
     corners on and one from more, along another main direction where the corners have one; without `kappa` both are along theirs.
     Raises FitError for points that span no area.
 
@@ -55,34 +58,75 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     (4, True)
     """
     points = np.ascontiguousarray(points, float)
-    starts, spacing, shape = rough_outlines(points[:, :2])
-    rough = shapely.Polygon(starts[0])
-    own = main_direction(rough)
+    rough = rough_outline(points[:, :2])
+    own = main_direction(shapely.Polygon(rough.rings[0][0]))
     kappa = own if kappa is None else kappa
     ways = (kappa, own if abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD else kappa)
-    wall = on_walls(points, points, spacing) if points.shape[1] > 2 else np.zeros(len(points), bool)
+    cloud = cloud_of(points, rough)
+    outline, *courts = [ring_of(starts, ways, cloud) for starts in rough.rings]
+    return with_courts(outline, courts)
+
+
+class Cloud(NamedTuple):
+    """What all rings are drawn by: points `xy` (n, 2), which of them are a `wall`'s, which are `telling`: not those of inner walls;
+    `density` (points of the roof a square metre), `spacing` (m), `dearness` of structure."""
+
+    xy: np.ndarray
+    wall: np.ndarray
+    telling: np.ndarray
+    density: float
+    spacing: float
+    dearness: float
+
+
+def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
+    """What `points` (n, 2 or 3) say of the rings to be drawn."""
+    xy = points[:, :2]
+    wall = on_walls(points, points, rough.spacing) if points.shape[1] > 2 else np.zeros(len(points), bool)
     outer = wall.copy()
-    outer[wall] = shapely.dwithin(shape.exterior, shapely.points(points[wall, :2]), OUTER_M)
-    density = (~wall).sum() / rough.area
-    telling, dearness = ~wall | outer, unevenness(points[~wall, :2], shape, spacing)
+    outer[wall] = shapely.dwithin(rough.shape.boundary, shapely.points(xy[wall]), OUTER_M)
+    density = (~wall).sum() / sum(area_of(starts[0]) for starts in rough.rings)
+    return Cloud(xy, wall, ~wall | outer, density, rough.spacing, unevenness(xy[~wall], rough.shape, rough.spacing))
+
+
+def ring_of(starts: list[np.ndarray], ways: tuple[float, float], cloud: Cloud) -> shapely.Polygon:
+    """One ring: the cheaper of the drawings from its `starts` on, each along one of the `ways` (rad)."""
     drawings = []
     for corners, angle in zip(starts, ways, strict=True):
-        border = border_of(turned_back(points[telling, :2], angle), wall[telling], density, dearness)
-        found = drawn(lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * spacing)
+        border = border_of(cloud, corners, angle)
+        found = drawn(lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing)
         drawings.append((found.cost, found.lines + [angle, 0.0]))
     _, lines = min(drawings, key=itemgetter(0))
-    lines = settled(lines, points[:, :2], density)
+    lines = settled(lines, cloud.xy, cloud.density)
     corners = np.empty_like(lines)
     find_corners(lines, corners)
     return shapely.Polygon(corners)
 
 
-def border_of(xy: np.ndarray, wall: np.ndarray, density: float, dearness: float) -> Border:
-    """What bears on the border: some of the points `xy` (n, 2), of which `wall` (n,) lie on outer walls; and the prices."""
-    step = math.ceil(density / MOST_DENSE)
+def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
+    """What bears on a ring that begins with `corners` (n, 2), in axes turned by `angle` (rad): some of the points, and the prices."""
+    xy, wall = turned_back(cloud.xy[cloud.telling], angle), cloud.wall[cloud.telling]
+    start, court = turned_back(corners, angle), area_of(corners) < 0.0
+    low, high = start.min(axis=0) - AROUND_M, start.max(axis=0) + AROUND_M
+    if court:
+        near = ((xy > low - AROUND_M) & (xy < high + AROUND_M)).all(axis=1)
+        xy, wall = xy[near], wall[near]
+    step = math.ceil(cloud.density / MOST_DENSE)
     order = np.argsort(xy[::step, 1], kind="stable") * step
     x, y = np.ascontiguousarray(xy[order].T)
-    return Border(x, y, wall[order], density / step, BLUR_M, STRAY, *(dearness * price for price in PRICES))
+    prices = (cloud.dearness * price for price in PRICES)
+    box = low[0], high[0], low[1], high[1]
+    return Border(x, y, wall[order], cloud.density / step, court, box, BLUR_M, STRAY, *prices)
+
+
+def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shapely.Polygon:
+    """The outline less its courts. One that is drawn as a bay already, or would cut a roof in two, is left out."""
+    for court in courts:
+        roof = largest(shapely.difference(outline, court))
+        gone = outline.area - roof.area
+        if MOSTLY_INSIDE * court.area < gone < court.area + LEAST_COURT_M2:
+            outline = roof
+    return outline
 
 
 def turned_back(xy: np.ndarray, angle: float) -> np.ndarray:

@@ -8,7 +8,8 @@ Points of the roof are spread evenly over it, those of its walls lie on the outl
 
 and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece, those of walls wherever the
 outline does not run through them. To this come the prices of lines (two for a notch), of directions besides the main one, of
-lines that run in them, and of sharp corners. All are in nats.
+lines that run in them, and of sharp corners. All are in nats. A court is drawn in the same way: its ring runs clockwise, what lies in it
+is outside.
 """
 
 from __future__ import annotations
@@ -27,8 +28,9 @@ SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 6
 TOGETHER = 16  # points next to each other in y for which sides are looked up once
 
 # x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
-# blur (m), stray (share): see above. line, direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
-Border = namedtuple("Border", "x y wall density blur stray line direction skew sharp")
+# court: whether the border is a court's, whose corners lie within box: x_low, x_high, y_low, y_high (m). blur (m), stray (share): see above.
+# line, direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
+Border = namedtuple("Border", "x y wall density court box blur stray line direction skew sharp")
 
 # lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, structure: the price of
 # the lines, cost: all of it.
@@ -39,16 +41,29 @@ Drawing = namedtuple("Drawing", "lines kappa corners own structure cost")
 def drawing_of(lines, kappa, border):
     """The drawing of `lines`; its cost is infinite where they are no polygon."""
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
-    if len(lines) < 3 or not find_corners(lines, corners) or area_of(corners) <= 0.0:
+    if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
         return Drawing(lines, kappa, corners, own, np.inf, np.inf)
     reach = SURE_BLURS * border.blur
     for first in range(0, len(own), TOGETHER):
         last = min(first + TOGETHER, len(own))
         sides = sides_near(corners, border.y[first] - reach, border.y[last - 1] + reach)
         for k in range(first, last):
-            own[k] = point_cost(border.x[k], border.y[k], corners, sides, border.wall[k], border.blur, border.stray)
+            x, y, wall = border.x[k], border.y[k], border.wall[k]
+            own[k] = point_cost(x, y, corners, sides, border.court, wall, border.blur, border.stray)
     misfit, structure = border.density * area_of(corners) + own.sum(), structure_cost(lines, kappa, border)
     return Drawing(lines, kappa, corners, own, structure, misfit + structure)
+
+
+@compiled
+def is_allowed(corners, border):
+    """Whether the ring runs as it has to, clockwise where it is a court's, and lies where it may."""
+    if not border.court:
+        return area_of(corners) > 0.0
+    x_low, x_high, y_low, y_high = border.box
+    for i in range(len(corners)):
+        if not (x_low <= corners[i, 0] <= x_high and y_low <= corners[i, 1] <= y_high):
+            return False
+    return area_of(corners) < 0.0
 
 
 @compiled
@@ -65,12 +80,12 @@ def structure_cost(lines, kappa, border):
 
 
 @compiled
-def point_cost(x, y, corners, sides, wall, blur, stray):
+def point_cost(x, y, corners, sides, court, wall, blur, stray):
     """Minus the logarithm of how likely a point at x, y is, against one deep inside; `sides` are all that come near its y.
 
     That of a `wall` is compared with one on the border.
     """
-    inside, reach = False, SURE_BLURS * blur
+    inside, reach = court, SURE_BLURS * blur
     nearest = reach * reach
     for i in sides:
         k = i + 1 if i + 1 < len(corners) else 0
@@ -136,9 +151,7 @@ def change_of(lines, drawing, i, count, fresh, border):
     corners, old = np.empty((len(lines), 2)), drawing.corners
     for k in range(fresh, len(lines)):
         corners[k] = old[(i + count + 1 + k - fresh) % len(old)]
-    possible = len(lines) >= 3 and find_corners(lines, corners, fresh)
-    area = area_of(corners) if possible else 0.0
-    if area <= 0.0:
+    if len(lines) < 3 or not find_corners(lines, corners, fresh) or not is_allowed(corners, border):
         return Drawing(lines, drawing.kappa, corners, np.empty(0), np.inf, np.inf), 0
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
     for k in range(count + 1 + fresh):
@@ -147,13 +160,13 @@ def change_of(lines, drawing, i, count, fresh, border):
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
     reach = SURE_BLURS * border.blur
     sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
-    misfit = border.density * (area - area_of(old))
+    misfit = border.density * (area_of(corners) - area_of(old))
     first, last = np.searchsorted(border.y, np.array([y_low - reach, y_high + reach]))
     own = drawing.own[first:last].copy()
     for k in range(first, last):
-        x, y = border.x[k], border.y[k]
+        x, y, wall = border.x[k], border.y[k], border.wall[k]
         if x_low - reach < x < x_high + reach:
-            own[k - first] = point_cost(x, y, corners, sides, border.wall[k], border.blur, border.stray)
+            own[k - first] = point_cost(x, y, corners, sides, border.court, wall, border.blur, border.stray)
             misfit += own[k - first] - drawing.own[k]
     structure = structure_cost(lines, drawing.kappa, border)
     cost = drawing.cost + misfit + structure - drawing.structure

@@ -1,4 +1,4 @@
-"""A polygon as the lines of its sides, counter-clockwise. Compiled.
+"""A polygon as the lines of its sides, counter-clockwise, or a court in one, clockwise. Compiled.
 
 `lines` (n, 2) hold a row a side: the azimuth of the normal that looks outwards (rad) and the line's distance from the
 origin along it (m). Corner i is where sides i - 1 and i meet, so side i runs from corner i to corner i + 1.
@@ -21,7 +21,7 @@ quarter_gap = compiled(direction.quarter_gap)
 
 
 def lines_through(corners: np.ndarray) -> np.ndarray:
-    """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise."""
+    """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise, or of a court, clockwise."""
     ends = np.roll(corners, -1, axis=0)
     step, middle = ends - corners, 0.5 * (corners + ends)
     azimuth = np.arctan2(step[:, 1], step[:, 0]) - 0.5 * math.pi

@@ -1,8 +1,11 @@
-"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners and with more."""
+"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners and with more.
+
+Places in it without points, 4 m2 or more, are courts."""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -15,18 +18,34 @@ NARROWER = 0.8  # of the usual radius of alpha shapes: bays of two spacings stay
 CLOSING_SPACINGS, PUSH_SPACINGS = 1.0, 0.5
 SIMPLIFY_SPACINGS = (0.7, 0.45)  # spacings of points within which corners are dropped, of few and of more
 COARSER, TRIES = 1.3, 12  # factor between tries at few corners, and how many tries
+LEAST_COURT_M2 = 4.0  # m2; as of buildings
 MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 
-def rough_outlines(xy: np.ndarray) -> tuple[list[np.ndarray], float, shapely.Polygon]:
-    """Corners (n, 2), counter-clockwise, of simple polygons about points `xy` (m, 2), no two neighbouring sides parallel, few first;
-    the points' spacing (m); and their alpha shape. Raises FitError for points that span no area."""
-    shape = alpha_shape(xy, NARROWER * default_radius(xy))
+class Rough(NamedTuple):
+    """`rings`: of the outline, then of each court in it, corners (n, 2) to begin with, few and more, no two neighbouring sides
+    parallel; the outline's run counter-clockwise, courts' clockwise. `spacing` (m) of the points, `shape`: their alpha shape."""
+
+    rings: list[list[np.ndarray]]
+    spacing: float
+    shape: shapely.Polygon
+
+
+def rough_outline(xy: np.ndarray) -> Rough:
+    """What points `xy` (m, 2) are drawn from. Raises FitError for points that span no area."""
+    shape = with_large_holes(alpha_shape(xy, NARROWER * default_radius(xy), holes=True))
     spacing = math.sqrt(shape.area / len(xy))
     closed = shapely.buffer(shape, CLOSING_SPACINGS * spacing, join_style="mitre")
-    closed = largest(shapely.buffer(closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre"))
-    filled = from_farthest_corner(closed)
-    return [corners_of(filled, spacings * spacing) for spacings in SIMPLIFY_SPACINGS], spacing, shape
+    pushed = shapely.buffer(closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre")
+    pushed = with_large_holes(largest(pushed))
+    filled = [from_farthest_corner(shapely.Polygon(ring)) for ring in (pushed.exterior, *pushed.interiors)]
+    rings = [[corners_of(ring, spacings * spacing) for spacings in SIMPLIFY_SPACINGS] for ring in filled]
+    return Rough(rings[:1] + [[corners[::-1] for corners in court] for court in rings[1:]], spacing, shape)
+
+
+def with_large_holes(polygon: shapely.Polygon) -> shapely.Polygon:
+    holes = [ring for ring in polygon.interiors if shapely.Polygon(ring).area >= LEAST_COURT_M2]
+    return shapely.Polygon(polygon.exterior, holes)
 
 
 def corners_of(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray:
