@@ -8,7 +8,9 @@ import shapely
 
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.shown import with_slivers
 from hiproof.fit.union.teeth import area_of
+from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from points_of_roofs import sampled
 
@@ -69,3 +71,12 @@ def test_wings_beside_a_yard_are_two_and_what_crosses_a_roof_is_one():
         parts = fit_building(sampled(z, outline), outline).roof_parts
         assert [part.type for part in parts] == ["flat"] * count
         assert sorted(round(part.translation[2], 1) for part in parts) == [6.0] * (count - 1) + [9.0]
+
+
+def test_a_strip_a_grid_step_off_its_neighbour_joins_it():
+    flat = [(-2.758176, 19.310466), (1.171256, 11.801776), (-10.364279, 5.765023), (-14.293711, 13.273712)]
+    strip = [(-10.364279, 5.765022), (1.171257, 11.801776), (1.200482, 11.745931), (-10.335054, 5.709177)]
+    level = np.array([[0.0, 0.0, 3.0]])
+    one, other = (Part("flat", (Piece(shapely.Polygon(ring), level),)) for ring in (flat, strip))
+    (part,) = with_slivers([one], other, math.inf)
+    assert part.area == pytest.approx(one.area + other.area, abs=1e-3)

@@ -14,6 +14,7 @@ from .plan import Plan
 from .regions import polygons_of, shares_most
 from .scene import Scene, nodes
 
+SEAM_M = 1e-5  # between corners that are the same but for the grid they lie on
 BORDER_M = 0.1  # a part shows that is the highest somewhere so far inside the outline
 
 
@@ -41,8 +42,10 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
         return None
     for sliver in bare:
         near, _, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
+        outline = pieces[k][q].outline
         seam = polygons_of(shapely.intersection(near, own, grid_size=GRID_M))
-        merged = polygons_of(shapely.union_all([pieces[k][q].outline, *seam, sliver], grid_size=GRID_M))
+        beside = shapely.snap(sliver, outline, SEAM_M)
+        merged = polygons_of(shapely.union_all([outline, *seam, beside], grid_size=GRID_M))
         if len(merged) != 1:
             return None
         pieces[k][q] = Piece(merged[0], pieces[k][q].planes)
