@@ -11,6 +11,7 @@ import os
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager
+from itertools import islice
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -26,7 +27,7 @@ from .head import FileHead
 from .naming import plan_wkt
 from .roof_figures import RoofFigures
 from .styles import TABLE, style_rows
-from .table_rows import Row, Rows, table_rows
+from .table_rows import Row, lines_of, table_rows
 from .writer import BuildingWriter
 
 BUILDINGS = "buildings"
@@ -55,18 +56,18 @@ def write_attributes(
 
 
 class WaitingRows:
-    """Rows of one table in a temporary file, and the types found in each column."""
+    """Rows of one table in a temporary file, as the text that their buildings brought, and the types found in each column."""
 
     def __init__(self, layer: str, file: BinaryIO) -> None:
-        self.layer, self.file, self.count = layer, file, 0
+        self.layer, self.file = layer, file
         self.found: dict[str, set[type]] = {a.name: set() for a in DECLARED.get(layer, ())}
 
-    def put(self, row: Row) -> None:
-        geometry, values = row
-        for name, value in values.items():
-            self.found.setdefault(name, set()).add(kind_of(value))
-        self.file.write(json.dumps([geometry and geometry.hex(), values]).encode() + b"\n")
-        self.count += 1
+    def put(self, line: bytes) -> None:
+        """A building's rows, as a line of `Rows.to_text`."""
+        for _, values in json.loads(line):
+            for name, value in values.items():
+                self.found.setdefault(name, set()).add(kind_of(value))
+        self.file.write(line + b"\n")
 
     def kinds(self, prefix: str) -> dict[str, type]:
         """The one type of every column."""
@@ -80,14 +81,10 @@ class WaitingRows:
     def batches(self) -> Iterator[list[Row]]:
         """The rows, some thousands at a time; one empty batch if there are none."""
         self.file.seek(0)
-        left = self.count
-        while True:
-            size = min(left, ROWS_AT_ONCE)
-            waiting = (json.loads(self.file.readline()) for _ in range(size))
-            yield [(geometry and bytes.fromhex(geometry), values) for geometry, values in waiting]
-            left -= size
-            if not left:
-                return
+        rows = ((wkb and bytes.fromhex(wkb), values) for line in self.file for wkb, values in json.loads(line))
+        yield list(islice(rows, ROWS_AT_ONCE))
+        while batch := list(islice(rows, ROWS_AT_ONCE)):
+            yield batch
 
 
 class AttributesWriter(BuildingWriter):
@@ -110,15 +107,12 @@ class AttributesWriter(BuildingWriter):
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
         attributes = building_attributes(building, figures, self.prefix, self.units, self.osm_tags)
-        self.put_rows(table_rows(building, figures, attributes, self.units))
+        self.put(Fragment(table_rows(building, figures, attributes, self.units).to_text()))
 
     def put(self, fragment: Fragment) -> None:
-        self.put_rows(Rows.of_text(fragment.text))
-
-    def put_rows(self, rows: Rows) -> None:
+        lines = lines_of(fragment.text)
         for layer, waiting in self.waiting.items():
-            for row in getattr(rows, layer):
-                waiting.put(row)
+            waiting.put(lines[layer])
 
     def finish(self) -> None:
         for waiting in self.waiting.values():

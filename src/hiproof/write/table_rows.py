@@ -26,15 +26,18 @@ class Rows(NamedTuple):
     roof_surfaces: tuple[Row, ...] = ()
 
     def to_text(self) -> bytes:
-        """The rows as JSON, geometries in hexadecimal digits."""
-        return json.dumps([[[wkb and wkb.hex(), values] for wkb, values in table] for table in self]).encode()
+        """The rows as JSON, a line a table, geometries in hexadecimal digits."""
+        tables = ([[wkb and wkb.hex(), values] for wkb, values in table] for table in self)
+        return b"\n".join(json.dumps(table).encode() for table in tables)
 
-    @classmethod
-    def of_text(cls, text: bytes) -> Rows:
-        """The rows that `to_text` wrote."""
-        return cls(
-            *(tuple((wkb and bytes.fromhex(wkb), values) for wkb, values in table) for table in json.loads(text))
-        )
+
+def lines_of(text: bytes) -> dict[str, bytes]:
+    """The line of each table in what `Rows.to_text` wrote.
+
+    >>> lines_of(Rows(((None, {"id": "a"}),)).to_text())
+    {'buildings': b'[[null, {"id": "a"}]]', 'parts': b'[]', 'roof_surfaces': b'[]'}
+    """
+    return dict(zip(Rows._fields, text.split(b"\n"), strict=True))
 
 
 def table_rows(
