@@ -189,24 +189,21 @@ def test_uneven_teeth_stay_uneven():
     assert found == pytest.approx(edges, abs=0.11)
 
 
-def test_detail_main_leaves_a_dormer_out():
+@pytest.mark.parametrize(
+    ("half_width", "depth", "top", "parts"),
+    [(0.9, 2.0, 8.0, {"main": 1, "full": 2, "fine": 2}), (0.6, 1.0, 6.9, {"main": 1, "full": 1, "fine": 2})],
+)
+def test_detail_says_how_small_a_dormer_may_be(half_width, depth, top, parts):
     def with_dormer(x, y):
-        return np.where((abs(x - 6) < 0.9) & (y > 1.0) & (y < 3.0), 8.0, 8.0 - 0.9 * np.abs(y - 3.5))
+        dormer = (abs(x - 6) < half_width) & (y > 1.0) & (y < 1.0 + depth)
+        return np.where(dormer, top, 8.0 - 0.9 * np.abs(y - 3.5))
 
     points = sampled(with_dormer, HOUSE)
-    main = fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": "main"}}))
-    assert len(main.roof_parts) == 1
-    assert len(fit_building(points, HOUSE).roof_parts) > 1
-
-
-def test_detail_fine_keeps_a_dormer_that_is_too_small_otherwise():
-    def with_dormer(x, y):
-        return np.where((abs(x - 6) < 0.6) & (y > 1.0) & (y < 2.0), 6.9, 8.0 - 0.9 * np.abs(y - 3.5))
-
-    points = sampled(with_dormer, HOUSE)
-    fine = fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": "fine"}}))
-    assert len(fine.roof_parts) == 2
-    assert len(fit_building(points, HOUSE).roof_parts) == 1
+    found = {
+        detail: len(fit_building(points, HOUSE, Settings.from_dict({"compound": {"detail": detail}})).roof_parts)
+        for detail in parts
+    }
+    assert found == parts
 
 
 def test_without_an_outline_the_plan_is_estimated():

@@ -33,12 +33,13 @@ def as_text(lines: list[dict]) -> bytes:
 def damaged_models(folder: Path) -> dict[str, bytes]:
     """Contents of `buildings.city.jsonl` by what is wrong; none of them is a file that can be used."""
     lines = sound_lines(folder)
-    sound, nested = as_text(lines), b"[" * DEEP + b"]" * DEEP
-    geometry = (1, "CityObjects", ..., "geometry")
-    solid = (*geometry, 0)
-    face = (*solid, "boundaries", 0, 0)
-    attributes = (1, "CityObjects", ..., "attributes")
-    cases = {
+    return damaged_texts(as_text(lines)) | damaged_members(lines) | damaged_geometries(lines)
+
+
+def damaged_texts(sound: bytes) -> dict[str, bytes]:
+    """What is no JSON, or none of a model."""
+    nested = b"[" * DEEP + b"]" * DEEP
+    return {
         "empty": b"",
         "blank": b"\n \n",
         "not JSON": b"buildings\n",
@@ -52,6 +53,13 @@ def damaged_models(folder: Path) -> dict[str, bytes]:
         "nested a million deep": nested,
         "nested after the header": sound.split(b"\n")[0] + b"\n" + nested,
         "a number of 5000 digits": sound.replace(b"0.0001", b"9" * 5000, 1),
+    }
+
+
+def damaged_members(lines: list[dict]) -> dict[str, bytes]:
+    """Headers, vertices, objects and attributes that are something else than they should be."""
+    attributes = (1, "CityObjects", ..., "attributes")
+    return {
         "header is a list": changed(lines, 0, to=[]),
         "feature is a list": changed(lines, 1, to=[]),
         "feature is null": changed(lines, 1, to=None),
@@ -72,6 +80,15 @@ def damaged_models(folder: Path) -> dict[str, bytes]:
         "an object is null": changed(lines, 1, "CityObjects", "house-1"),
         "an object is a text": changed(lines, 1, "CityObjects", "house-1", to="gable"),
         "an attribute that is no number": changed(lines, *attributes, by=lambda a: a | {"height": float("nan")}),
+    }
+
+
+def damaged_geometries(lines: list[dict]) -> dict[str, bytes]:
+    """Boundaries and semantics that are something else than they should be."""
+    geometry = (1, "CityObjects", ..., "geometry")
+    solid = (*geometry, 0)
+    face = (*solid, "boundaries", 0, 0)
+    return {
         "geometry is a text": changed(lines, *geometry, to="solid"),
         "geometry is a number": changed(lines, *geometry, to=5),
         "a geometry is null": changed(lines, *solid),
@@ -91,7 +108,6 @@ def damaged_models(folder: Path) -> dict[str, bytes]:
         "a surface that is a text": changed(lines, *solid, "semantics", "values", 0, 0, to="roof"),
         "surfaces are numbers": changed(lines, *solid, "semantics", "surfaces", to=[1, 2, 3]),
     }
-    return cases
 
 
 def invalid_models(folder: Path) -> dict[str, bytes]:

@@ -175,7 +175,34 @@ def test_withheld_points_are_left_out_with_a_warning(tmp_path):
         assert np.allclose(read_points(tmp_path / "b.las").xyz, xyz[4:], atol=1e-6)
 
 
+AS_TOLD = {
+    "text as laz": ("bad.laz", b"1 2 3\n4 5 6\n"),
+    "empty": ("bad.laz", b""),
+    "ply of faces": ("bad.ply", b"ply\nformat ascii 1.0\nelement face 2\nproperty int a\nend_header\n1\n2\n"),
+    "ply without end": ("bad.ply", b"ply\nformat ascii 1.0\nelement vertex 2\n"),
+    "prose": ("bad.txt", b"Dear reader, this is\nno point cloud at all\n"),
+    "word among numbers": ("bad.xyz", b"1 2 3\n4 five 6\n"),
+    "two columns": ("bad.csv", b"1,2\n3,4\n"),
+    "binary text": ("bad.xyz", bytes(range(256))),
+    "other ending": ("cloud.jpg", b"\xff\xd8\xff\xe0"),
+}
+"""Name and content of files that nobody has to damage."""
+
+
 def damaged(tmp_path, kind):
+    """Where a file lies that is wrong in this way; "missing" is none."""
+    if kind in AS_TOLD:
+        name, content = AS_TOLD[kind]
+        (tmp_path / name).write_bytes(content)
+        return tmp_path / name
+    if kind == "empty folder":
+        (tmp_path / "folder").mkdir()
+        return tmp_path / "folder"
+    return damaged_points(tmp_path, kind)
+
+
+def damaged_points(tmp_path, kind):
+    """A sound file of 5000 points, cut or changed."""
     xyz, classes = some_points(5000)
     path = tmp_path / "bad.laz"
     if kind == "truncated laz":
@@ -194,41 +221,13 @@ def damaged(tmp_path, kind):
         raw = bytearray(write_copc(path, xyz, classes).read_bytes())
         struct.pack_into("<I", raw, 243, 4_000_000_000)
         path.write_bytes(raw)
-    elif kind == "text as laz":
-        path.write_text("1 2 3\n4 5 6\n")
-    elif kind == "empty":
-        path.write_bytes(b"")
     elif kind == "zero points":
         path = write_las(tmp_path / "zero.las", np.empty((0, 3)))
-    elif kind == "empty folder":
-        path = tmp_path / "folder"
-        path.mkdir()
     elif kind == "truncated ply":
         path = write_ply(tmp_path / "bad.ply", xyz, classes, "binary_little_endian")
         path.write_bytes(path.read_bytes()[:5000])
-    elif kind == "ply of faces":
-        path = tmp_path / "bad.ply"
-        path.write_text("ply\nformat ascii 1.0\nelement face 2\nproperty int a\nend_header\n1\n2\n")
-    elif kind == "ply without end":
-        path = tmp_path / "bad.ply"
-        path.write_text("ply\nformat ascii 1.0\nelement vertex 2\n")
-    elif kind == "prose":
-        path = tmp_path / "bad.txt"
-        path.write_text("Dear reader, this is\nno point cloud at all\n")
-    elif kind == "word among numbers":
-        path = tmp_path / "bad.xyz"
-        path.write_text("1 2 3\n4 five 6\n")
-    elif kind == "two columns":
-        path = tmp_path / "bad.csv"
-        path.write_text("1,2\n3,4\n")
-    elif kind == "binary text":
-        path = tmp_path / "bad.xyz"
-        path.write_bytes(bytes(range(256)))
     elif kind == "degrees":
         path = write_las(path, xyz - [85000, 446000, 0], epsg=4326)
-    elif kind == "other ending":
-        path = tmp_path / "cloud.jpg"
-        path.write_bytes(b"\xff\xd8\xff\xe0")
     return path
 
 

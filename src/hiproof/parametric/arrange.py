@@ -66,7 +66,7 @@ def merged_parts(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     together = shapely.union_all([polygon_of(o) for part in (main, side) for o in part["outlines"]], grid_size=GRID_M)
     merged = {key: value for key, value in main.items() if key != "sigma"}
     position = [float(x), float(y), main["position"][2]]
-    return {**merged, "parameters": parameters, "position": position, "outlines": polygons_of(together)}
+    return {**merged, "parameters": parameters, "position": position, "outlines": rings_of(together)}
 
 
 def dormer_on(roof: Roof, index: int, place: tuple[float, float] | None = None) -> dict[str, Any]:
@@ -132,7 +132,7 @@ def outlines_beyond(outlines: list, place: np.ndarray, direction: np.ndarray) ->
     kept = shapely.intersection(
         shapely.union_all([polygon_of(o) for o in outlines]), shapely.Polygon(ring), grid_size=GRID_M
     )
-    found = polygons_of(kept)
+    found = rings_of(kept)
     if not found:
         raise InputError("expected a cut through what the part roofs, got one beside it; cut elsewhere")
     return found
@@ -143,7 +143,7 @@ def polygon_of(rings: list) -> shapely.Geometry:
     return polygon if polygon.is_valid else shapely.make_valid(polygon)
 
 
-def polygons_of(geometry: shapely.Geometry) -> list:
+def rings_of(geometry: shapely.Geometry) -> list:
     """The polygons of a geometry as rings, the outer first."""
     return [
         [shapely.get_coordinates(ring).tolist() for ring in (polygon.exterior, *polygon.interiors)]

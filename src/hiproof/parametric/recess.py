@@ -13,7 +13,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Roof
-from .arrange import BLOCK_HEIGHT_M, BLOCK_M, GRID_M, corners_of, polygons_of
+from .arrange import BLOCK_HEIGHT_M, BLOCK_M, GRID_M, corners_of, rings_of
 from .change import with_sizes
 from .record import list_at, number, numbers_by_name, place, polygon, valid
 
@@ -54,14 +54,14 @@ def moved_along(part: dict[str, Any], old: shapely.Geometry, new: shapely.Geomet
     if shared.area < LEAST_M2 or area_of(part).intersection(shared).area > CLEAR * shared.area:
         return part
     whole = shapely.union(area_of(part), shared, grid_size=GRID_M)
-    return leaving_out({**part, "outlines": polygons_of(whole)}, new)
+    return leaving_out({**part, "outlines": rings_of(whole)}, new)
 
 
 def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
     """The part without what it roofs of `area`. Raises InputError where nothing is left of it."""
     if not area_of(part).intersection(area).area > 0.0:
         return part
-    left = polygons_of(shapely.difference(area_of(part), area, grid_size=GRID_M))
+    left = rings_of(shapely.difference(area_of(part), area, grid_size=GRID_M))
     if not left:
         raise InputError("expected a recess smaller than the part it lies in, got one that covers it; delete the part")
     return {**part, "outlines": left}

@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from ..model import GROUND, ROOF, WALL, Solid
-from ..rings import ring_normal
 from .colours import GROUND_COLOUR, WALL_COLOUR, linear_rgb, type_colour
 from .glb import GlbDocument, y_up
-from .triangles import faces_triangles
+from .triangles import face_normals, faces_triangles
 
 
 def write_models(
@@ -92,8 +91,8 @@ def flat_triangles(solid: Solid, kind: str, origin: np.ndarray) -> tuple[np.ndar
     """Corners (3 t, 3) and face normals (3 t, 3) of the triangles of one kind of face, y up, about `origin`."""
     corners, normals = [np.empty((0, 3))], [np.empty((0, 3))]
     faces = solid.of_kind(kind)
-    for face, triangles in zip(faces, faces_triangles(solid.vertices, faces), strict=True):
-        normal = ring_normal(solid.vertices[list(face.rings[0])])
+    directions = face_normals(solid.vertices, faces)
+    for normal, triangles in zip(directions, faces_triangles(solid.vertices, faces, directions), strict=True):
         corners.append(solid.vertices[triangles.ravel()] - origin)
         normals.append(np.tile(normal / max(np.linalg.norm(normal), 1e-12), (triangles.size, 1)))
     return y_up(np.concatenate(corners)), y_up(np.concatenate(normals))

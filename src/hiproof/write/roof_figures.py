@@ -74,8 +74,7 @@ def roof_figures(solid: Solid) -> RoofFigures:
     >>> figures.volume_m3, figures.h_70p, figures.roofer_type
     (60.0, 3.0, 'horizontal')
     """
-    from ..compose import volume  # both are compiled: a process that only joins files does without
-    from .roof_levels import level_of_share
+    from ..compose import volume  # compiled: a process that only joins files does without
 
     if not solid.of_kind(ROOF):
         raise ValueError("its solid has no RoofSurface")
@@ -87,15 +86,12 @@ def roof_figures(solid: Solid) -> RoofFigures:
     is_roof = np.array([face.kind == ROOF for face in solid.faces])
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     roof = is_roof[face_of]
-    z, plan = np.sort(corners[roof, :, 2], axis=1), triangles[roof, 2]
+    plan = triangles[roof, 2]
     edges = corners[roof, 1:], fan[roof, 1:], area[face_of[roof]]
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
-        h_min=float(z[:, 0].min() + origin[2]),
-        h_50p=float(level_of_share(0.5, z, plan) + origin[2]),
-        h_70p=float(level_of_share(0.7, z, plan) + origin[2]),
-        h_max=float(z[:, 2].max() + origin[2]),
+        **roof_heights(np.sort(corners[roof, :, 2], axis=1), plan, float(origin[2])),
         h_ridge=ridge_height(*edges) + float(origin[2]),
         h_eave=eave_height(*edges) + float(origin[2]),
         h_base=base_height(solid),
@@ -109,6 +105,16 @@ def roof_figures(solid: Solid) -> RoofFigures:
         face_azimuth_deg=azimuth,
         face_area_m2=size,
     )
+
+
+def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, float]:
+    """Lowest, highest and two heights between them below which a share of the roof's area lies; of triangles by their corners'
+    heights `z` (t, 3) over `z_origin`, in order, and their areas in plan (t,)."""
+    from .roof_levels import level_of_share  # compiled, as above
+
+    heights = {"h_min": z[:, 0].min(), "h_max": z[:, 2].max()}
+    heights |= {name: level_of_share(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))}
+    return {name: float(height + z_origin) for name, height in heights.items()}
 
 
 def face_fans(solid: Solid) -> tuple[np.ndarray, np.ndarray]:

@@ -23,10 +23,17 @@ def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
     return faces_triangles(vertices, [face])[0]
 
 
-def faces_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> list[np.ndarray]:
-    """The triangles of every face, as `face_triangles` has them, all cut by one call."""
-    others = [face.rings for face in faces if not is_triangle(face)]
-    tiles = iter(cut(vertices, others) if others else [])
+def face_normals(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
+    """Vector areas (n, 3) of the outer rings of n faces."""
+    return ring_normals([vertices[list(face.rings[0])] for face in faces]) if faces else np.empty((0, 3))
+
+
+def faces_triangles(vertices: np.ndarray, faces: Sequence[Face], normals: np.ndarray | None = None) -> list[np.ndarray]:
+    """The triangles of every face, as `face_triangles` has them, all cut by one call; `normals` are those of `face_normals`, where a
+    caller has them."""
+    others = [number for number, face in enumerate(faces) if not is_triangle(face)]
+    normals = face_normals(vertices, faces) if normals is None else normals
+    tiles = iter(cut(vertices, [faces[number].rings for number in others], normals[others]) if others else [])
     return [np.array(face.rings[:1], int) if is_triangle(face) else next(tiles) for face in faces]
 
 
@@ -34,9 +41,8 @@ def is_triangle(face: Face) -> bool:
     return len(face.rings) == 1 and len(face.rings[0]) == 3
 
 
-def cut(vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]]) -> list[np.ndarray]:
-    """Triangles (t, 3) of faces given by their rings of vertex indices, by constrained Delaunay."""
-    normals = ring_normals([vertices[list(rings[0])] for rings in faces])
+def cut(vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray) -> list[np.ndarray]:
+    """Triangles (t, 3) of faces given by their rings of vertex indices and their normals (n, 3), by constrained Delaunay."""
     # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they name their vertex.
     axes = np.abs(normals).argmax(axis=1)
     drawn = [vertices[:, [(axis + 1) % 3, (axis + 2) % 3]] for axis in range(3)]
