@@ -49,6 +49,14 @@ def test_a_ridge_is_obeyed_and_the_contradiction_is_said(scanned):
     assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith("ridge_height 8.0 (seen, anna)")
 
 
+def test_a_ground_above_the_eaves_is_said(scanned):
+    assert "ground given" not in obeyed(scanned, z_ground=1.0).detail
+    assert "ground given" not in obeyed(scanned, z_ground=-500.0).detail
+    house = obeyed(scanned, z_ground=7.0)
+    assert "the ground given lies above its lowest eave; overridden: z_ground 7.0" in house.detail
+    assert house.solid.vertices[:, 2].min() < 5.0 and not check_solid(house.solid)
+
+
 def test_no_more_parts_than_asked_for():
     rng = np.random.default_rng(1)
     xy = rng.uniform((0, 0), (16, 8), (1600, 2))
@@ -120,6 +128,12 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
         ({"id": "a", "parts": [], "origin": [0, 0, 0], "type": "hip", "ridge_height": 3}, "list of parts without"),
         ({"id": "a", "ridge_height": float("nan")}, "a number as ridge_height"),
         ({"id": "a", "fixed": {"height": "high"}}, "a number as height"),
+        (
+            {"id": "a", "ridge_height": 1e9},
+            "ridge_height of the override of 'a' within 100000, got 1e\\+09; check its unit",
+        ),
+        ({"id": "a", "z_ground": -1e6}, "z_ground of the override of 'a' within 100000"),
+        ({"id": "a", "block_height": 1e6}, "block_height of the override of 'a' within 100000"),
         ("hip", "an object as an override"),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -26,10 +27,11 @@ MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a kille
 def make_plan(request: Request) -> WorkPlan:
     """The plan of a request. Raises InputError when nothing can be read."""
     from ..read.terrain import read_terrain
-    from .frame import settle_frame
+    from .frame import plan_bounds, settle_frame
 
     headers = read_headers(request.clouds)
     frame = settle_frame(request, headers)
+    refuse_box_elsewhere(request.bbox, plan_bounds(headers))
     if request.terrain:
         # only to be told now if it cannot be read, and not after all points are sorted
         read_terrain(request.terrain, frame.crs, frame.units)
@@ -124,6 +126,24 @@ def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[
     return tuple(dataclasses.replace(job, index=index) for index, job in enumerate(met))
 
 
+def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
+    """A box that meets none of the clouds' boxes (n, 4), both in the clouds' own unit, is refused before anything is read."""
+    if bbox is None or not len(bounds) or shapely.intersects(shapely.box(*bbox), shapely.box(*bounds.T)).any():
+        return
+    extent = [*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)]
+    raise InputError(
+        f"expected a --bbox that meets the clouds, which lie in {told_box(extent)}, got {told_box(bbox)}; give it in their coordinates"
+    )
+
+
 def nothing_in(bbox: Box) -> str:
-    box = ",".join(f"{side:.10g}" for side in bbox)
-    return f"expected buildings in --bbox {box}, got none; it is in the coordinates of the clouds"
+    return f"expected buildings in --bbox {told_box(bbox)}, got none; it is in the coordinates of the clouds"
+
+
+def told_box(box: Sequence[float]) -> str:
+    """A box as `--bbox` takes it.
+
+    >>> told_box((84600, 447300.25, 85000, 447700))
+    '84600,447300.25,85000,447700'
+    """
+    return ",".join(f"{side:.10g}" for side in box)

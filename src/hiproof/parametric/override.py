@@ -33,7 +33,7 @@ from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import built
-from .record import MOST_PARTS, mapping, number, numbers_by_name, place, polygon, shown
+from .record import MOST_PARTS, mapping, measure, number, numbers_by_name, place, polygon, shown
 from .refit import measured
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
@@ -80,7 +80,7 @@ def override_of(record: Mapping[str, Any]) -> Override:
     refuse_contradictions(record, has_list, where)
     fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {where}")
     fixed |= {
-        name: number(record[name], f"{name} of {where}") for name in ("ridge_height", "eave_height") if name in record
+        name: measure(record[name], f"{name} of {where}") for name in ("ridge_height", "eave_height") if name in record
     }
     count = None if has_list or "parts" not in record else number(record["parts"], f"parts of {where}")
     if count is not None and not (count == int(count) and 1 <= count <= MOST_PARTS):
@@ -97,8 +97,8 @@ def override_of(record: Mapping[str, Any]) -> Override:
         if "outline" in record and polygon(record["outline"], f"outline of {where}")
         else None,
         fixed=fixed,
-        z_ground=number(record["z_ground"], f"z_ground of {where}") if "z_ground" in record else None,
-        block_height=number(record["block_height"], f"block_height of {where}") if "block_height" in record else None,
+        z_ground=measure(record["z_ground"], f"z_ground of {where}") if "z_ground" in record else None,
+        block_height=measure(record["block_height"], f"block_height of {where}") if "block_height" in record else None,
         leave_out=bool(record.get("leave_out", False)),
         told=told_of(record, has_list),
     )
@@ -168,7 +168,16 @@ def overridden(
             found = fitted_within(override, points, footprint, terrain, settings, id)
     except HiproofError as error:
         found = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
+    if lies_under(found, override.z_ground):
+        found = stages.remarked(found, "the ground given lies above its lowest eave")
     return stages.remarked(found, override.told)
+
+
+def lies_under(building: Building, z_ground: float | None) -> bool:
+    """Whether walls had to begin below the ground given: composing puts it under the lowest eave."""
+    if z_ground is None or building.built is None:
+        return False
+    return bool(building.solid.vertices[:, 2].min() < z_ground - 1e-3)
 
 
 def as_given(override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings) -> Building:

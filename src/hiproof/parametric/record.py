@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from ..write.attribute_list import PARAMETERS, PART
 from .shape import refuse_no_shape
 
 MOST_PARTS = 1000  # parts of a building; a cathedral has some hundred, a slip in a program any number
-WIDEST_M = 1e5  # of any number of a part
+WIDEST_M = 1e5  # of any number of a part, and of heights
 MOST = 1e15  # of any number
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 PART_KEYS = tuple(attribute.name for attribute in PART)
@@ -38,7 +38,7 @@ def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     status = status_of(record, bool(parts))
     roof = roof_of(parts, outline, origin) if parts else None
     world = outline if roof is None else shapely.transform(roof.outline, roof.frame.to_world)
-    ground = figure(record, "z_ground") if roof is None else number(record.get("z_ground"), "z_ground")
+    ground = figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
     building = Building(
         id=str(record["id"]),
         status=status,
@@ -97,7 +97,7 @@ def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
     refuse_no_shape(kind, parameters, where)
     parameters = {name: settled(value) for name, value in parameters.items()}
-    position = rounded(place(record.get("position"), f"position of {where}"), DIGITS)
+    position = rounded(place(record.get("position"), f"position of {where}", measure), DIGITS)
     kappa = math.radians(settled(number(record.get("rotation", 0.0), f"rotation of {where}")))
     outlines = outlines_of(record, parameters, position, kappa, outline, where)
     if kind == "shed":
@@ -234,6 +234,19 @@ def number(value: Any, where: str) -> float:
     return float(value)
 
 
+def measure(value: Any, where: str) -> float:
+    """A size, a height or an angle that something on Earth can have.
+
+    >>> measure(1e9, "z_ground")
+    Traceback (most recent call last):
+    hiproof.errors.InputError: expected z_ground within 100000, got 1e+09; check its unit
+    """
+    found = number(value, where)
+    if abs(found) > WIDEST_M:
+        raise InputError(f"expected {where} within {WIDEST_M:g}, got {found:g}; check its unit")
+    return found
+
+
 def rounded(values: np.ndarray, digits: int) -> np.ndarray:
     return np.array([settled(v, digits) for v in values.ravel()]).reshape(values.shape)
 
@@ -244,11 +257,7 @@ def figure(record: Mapping[str, Any], name: str) -> float:
 
 
 def numbers_by_name(values: Any, where: str) -> dict[str, float]:
-    found = {str(name): number(value, f"{name} in {where}") for name, value in mapping(values, where).items()}
-    far = [name for name, value in found.items() if abs(value) > WIDEST_M]
-    if far:
-        raise InputError(f"expected {far[0]} in {where} within {WIDEST_M:g}, got {found[far[0]]:g}; check its unit")
-    return found
+    return {str(name): measure(value, f"{name} in {where}") for name, value in mapping(values, where).items()}
 
 
 def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
@@ -259,11 +268,11 @@ def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
     return number(value[0], "shift"), number(value[1], "shift")
 
 
-def place(value: Any, where: str) -> np.ndarray:
-    """Three numbers (3,)."""
+def place(value: Any, where: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
+    """Three numbers (3,), each read by `read`."""
     if not isinstance(value, list) or len(value) != 3:
         raise InputError(f"expected three numbers [x, y, z] as {where}, got {shown(value)}; give metres")
-    return np.array([number(v, where) for v in value])
+    return np.array([read(v, where) for v in value])
 
 
 def polygon(rings: Any, where: str) -> shapely.Polygon:

@@ -117,8 +117,10 @@ def read_features(
     if wkb is None:
         raise InputError(f"expected polygons in {path}, got a table without geometry; name another file or layer")
     if not len(wkb) and (where or bbox):
+        said = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
+        extent = ",".join(f"{side:.10g}" for side in info["total_bounds"])
         raise InputError(
-            f"expected footprints in {path} that --where and --bbox let through, got none; relax them, or leave them out"
+            f"expected footprints in {path} ({extent}) that {said} let through, got none; relax or leave out what does not fit"
         )
     if not len(wkb):
         raise InputError(f"expected footprints in {path}, got a layer without features; name another file or layer")

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
+from ..errors import OutputError
 from ..frames import METRES, Units
 from ..model import ROOF, Building, Part
 from .attribute_list import PARTS_LAYER, SHAPE
@@ -32,12 +33,17 @@ class Rows(NamedTuple):
 
 
 def lines_of(text: bytes) -> dict[str, bytes]:
-    """The line of each table in what `Rows.to_text` wrote.
+    """The line of each table in what `Rows.to_text` wrote. Raises OutputError for what another version did.
 
     >>> lines_of(Rows(((None, {"id": "a"}),)).to_text())
     {'buildings': b'[[null, {"id": "a"}]]', 'parts': b'[]', 'roof_surfaces': b'[]'}
     """
-    return dict(zip(Rows._fields, text.split(b"\n"), strict=True))
+    lines = text.split(b"\n")
+    if len(lines) != len(Rows._fields):
+        raise OutputError(
+            "expected the rows of a building as this version keeps them, got others; begin anew with --restart"
+        )
+    return dict(zip(Rows._fields, lines, strict=True))
 
 
 def table_rows(
