@@ -276,6 +276,15 @@ def test_the_same_run_from_elsewhere_redoes_nothing(town_files, run_by_relative_
     assert (run_by_relative_names / "run/buildings.gml").stat().st_ino == was
 
 
+def test_a_run_goes_on_where_its_files_were_moved(town_files, run_by_relative_names, tmp_path):
+    project = run_by_relative_names.rename(tmp_path / "archive")
+    was = (project / "run/buildings.gml").stat().st_ino
+    there = [str(project / Path(file).name) for file in town_files]
+    hiproof.reconstruct_area(request_over(there, project / "run", project / "known.jsonl"))
+    assert (project / "run/buildings.gml").stat().st_ino == was
+    assert Desk(project / "run", "anna").cloud(ID)["count"]
+
+
 def test_files_that_moved_are_found_in_the_folder_that_a_person_names(run_by_relative_names, tmp_path):
     run = (run_by_relative_names / "run").rename(tmp_path / "run")
     files = run_by_relative_names.rename(tmp_path / "archive")

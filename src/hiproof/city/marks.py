@@ -53,14 +53,18 @@ def with_files(value: Any) -> Any:
 
 
 def file_stamps(path: Path) -> list[tuple[str, int, int]]:
-    """(path, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none if nothing is there."""
+    """(name, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none if nothing is there.
+
+    The names are those within its folder: what was moved whole is the same.
+    """
     with suppress(OSError, ValueError):  # ValueError: a text that is no path at all
         if path.is_dir():
-            files = [file for file in path.rglob("*") if file.is_file()]
+            folder, files = path, [file for file in path.rglob("*") if file.is_file()]
         else:
             beside = [path.with_suffix(end) for end in BESIDE] + [Path(f"{path}{end}") for end in APPENDED]
-            files = [file for file in {path, *beside} if path.is_file() and file.is_file()]
-        return sorted((str(file.resolve()), (stat := file.stat()).st_size, stat.st_mtime_ns) for file in files)
+            folder, files = path.parent, [file for file in {path, *beside} if path.is_file() and file.is_file()]
+        stamps = [(file.relative_to(folder).as_posix(), file.stat()) for file in files]
+        return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stamps)
     return []
 
 

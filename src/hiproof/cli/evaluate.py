@@ -40,9 +40,7 @@ def evaluate(
 
     run = evaluate_run(folder, clouds or (), footprints, reference, layer)
     if not run.clouds:
-        raise InputError(
-            f"expected point files to measure {folder} against, got none, nor are the run's there; name them"
-        )
+        raise InputError(f"expected point files to measure {folder} against, got none; name them after it")
     place = Path(out or folder)
     for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
         with atomic_file(place / name) as file:

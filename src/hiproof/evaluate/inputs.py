@@ -39,7 +39,7 @@ class RunInputs:
         if not self.gone:
             return ""
         more = f" and {len(self.gone) - 1} more" if len(self.gone) > 1 else ""
-        return f"the run's points are gone ({self.gone[0]}{more} is not there)"
+        return f"the run's points are gone ({self.gone[0]}{more} {'are' if more else 'is'} not there)"
 
 
 def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInputs:

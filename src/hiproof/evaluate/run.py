@@ -78,7 +78,8 @@ def evaluate_run(
     record = run_record(folder)
     known = found_inputs(record)
     if not clouds and known.gone:
-        warnings.warn(f"{folder}: {known.told_gone}; name them after the folder", InputWarning)
+        left = "measured against the others alone" if known.files else "nothing to measure against"
+        warnings.warn(f"{folder}: {known.told_gone}, {left}; name them after the folder", InputWarning)
     clouds = clouds or known.files
     if footprints is None:
         footprints, layer = known.footprint_file, layer or known.layer
