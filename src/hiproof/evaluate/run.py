@@ -67,7 +67,7 @@ def evaluate_run(
     clouds: Sequence[str] = (),
     footprints: str | None = None,
     reference: str | None = None,
-    layer: str | None = None,
+    layer: str | int | None = None,
 ) -> EvaluatedRun:
     """Read the models of `folder` and measure them against `clouds` and `footprints`; where none are named, against those that
     the run was made from, as far as they are there. Without any clouds no residual figures come out.
@@ -141,7 +141,7 @@ def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequen
 
 
 def footprint_of_each(
-    models: Sequence[BuildingModel], path: str | None, layer: str | None, record: dict[str, Any]
+    models: Sequence[BuildingModel], path: str | None, layer: str | int | None, record: dict[str, Any]
 ) -> list[Any]:
     """The footprint polygon of each model, None without one."""
     if path is None:
