@@ -96,8 +96,8 @@ def test_an_error_of_our_own_shows_its_traceback_without_secrets(monkeypatch, ca
     def fail(*_, **__):
         raise RuntimeError("planted at https://adm:s3cret@host/a.laz")
 
-    monkeypatch.setattr("hiproof.cli.status.run", fail)
-    monkeypatch.setattr(sys, "argv", ["hiproof", "status", "."])
+    monkeypatch.setattr("hiproof.write.attribute_list.attributes_text", fail)
+    monkeypatch.setattr(sys, "argv", ["hiproof", "attributes"])
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 1

@@ -119,7 +119,7 @@ def begun(monkeypatch):
         requests.append(request)
         return Summary(request.out, 0, {}, {}, None, None, (), (), {})
 
-    monkeypatch.setattr("hiproof.cli.reconstruct.reconstruct_area", check_only)
+    monkeypatch.setattr("hiproof.cli.running.reconstruct_area", check_only)
     return requests
 
 

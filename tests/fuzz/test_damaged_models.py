@@ -52,14 +52,14 @@ def test_damaged_models_are_answered_with_a_sentence(make, command, run_folder, 
 def test_damaged_models_cannot_be_checked(run_folder, tmp_path_factory):
     for name, content in cases(damaged_models, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        code, said = answer(check.run, [run_folder / MODELS], 0.01)
+        code, said = answer(check.count_invalid, [run_folder / MODELS], 0.01)
         assert code == 2 and said.startswith("expected") and "got" in said, name
 
 
 def test_solids_that_are_none_are_found_invalid(run_folder, tmp_path_factory, capsys):
     for name, content in cases(invalid_models, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
-        assert answer(check.run, [run_folder / MODELS], 0.01)[0] == 1, name
+        assert answer(check.count_invalid, [run_folder / MODELS], 0.01)[0] == 1, name
         assert "2 solids, 1 valid, 1 invalid" in capsys.readouterr().out, name
 
 

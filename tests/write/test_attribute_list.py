@@ -5,7 +5,7 @@ import re
 from pathlib import Path
 
 from handmade import gable_house, modelled, unmodelled
-from hiproof.cli.attributes import run
+from hiproof.cli.attributes import attributes as print_attributes
 from hiproof.evaluate.evaluation import BuildingFigures, Comparison
 from hiproof.frames import METRES, Units
 from hiproof.parametric.shape import names_of, side_by_side_names
@@ -41,7 +41,7 @@ def names(attributes, prefix=""):
 
 
 def test_the_document_is_current(capsys):
-    run()
+    print_attributes()
     assert DOCUMENT.read_text() == capsys.readouterr().out
 
 

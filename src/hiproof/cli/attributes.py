@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import typer
 
-def run() -> int:
+
+def attributes() -> None:
+    """Print every attribute and table that a run writes, with kind, unit and meaning, as Markdown."""
     from ..write.attribute_list import attributes_text
 
-    print(attributes_text(), end="")
-    return 0
+    typer.echo(attributes_text(), nl=False)

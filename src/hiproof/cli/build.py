@@ -45,7 +45,7 @@ def build(
     Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid solid, or unusable input.
     """
     from ..parametric.run import build_file
-    from .reconstruct import Bar
+    from .running import Bar
 
     with Bar() as bar:
         built = build_file(parameters, out, lambda done: bar.update("build", done, None), changes)

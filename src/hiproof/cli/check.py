@@ -4,10 +4,23 @@ from __future__ import annotations
 
 from collections import Counter
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 
-def run(files: list[Path], planarity_m: float) -> int:
-    """Print a line for each invalid solid and a count a file; 1 if any solid is invalid, else 0."""
+def check(
+    files: Annotated[list[Path], typer.Argument(help="CityJSON, CityJSONSeq or CityGML files")],
+    planarity: Annotated[
+        float, typer.Option(min=0.0, help="largest distance of a vertex from its face's plane, m")
+    ] = 0.01,
+) -> None:
+    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid."""
+    raise typer.Exit(1 if count_invalid(files, planarity) else 0)
+
+
+def count_invalid(files: list[Path], planarity_m: float) -> int:
+    """How many solids of `files` are invalid; prints a line for each of them and a count a file."""
     from ..compose import check_solid
     from ..read.solids import read_solids
 
@@ -21,8 +34,8 @@ def run(files: list[Path], planarity_m: float) -> int:
             if findings:
                 bad += 1
                 codes.update({finding.code for finding in findings})
-                print(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
+                typer.echo(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
         by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
-        print(f"{path}: {total} solids, {total - bad} valid, {bad} invalid{by_code}")
+        typer.echo(f"{path}: {total} solids, {total - bad} valid, {bad} invalid{by_code}")
         invalid += bad
-    return 1 if invalid else 0
+    return invalid

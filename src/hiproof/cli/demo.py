@@ -3,25 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
-from ..city.run import Request
-from .reconstruct import run_request
 
-
-def run(folder: Path) -> int:
+def demo(folder: Annotated[Path, typer.Argument(help="folder for the results")] = Path("demo")) -> None:
+    """Run the main job on the bundled simulated neighbourhood, all roof types in it."""
+    from ..city.request import Request
     from ..simulate import demo_files
+    from .running import run_request
 
-    files = demo_files()
-    request = Request(
-        clouds=(str(files["cloud"]),),
-        out=folder,
-        footprints=str(files["footprints"]),
-        terrain=str(files["terrain"]),
-        restart=True,
-    )
-    code = run_request(request)
+    files = {name: str(path) for name, path in demo_files().items()}
+    code = run_request(Request((files["cloud"],), folder, files["footprints"], files["terrain"], restart=True))
     if code == 0:
         typer.echo(f"look at them: hiproof view {folder}; a page about them: hiproof report {folder}")
-    return code
+    raise typer.Exit(code)

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
+
+import typer
 
 
-def run(folder: Path, dsn: str, prefix: str) -> int:
+def load(
+    folder: Annotated[Path, typer.Argument(help="output folder of a run")],
+    database: Annotated[str, typer.Argument(help="postgresql://user@host/database")],
+    prefix: Annotated[str, typer.Option(help="first part of the table names")] = "hiproof",
+) -> None:
+    """Load the models of a run into PostGIS tables; loading again replaces them."""
     from ..write.postgis import load_postgis
 
-    print(
-        f"{load_postgis(folder, dsn, prefix)} buildings loaded into {prefix}_buildings, {prefix}_roofs and {prefix}_parts"
-    )
-    return 0
+    count = load_postgis(folder, database, prefix)
+    typer.echo(f"{count} buildings loaded into {prefix}_buildings, {prefix}_roofs and {prefix}_parts")

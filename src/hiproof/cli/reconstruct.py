@@ -1,46 +1,72 @@
-"""`hiproof reconstruct`: the options become a request, the summary becomes a table."""
+"""`hiproof reconstruct`: the options become a request."""
 
 from __future__ import annotations
 
-import functools
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any
 
-from ..city.run import Request, Summary, reconstruct_area
-from ..compiled import news
+import typer
+
 from ..errors import SettingsError
-from ..log import LOGGER
-from ..read.pointcloud import expand_paths
+from ..log import LOGGER, Level, start
 from ..settings import Settings
-from ..status import Status
+from .options import box_of, with_settings
 
 BESIDE = "hiproof.toml"
 
 
-def run(
-    clouds: list[str],
-    out: Path,
-    inputs: dict[str, Any],
-    changes: dict[str, dict[str, Any]],
-    config: Path | None,
-    jobs: int,
-    scheduler: str | None,
-    restart: bool,
-) -> int:
-    """Run the main job and print its summary; returns the exit code. `inputs` are further fields of the request."""
-    config = config or settings_beside(*clouds, inputs["footprints"])
-    settings = (Settings.from_toml(config) if config else Settings()).replace(changes)
+@with_settings()
+def reconstruct(
+    clouds: Annotated[list[str], typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them")],
+    out: Annotated[Path, typer.Option(help="folder for the results")],
+    footprints: Annotated[str | None, typer.Option(help="building polygons; without them the cloud is split")] = None,
+    layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
+    where: Annotated[str | None, typer.Option(help='SQL condition on the footprints, such as "year < 1950"')] = None,
+    bbox: Annotated[
+        str | None, typer.Option(help="only buildings in this box: xmin,ymin,xmax,ymax in the clouds' coordinates")
+    ] = None,
+    id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
+    terrain: Annotated[str | None, typer.Option(help="terrain model (GeoTIFF); else the cloud's ground class")] = None,
+    overrides: Annotated[
+        str | None, typer.Option(help="what is known better of some buildings (JSONL or a table); the fit obeys it")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)")
+    ] = None,
+    jobs: Annotated[int, typer.Option(help="processes on this machine")] = 1,
+    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
+    restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
+    log_file: Annotated[Path | None, typer.Option(help="keep the log from progress on here, added at the end")] = None,
+    log_level: Annotated[Level, typer.Option(help="what of the log to show; debug also in the file")] = Level.warning,
+    changes: dict[str, dict[str, Any]] | None = None,
+) -> None:
+    """Reconstruct the buildings of point clouds into CityGML, CityJSON, parameters and attributes.
+
+    Exit code: 0 all buildings were modelled or explained by their data, 1 an internal error, 2 unusable input.
+    """
+    from ..city.request import Request
+    from ..read.pointcloud import expand_paths
+    from .running import run_request
+
+    start(log_level, log_file)
+    box = None if bbox is None else box_of(bbox)
+    config = config or settings_beside(*clouds, footprints)
     request = Request(
         clouds=tuple(map(str, expand_paths(tuple(clouds)))),
         out=out,
-        **inputs,
-        settings=settings,
+        footprints=footprints,
+        layer=layer,
+        where=where,
+        bbox=box,
+        id_attribute=id_attribute,
+        terrain=terrain,
+        overrides=overrides,
+        settings=(Settings.from_toml(config) if config else Settings()).replace(changes or {}),
         processes=jobs,
         scheduler=scheduler,
         restart=restart,
     )
-    return run_request(request)
+    raise typer.Exit(run_request(request))
 
 
 def settings_beside(*inputs: str | None) -> Path | None:
@@ -57,73 +83,3 @@ def settings_beside(*inputs: str | None) -> Path | None:
     if found:
         LOGGER.warning("settings are those of %s; name others with --config", found[0])
     return found[0] if found else None
-
-
-def run_request(request: Request) -> int:
-    with Bar() as bar:
-        summary = reconstruct_area(request, bar.update)
-    print_summary(summary)
-    return summary.exit_code
-
-
-class Bar:
-    """A progress bar on standard error, none when that is no terminal."""
-
-    STEPS: ClassVar = {
-        "compile": "compiling, once for each version",
-        "sort": "reading points",
-        "solve": "fitting roofs",
-        "merge": "writing models",
-        "build": "building models",
-    }
-
-    def __enter__(self) -> Bar:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        console = Console(stderr=True)
-        self.bar = Progress(console=console, transient=True, disable=not console.is_terminal)
-        self.tasks: dict[str, Any] = {}
-        self.bar.start()
-        self.lines = news.listener
-        if console.is_terminal:
-            news.listener = functools.partial(self.update, "compile")
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        news.listener = self.lines
-        self.bar.stop()
-
-    def update(self, step: str, done: int, total: int | None) -> None:
-        if step not in self.tasks:
-            self.tasks[step] = self.bar.add_task(self.STEPS.get(step, step), total=total)
-        self.bar.update(self.tasks[step], completed=done, total=total)
-
-
-def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> None:
-    """The table at the end: buildings by status and by type, figures, time, and every failure by name."""
-    from rich.console import Console
-    from rich.table import Table
-    from rich.text import Text
-
-    console = Console(soft_wrap=True, markup=False)  # names from outside may look like markup
-    show = show or console.print
-    table = Table("buildings", "outcome", title=f"{summary.buildings} buildings")
-    for code, number in summary.by_status.items():
-        table.add_row(str(number), Status[code.upper()].value)
-    show(table)
-    if summary.by_type:
-        show("roof types: " + ", ".join(f"{number} {name}" for name, number in summary.by_type.items()))
-    if summary.median_psd is not None:
-        show(f"median over buildings of the mean distance of all points, facades included: {summary.median_psd:.3f} m")
-    if summary.mean_share is not None:
-        share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
-        show(f"mean over buildings: {share} lie within 0.2 m of the roof")
-    if not summary.units.are_metres:
-        show(f"coordinates are in {summary.units}; attributes and parameters in metres")
-    show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
-    for name, why in summary.broken_inputs:
-        show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
-    for id, why in summary.failures:
-        show(Text.assemble(("internal error:", "red"), f" building {id}: {why}"))
-    show(Text(f"models: {summary.out / 'buildings.gml'}, {summary.out / 'buildings.city.jsonl'}"))

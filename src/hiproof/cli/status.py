@@ -4,23 +4,30 @@ from __future__ import annotations
 
 import sqlite3
 from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
-from ..city.ledger import Ledger
+import typer
+
 from ..errors import InputError
+
+if TYPE_CHECKING:
+    from ..city.ledger import Ledger
 
 CLOSED = ("done", "failed")
 
 
-def run(folder: Path) -> int:
+def status(folder: Annotated[Path, typer.Argument(help="output folder of a run")]) -> None:
+    """Show how far a run is: progress, failures by kind, throughput and time left, while it runs or after."""
+    from ..city.ledger import Ledger
+
     path = folder / ".hiproof" / "ledger.sqlite"
     if not path.is_file():
         raise InputError(f"expected the output folder of a run, got {folder}, which has no ledger; check the path")
     try:
         for line in describe(Ledger(path, read_only=True)):
-            print(line)
+            typer.echo(line)
     except sqlite3.DatabaseError as error:
         raise InputError(f"expected the ledger of a run at {path}, got: {error}; it may be damaged") from error
-    return 0
 
 
 def describe(ledger: Ledger) -> list[str]:

@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
-from ..city.tasks import ALL, MAIN_JOB, make_ready
-from .reconstruct import Bar
+from typing import Annotated
+
+import typer
 
 
-def run(everything: bool) -> int:
+def warm(
+    everything: Annotated[
+        bool, typer.Option("--all", help="also what only runs without footprints or with --parts one call")
+    ] = False,
+) -> None:
+    """Compile what runs call, once for each version and machine, so that the first run starts at once."""
+    from ..city.tasks import ALL, MAIN_JOB, make_ready
+    from .running import Bar
+
     with Bar():
         make_ready(ALL if everything else MAIN_JOB)
-    return 0

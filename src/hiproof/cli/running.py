@@ -1,0 +1,82 @@
+"""A run seen from the terminal: a bar while it works, a table at its end."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, ClassVar
+
+from ..city.run import Request, Summary, reconstruct_area
+from ..compiled import news
+from ..status import Status
+
+
+def run_request(request: Request) -> int:
+    """Run a request and print its summary; returns the exit code."""
+    with Bar() as bar:
+        summary = reconstruct_area(request, bar.update)
+    print_summary(summary)
+    return summary.exit_code
+
+
+class Bar:
+    """A progress bar on standard error, none when that is no terminal."""
+
+    STEPS: ClassVar = {
+        "compile": "compiling, once for each version",
+        "sort": "reading points",
+        "solve": "fitting roofs",
+        "merge": "writing models",
+        "build": "building models",
+    }
+
+    def __enter__(self) -> Bar:
+        from rich.console import Console
+        from rich.progress import Progress
+
+        console = Console(stderr=True)
+        self.bar = Progress(console=console, transient=True, disable=not console.is_terminal)
+        self.tasks: dict[str, Any] = {}
+        self.bar.start()
+        self.lines = news.listener
+        if console.is_terminal:
+            news.listener = functools.partial(self.update, "compile")
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        news.listener = self.lines
+        self.bar.stop()
+
+    def update(self, step: str, done: int, total: int | None) -> None:
+        if step not in self.tasks:
+            self.tasks[step] = self.bar.add_task(self.STEPS.get(step, step), total=total)
+        self.bar.update(self.tasks[step], completed=done, total=total)
+
+
+def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> None:
+    """The table at the end: buildings by status and by type, figures, time, and every failure by name."""
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(soft_wrap=True, markup=False)  # names from outside may look like markup
+    show = show or console.print
+    table = Table("buildings", "outcome", title=f"{summary.buildings} buildings")
+    for code, number in summary.by_status.items():
+        table.add_row(str(number), Status[code.upper()].value)
+    show(table)
+    if summary.by_type:
+        show("roof types: " + ", ".join(f"{number} {name}" for name, number in summary.by_type.items()))
+    if summary.median_psd is not None:
+        show(f"median over buildings of the mean distance of all points, facades included: {summary.median_psd:.3f} m")
+    if summary.mean_share is not None:
+        share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
+        show(f"mean over buildings: {share} lie within 0.2 m of the roof")
+    if not summary.units.are_metres:
+        show(f"coordinates are in {summary.units}; attributes and parameters in metres")
+    show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
+    for name, why in summary.broken_inputs:
+        show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
+    for id, why in summary.failures:
+        show(Text.assemble(("internal error:", "red"), f" building {id}: {why}"))
+    show(Text(f"models: {summary.out / 'buildings.gml'}, {summary.out / 'buildings.city.jsonl'}"))
