@@ -11,7 +11,7 @@ from benchmarks.matching import hidden_end, right_types
 from hiproof.compose import check_solid, compose
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
-from hiproof.fit.union.names import REGISTERED_M
+from hiproof.fit.union.names import REGISTERED_M, REGISTERED_PLAN_M
 from hiproof.model import Roof
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import COMPONENTS, SHAPES, planes_of
@@ -223,7 +223,7 @@ def test_the_roof_of_the_solid_is_the_height_of_the_parts():
         assert np.mean(np.abs(found - roof.height_at(xy)) > 2e-3) < 5e-3
 
 
-@pytest.mark.parametrize("shape", ["gable", "hip", "side_hip"])
+@pytest.mark.parametrize("shape", ["gable", "hip", "side_hip", "monopitch"])
 def test_errors_are_about_as_large_as_the_deviations_say(shape):
     ratios = []
     for seed in range(8):
@@ -232,7 +232,8 @@ def test_errors_are_about_as_large_as_the_deviations_say(shape):
         outline = shapely.Polygon(rectangle_of(member))
         xy = strewn(outline, rng)
         z = lowest_of(member.planes(), xy) + rng.normal(0.0, 0.05, len(xy)) + rng.normal(0.0, REGISTERED_M)
-        (part,) = fit_building(np.column_stack([xy, z]), outline).roof_parts
+        beside = rng.normal(0.0, REGISTERED_PLAN_M, 2)
+        (part,) = fit_building(np.column_stack([xy + beside, z]), outline).roof_parts
         truth = member.canonical().part([outline])
         errors = {name: part.parameters[name] - value for name, value in truth.parameters.items()}
         errors["t_z"] = part.translation[2] - truth.translation[2]

@@ -41,6 +41,7 @@ from hiproof.fit.union.volumes import (
     SLOPE_LOW,
     TIE,
     U0,
+    V0,
     V1,
     base_only,
     coefficients,
@@ -337,6 +338,31 @@ def test_trimming_gives_the_true_objective_and_no_volume_reaches_further_than_be
         before = planes[tuple(row[OFFSET : OFFSET + PLANES])]
         assert (row[[U0, U0 + 2]] >= before[[U0, U0 + 2]] - NEAR_EDGE_M).all()
         assert (row[[U0 + 1, V1]] <= before[[U0 + 1, V1]] + NEAR_EDGE_M).all()
+
+
+def falling(low, high, slope, at_low):
+    """A volume whose one plane is `at_low` high at v = `low` and changes by `slope` along v up to `high`."""
+    row = base_only(np.inf)[0]
+    row[V0], row[V1] = low, high
+    plane = 2 if slope > 0.0 else 3
+    row[SLOPE + plane], row[OFFSET + plane] = abs(slope), at_low - slope * low
+    return row
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_volume_that_shows_again_behind_its_neighbour_is_cut_short(seed):
+    scene = random_scene(np.random.default_rng(seed))
+    low, *_, high = sorted(x for x in scene.vertices[0, 1] if np.isfinite(x))
+    step = low + 0.4 * (high - low)
+    annex, house = falling(low, high, 0.26, 0.0), falling(step, high, -0.25, 2.5)
+    true = np.vstack([base_only(-50.0), annex, house])
+    true[1, V1] = step
+    scene = scene._replace(z=heights(true, scene.U, scene.V)[0])
+    found = true.copy()
+    found[1, V1], found[2, V1] = high, high - 0.2  # the annex runs on under the house, and is higher behind it
+    found, _ = trim(found, scene, objective(found, scene, np.inf))
+    assert found[1, V1] == pytest.approx(step)
+    assert found[2, V1] > high - 0.1
 
 
 # --- planes and candidates -------------------------------------------------------------------------------------------

@@ -21,7 +21,8 @@ LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little furt
 APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
 STRAIGHT = 1e-9  # rad; numerically the same direction
 GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
-REGISTERED_M = 0.01  # standard deviation of a swath's height, which no point of a building tells
+# standard deviations of a swath's place and height, which no point of a building tells: roofs lie beside their outline by the former
+REGISTERED_PLAN_M, REGISTERED_M = 0.03, 0.01
 PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it
 
 
@@ -39,6 +40,7 @@ def part_of(
     axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
     corners = np.concatenate([shapely.get_coordinates(region) for region in regions]) - plan.frame.origin[:2]
     rows = np.where(showing(planes.rows, corners @ axes.T)[:, None], planes.rows, np.nan)
+    registrations = registered(planes, rows, corners @ axes.T)
     turn = common_lean(rows)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
     rows = turned(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]
@@ -48,6 +50,7 @@ def part_of(
     member = regular(rows, low, high, kappa)
     modes = [*(turned(mode, turn) for mode in planes.modes), np.tile((0.0, 0.0, REGISTERED_M), (SIDES + 1, 1))]
     loose = [regular(rows, *ends, kappa) for ends in ends_moved(sides, low, high, known=True)]
+    loose += [regular(rows + turned(change, turn), low, high, kappa) for change in registrations]
     unknown = [regular(rows, *ends, kappa) for ends in ends_moved(sides, low, high, known=False)]
     changes, unknown = (
         alike_turned(own, member.quarter_turns) for own in (changed(member, np.array(modes)) + loose, unknown)
@@ -56,6 +59,16 @@ def part_of(
     part = member.part(regions, name_among(member.name, allowed), changes)
     untold = member.sigma(unknown, part.type == member.name)
     return replace(part, sigma={name: value for name, value in part.sigma.items() if name not in untold})
+
+
+def registered(planes: Planes, rows: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
+    """By how much planes (5, 3) change were their points' swath to lie further along u or along v by a standard deviation: as those
+    that show (`rows`) can over `corners` (n, 2), tied to sides of the outline as they are."""
+    there, at = np.isfinite(rows[:, 2]), np.column_stack([corners, np.ones(len(corners))])
+    design = (at @ planes.design[there]).reshape(there.sum() * len(at), planes.design.shape[2])
+    shifted = -REGISTERED_PLAN_M * rows[there, :2].repeat(len(corners), axis=0)
+    unknowns = np.linalg.lstsq(design, shifted, rcond=None)[0]
+    return [planes.design @ own for own in unknowns.T]
 
 
 def alike_turned(members: list[Member], quarter_turns: int) -> list[Member]:

@@ -15,6 +15,9 @@ from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
 HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
 # m from what shows within which an edge or a corner is the place to draw a side in to
 NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
+# m, and of the raster's steps, for which a volume is hidden that then shows again, by chance, where it happens to be higher
+GAP_M, GAP_NODES = 0.8, 2.5
+CUT_UNITS = 10.0  # units that a volume cut short may cost before its neighbours are drawn out
 SLACK_UNITS = 0.02  # units of evidence that drawing in may cost; what is hidden explains nothing
 
 
@@ -34,11 +37,22 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
                 continue
         else:
             direction = int(volumes[k, DIRECTION])
-            u, v = U[direction][seen], V[direction][seen]
-            for edge, seen_to in zip((U0, U1, V0, V1), (u.min(), u.max(), v.min(), v.max()), strict=True):
-                volumes, value = drawn_in(volumes, scene, value, k, edge, float(seen_to), U, V)
+            for low, x in ((U0, U[direction][seen]), (V0, V[direction][seen])):
+                for edge, seen_to in ((low, x.min()), (low + 1, x.max())):
+                    volumes, value = drawn_in(volumes, scene, value, k, edge, float(seen_to), U, V)
+                for edge, seen_to in zip((low, low + 1), longest_run(x, scene.pitch), strict=True):
+                    volumes, value = cut_short(volumes, scene, value, k, edge, seen_to)
         k += 1
     return volumes, value
+
+
+def longest_run(x: np.ndarray, pitch: float) -> tuple[float, float]:
+    """From where to where most of the places x (n,) lie that follow each other by no more than a few steps of the raster."""
+    x = np.sort(x)
+    starts = np.r_[0, np.nonzero(np.diff(x) > max(GAP_M, GAP_NODES * pitch))[0] + 1]
+    ends = np.r_[starts[1:], len(x)]
+    longest = int(np.argmax(ends - starts))
+    return float(x[starts[longest]]), float(x[ends[longest] - 1])
 
 
 def drawn_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
@@ -85,6 +99,22 @@ def drawn_in(
         if np.array_equal(roof_heights(trial, U, V)[0], roof_heights(volumes, U, V)[0]):
             return trial, objective(trial, scene, np.inf)
     return volumes, value
+
+
+def cut_short(
+    volumes: np.ndarray, scene: Scene, value: float, k: int, edge: int, seen_to: float
+) -> tuple[np.ndarray, float]:
+    """Edge `edge` (a column) of volume k at `seen_to`, where most of what shows of it ends, if neighbours may take the rest for next to
+    nothing."""
+    low = edge in (U0, V0)
+    if (seen_to - volumes[k, edge] if low else volumes[k, edge] - seen_to) < HIDDEN_M:
+        return volumes, value
+    trial = volumes.copy()
+    trial[k, edge] = next(iter(lines_near(volumes, scene, k, edge, seen_to)), seen_to)
+    found = objective(trial, scene, value + CUT_UNITS * scene.evidence)
+    if np.isfinite(found):
+        trial, found = drawn_out(trial, scene, found)
+    return (trial, found) if found < value + SLACK_UNITS * scene.evidence else (volumes, value)
 
 
 def lines_near(volumes: np.ndarray, scene: Scene, k: int, edge: int, seen_to: float) -> list[float]:
