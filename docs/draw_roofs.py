@@ -31,7 +31,7 @@ from matplotlib import patheffects
 from hiproof import Request, read_parameters, reconstruct_area
 from hiproof.errors import HiproofError, InputError
 from hiproof.evaluate.models import read_models
-from hiproof.evaluate.run import evaluate_run, run_inputs
+from hiproof.evaluate.run import evaluate_run
 from hiproof.model import ROOF, Face, Part, Piece, Solid
 from hiproof.parametric.record import building_of
 from hiproof.write.colours import type_colour
@@ -103,12 +103,11 @@ def modelled(name: str, out: Path) -> Path:
 
 def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
     """The buildings of a run that have a model and points, with the models of `truth` under the same ids."""
-    clouds, footprints, layer = run_inputs(folder)
-    if not clouds:
+    run = evaluate_run(folder)
+    if not run.clouds:
         raise InputError(
             f"expected the clouds of the run in {folder} where run.json says, got none; make the run again"
         )
-    run = evaluate_run(folder, clouds, footprints, layer=layer)
     roofs = {r["id"]: building_of(r)[1] for r in read_parameters(folder / "parameters.jsonl")}
     true_solids = {model.id: model.solid for model in read_models(truth)} if truth else {}
     found = []
