@@ -176,15 +176,22 @@ def node(segments, reach):
         xy[count, 0], xy[count, 1] = x, y
         count += 1
         stack[top, 0], stack[top, 1] = a, b
-        top += 1
-        for other in range(edge_count):  # every live edge beside the new vertex goes through it
-            c = edges[other, 0]
-            if c >= 0 and (other == e or is_beside(xy[count - 1], xy[c], xy[edges[other, 1]], reach)):
-                stack[top] = edges[other]
-                edges[other, 0] = edges[other, 1] = -1
-                top += 1
+        top = taken_back(xy, count - 1, e, edges, edge_count, stack, top + 1, reach)
     live = edges[:edge_count, 0] >= 0
     return xy[:count].copy(), edges[:edge_count][live]
+
+
+@compiled
+def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
+    """Put every live edge that must go through the new `vertex`, the `crossed` one and those beside it, back onto the stack;
+    returns its new top."""
+    for other in range(edge_count):
+        c = edges[other, 0]
+        if c >= 0 and (other == crossed or is_beside(xy[vertex], xy[c], xy[edges[other, 1]], reach)):
+            stack[top] = edges[other]
+            edges[other, 0] = edges[other, 1] = -1
+            top += 1
+    return top
 
 
 @compiled

@@ -177,39 +177,44 @@ def sum_moments(problem, tables, kind, theta, noise, space):
         margin_u, margin_v = SOFT, SOFT
         if problem.plan_is_free:
             margin_u, margin_v = (half_length - abs(u)) * per_tau, (half_width - abs(v)) * per_tau
-        if residual * residual > FAR_SQUARED or margin_u < -25.0 or margin_v < -25.0:
-            product *= outlier
-            if product < 1e-250:
-                value -= math.log(product)
-                product = 1.0
-            continue
-        inside_u = 1.0 / (1.0 + math.exp(-margin_u)) if margin_u < SOFT else 1.0
-        inside_v = 1.0 / (1.0 + math.exp(-margin_v)) if margin_v < SOFT else 1.0
-        inlier = prior * scale * inside_u * inside_v * math.exp(-0.5 * residual * residual)
-        total = inlier + outlier
-        product *= total
+        is_far = residual * residual > FAR_SQUARED or margin_u < -25.0 or margin_v < -25.0
+        inside_u, inside_v = (0.0, 0.0) if is_far else (share_inside(margin_u), share_inside(margin_v))
+        inlier = 0.0 if is_far else prior * scale * inside_u * inside_v * math.exp(-0.5 * residual * residual)
+        product *= inlier + outlier
         if product < 1e-250 or product > 1e250:
             value -= math.log(product)
             product = 1.0
-        w = inlier / total
+        if is_far:
+            continue
+        w = inlier / (inlier + outlier)
         inliers += w
         squares += w * residual * residual
-        weight, pull = w * per_sigma * per_sigma, w * residual * per_sigma
-        m = moments[j]
-        m[0] += weight * u * u
-        m[1] += weight * u * v
-        m[2] += weight * u
-        m[3] += weight * v * v
-        m[4] += weight * v
-        m[5] += weight
-        m[6] += pull * u
-        m[7] += pull * v
-        m[8] += pull
+        add_moments(moments[j], w * per_sigma * per_sigma, w * residual * per_sigma, u, v)
         if margin_u < SOFT:
             add_side(sides[0 if u > 0 else 1], w * (1.0 - inside_u) * per_tau, inside_u * per_tau, v)
         if margin_v < SOFT:
             add_side(sides[2 if v > 0 else 3], w * (1.0 - inside_v) * per_tau, inside_v * per_tau, u)
     return value - math.log(product), inliers, squares
+
+
+@compiled
+def share_inside(margin):
+    """How much of a soft edge lies within it, of a point `margin` softnesses inside."""
+    return 1.0 / (1.0 + math.exp(-margin)) if margin < SOFT else 1.0
+
+
+@compiled
+def add_moments(m, weight, pull, u, v):
+    """Add to the moments (9,) of a plane those of a point at u, v."""
+    m[0] += weight * u * u
+    m[1] += weight * u * v
+    m[2] += weight * u
+    m[3] += weight * v * v
+    m[4] += weight * v
+    m[5] += weight
+    m[6] += pull * u
+    m[7] += pull * v
+    m[8] += pull
 
 
 @compiled
