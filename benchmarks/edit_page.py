@@ -38,6 +38,7 @@ from hiproof.evaluate.metrics import FACADE_M
 from hiproof.evaluate.run import run_record
 from hiproof.parametric.file import read_parameters
 from hiproof.read.solids import read_solids
+from hiproof.rings import GRID_M
 from hiproof.settings import Settings
 
 TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "side_hip", "asymmetric_gable", "mansard")
@@ -170,7 +171,8 @@ def crowds(window: Window, id: str, model: dict[str, Any], heights: tuple[float,
     cloud = window.ask("GET", f"points?id={id}")[1]
     places = np.frombuffer(base64.b64decode(cloud["places"]), "<f4").reshape(-1, 3).astype(float)
     gaps = np.frombuffer(base64.b64decode(model["gaps"]), "<f4")
-    roofed = shapely.union_all([shapely.Polygon(*o[:1]) for part in model["parts"] for o in part["outlines"]])
+    outlines = [shapely.Polygon(o[0]) for part in model["parts"] for o in part["outlines"]]
+    roofed = shapely.union_all(shapely.make_valid(outlines), grid_size=GRID_M)
     counts = shapely.intersects_xy(shapely.buffer(roofed, -FACADE_M), *places[:, :2].T)
     off = places[(gaps > heights[0]) & (gaps < heights[1]) & counts]
     if not len(off):

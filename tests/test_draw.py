@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hiproof
-from hiproof.draw.view import colours_of, projected, seen_faces
+from hiproof.draw.view import colours_of, projected, seen_faces, turn_of
 from hiproof.errors import InputError
 from hiproof.status import Status
 from parametric_house import gable_house
@@ -34,6 +34,17 @@ def test_faces_seen_are_those_that_look_here(house):
     from_above = seen_faces(house.solid, colours_of(house), tilt_deg=90.0)
     assert [face.is_roof for face in from_above] == [True, True]
     assert len(seen_faces(house.solid, colours_of(house))) == 4  # two slopes, one wall each way
+
+
+@pytest.mark.parametrize("rotation", [0.0, 37.0, 125.0, -80.0])
+def test_a_building_is_seen_from_the_same_corner_whichever_way_it_stands(house, rotation):
+    turned = gable_house(rotation)
+    assert turn_of(turned) == pytest.approx(turn_of(house) - rotation)
+    pages = [
+        np.sort(projected(b.solid.vertices - b.solid.vertices.mean(axis=0), turn_of(b), 35.0)[:, :2], axis=0)
+        for b in (house, turned)
+    ]
+    assert np.allclose(*pages, atol=1e-3)
 
 
 def test_north_is_up_from_above():

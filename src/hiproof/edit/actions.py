@@ -26,9 +26,15 @@ Record = Mapping[str, Any]
 def edited(record: Record, asked: Any, points: np.ndarray, settings: Settings, is_measured: bool = True) -> Building:
     """The building of `record` (an object of parameters.jsonl) after the edit `asked`: {"action": ..., "part": ..., ...}.
 
-    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). settings: those of
-    its run. Raises
-    InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
+    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). settings: those
+    of its run. Raises InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
+
+    >>> ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
+    >>> flat = {"type": "flat", "position": [0, 0, 5], "parameters": {"width": 8, "length": 12}}
+    >>> shed = {"id": "shed", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0, "parts": [flat]}
+    >>> gable = {"action": "change", "part": 0, "change": {"type": "gable", "height": 3}}
+    >>> edited(shed, gable, np.zeros((0, 3)), Settings()).type
+    'gable'
     """
     action = mapping(asked, "an edit").get("action")
     if action not in ACTIONS:

@@ -13,7 +13,7 @@ CLOSE_CALL = 0.2  # by which the most probable type leads
 LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
 LOOSE_M = 0.3  # standard deviation of a part that few points support
 UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT)
-LENGTHS_APART = ("pitch_", "skew_", "rotation")
+ANGLES = ("pitch_", "skew_", "rotation")  # beginnings of names: their deviations are degrees
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def is_loose(sigma: Mapping[str, float]) -> bool:
-    return any(value > LOOSE_M for name, value in sigma.items() if not name.startswith(LENGTHS_APART))
+    return any(value > LOOSE_M for name, value in sigma.items() if not name.startswith(ANGLES))
 
 
 def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:

@@ -40,8 +40,8 @@ def with_recess(parts: list, roof: Roof, index: int, at: tuple[float, float] | N
 
 def placed(parts: list, index: int, changed: dict[str, Any]) -> list:
     """The parts with `changed` in place of part `index`; those that left out its old place leave out its new one instead."""
-    old = area_of(parts[index])
-    own = covered(changed) if "outlines" not in changed else area_of(changed)
+    old = roofed_by(parts[index])
+    own = covered(changed) if "outlines" not in changed else roofed_by(changed)
     others = [part if k == index else moved_along(part, old, own) for k, part in enumerate(parts)]
     return [*others[:index], changed, *others[index + 1 :]]
 
@@ -51,23 +51,23 @@ def moved_along(part: dict[str, Any], old: shapely.Geometry, new: shapely.Geomet
     if "outlines" not in part or old.equals(new):
         return part
     shared = with_area(shapely.intersection(covered(with_sizes(part)), old, grid_size=GRID_M))
-    if shared.area < LEAST_M2 or area_of(part).intersection(shared).area > CLEAR * shared.area:
+    if shared.area < LEAST_M2 or roofed_by(part).intersection(shared).area > CLEAR * shared.area:
         return part
-    whole = shapely.union(area_of(part), shared, grid_size=GRID_M)
+    whole = shapely.union(roofed_by(part), shared, grid_size=GRID_M)
     return leaving_out({**part, "outlines": rings_of(whole)}, new)
 
 
 def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
     """The part without what it roofs of `area`. Raises InputError where nothing is left of it."""
-    if not area_of(part).intersection(area).area > 0.0:
+    if not roofed_by(part).intersection(area).area > 0.0:
         return part
-    left = rings_of(shapely.difference(area_of(part), area, grid_size=GRID_M))
+    left = rings_of(shapely.difference(roofed_by(part), area, grid_size=GRID_M))
     if not left:
         raise InputError("expected a recess smaller than the part it lies in, got one that covers it; delete the part")
     return {**part, "outlines": left}
 
 
-def area_of(part: dict[str, Any]) -> shapely.Geometry:
+def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
     """What a part roofs in plan: its outlines, else its rectangle."""
     if part.get("outlines") is None:
         return covered(part)

@@ -37,8 +37,8 @@ LAYERS = {BUILDINGS: "MultiPolygon", "parts": "Polygon", "roof_surfaces": "Polyg
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
 ROWS_AT_ONCE = 1000  # rows handed to GDAL at once: its overhead is a call's, its memory a row's
 RESERVED = ("fid", "geom")
-# GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more
+# GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
 
