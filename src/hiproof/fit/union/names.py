@@ -17,6 +17,7 @@ from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION, LEVEL, SIDES
 
+EACH = np.arange(SIDES)
 LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
 APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
 STRAIGHT = 1e-9  # rad; numerically the same direction
@@ -102,6 +103,8 @@ def common_lean(rows: np.ndarray) -> float:
 
 def turned(rows: np.ndarray, angle: float) -> np.ndarray:
     """Planes over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
+    if angle == 0.0:
+        return rows
     c, s = math.cos(angle), math.sin(angle)
     rows = rows @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     for k in range(SIDES):
@@ -155,22 +158,19 @@ def regular(rows: np.ndarray, low: np.ndarray, high: np.ndarray, kappa: float) -
 def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray, kappa: float) -> Member:
     """The member over the rectangle with planes `rows` (5, 3), in the axes they are given in, whose first is at `kappa`."""
     centre, half = 0.5 * (low + high), 0.5 * (high - low)
-    eaves, slopes, leans = np.full(SIDES, np.inf), np.zeros(SIDES), np.zeros(SIDES)
-    for k in range(SIDES):
-        if np.isfinite(rows[k, 2]):
-            slopes[k] = SIGN[k] * rows[k, AXIS[k]]
-            leans[k] = rows[k, 1 - AXIS[k]] / slopes[k]
-            eaves[k] = rows[k] @ (*centre, 1.0) - slopes[k] * half[AXIS[k]]
+    sides, has = rows[:SIDES], np.isfinite(rows[:SIDES, 2])
+    slopes = np.where(has, SIGN * sides[EACH, AXIS], 0.0)
+    leans = np.divide(sides[EACH, 1 - AXIS], slopes, out=np.zeros(SIDES), where=has)
+    eaves = np.where(has, sides[:, :2] @ centre + sides[:, 2] - slopes * half[AXIS], np.inf)
     top = float(rows[LEVEL, 2]) if np.isfinite(rows[LEVEL, 2]) else math.inf
     return Member(kappa, centre, half, eaves, slopes, top, leans)
 
 
 def changed(member: Member, changes: np.ndarray) -> list[Member]:
     """The member with its planes changed by each of `changes` (m, 5, 3), its sides where they are."""
-    sides = np.arange(SIDES)
-    slopes = member.slopes + np.where(member.has, SIGN * changes[:, sides, AXIS], 0.0)
+    slopes = member.slopes + np.where(member.has, SIGN * changes[:, EACH, AXIS], 0.0)
     middles = np.tile(member.centre, (SIDES, 1))  # of the sides
-    middles[sides, AXIS] -= SIGN * member.half[AXIS]
+    middles[EACH, AXIS] -= SIGN * member.half[AXIS]
     eaves = member.eaves + (changes[:, :SIDES, :2] * middles).sum(axis=2) + changes[:, :SIDES, 2]
     tops = member.top + changes[:, LEVEL, 2]
     kappa, centre, half, leans = member.kappa, member.centre, member.half, member.leans
@@ -182,20 +182,13 @@ def level(member: Member) -> Member:
     if not member.has.any():
         return member
     lowest = member.eaves.min()
-    outwards = np.zeros(SIDES)
-    for side in np.nonzero(member.has)[0]:
-        further = (member.eaves[side] - lowest) / member.slopes[side]
-        outwards[side] = further if further < LEVEL_EAVE_M else 0.0
-    low = member.centre - member.half - outwards[[0, 2]]
-    high = member.centre + member.half + outwards[[1, 3]]
-    centre, half = 0.5 * (low + high), 0.5 * (high - low)
-    rows = np.full((SIDES + 1, 3), np.nan)
-    for k in np.nonzero(member.has)[0]:
-        rows[k, AXIS[k]], rows[k, 1 - AXIS[k]] = SIGN[k] * member.slopes[k], member.leans[k] * member.slopes[k]
-        rows[k, 2] = member.eaves[k] + member.slopes[k] * member.half[AXIS[k]] - rows[k, :2] @ member.centre
-    again = member_of(rows, low, high, member.kappa)
-    near = np.abs(again.eaves - lowest) < 1e-6
-    return replace(member, centre=centre, half=half, eaves=np.where(near & member.has, lowest, again.eaves))
+    further = np.divide(member.eaves - lowest, member.slopes, out=np.full(SIDES, np.inf), where=member.has)
+    outwards = np.where(further < LEVEL_EAVE_M, further, 0.0)
+    low, high = outwards[[0, 2]], outwards[[1, 3]]
+    shift, half = 0.5 * (high - low), member.half + 0.5 * (high + low)
+    eaves = member.eaves + member.slopes * (member.leans * shift[1 - AXIS] - outwards)
+    near = member.has & (np.abs(eaves - lowest) < 1e-6)
+    return replace(member, centre=member.centre + shift, half=half, eaves=np.where(near, lowest, eaves))
 
 
 def with_one_apex(member: Member) -> Member:
