@@ -168,15 +168,21 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
         assert area > 96.0  # of the turned box around its outline, for its length is not known
 
 
+def documented(number, prefix):
+    """A question of docs/tables.md, for the tables of a prefix."""
+    return re.findall(r"```sql\n(.*?)```", (DOCS / "tables.md").read_text(), re.DOTALL)[number].replace(
+        "hiproof_", f"{prefix}_"
+    )
+
+
 def test_the_documented_question_of_a_solar_map(database, tmp_path):
     """Roof surfaces of 20 m2 or more that look between south-east and south-west, as docs/tables.md asks for them."""
     house = reconstructed_gable()
     (tmp_path / "run").mkdir()
     write_all(tmp_path / "run", [house], "EPSG:7415")
     load_postgis(tmp_path / "run", database, "solar")
-    (sql,) = re.findall(r"```sql\n(.*?)```", (DOCS / "tables.md").read_text(), re.DOTALL)
     with psycopg.connect(database) as connection:
-        rows = connection.execute(sql.replace("hiproof_", "solar_")).fetchall()
+        rows = connection.execute(documented(0, "solar")).fetchall()
     assert [(id, kind, round(azimuth)) for id, kind, azimuth, *_ in rows] == [("south", "gable", 180)]
 
 
@@ -186,9 +192,9 @@ def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_
     with psycopg.connect(database) as connection:
         if not connection.execute("select 1 from pg_available_extensions where name = 'postgis_sfcgal'").fetchone():
             pytest.skip("PostGIS was built without SFCGAL, which computes volumes")
-        connection.execute("create extension if not exists postgis_sfcgal")
-        sql = "select id, ST_Volume(ST_MakeSolid(geom)) from volumes_buildings where geom is not null"
-        volumes = dict(connection.execute(sql).fetchall())
+        extension, question = documented(1, "volumes").split(";\n", 1)
+        connection.execute(extension)
+        volumes = dict(connection.execute(question).fetchall())
     assert volumes == pytest.approx({b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.built}, abs=0.0005)
 
 
