@@ -63,24 +63,24 @@ def read_models(path: str | Path, otherwise: Units = METRES, known: Units | None
     """
     for feature in features(Path(path), otherwise, known):
         try:
-            yield from _buildings(feature.objects, feature.vertices)
+            yield from buildings_of(feature.objects, feature.vertices)
         except UNUSABLE as error:
             raise InputError(
                 f"expected CityJSON whose solids can be used in {feature.place}, got {error!r}; `hiproof check` may tell more"
             ) from error
 
 
-def _buildings(objects: dict[str, Any], vertices: np.ndarray) -> Iterator[BuildingModel]:
+def buildings_of(objects: dict[str, Any], vertices: np.ndarray) -> Iterator[BuildingModel]:
     for id, city_object in objects.items():
         if city_object["type"] != "Building":
             continue
         family = [city_object, *(objects[child] for child in city_object.get("children", ()) if child in objects)]
-        level = max((_level_of_detail(solid) for member in family for solid in _solids(member)), default=0.0)
-        faces = tuple(face for member in family for face in _faces(member, level))
+        level = max((level_of_detail(solid) for member in family for solid in solids_of(member)), default=0.0)
+        faces = tuple(face for member in family for face in faces_of(member, level))
         attributes = city_object.get("attributes") or {}
         if not isinstance(attributes, dict):
             raise TypeError(f"attributes of {id!r} that are no object")
-        solid = _compact(vertices, faces) if faces else None
+        solid = compact(vertices, faces) if faces else None
         yield BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
 
 
@@ -94,12 +94,12 @@ def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
     return whole_of(solid)
 
 
-def _solids(city_object: dict[str, Any]) -> list[dict[str, Any]]:
+def solids_of(city_object: dict[str, Any]) -> list[dict[str, Any]]:
     return [geometry for geometry in city_object.get("geometry") or () if geometry["type"] == "Solid"]
 
 
-def _faces(city_object: dict[str, Any], level: float) -> Iterator[Face]:
-    solid = next((solid for solid in _solids(city_object) if _level_of_detail(solid) == level), None)
+def faces_of(city_object: dict[str, Any], level: float) -> Iterator[Face]:
+    solid = next((solid for solid in solids_of(city_object) if level_of_detail(solid) == level), None)
     if solid is None:
         return
     semantics = solid.get("semantics") or {"surfaces": [], "values": None}
@@ -109,14 +109,14 @@ def _faces(city_object: dict[str, Any], level: float) -> Iterator[Face]:
         yield Face(tuple(tuple(ring) for ring in rings), name, 0 if name == ROOF else -1)
 
 
-def _level_of_detail(geometry: dict[str, Any]) -> float:
+def level_of_detail(geometry: dict[str, Any]) -> float:
     try:
         return float(geometry["lod"])
     except (KeyError, TypeError, ValueError):
         return 0.0
 
 
-def _compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
+def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
     """A solid with only the vertices its faces use, each of which must be a place; ValueError or IndexError otherwise."""
     rings = [ring for face in faces for ring in (face.rings or ((),))]
     least = min(len(set(ring)) for ring in rings)

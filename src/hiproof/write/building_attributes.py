@@ -62,8 +62,8 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
         **shape,
         "roof_type": roof_type,
         "roof_n_surfaces": None if figures is None else figures.roof_faces,
-        "slope": None if figures is None else metres(figures.slope_deg),
-        "azimuth": None if figures is None else metres(figures.azimuth_deg),
+        "slope": None if figures is None else rounded(figures.slope_deg, 4),
+        "azimuth": None if figures is None else rounded(figures.azimuth_deg, 4),
         "rmse_lod22": rounded(quality.rmse),
         "pt_density": rounded(quality.density),
         "nodata_frac": rounded(quality.nodata_share),
@@ -79,7 +79,7 @@ def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
         "h_roof_70p": metres(figures.h_70p),
         "h_roof_max": metres(figures.h_max),
         "h_roof_ridge": metres(figures.h_ridge),
-        "volume_lod22": metres(figures.volume_m3),
+        "volume_lod22": rounded(figures.volume_m3, 4),
     }
 
 
