@@ -27,6 +27,7 @@ SHARED_M = 0.3  # m within which a side takes its neighbour's line
 # units of evidence: for a side along no line, for one with no wall below, and for each metre off
 LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 0.45, 0.4, 0.1
 FACING = 1e-9  # m; numerically along the axis
+SHOWN_M = 0.5  # m next to a side in which points need its volume, or else it lies hidden
 MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
 NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
 NEEDED, FEWEST_NEEDED = 0.3, 3  # a point that costs so much more without a volume needs it; fewer show nothing
@@ -178,7 +179,7 @@ def shows_at(volume, edge, lines, uv, gain):
     x, y = uv[axis], uv[1 - axis]
     count = 0
     for i in range(len(x)):
-        within = volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis] and -MOVED_M < sign * (x[i] - at) <= 0.0
+        within = volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis] and -SHOWN_M < sign * (x[i] - at) <= 0.0
         count += int(within and gain[i] < -NEEDED)
     return count >= FEWEST_NEEDED
 
