@@ -8,12 +8,14 @@ from hypothesis import strategies as st
 
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.apart import in_a_row
 from hiproof.fit.union.candidates import candidates_of
 from hiproof.fit.union.grow import ground_of, regrown
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import emptiness, lay_out_plan
 from hiproof.fit.union.planes import Cloud, Grid
 from hiproof.fit.union.scene import directions_of, scene_of
+from hiproof.fit.union.volumes import U0, V0, V1, base_only
 from hiproof.model import Roof
 from roof_zoo import FRAME
 from union_scenes import random_scene, random_volumes
@@ -102,6 +104,14 @@ def test_cells_are_as_empty_as_a_plain_count_says(seed):
             assert found[a, b] == pytest.approx(min(max(1.0 - 2.0 * count / usual, 0.0), 1.0))
 
 
+def test_what_hides_a_row_is_as_deep_as_the_outline_lets_it_be():
+    own, higher = (base_only(5.0)[0] for _ in range(2))
+    own[U0 : V1 + 1], higher[U0 : V1 + 1] = (0.0, 18.0, 0.0, 8.0), (6.0, 12.0, -0.6, 8.7)
+    y = np.linspace(0.1, 7.9, 20)
+    assert in_a_row(own, higher[None], V0, y)
+    assert not in_a_row(own, higher[None], V0, np.linspace(-1.0, 9.0, 20))
+
+
 def test_houses_beside_a_higher_one_are_told_apart():
     """Three gables in a row under one direction, the first and the last alike."""
     outline = shapely.box(0, 0, 18, 8)
@@ -112,6 +122,17 @@ def test_houses_beside_a_higher_one_are_told_apart():
     assert [part.type for part in fit.roof_parts] == ["gable"] * 3
     lengths = sorted(part.parameters["length"] for part in fit.roof_parts)
     assert lengths == pytest.approx([6.0, 6.0, 6.0], abs=0.2)
+
+
+@pytest.mark.parametrize("wide", [5.0, 6.0, 7.0])
+def test_a_level_roof_ends_where_a_gable_begins_whose_eaves_are_lower(wide):
+    """Along the eaves nothing but the points tells that the level roof does not run on over them."""
+    outline = shapely.box(0, 0, 6.0 + wide, 10.7)
+    xy = scene_points(outline, 5.0)
+    gable = 6.75 + 0.65 * (5.35 - np.abs(xy[:, 1] - 5.35))
+    parts = fit_building(np.column_stack([xy, np.where(xy[:, 0] < 6.0, gable, 7.1)]), outline).roof_parts
+    areas = {part.type: part.area / 10.7 for part in parts}
+    assert areas == {"gable": pytest.approx(6.0, abs=0.2), "flat": pytest.approx(wide, abs=0.2)}
 
 
 def test_a_wing_that_crosses_the_roof_stays_one():

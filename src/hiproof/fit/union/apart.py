@@ -53,7 +53,9 @@ def pieces_of(
     counts = np.diff(np.r_[0, gaps + 1, len(seen)])
     between = within & np.any([(x > a) & (x < b) for a, b in zip(ends[:-1], starts[1:], strict=True)], axis=0)
     covers = volumes[np.unique(top[between])]
-    if counts.min() * scene.pitch**2 < LEAST_M2 or not (in_a_row(own, covers, cross) or inside(own, low, cross, scene)):
+    if counts.min() * scene.pitch**2 < LEAST_M2 or not (
+        in_a_row(own, covers, cross, y) or inside(own, low, cross, scene)
+    ):
         return volumes[:0]
     pieces = np.repeat(own[None], len(starts), axis=0)
     for n, (a, b) in enumerate(zip(starts, ends, strict=True)):
@@ -64,11 +66,12 @@ def pieces_of(
     return pieces
 
 
-def in_a_row(own: np.ndarray, covers: np.ndarray, cross: int) -> bool:
-    """Whether what hides a volume lies along its direction and is no deeper."""
-    along = covers[:, DIRECTION] == own[DIRECTION]
-    deeper = (covers[:, cross] < own[cross] - IN_LINE_M) | (covers[:, cross + 1] > own[cross + 1] + IN_LINE_M)
-    return bool((along & ~deeper & (covers[:, cross] > -1e3)).all())
+def in_a_row(own: np.ndarray, covers: np.ndarray, cross: int, y: np.ndarray) -> bool:
+    """Whether what hides a volume lies along its direction and is no deeper where the outline is: at places `y` (n,) across it."""
+    along = (covers[:, DIRECTION] == own[DIRECTION]) & (covers[:, cross] > -1e3)
+    (low, high), ends = own[cross : cross + 2], np.clip(covers[:, cross : cross + 2], y.min(), y.max())
+    deeper = (ends[:, 0] < low - IN_LINE_M) | (ends[:, 1] > high + IN_LINE_M)
+    return bool((along & ~deeper).all())
 
 
 def inside(own: np.ndarray, low: int, cross: int, scene: Scene) -> bool:

@@ -85,9 +85,26 @@ def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> 
 def rises_through(
     base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, plan: Plan, scene: Scene
 ) -> bool:
-    """Whether the level base is noticeably above the volume somewhere over its region."""
+    """Whether the level base is noticeably above the volume somewhere over its region, and no worse for the points there."""
     corners = shapely.get_coordinates(region)
-    return bool(len(corners)) and bool((heights_over(volume, planes, corners, plan, scene) < base - SHOWS_M).any())
+    if not len(corners) or not (heights_over(volume, planes, corners, plan, scene) < base - SHOWS_M).any():
+        return False
+    xy, z = points_in(region, plan, scene)
+    height = heights_over(volume, planes, xy, plan, scene)
+    below = height < base
+    return misfit(z[below], np.full(below.sum(), base), scene) <= misfit(z[below], height[below], scene)
+
+
+def points_in(region: shapely.Geometry, plan: Plan, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """The points inside a region: local x, y (n, 2) and the plan's z (n,)."""
+    xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
+    inside = shapely.contains_xy(region, xy[:, 0], xy[:, 1])
+    return xy[inside], scene.z[: scene.n][inside]
+
+
+def misfit(z: np.ndarray, height: np.ndarray, scene: Scene) -> float:
+    """What points at `z` (n,) cost under a roof so high (n,)."""
+    return float((np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2).sum())
 
 
 def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan, scene: Scene) -> np.ndarray:
@@ -113,10 +130,9 @@ def gaps_filled(
 ) -> list[list]:
     """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
     rest = shapely.difference(outline, shapely.union_all(quads[1:], grid_size=GRID_M), grid_size=GRID_M)
-    xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
     for gap in polygons_of(rest):
         near, shared, k, q = shares_most(gap, [[], *regions[1:]])
-        if shared > 0.0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], xy, plan, scene)):
+        if shared > 0.0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], plan, scene)):
             merged = polygons_of(
                 shapely.intersection(
                     shapely.union_all([regions[k][q], near], grid_size=GRID_M), outline, grid_size=GRID_M
@@ -149,16 +165,13 @@ def is_base(
     base: np.ndarray,
     volume: np.ndarray,
     planes: Planes,
-    xy: np.ndarray,
     plan: Plan,
     scene: Scene,
 ) -> bool:
     """Whether a gap is wide enough to be drawn and its points lie on the base rather than on its neighbour continued."""
     if shapely.buffer(gap, -THICK_M).is_empty:
         return False
-    inside = shapely.contains_xy(gap, xy[:, 0], xy[:, 1])
-    z = scene.z[: scene.n][inside]
-    continued = heights_over(volume, planes, xy[inside], plan, scene)
+    xy, z = points_in(gap, plan, scene)
+    continued = heights_over(volume, planes, xy, plan, scene)
     level = np.full(len(z), base[OFFSET + LEVEL])
-    cost = [np.clip((np.abs(z - h) - scene.dead) / scene.width, 0.0, 1.0) ** 2 for h in (continued, level)]
-    return not len(z) or bool(cost[0].sum() > cost[1].sum() + SHAPE_UNITS * scene.evidence)
+    return not len(z) or misfit(z, continued, scene) > misfit(z, level, scene) + SHAPE_UNITS * scene.evidence
