@@ -61,13 +61,14 @@ def test_a_strip_between_teeth_is_no_roof_of_its_own(kappa):
     assert shed.area == pytest.approx(2.0 * WIDTH * LENGTH, abs=1e-3)
 
 
-def test_wings_beside_a_yard_are_two_and_what_crosses_a_roof_is_one():
+def test_wings_beside_a_yard_or_in_a_row_are_two_and_what_crosses_a_roof_is_one():
     def z(x, y):
         return np.where(np.abs(y) < 4.0, 9.0, 6.0)
 
     across = shapely.union(shapely.box(-12, -4, 12, 4), shapely.box(-3, -11, 3, 11))
+    row = shapely.box(-3, -11, 3, 11)
     beside = shapely.union_all([shapely.box(-12, -4, 12, 4), shapely.box(-12, 4, -6, 11), shapely.box(6, 4, 12, 11)])
-    for outline, count in ((across, 2), (beside, 3)):
+    for outline, count in ((across, 2), (row, 3), (beside, 3)):
         parts = fit_building(sampled(z, outline), outline).roof_parts
         assert [part.type for part in parts] == ["flat"] * count
         assert sorted(round(part.translation[2], 1) for part in parts) == [6.0] * (count - 1) + [9.0]

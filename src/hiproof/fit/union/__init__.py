@@ -89,7 +89,8 @@ def fit_building(
     planes = agreed(volumes, sides, roof.planes, scene)
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
-        part_of(volumes[k], planes[k], sides[k], own, plan, scene, types) for k, own in places_of(regions, outline)
+        part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)
+        for k, own in places_of(regions, outline, plan)
     ]
     parts = that_show(parts, plan, scene)
     parts = in_own_shapes(put_together(parts, types), points_local, settings)

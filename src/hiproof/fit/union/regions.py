@@ -18,6 +18,8 @@ THICK_M = 0.25  # a gap may be the base's where a disc of this radius fits
 SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
 # of the base apart from the rest of it, from which on that is a part; of what lies between, that is roofed where it runs on
 PLACE_M2, ROOFED = 1.0, 0.5
+# m by which a house between two others may stand out and be in a row with them; m beyond all of an outline
+IN_LINE_M, FAR_M = 0.5, 1e4
 SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
 
 
@@ -50,12 +52,14 @@ def regions_of(
 
 
 def places_of(
-    regions: list[list[shapely.Polygon]], outline: shapely.Polygon
+    regions: list[list[shapely.Polygon]], outline: shapely.Polygon, plan: Plan
 ) -> Iterator[tuple[int, list[shapely.Polygon]]]:
     """Which volume roofs which polygons, each to be one part: what lies apart of the base are several, such as two wings."""
     places: list[list[shapely.Polygon]] = []
     for polygon in sorted(polygons_of(shapely.union_all(regions[0], grid_size=GRID_M)), key=lambda p: -p.area):
-        alike = places if polygon.area < PLACE_M2 else (own for own in places if runs_on(own[0], polygon, outline))
+        alike = (
+            places if polygon.area < PLACE_M2 else (own for own in places if runs_on(own[0], polygon, outline, plan))
+        )
         own = next(iter(alike), None)
         if own is None:
             places.append([polygon])
@@ -65,11 +69,22 @@ def places_of(
     yield from ((k, own) for k, own in enumerate(regions) if k > 0 and own)
 
 
-def runs_on(one: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polygon) -> bool:
-    """Whether a roof may run on from one place to another under what stands between, and not across a yard."""
+def runs_on(one: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polygon, plan: Plan) -> bool:
+    """Whether a roof may run on from one place to another under what stands between: no yard, nor a house in a row with them."""
     both = shapely.union(one, other, grid_size=GRID_M)
     between = shapely.difference(shapely.convex_hull(both), both)
-    return shapely.intersection(between, outline).area > ROOFED * between.area
+    if shapely.intersection(between, outline).area <= ROOFED * between.area:
+        return False
+    whole, *places = (shapely.transform(p, lambda xy: xy @ plan.frame.rotation.T) for p in (outline, one, other))
+    low, high = (shapely.bounds(places)[:, ends] for ends in ([0, 1], [2, 3]))
+    for axis in (0, 1):
+        start, end = high[:, axis].min(), low[:, axis].max()
+        if start < end:
+            strip = [start, -FAR_M, end, FAR_M] if axis == 0 else [-FAR_M, start, FAR_M, end]
+            hides = shapely.bounds(shapely.clip_by_rect(whole, *strip))[[1 - axis, 3 - axis]]
+            deepest = low[:, 1 - axis].min() - IN_LINE_M, high[:, 1 - axis].max() + IN_LINE_M
+            return bool(hides[0] < deepest[0] or hides[1] > deepest[1])
+    return True
 
 
 def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> shapely.Polygon:
