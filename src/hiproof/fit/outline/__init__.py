@@ -1,6 +1,6 @@
 """The outline of a building without a footprint, from its points, as a draughtsman would draw it.
 
-rough   the points' alpha shape, pushed out, with few corners and with more
+rough   the points' alpha shape, pushed out, with few corners, with more and with many
 spread  how evenly points are spread, by which prices go
 soft    how soft a side is
 lines   a polygon as the lines of its sides
@@ -48,8 +48,9 @@ STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
     """Outline, with courts, of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and across.
 
-    With heights, points of walls are known, and the outline runs through them. Each ring is the cheaper of two drawings, one from few
-    corners on and one from more, along another main direction where the corners have one; without `kappa` both are along theirs.
+    With heights, points of walls are known, and the outline runs through them. Each ring is the cheapest of three drawings, from few
+    corners on, from more and from many, these along another main direction where the corners have one; without `kappa` all are along
+    theirs.
     Raises FitError for points that span no area.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12, 0.5), np.arange(0.25, 7, 0.5)))
@@ -61,7 +62,8 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     rough = rough_outline(points[:, :2])
     own = main_direction(shapely.Polygon(rough.rings[0][0]))
     kappa = own if kappa is None else kappa
-    ways = (kappa, own if abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD else kappa)
+    other = own if abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD else kappa
+    ways = (kappa, other, other)
     cloud = cloud_of(points, rough)
     outline, *courts = [ring_of(starts, ways, cloud) for starts in rough.rings]
     return with_courts(outline, courts)
@@ -89,8 +91,8 @@ def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
     return Cloud(xy, wall, ~wall | outer, density, rough.spacing, unevenness(xy[~wall], rough.shape, rough.spacing))
 
 
-def ring_of(starts: list[np.ndarray], ways: tuple[float, float], cloud: Cloud) -> shapely.Polygon:
-    """One ring: the cheaper of the drawings from its `starts` on, each along one of the `ways` (rad)."""
+def ring_of(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> shapely.Polygon:
+    """One ring: the cheapest of the drawings from its `starts` on, each along one of the `ways` (rad)."""
     drawings = []
     for corners, angle in zip(starts, ways, strict=True):
         border = border_of(cloud, corners, angle)
