@@ -8,8 +8,8 @@ import shapely
 
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
+from hiproof.fit.union.regions import area_of
 from hiproof.fit.union.shown import with_slivers
-from hiproof.fit.union.teeth import area_of
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from points_of_roofs import sampled

@@ -9,11 +9,10 @@ from __future__ import annotations
 import numpy as np
 
 from .scene import Scene, nodes
-from .trim import COVER_M
+from .trim import COVER_M, runs_of
 from .volumes import DIRECTION, LEVEL, OFFSET, U0, roof_heights
 
-HIDDEN_M, LEAST_M2 = 0.8, 1.0  # hidden for so long between two places of so much area at least
-LEAST_NODES = 2.5  # and for so many of the raster's steps, which are long on large roofs
+LEAST_M2 = 1.0  # of each of the places in which a volume shows
 IN_LINE_M = 0.5  # what stands in a row is as deep as its neighbours
 # m within which an edge of another volume is taken for that at which one ends; m inside the outline at which it must show
 NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
@@ -45,12 +44,10 @@ def pieces_of(
     x = np.stack([U, V])[axis, int(own[DIRECTION])]
     y = np.stack([U, V])[1 - axis, int(own[DIRECTION])]
     within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])
-    seen = np.sort(x[within & (top == k)])
-    gaps = np.nonzero(np.diff(seen) > max(HIDDEN_M, LEAST_NODES * scene.pitch))[0]
-    if len(gaps) == 0:
+    seen = x[within & (top == k)]
+    starts, ends, counts = runs_of(seen, scene.pitch) if len(seen) else (seen, seen, seen)
+    if len(starts) < 2:
         return volumes[:0]
-    starts, ends = seen[np.r_[0, gaps + 1]], seen[np.r_[gaps, len(seen) - 1]]
-    counts = np.diff(np.r_[0, gaps + 1, len(seen)])
     between = within & np.any([(x > a) & (x < b) for a, b in zip(ends[:-1], starts[1:], strict=True)], axis=0)
     covers = volumes[np.unique(top[between])]
     if counts.min() * scene.pitch**2 < LEAST_M2 or not (

@@ -15,7 +15,7 @@ from ...primitives import get
 from ...primitives.contract import BACK, FRONT
 from ...primitives.family import member_of
 from ...rings import GRID_M
-from .regions import polygons_of
+from .regions import besides, polygons_of
 from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, with_saw_teeth
 
 ON_TOP_M = 0.3  # a gable whose eave is so near another's top stands on it
@@ -37,8 +37,7 @@ def with_gambrels(parts: list[Part]) -> list[Part]:
         for lower in [(part,) for part in below] + list(combinations(below, 2)):
             found = gambrel_of(upper, slopes_below(upper, lower))
             if found is not None:
-                rest = [part for part in below if not any(part is one for one in lower)]
-                return with_gambrels([*rest, found])
+                return with_gambrels([*besides(below, lower), found])
     return parts
 
 

@@ -40,8 +40,9 @@ def part_of(
     c, s = scene.turn[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
     corners = np.concatenate([shapely.get_coordinates(region) for region in regions]) - plan.frame.origin[:2]
-    rows = np.where(showing(planes.rows, corners @ axes.T)[:, None], planes.rows, np.nan)
-    registrations = registered(planes, rows, corners @ axes.T)
+    uv = corners @ axes.T
+    rows = np.where(showing(planes.rows, uv)[:, None], planes.rows, np.nan)
+    registrations = registered(planes, rows, uv)
     turn = common_lean(rows)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
     rows = turned(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]

@@ -17,7 +17,7 @@ from ...primitives.contract import Primitive
 from ...primitives.family import COMPONENTS
 from ...rings import GRID_M
 from ...settings import Settings
-from .regions import polygons_of
+from .regions import area_of, besides, polygons_of
 
 MOST_PARTS = 3  # that one shape may take the place of
 RECTANGULAR = 0.9  # share of the smallest rectangle around them that the parts roof together
@@ -32,8 +32,7 @@ def in_own_shapes(parts: list[Part], points: np.ndarray, settings: Settings) -> 
             for chosen in combinations([part for part in parts if part.type != name], count):
                 one = as_one(CATALOGUE[name], chosen, points, settings)
                 if one is not None:
-                    rest = [part for part in parts if not any(part is other for other in chosen)]
-                    return in_own_shapes([*rest, one], points, settings)
+                    return in_own_shapes([*besides(parts, chosen), one], points, settings)
     return parts
 
 
@@ -45,8 +44,7 @@ def own_names(allowed: tuple[str, ...]) -> list[str]:
 
 def as_one(shape: Primitive, chosen: tuple[Part, ...], points: np.ndarray, settings: Settings) -> Part | None:
     """The `chosen` parts as one of `shape` over what they roof, None where they are none."""
-    outlines = [piece.outline for part in chosen for piece in part.pieces]
-    covered = polygons_of(shapely.union_all(outlines, grid_size=GRID_M))
+    covered = polygons_of(area_of(chosen))
     if len(covered) != 1 or covered[0].area < RECTANGULAR * shapely.minimum_rotated_rectangle(covered[0]).area:
         return None
     own = points[shapely.intersects_xy(covered[0], points[:, 0], points[:, 1])]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 import shapely
 
+from ...model import Part
 from ...rings import GRID_M
+from .apart import IN_LINE_M
 from .finish import Planes
 from .plan import Plan
 from .scene import Scene
@@ -18,8 +20,7 @@ THICK_M = 0.25  # a gap may be the base's where a disc of this radius fits
 SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
 # of the base apart from the rest of it, from which on that is a part; of what lies between, that is roofed where it runs on
 PLACE_M2, ROOFED = 1.0, 0.5
-# m by which a house between two others may stand out and be in a row with them; m beyond all of an outline
-IN_LINE_M, FAR_M = 0.5, 1e4
+FAR_M = 1e4  # m beyond all of an outline
 SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
 
 
@@ -132,6 +133,16 @@ def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan,
 
 def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     return [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon" and g.area > 1e-9]
+
+
+def area_of(parts: Iterable[Part]) -> shapely.Geometry:
+    """What parts cover together."""
+    return shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M)
+
+
+def besides(parts: Iterable[Part], some: Iterable[Part]) -> list[Part]:
+    """The parts that are none of `some`."""
+    return [part for part in parts if not any(part is one for one in some)]
 
 
 def gaps_filled(

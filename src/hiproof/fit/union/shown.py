@@ -11,7 +11,7 @@ import shapely
 from ...model import Part, Piece
 from ...rings import GRID_M
 from .plan import Plan
-from .regions import polygons_of, shares_most
+from .regions import area_of, polygons_of, shares_most
 from .scene import Scene, nodes
 
 SEAM_M = 1e-5  # between corners that are the same but for the grid they lie on
@@ -34,8 +34,7 @@ def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = ma
 
 def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part] | None:
     """`parts` with what only the `hidden` one covers added to the pieces beside it; None where that cannot be or is too much."""
-    covered = shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M)
-    own = shapely.union_all([piece.outline for piece in hidden.pieces], grid_size=GRID_M)
+    covered, own = area_of(parts), area_of([hidden])
     pieces = [list(part.pieces) for part in parts]
     bare = polygons_of(shapely.difference(own, covered, grid_size=GRID_M))
     if sum(polygon.area for polygon in bare) > widest_m2:

@@ -18,7 +18,7 @@ from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
 from ...rings import GRID_M
-from .regions import polygons_of
+from .regions import area_of, besides, polygons_of
 from .shown import with_slivers
 
 # rise over run; m; share of a size; rad: within which teeth, or the halves of a gambrel, are alike
@@ -48,10 +48,10 @@ def rows_of(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
             neighbour = next((part for part in teeth if follows(row[-1], part) or follows(part, row[0])), None)
             grown = neighbour is not None
             if neighbour is not None:
-                teeth = [part for part in teeth if part is not neighbour]
+                teeth = besides(teeth, [neighbour])
                 row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
         if len(row) >= min(TEETH):
-            yield carried_on(row, [part for part in parts if not any(part is tooth for tooth in row)])
+            yield carried_on(row, besides(parts, row))
 
 
 def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:
@@ -60,12 +60,12 @@ def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Pa
     for step in 1.0, -1.0:
         while len(row) < max(TEETH):
             place = next_tooth(row, row[-1] if step > 0.0 else row[0], step)
-            part = next((p for p in others if shows_as(p, place, [q for q in parts if q is not p])), None)
+            part = next((p for p in others if shows_as(p, place, besides(parts, [p]))), None)
             if part is None:
                 break
             tooth = as_high(place, part)
             row = [*row, tooth] if step > 0.0 else [tooth, *row]
-            others = [other for other in others if other is not part]
+            others = besides(others, [part])
     return row, others
 
 
@@ -138,7 +138,8 @@ def follows(tooth: Part, next_tooth: Part) -> bool:
 @dataclass(frozen=True)
 class Ground:
     """Where a row stands: u along the teeth and v across them are `axes` (2, 2) about `origin` (2,), teeth reach from `left` to
-    `right` along u, the row was seen from `first` to `last` along v, and covers `covered`; `roof` is all that is roofed."""
+    `right` along u, the row was seen from `first` to `last` along v, and covers `covered`; `roof` is all that is roofed, and `walls`
+    its border: cracks between parts are none."""
 
     origin: np.ndarray
     axes: np.ndarray
@@ -148,6 +149,7 @@ class Ground:
     last: float
     covered: shapely.Geometry
     roof: shapely.Geometry
+    walls: shapely.Geometry
 
     def strip(self, foot: float, top: float) -> shapely.Polygon:
         """From v = `foot` to `top` as long as the teeth; nothing where `top` is not above."""
@@ -155,15 +157,9 @@ class Ground:
         return shapely.transform(box, lambda uv: uv @ self.axes + self.origin)
 
     def is_wall(self, at: float) -> bool:
-        """Whether the roof's outline runs along v = `at`; cracks between its parts are no walls."""
-        walls = shapely.buffer(self.roof, CRACK_M, join_style="mitre").boundary
-        along = shapely.intersection(walls, self.strip(at - AT_WALL_M, at + AT_WALL_M))
+        """Whether the roof's outline runs along v = `at`."""
+        along = shapely.intersection(self.walls, self.strip(at - AT_WALL_M, at + AT_WALL_M))
         return along.length > AT_WALL * (self.right - self.left)
-
-
-def area_of(parts: list[Part]) -> shapely.Geometry:
-    """What parts cover together."""
-    return shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M)
 
 
 def ground_of(row: list[Part], others: list[Part]) -> Ground:
@@ -174,7 +170,8 @@ def ground_of(row: list[Part], others: list[Part]) -> Ground:
     uv = (shapely.get_coordinates(covered) - origin) @ axes.T
     (left, first), (right, last) = uv.min(axis=0).tolist(), uv.max(axis=0).tolist()
     roof = shapely.MultiPolygon(polygons_of(shapely.union(covered, beside, grid_size=GRID_M)))
-    return Ground(origin, axes, left, right, first, last, covered, roof)
+    walls = shapely.buffer(roof, CRACK_M, join_style="mitre").boundary
+    return Ground(origin, axes, left, right, first, last, covered, roof, walls)
 
 
 def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
@@ -216,7 +213,7 @@ def without_splinters(row: list[Part], others: list[Part]) -> tuple[list[Part], 
         if part.parameters.get("width", math.inf) < narrow
         and all(shapely.intersection(between, p.outline).area > NEARLY * p.outline.area for p in part.pieces)
     ]
-    return [part for part in others if not any(part is one for one in splinters)], splinters
+    return besides(others, splinters), splinters
 
 
 def laid_out(feet: np.ndarray, ground: Ground) -> np.ndarray:

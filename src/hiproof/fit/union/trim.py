@@ -15,7 +15,7 @@ from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
 HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
 # m from what shows within which an edge or a corner is the place to draw a side in to
 NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
-# m, and of the raster's steps, for which a volume is hidden that then shows again, by chance, where it happens to be higher
+# m, and of the raster's steps, which are long on large roofs, for which a volume is hidden that shows in several places
 GAP_M, GAP_NODES = 0.8, 2.5
 CUT_UNITS = 10.0  # units that a volume cut short may cost before its neighbours are drawn out
 SLACK_UNITS = 0.02  # units of evidence that drawing in may cost; what is hidden explains nothing
@@ -38,21 +38,23 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
         else:
             direction = int(volumes[k, DIRECTION])
             for low, x in ((U0, U[direction][seen]), (V0, V[direction][seen])):
-                for edge, seen_to in ((low, x.min()), (low + 1, x.max())):
+                starts, ends, counts = runs_of(x, scene.pitch)
+                for edge, seen_to in ((low, starts[0]), (low + 1, ends[-1])):
                     volumes, value = drawn_in(volumes, scene, value, k, edge, float(seen_to), U, V)
-                for edge, seen_to in zip((low, low + 1), longest_run(x, scene.pitch), strict=True):
-                    volumes, value = cut_short(volumes, scene, value, k, edge, seen_to)
+                longest = int(np.argmax(counts))
+                for edge, seen_to in ((low, starts[longest]), (low + 1, ends[longest])):
+                    volumes, value = cut_short(volumes, scene, value, k, edge, float(seen_to))
         k += 1
     return volumes, value
 
 
-def longest_run(x: np.ndarray, pitch: float) -> tuple[float, float]:
-    """From where to where most of the places x (n,) lie that follow each other by no more than a few steps of the raster."""
+def runs_of(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the runs of places x (n,) begin and end (m,) that follow each other by no more than a few steps of the raster, and how
+    many places each has."""
     x = np.sort(x)
-    starts = np.r_[0, np.nonzero(np.diff(x) > max(GAP_M, GAP_NODES * pitch))[0] + 1]
-    ends = np.r_[starts[1:], len(x)]
-    longest = int(np.argmax(ends - starts))
-    return float(x[starts[longest]]), float(x[ends[longest] - 1])
+    first = np.r_[0, np.nonzero(np.diff(x) > max(GAP_M, GAP_NODES * pitch))[0] + 1]
+    last = np.r_[first[1:], len(x)] - 1
+    return x[first], x[last], last - first + 1
 
 
 def drawn_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
