@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ import shapely
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
+from ..read.overlap import told_box
 from ..settings import Settings
 from ..write.naming import FileUnits
 from ..write.reprojected import crs_of_files
@@ -138,12 +138,3 @@ def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
 
 def nothing_in(bbox: Box) -> str:
     return f"expected buildings in --bbox {told_box(bbox)}, got none; it is in the coordinates of the clouds"
-
-
-def told_box(box: Sequence[float]) -> str:
-    """A box as `--bbox` takes it.
-
-    >>> told_box((84600, 447300.25, 85000, 447700))
-    '84600,447300.25,85000,447700'
-    """
-    return ",".join(f"{side:.10g}" for side in box)

@@ -19,7 +19,7 @@ from ..model import Footprint
 from ..settings import Settings
 from .crs import described, parse_crs, same_horizontal, units_of
 from .database import is_database, read_table, table_crs
-from .overlap import refuse_degrees
+from .overlap import refuse_degrees, told_box
 from .polygons import simple_polygons
 from .remote import is_url
 
@@ -118,9 +118,8 @@ def read_features(
         raise InputError(f"expected polygons in {path}, got a table without geometry; name another file or layer")
     if not len(wkb) and (where or bbox):
         said = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
-        extent = ",".join(f"{side:.10g}" for side in info["total_bounds"])
         raise InputError(
-            f"expected footprints in {path} ({extent}) that {said} let through, got none; relax or leave out what does not fit"
+            f"expected footprints in {path} ({told_box(info['total_bounds'])}) that {said} let through, got none; relax or leave out what does not fit"
         )
     if not len(wkb):
         raise InputError(f"expected footprints in {path}, got a layer without features; name another file or layer")

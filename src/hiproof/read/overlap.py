@@ -143,3 +143,12 @@ def extent(low: np.ndarray, high: np.ndarray) -> str:
     (xmin, ymin), (xmax, ymax) = np.nanmin(low, axis=0), np.nanmax(high, axis=0)
     digits = 5 if max(map(abs, (xmin, ymin, xmax, ymax))) <= 180 else 1
     return f"x {xmin:.{digits}f} to {xmax:.{digits}f}, y {ymin:.{digits}f} to {ymax:.{digits}f}"
+
+
+def told_box(box: Sequence[float]) -> str:
+    """A box as `--bbox` takes it.
+
+    >>> told_box((84600, 447300.25, 85000, 447700))
+    '84600,447300.25,85000,447700'
+    """
+    return ",".join(f"{side:.10g}" for side in box)

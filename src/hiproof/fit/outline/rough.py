@@ -1,4 +1,4 @@
-"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners and with more.
+"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners, with more and with many.
 
 Places in it without points, 4 m2 or more, are courts."""
 
@@ -23,7 +23,7 @@ MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 
 class Rough(NamedTuple):
-    """`rings`: of the outline, then of each court in it, corners (n, 2) to begin with, few and more, no two neighbouring sides
+    """`rings`: of the outline, then of each court in it, corners (n, 2) to begin with, few, more and many, no two neighbouring sides
     parallel; the outline's run counter-clockwise, courts' clockwise. `spacing` (m) of the points, `shape`: their alpha shape."""
 
     rings: list[list[np.ndarray]]
