@@ -1,10 +1,12 @@
 """A small finished run written by hand, not by our writers: a gable, a block with a courtyard, one without model."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 
 from hiproof.model import GROUND, ROOF, WALL, Face, Solid
+from hiproof.write.viewed import ViewedModel
 
 ORIGIN = np.array([85000.0, 446000.0, 0.0])
 
@@ -29,6 +31,13 @@ def courtyard_solid(side=20.0, yard=8.0, height=9.0):
     inner = [Face(((i + 4, i + 12, (i + 1) % 4 + 12, (i + 1) % 4 + 4),), WALL) for i in range(4)]
     roof = Face(((8, 9, 10, 11), (15, 14, 13, 12)), ROOF, 0)
     return Solid(xyz, (roof, *outer, *inner, Face(((3, 2, 1, 0), (4, 5, 6, 7)), GROUND)))
+
+
+def two_parts(id="pair"):
+    """A model whose roof faces belong to a gable and a hip."""
+    solid = gable_solid()
+    faces = [replace(face, part=index) if face.kind == ROOF else face for index, face in enumerate(solid.faces)]
+    return ViewedModel(id, "gable", Solid(solid.vertices + ORIGIN, tuple(faces)), {}, {0: "gable", 1: "hip"})
 
 
 SOLIDS = {"house-1": ("gable", gable_solid()), "block 2": ("flat", courtyard_solid().moved(np.array([30.0, 0, 0])))}

@@ -8,7 +8,7 @@ here. The module of a file that a run writes has
 
 and that of one that `hiproof convert` makes of finished models has
 
-    write_models(path, buildings, crs)      buildings of (id, roof type, solid, attributes); returns how many it wrote
+    write_models(path, buildings, crs)      write.viewed.ViewedModel; returns how many it wrote
 
 Modules are imported when a file of theirs is asked for.
 """

@@ -47,6 +47,16 @@ def test_what_is_no_cityjson_is_refused_in_a_sentence(tmp_path, text):
         list(read_models(path))
 
 
+@pytest.mark.parametrize("part", ["x", None, [], 10**20])
+def test_a_part_that_is_no_number_is_refused_in_a_sentence(tmp_path, part):
+    write_sample_run(tmp_path)
+    path = run_models(tmp_path)
+    told = json.dumps({"type": "RoofSurface", "hiproof_part": part, "hiproof_part_type": "gable"})
+    path.write_text(path.read_text().replace('{"type": "RoofSurface"}', told))
+    with pytest.raises(InputError, match="expected CityJSON whose solids can be used in line 2"):
+        list(read_models(path))
+
+
 def test_missing_files_are_refused(tmp_path):
     with pytest.raises(InputError, match="expected a readable text file"):
         list(read_models(tmp_path / "none.json"))

@@ -1,5 +1,6 @@
 """The report as text, and as a browser shows it: headless Chromium opens the page, clicks, and dumps what came of it."""
 
+import base64
 import json
 import re
 import shutil
@@ -13,9 +14,11 @@ import typer
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
 from hiproof.evaluate.report import embedded, report_html
-from hiproof.evaluate.report_pictures import RESIDUAL_STOPS, histogram, residual_bins
+from hiproof.evaluate.report_data import report_data
+from hiproof.evaluate.report_pictures import RESIDUAL_STOPS, building_pictures, histogram, residual_bins
 from hiproof.evaluate.run import evaluate_run
-from sample_models import sample_points, write_sample_run
+from hiproof.write.colours import type_colour
+from sample_models import sample_points, two_parts, write_sample_run
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 
@@ -133,6 +136,20 @@ def test_nothing_in_the_page_asks_the_network(page):
     outside = {name for name in re.findall(r"https?://[^\s\"'<>\\]+", page)}
     assert outside <= {"http://www.w3.org/2000/svg"}
     assert not re.search(r"<(link|script|img)[^>]+(src|href)=[\"'](?!data:)", page)
+
+
+def test_roofs_are_coloured_by_their_parts(run):
+    solid, parts = two_parts().solid, two_parts().part_types
+    model = replace(run.models[0], solid=solid, part_types=parts)
+    data = report_data(replace(run, models=(model, *run.models[1:])), [None] * len(run.models))
+    types = list(data["colours"]["type"])
+    assert types == ["flat", "gable", "hip", "unknown"]
+    owner = np.frombuffer(base64.b64decode(data["mesh"]["owner"]), "<u4")
+    roof = np.frombuffer(base64.b64decode(data["mesh"]["roof"]), "u1")
+    assert [types[k - 1] for k in roof[owner == 0] if k] == ["gable", "gable", "hip", "hip"]
+    assert {types[k - 1] for k in roof[owner == 1] if k} == {"flat"}
+    pictures = building_pictures(solid, np.empty((0, 3)), np.empty(0), parts)
+    assert all(f'fill="{type_colour(kind)}"' in pictures for kind in ("gable", "hip"))
 
 
 def test_names_from_the_data_cannot_become_markup(run):

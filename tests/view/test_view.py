@@ -9,6 +9,7 @@ import subprocess
 import threading
 from functools import partial
 
+import numpy as np
 import pytest
 
 from hiproof.cli.view import tiles_of
@@ -16,7 +17,8 @@ from hiproof.errors import HiproofError, InputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
 from hiproof.view.server import Handler, page_of, server_of
 from hiproof.write.tiles import write_models
-from sample_models import SOLIDS, write_sample_run
+from hiproof.write.viewed import ViewedModel
+from sample_models import ORIGIN, SOLIDS, two_parts, write_sample_run
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
@@ -59,14 +61,21 @@ function click([x, y]) {
 )
 
 
+def parameters(*kinds):
+    """What is told of a roof of parts of these types."""
+    return json.dumps({"parts": [{"type": kind, "parameters": {"width": 8.123}} for kind in kinds]})
+
+
 @pytest.fixture(scope="module")
 def tiles(tmp_path_factory):
     folder = tmp_path_factory.mktemp("view") / "a.3dtiles"
-    parameters = json.dumps({"parts": [{"type": "gable", "parameters": {"width": 8.123}}]})
     models = [
-        (id, kind, solid, {"parameters": parameters, "rf_slope": 36.87, "unknown": None})
+        ViewedModel(id, kind, solid, {"parameters": parameters(kind), "rf_slope": 36.87, "unknown": None}, {0: kind})
         for id, (kind, solid) in SOLIDS.items()
     ]
+    pair = two_parts()
+    beside = pair.solid.moved(np.array([0, 20, 0]) - ORIGIN)
+    models.append(pair._replace(solid=beside, attributes={"parameters": parameters("gable", "hip")}))
     with pytest.warns(UserWarning, match="no CRS"):
         write_models(folder, models)
     return folder
@@ -112,7 +121,7 @@ def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving
     assert said, f"the page's scripts did not run to their end: {text[-2000:]}"
     say = json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
     assert say["faults"] == [] and say["webgl"] and say["tiles"] == 1
-    assert "gable" in say["legend"] and "flat" in say["legend"]
+    assert say["legend"].split() == ["gable", "flat", "hip"]  # of all parts, the most frequent first
     assert re.search(r"id\s+house-1", say["clicked"]) and re.search(r"rf_slope\s+36.87", say["clicked"])
     assert re.search(r"part 0\s+gable: width 8.12", say["clicked"]) and "unknown" not in say["clicked"]
     assert say["kept"] == say["clicked"] and say["cleared"] == ""  # a click beside the buildings changes nothing

@@ -8,12 +8,14 @@ from glb_files import accessor_values, parse_glb
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
 from hiproof.rings import ring_normal
+from hiproof.write.colours import linear_rgb, type_colour
 from hiproof.write.gltf import write_models as write_glb
 from hiproof.write.obj import write_models as write_obj
 from hiproof.write.triangles import face_triangles, faces_triangles
-from sample_models import SOLIDS, courtyard_solid, gable_solid, write_sample_run
+from hiproof.write.viewed import ViewedModel
+from sample_models import SOLIDS, courtyard_solid, gable_solid, two_parts, write_sample_run
 
-BUILDINGS = [(id, kind, solid, {"height": 3.5}) for id, (kind, solid) in SOLIDS.items()]
+BUILDINGS = [ViewedModel(id, kind, solid, {"height": 3.5}, {0: kind}) for id, (kind, solid) in SOLIDS.items()]
 
 
 def glb_positions(document, binary, mesh):
@@ -63,8 +65,22 @@ def test_obj_holds_every_building_closed(tmp_path):
 
 
 def test_an_unheard_of_roof_type_gets_a_material_that_exists(tmp_path):
-    write_obj(tmp_path / "a.obj", [("x", "onion", gable_solid(), {})])
+    write_obj(tmp_path / "a.obj", [ViewedModel("x", "onion", gable_solid(), {}, {0: "onion"})])
     assert "usemtl roof_unknown" in (tmp_path / "a.obj").read_text()
+
+
+def test_a_roof_face_has_the_colour_of_its_part(tmp_path):
+    write_glb(tmp_path / "a.glb", [two_parts()])
+    document, _ = parse_glb(tmp_path / "a.glb")
+    drawn = [document["materials"][p["material"]] for p in document["meshes"][0]["primitives"]]
+    colours = {m["name"]: m["pbrMetallicRoughness"]["baseColorFactor"] for m in drawn}
+    assert list(colours) == ["roof gable", "roof hip", "WallSurface", "GroundSurface"]
+    assert [colours[f"roof {kind}"][:3] for kind in ("gable", "hip")] == [
+        list(linear_rgb(type_colour(kind))) for kind in ("gable", "hip")
+    ]
+    write_obj(tmp_path / "a.obj", [two_parts()])
+    used = [line[7:] for line in (tmp_path / "a.obj").read_text().splitlines() if line.startswith("usemtl")]
+    assert used == ["roof_gable", "roof_hip", "WallSurface", "GroundSurface"]
 
 
 def test_no_buildings_make_a_valid_empty_file(tmp_path):

@@ -14,9 +14,10 @@ from handmade import RD_ORIGIN, gable_house, modelled, unmodelled
 from hiproof.compose import check_solid, compose, volume
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
-from hiproof.model import Building, Model, Part, Piece, Quality, Roof
+from hiproof.model import ROOF, Building, Model, Part, Piece, Quality, Roof
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
+from hiproof.rings import ring_normal
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
@@ -149,6 +150,9 @@ def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, wr
     assert check_solid(model.solid, 0.01) == () and volume(model.solid) == pytest.approx(
         volume(building.solid), rel=1e-4
     )
+    for face in model.solid.of_kind(ROOF):
+        x, y, z = ring_normal(model.solid.vertices[list(face.rings[0])])
+        assert model.part_types[face.part] == ("gable" if np.hypot(x, y) > 0.1 * z else "flat")
 
 
 def test_a_files_head_says_how_it_is_drawn_and_a_build_obeys_it_or_options(tmp_path):

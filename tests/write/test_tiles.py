@@ -14,11 +14,13 @@ from glb_files import accessor_values, parse_glb, view_bytes
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.read.crs import units_of
+from hiproof.write.colours import linear_rgb, type_colour
 from hiproof.write.naming import FileUnits
 from hiproof.write.tiles import Globe, write_models
 from hiproof.write.tiles.properties import NO_NUMBER, Found
 from hiproof.write.tiles.quadtree import quadtree
-from sample_models import ORIGIN, courtyard_solid, gable_solid, write_sample_run
+from hiproof.write.viewed import ViewedModel
+from sample_models import ORIGIN, courtyard_solid, gable_solid, two_parts, write_sample_run
 
 GEOID_M = 43.2
 PLACES = {  # a place on land in each CRS, in its own unit
@@ -39,7 +41,8 @@ def town(count=60, seed=0):
         width = float(rng.uniform(4, 30))
         solid = courtyard_solid(width, width / 3) if k % 5 == 0 else gable_solid(width, 1.5 * width)
         told = {"k": k, "half known": None if k % 2 else k / 2, "name": None if k % 3 else f"Haus {k} ü", "flag": k > 3}
-        yield f"house-{k}", "flat" if k % 5 == 0 else "gable", solid.moved(at), told
+        kind = "flat" if k % 5 == 0 else "gable"
+        yield ViewedModel(f"house-{k}", kind, solid.moved(at), told, {0: kind})
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +107,7 @@ def rows_of(document, binary):
 def test_every_building_stands_in_one_tile_at_its_place_within_a_centimetre(tiled, globe):
     folder, tileset = tiled
     transform = np.array(tileset["root"]["transform"]).reshape(4, 4).T
-    expected = {id: solid for id, _, solid, _ in town()}
+    expected = {model.id: model.solid for model in town()}
     found = []
     for tile, _ in tiles_below(tileset["root"]):
         places, ids, rows = content_of(folder, tile)
@@ -138,9 +141,7 @@ def boxes_on_earth(folder):
 def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled, tmp_path, out):
     """Whatever the frames of the tilesets, which may lie half a metre apart."""
     way = FileUnits.of("EPSG:7415", out_crs=out).gml
-    moved = (
-        (id, kind, replace(solid, vertices=way.from_metres(solid.vertices)), told) for id, kind, solid, told in town()
-    )
+    moved = (m._replace(solid=replace(m.solid, vertices=way.from_metres(m.solid.vertices))) for m in town())
     write_models(tmp_path / "there.3dtiles", moved, f"{out}+5709", GEOID_M)
     here, there = boxes_on_earth(tiled[0]), boxes_on_earth(tmp_path / "there.3dtiles")
     assert here.keys() == there.keys()
@@ -149,13 +150,24 @@ def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled, tmp_path, o
 
 def test_attributes_are_those_of_the_building(tiled):
     folder, tileset = tiled
-    expected = {id: (roof_type, told) for id, roof_type, _, told in town()}
+    expected = {model.id: (model.roof_type, model.attributes) for model in town()}
     for tile, _ in tiles_below(tileset["root"]):
         for row in content_of(folder, tile)[2]:
             roof_type, told = expected[row["id"]]
             assert row["type"] == roof_type and row["k"] == told["k"]
             assert row["half known"] == (NO_NUMBER if told["half known"] is None else told["half known"])
             assert row["name"] == (told["name"] or "") and row["flag"] == str(told["flag"]).lower()
+
+
+def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
+    write_models(tmp_path / "a.3dtiles", [two_parts()], "EPSG:7415", GEOID_M)
+    document, binary = parse_glb(tmp_path / "a.3dtiles/tiles/r.glb")
+    names = document["meshes"][0]["primitives"][0]["attributes"]
+    up = accessor_values(document, binary, names["NORMAL"])[:, 1]
+    painted = {tuple(c) for c in accessor_values(document, binary, names["COLOR_0"])[(up > 0.1) & (up < 0.9)].tolist()}
+    assert painted == {
+        (*(round(255 * part) for part in linear_rgb(type_colour(kind))), 255) for kind in ("gable", "hip")
+    }
 
 
 def test_boxes_hold_what_is_drawn_in_them_and_below(tiled):
@@ -243,7 +255,7 @@ def test_without_a_crs_tiles_keep_the_planes_own_axes(tmp_path):
     tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
     assert "transform" not in tileset["root"]
     places, ids, rows = content_of(tmp_path / "a.3dtiles", tileset["root"])
-    solid = {id: solid for id, _, solid, _ in town(3)}[rows[0]["id"]]
+    solid = {model.id: model.solid for model in town(3)}[rows[0]["id"]]
     world = places[ids == 0] + tileset["asset"]["extras"]["origin"]
     np.testing.assert_allclose(world.min(axis=0), solid.vertices.min(axis=0), atol=0.001)
 
@@ -260,7 +272,7 @@ def test_a_failure_leaves_the_older_tileset(tmp_path):
     folder = tmp_path / "a.3dtiles"
     write_models(folder, town(2), "EPSG:7415", GEOID_M)
     before = (folder / "tiles" / "r.glb").read_bytes()
-    nowhere = "x", "flat", gable_solid().moved(np.array([1e9, 1e9, 0])), {}
+    nowhere = ViewedModel("x", "flat", gable_solid().moved(np.array([1e9, 1e9, 0])), {}, {})
     with pytest.raises(InputError, match="no place there"):
         write_models(folder, [*town(3), nowhere], "EPSG:7415", GEOID_M)
     assert (folder / "tiles" / "r.glb").read_bytes() == before

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,15 +18,19 @@ from ..read.plausible import is_plausible
 from ..write.attribute_list import OWN
 
 RUN_MODELS = FORMATS["cityjson"].file
+PART, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
+"""What hiproof tells of a roof surface: its part's number and type."""
 
 
 @dataclass(frozen=True)
 class BuildingModel:
-    """One building of a file: its `attributes`, and its `solid` in world metres (None where the file has none)."""
+    """One building of a file: its `attributes`, its `solid` in world metres (None where the file has none), and the roof types of its
+    parts by number (`Face.part`)."""
 
     id: str
     attributes: dict[str, Any] = field(default_factory=dict)
     solid: Solid | None = None
+    part_types: dict[int, str] = field(default_factory=dict)
 
     @property
     def roof_type(self) -> str:
@@ -81,7 +85,8 @@ def buildings_of(objects: dict[str, Any], vertices: np.ndarray) -> Iterator[Buil
         if not isinstance(attributes, dict):
             raise TypeError(f"attributes of {id!r} that are no object")
         solid = compact(vertices, faces) if faces else None
-        yield BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
+        model = BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
+        yield replace(model, part_types={0: model.roof_type} | part_types_of(family))
 
 
 def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
@@ -105,8 +110,21 @@ def faces_of(city_object: dict[str, Any], level: float) -> Iterator[Face]:
     semantics = solid.get("semantics") or {"surfaces": [], "values": None}
     kinds = semantics["values"][0] if semantics["values"] else [None] * len(solid["boundaries"][0])
     for rings, kind in zip(solid["boundaries"][0], kinds, strict=True):
-        name = WALL if kind is None else semantics["surfaces"][kind]["type"]
-        yield Face(tuple(tuple(ring) for ring in rings), name, 0 if name == ROOF else -1)
+        surface = {"type": WALL} if kind is None else semantics["surfaces"][kind]
+        part = part_of(surface) if surface["type"] == ROOF else -1
+        yield Face(tuple(tuple(ring) for ring in rings), surface["type"], part)
+
+
+def part_of(surface: dict[str, Any]) -> int:
+    """The number of the part that a roof surface belongs to, 0 where the file does not tell."""
+    return int(np.int32(surface.get(PART, 0)))  # NumPy's own, for it refuses what is beyond all bounds
+
+
+def part_types_of(family: list[dict[str, Any]]) -> dict[int, str]:
+    """The roof type of each part that a roof surface belongs to, as far as the file tells."""
+    solids = (solid for member in family for solid in solids_of(member))
+    surfaces = (surface for solid in solids for surface in (solid.get("semantics") or {}).get("surfaces", ()))
+    return {part_of(surface): str(surface[PART_TYPE]) for surface in surfaces if PART_TYPE in surface}
 
 
 def level_of_detail(geometry: dict[str, Any]) -> float:

@@ -147,7 +147,9 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
     if model.solid is None:
         return ""
     origin = model.solid.vertices.min(axis=0)
-    pictures = building_pictures(model.solid.moved(-origin), points - origin, psd(model.solid, points), model.roof_type)
+    pictures = building_pictures(
+        model.solid.moved(-origin), points - origin, psd(model.solid, points), model.part_types
+    )
     text = (
         f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, {100 * quality.share_within_20cm:.0f} % of the points "
         f"inside the outline within 0.2 m of the roof; RMSE of all, facades included, {quality.rmse:.2f} m"

@@ -12,6 +12,7 @@ from ..status import Status
 from ..write.colours import type_colour
 from ..write.page_mesh import packed, solid_mesh
 from .metrics import plan_outline, psd
+from .models import BuildingModel
 from .report_pictures import RESIDUAL_STOPS
 from .run import EvaluatedRun
 
@@ -32,7 +33,7 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     """JSON-ready content of the page. `outlines` are plan polygons (world), None where nothing is known of the place."""
     origin = scene_origin(run, outlines)
     buildings = [building_data(run, i, outlines[i], origin) for i in range(len(run.models))]
-    types = sorted({model.roof_type for model in run.models})
+    types = sorted({name for model in run.models for name in (model.roof_type, *model.part_types.values())})
     statuses = sorted({model.status for model in run.models})
     return {
         "buildings": buildings,
@@ -41,7 +42,7 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
             "status": {name: STATUS_COLOURS.get(name, NO_MODEL_COLOUR) for name in statuses},
             "residual": [list(stop) for stop in RESIDUAL_STOPS],
         },
-        "mesh": mesh_data(run, origin),
+        "mesh": mesh_data(run, types, origin),
         "points": point_data(run, origin),
     }
 
@@ -93,17 +94,23 @@ def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[
     return [np.round(shapely.get_coordinates(ring) - origin[:2], 2).ravel().tolist() for ring in rings]
 
 
-def mesh_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
-    """Triangles of roofs and walls: corners (t, 3, 3), building (t,), whether roof (t,); roof edges (e, 2, 3)."""
+def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[str, str]:
+    """Triangles of roofs and walls: corners (t, 3, 3), building (t,), `roof_places` (t,); roof edges (e, 2, 3)."""
     solids = [(index, model.solid) for index, model in enumerate(run.models) if model.solid is not None]
     meshes = [solid_mesh(solid.moved(-origin)) for _, solid in solids]
     owners = [np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)]
+    roofs = [roof_places(run.models[index], mesh.part, types) for (index, _), mesh in zip(solids, meshes, strict=True)]
     return {
         "corners": packed(np.concatenate([np.empty((0, 3, 3)), *(mesh.corners for mesh in meshes)]), "<f4"),
         "owner": packed(np.concatenate([np.empty(0), *owners]), "<u4"),
-        "roof": packed(np.concatenate([np.empty(0), *(mesh.part >= 0 for mesh in meshes)]), "u1"),
+        "roof": packed(np.concatenate([np.empty(0), *roofs]), "u1"),
         "edges": packed(np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"),
     }
+
+
+def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> list[int]:
+    """The place among `types`, from 1 on, of the roof type of triangles by their `part` (t,); 0 of walls."""
+    return [0 if k < 0 else 1 + types.index(model.part_types.get(k, model.roof_type)) for k in part.tolist()]
 
 
 def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from html import escape
 
 import numpy as np
 
 from ..model import GROUND, ROOF, Solid
 from ..rings import ring_normal
-from ..write.colours import WALL_COLOUR, type_colour
+from ..write.viewed import look_of
 
 RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "#fdae61"), (0.4, "#d7191c"))
 """Colour from each distance in metres upwards, blue near and red far; the same on map, models and points."""
@@ -60,20 +60,21 @@ def short(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, roof_type: str) -> str:
+def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, part_types: Mapping[int, str]) -> str:
     """The model with its points (n, 3), coloured by their distances (n,): from above at an angle, and from the side.
 
-    The side view looks along the level direction of the largest roof face, so that slopes show as lines.
+    The side view looks along the level direction of the largest roof face, so that slopes show as lines. Roofs have the colour of
+    their part's type, by number in `part_types`.
     """
     if len(points) > MOST_POINTS:
         keep = np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)
         points, distances = points[keep], distances[keep]
     across = slope_direction(solid)
     along = np.array([-across[1], across[0], 0.0])
-    colour = type_colour(roof_type)
+    colours = [look_of(face, part_types).colour for face in solid.faces]
     above = (0.8 * across + 0.6 * along, 0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)])
     side = (across, np.array([0.0, 0.0, 1.0]))
-    return "".join(projection(solid, points, distances, colour, *view) for view in (above, side))
+    return "".join(projection(solid, colours, points, distances, *view) for view in (above, side))
 
 
 def slope_direction(solid: Solid) -> np.ndarray:
@@ -88,9 +89,9 @@ def slope_direction(solid: Solid) -> np.ndarray:
 
 
 def projection(
-    solid: Solid, points: np.ndarray, distances: np.ndarray, colour: str, right: np.ndarray, up: np.ndarray
+    solid: Solid, colours: list[str], points: np.ndarray, distances: np.ndarray, right: np.ndarray, up: np.ndarray
 ) -> str:
-    """An SVG of faces and points seen along one direction, `right` and `up` (3,) being the picture's axes."""
+    """An SVG of faces, each in its colour, and points seen along one direction, `right` and `up` (3,) being the picture's axes."""
     axes = np.column_stack([right, -up])
     corners, dots = solid.vertices @ axes, points @ axes
     everything = np.concatenate([corners, dots])
@@ -102,13 +103,10 @@ def projection(
 
     towards = np.cross(right, up)
     faces = sorted(
-        (face for face in solid.faces if face.kind != GROUND),
-        key=lambda face: float((solid.vertices[list(face.rings[0])] @ towards).mean()),
+        ((face, colour) for face, colour in zip(solid.faces, colours, strict=True) if face.kind != GROUND),
+        key=lambda drawn: float((solid.vertices[list(drawn[0].rings[0])] @ towards).mean()),
     )
-    shapes = "".join(
-        f'<path d="{ring_paths(place(corners), face.rings)}" fill="{colour if face.kind == ROOF else WALL_COLOUR}"/>'
-        for face in faces
-    )
+    shapes = "".join(f'<path d="{ring_paths(place(corners), face.rings)}" fill="{colour}"/>' for face, colour in faces)
     cloud = "".join(
         f'<path d="{"".join(f"M{x:.1f} {y:.1f}h0" for x, y in place(dots[residual_bins(distances) == i]))}" stroke="{stop}"/>'
         for i, (_, stop) in enumerate(RESIDUAL_STOPS)

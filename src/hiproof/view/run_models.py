@@ -12,11 +12,11 @@ from ..errors import InputError
 from ..evaluate.models import read_models, run_models
 from ..evaluate.run import run_crs, run_out_crs, run_record, run_units
 from ..formats import FORMATS
-from ..model import Solid
 from ..parametric.file import opened_parameters
 from ..read.cityjson import documents, reference_system
 from ..write.parameters import crs_text
 from ..write.reprojected import crs_of_files
+from ..write.viewed import ViewedModel
 
 TOLD = ("type", "parameters", "position", "rotation")
 
@@ -28,8 +28,8 @@ def run_crs_text(folder: Path) -> str | None:
     return crs_text(crs_of_files(run_crs(record), run_out_crs(record))) or reference_system(header)
 
 
-def run_buildings(folder: Path) -> Iterator[tuple[str, str, Solid, dict[str, Any]]]:
-    """(id, roof type, solid in world metres, attributes) of the run's buildings that have a solid.
+def run_buildings(folder: Path) -> Iterator[ViewedModel]:
+    """The run's buildings that have a solid.
 
     Among the attributes are the `parameters` of the roof as JSON, where the folder has them. Raises InputError for what cannot
     be read.
@@ -43,7 +43,7 @@ def run_buildings(folder: Path) -> Iterator[tuple[str, str, Solid, dict[str, Any
             if records is not None:  # a line a building, in the order of the models
                 attributes = {"parameters": parameters_text(next(records, {}), model.id, path), **attributes}
             if model.solid is not None:
-                yield model.id, model.roof_type, model.solid, attributes
+                yield ViewedModel(model.id, model.roof_type, model.solid, attributes, model.part_types)
 
 
 def parameters_text(record: dict[str, Any], id: str, path: Path) -> str | None:

@@ -5,7 +5,7 @@ roof_levels (measured on its solid), roof_codes and osm_tags (its type in other 
 table_rows (its rows), values (numbers and text as every format holds them), naming (ids), reprojected (another CRS), colours.
 
 Formats: citygml (citygml_geometry, xml_text), citygml3 (made of 2.0), cityjson (cityjson_geometry), parameters (json_text), attributes (the
-GeoPackage, with styles), geoparquet, gltf (in the container glb), obj, triangles for these, tiles, postgis, page_mesh (for pages).
+GeoPackage, with styles), geoparquet, gltf (in the container glb), obj, triangles and viewed for these, tiles, postgis, page_mesh (for pages).
 
 Files: writer (the life of one: opened, added to, finished), files (whole or none), head (what all of a run have in common),
 fragments (a building's texts, to be joined), run_files (all files of a run in one pass).

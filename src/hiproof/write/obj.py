@@ -1,6 +1,6 @@
 """Wavefront OBJ with its material library: one object a building, groups that name the roof type and kind of surface.
 
-OBJ has no attributes: the building's id is the object's name, its roof type the group's and the material's. Coordinates
+OBJ has no attributes: the building's id is the object's name, the roof types of its parts are those of groups and materials. Coordinates
 are about an origin that the first lines name, because viewers compute in float32. z points up.
 """
 
@@ -8,19 +8,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..model import ROOF, Face, Solid
+from ..model import Face, Solid
 from .colours import GROUND_COLOUR, WALL_COLOUR, srgb, type_colours
 from .triangles import face_triangles
+from .viewed import ViewedModel
 
 
-def write_models(
-    path: Path, buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]], crs: str | None = None
-) -> int:
-    """Write `buildings` (id, roof type, solid in world metres, attributes) to `path` with its `.mtl`; returns how many.
+def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None = None) -> int:
+    """Write `buildings` to `path` with its `.mtl`; returns how many.
 
     Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file cannot be written.
     """
@@ -32,12 +30,12 @@ def write_models(
         file.write(material_library().encode())
     count, first, origin = 0, 1, None
     with atomic_file(path) as file:
-        for id, roof_type, solid, _ in buildings:
+        for model in buildings:
             if origin is None:
-                origin = np.floor(solid.vertices.min(axis=0))
+                origin = np.floor(model.solid.vertices.min(axis=0))
                 file.write(header(library.name, origin, crs).encode())
-            file.write(building_text(id, roof_type, solid, origin, first).encode())
-            first += len(solid.vertices)
+            file.write(building_text(model, origin, first).encode())
+            first += len(model.solid.vertices)
             count += 1
     return count
 
@@ -50,15 +48,14 @@ def header(library: str, origin: np.ndarray, crs: str | None) -> str:
     )
 
 
-def building_text(id: str, roof_type: str, solid: Solid, origin: np.ndarray, first: int) -> str:
+def building_text(model: ViewedModel, origin: np.ndarray, first: int) -> str:
     """One building's lines; `first` is the number of its first vertex in the file."""
-    name = "_".join(id.split()) or "_"
+    name, solid = "_".join(model.id.split()) or "_", model.solid
     lines = [f"o {name}"]
     lines += [f"v {x:.4f} {y:.4f} {z:.4f}" for x, y, z in solid.vertices - origin]
-    for kind in dict.fromkeys(face.kind for face in solid.faces):
-        material = f"roof_{roof_type if roof_type in type_colours() else 'unknown'}" if kind == ROOF else kind
-        lines += [f"g {name} {kind} roof_type={roof_type}", f"usemtl {material}"]
-        for face in solid.of_kind(kind):
+    for look, faces in model.faces_by_look().items():
+        lines += [f"g {name} {look.name}", f"usemtl {look.name.replace(' ', '_')}"]
+        for face in faces:
             lines += ["f " + " ".join(str(first + index) for index in polygon) for polygon in polygons(solid, face)]
     return "\n".join(lines) + "\n"
 

@@ -18,8 +18,9 @@ function colourOf(building) {
 const light = lightOf(mesh.corners);
 
 function meshColours() {
-  const roofs = data.buildings.map(building => rgb(colourOf(building)));
-  return shadedColours(light, t => !mesh.roof[t] ? [226, 221, 210] : mesh.owner[t] === selected ? [255, 45, 111] : roofs[mesh.owner[t]]);
+  const buildings = data.buildings.map(building => rgb(colourOf(building))), types = Object.values(data.colours.type).map(rgb);
+  const roof = t => mode === "type" ? types[mesh.roof[t] - 1] : buildings[mesh.owner[t]];
+  return shadedColours(light, t => !mesh.roof[t] ? [226, 221, 210] : mesh.owner[t] === selected ? [255, 45, 111] : roof(t));
 }
 
 const viewer = new Viewer(document.getElementById("scene"), mesh.corners, mesh.owner);

@@ -6,7 +6,7 @@ let scene = null;
 
 function show(found) {
   const rows = found ? found.tile.table.row(found.row).filter(({ value }) => value !== null && value !== "") : [];
-  const lines = rows.flatMap(row => row.name === "parameters" ? parts(row) : [row]);
+  const lines = rows.flatMap(row => partsOf(row)?.map((part, number) => lineOf(part, number, row.told)) || [row]);
   document.getElementById("details").replaceChildren(...lines.map(line));
   hint.hidden = rows.length > 0;
   scene.select(found);
@@ -19,22 +19,25 @@ function line({ name, told, value }) {
   return made;
 }
 
-// The parts of a roof, a line each; the row itself where it is the input's own of that name.
-function parts(row) {
+// The parts of a roof that a row tells of; null where it tells of something else, as the input's own of that name does.
+function partsOf({ name, value }) {
   try {
-    return JSON.parse(row.value).parts.map(({ type, parameters }, number) => {
-      const named = Object.entries(parameters).map(([name, size]) => `${name} ${Math.round(100 * size) / 100}`);
-      return { name: `part ${number}`, told: row.told, value: `${type}: ${named.join(", ")}` };
-    });
-  } catch { return [row]; }
+    const { parts } = name === "parameters" ? JSON.parse(value) : {};
+    return parts.every(({ type, parameters }) => type && parameters) ? parts : null;
+  } catch { return null; }
+}
+
+function lineOf({ type, parameters }, number, told) {
+  const named = Object.entries(parameters).map(([name, size]) => `${name} ${Math.round(100 * size) / 100}`);
+  return { name: `part ${number}`, told, value: `${type}: ${named.join(", ")}` };
 }
 
 function fail(sentence) { hint.textContent = sentence; hint.hidden = false; }
 
 function legend(tile) {
   for (let row = 0; row < tile.table.count; row++) {
-    const type = tile.table.row(row).find(({ name }) => name === "type").value;
-    types.set(type, (types.get(type) || 0) + 1);
+    const told = tile.table.row(row), whole = [{ type: told.find(({ name }) => name === "type").value }];
+    for (const { type } of told.map(partsOf).find(Boolean) || whole) types.set(type, (types.get(type) || 0) + 1);
   }
   document.getElementById("legend").replaceChildren(...[...types].sort((a, b) => b[1] - a[1]).map(([type]) => {
     const mark = document.createElement("span"), square = document.createElement("i");

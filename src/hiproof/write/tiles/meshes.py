@@ -7,9 +7,9 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...model import Solid
 from ..colours import linear_rgb
-from ..gltf import flat_triangles, surface_colours
+from ..gltf import flat_triangles
+from ..viewed import ViewedModel
 
 
 @dataclass(frozen=True)
@@ -34,14 +34,14 @@ class Mesh:
         return cls(*(np.load(file, allow_pickle=False) for _ in range(3)))
 
 
-def mesh_of(solid: Solid, roof_type: str) -> Mesh:
-    """The mesh of `solid`, whose vertices are east, north, up of the tileset's frame; the roof has its type's colour."""
+def mesh_of(model: ViewedModel, vertices: np.ndarray) -> Mesh:
+    """The mesh of a model whose solid's `vertices` (n, 3) are east, north, up of the tileset's frame."""
     corners, normals, colours = [], [], []
-    for kind, colour in surface_colours(roof_type).items():
-        places, facing = flat_triangles(solid, kind, np.zeros(3))
+    for look, faces in model.faces_by_look().items():
+        places, facing = flat_triangles(vertices, faces)
         corners.append(places)
         normals.append(facing)
-        colours.append(np.tile(np.round(np.multiply([*linear_rgb(colour), 1.0], 255)), (len(places), 1)))
+        colours.append(np.tile(np.round(np.multiply([*linear_rgb(look.colour), 1.0], 255)), (len(places), 1)))
     return Mesh(
         np.concatenate(corners), np.concatenate(normals).astype("<f4"), np.concatenate(colours).astype(np.uint8)
     )

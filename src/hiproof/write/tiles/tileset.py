@@ -11,7 +11,6 @@ import shutil
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -19,8 +18,8 @@ import numpy as np
 
 from ... import __version__
 from ...errors import InputError, InputWarning, OutputError
-from ...model import Solid
 from ..files import hidden_name, output_error, scratch
+from ..viewed import ViewedModel
 from .content import tile_glb
 from .globe import Globe, east_north_up
 from .meshes import Mesh, mesh_of
@@ -34,12 +33,12 @@ SLACK_M = 0.01  # boxes are wider by so much, for coordinates rounded to float32
 
 def write_models(
     folder: Path,
-    buildings: Iterable[tuple[str, str, Solid, dict[str, Any]]],
+    buildings: Iterable[ViewedModel],
     crs: Any = None,
     geoid_height_m: float | None = None,
     most: int = MOST_TRIANGLES,
 ) -> int:
-    """Write `buildings` (id, roof type, solid in world metres, attributes) as 3D Tiles 1.1 to `folder`; returns how many.
+    """Write `buildings` as 3D Tiles 1.1 to `folder`; returns how many.
 
     `crs` is anything pyproj understands; without one the tiles keep the plane's axes about the first building, for viewers that
     need no place on the Earth. `geoid_height_m` is added to heights, else pyproj's grid is asked. A tile draws about
@@ -52,8 +51,8 @@ def write_models(
     make_room(folder)
     with scratch(folder) as file:
         city = WaitingCity(file, globe)
-        for id, roof_type, solid, attributes in buildings:
-            city.add(solid, roof_type, {"id": id, "type": roof_type, **attributes})
+        for model in buildings:
+            city.add(model)
         if not city.offsets:
             raise InputError(
                 "expected buildings with solids, got none; their `hiproof_status` says what became of them"
@@ -84,10 +83,10 @@ class WaitingCity:
         self.triangles: list[int] = []
         self.boxes: list[np.ndarray] = []
 
-    def add(self, solid: Solid, roof_type: str, row: dict[str, Any]) -> None:
-        """Keep a building, of which `row` tells."""
-        local = self.local(solid.vertices)
-        mesh = mesh_of(replace(solid, vertices=local), roof_type)
+    def add(self, model: ViewedModel) -> None:
+        """Keep a building: its mesh, and a row of the table that tells of it."""
+        local = self.local(model.solid.vertices)
+        mesh, row = mesh_of(model, local), {"id": model.id, "type": model.roof_type, **model.attributes}
         self.found.add(row)
         self.offsets.append(self.file.tell())
         self.triangles.append(mesh.triangles)
