@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import shapely
+from shapely import affinity
 
 import hiproof
 from handmade import courtyard, gable_house, modelled, unmodelled
@@ -136,10 +137,11 @@ def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
         assert all(abs(slope - 36.87) < 0.01 for slope, _ in slopes)
 
 
-def reconstructed_gable():
-    """A gable of 12 by 8 m whose ridge runs east, built of its parameters."""
+def reconstructed_gable(rotation=0.0):
+    """A gable of 12 by 8 m whose ridge runs east, or so many degrees to the north of it, built of its parameters."""
     ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
     part = {"type": "gable", "parameters": {"width": 8, "length": 12, "height": 3}, "position": [0, 0, 5]}
+    part["rotation"] = rotation
     place = {"origin": [85000, 446000, 0], "outline": [ring], "z_ground": 0}
     return hiproof.build({"id": "south", **place, "parts": [part]})
 
@@ -164,8 +166,8 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
         assert types == [("house", "gable"), ("yard", "flat")]
         told = connection.execute("select building_id, part, type, width, ridge_length from told_parts order by 1")
         assert told.fetchall() == [("house", 0, "gable", 8.0, None), ("yard", 0, "flat", 8.0, None)]
-        (area,) = connection.execute("select ST_Area(geom) from told_parts where building_id = 'house'").fetchone()
-        assert area > 96.0  # of the turned box around its outline, for its length is not known
+        sql = "select GeometryType(geom), ST_Area(geom), area_m2 from told_parts where building_id = 'house'"
+        assert connection.execute(sql).fetchone() == ("MULTIPOLYGON", 96.0, 96.0)
 
 
 def documented(number, prefix):
@@ -182,8 +184,23 @@ def test_the_documented_question_of_a_solar_map(database, tmp_path):
     write_all(tmp_path / "run", [house], "EPSG:7415")
     load_postgis(tmp_path / "run", database, "solar")
     with psycopg.connect(database) as connection:
-        rows = connection.execute(documented(0, "solar")).fetchall()
+        rows = connection.execute(documented(1, "solar")).fetchall()
     assert [(id, kind, round(azimuth)) for id, kind, azimuth, *_ in rows] == [("south", "gable", 180)]
+
+
+def test_the_documented_question_of_rectangles(database, tmp_path):
+    """A part is drawn where it shows, and its whole rectangle is made of its columns."""
+    house = reconstructed_gable(rotation=30.0)
+    (tmp_path / "run").mkdir()
+    write_all(tmp_path / "run", [house], "EPSG:7415")
+    load_postgis(tmp_path / "run", database, "whole")
+    with psycopg.connect(database) as connection:
+        ((_, _, rectangle),) = connection.execute(documented(0, "whole")).fetchall()
+        (shown,) = connection.execute("select ST_AsBinary(geom) from whole_parts").fetchone()
+    expected = affinity.translate(affinity.rotate(shapely.box(-6, -4, 6, 4), 30.0), 85000, 446000)
+    assert shapely.from_wkb(rectangle).symmetric_difference(expected).area < 0.01
+    outline = shapely.box(84994, 445996, 85006, 446004)
+    assert shapely.from_wkb(shown).symmetric_difference(outline).area < 0.01
 
 
 def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_two):
@@ -192,7 +209,7 @@ def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_
     with psycopg.connect(database) as connection:
         if not connection.execute("select 1 from pg_available_extensions where name = 'postgis_sfcgal'").fetchone():
             pytest.skip("PostGIS was built without SFCGAL, which computes volumes")
-        extension, question = documented(1, "volumes").split(";\n", 1)
+        extension, question = documented(2, "volumes").split(";\n", 1)
         connection.execute(extension)
         volumes = dict(connection.execute(question).fetchall())
     assert volumes == pytest.approx({b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.built}, abs=0.0005)

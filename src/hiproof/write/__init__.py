@@ -2,7 +2,7 @@
 
 What is written: attribute_list (every attribute, once), building_attributes (those of one building), roof_figures and
 roof_levels (measured on its solid), roof_codes and osm_tags (its type in other words), shapes (blocks, parts, LoD0),
-table_rows (its rows), values (numbers and text as every format holds them), naming (ids), reprojected (another CRS), colours.
+shown (where its parts show), table_rows (its rows), values (numbers and text as every format holds them), naming (ids), reprojected (another CRS), colours.
 
 Formats: citygml (citygml_geometry, xml_text), citygml3 (made of 2.0), cityjson (cityjson_geometry), parameters (json_text), attributes (the
 GeoPackage, with styles), geoparquet, gltf (in the container glb), obj, triangles and viewed for these, tiles, postgis, page_mesh (for pages).

@@ -202,7 +202,9 @@ PARTS_LAYER = (
     Attribute("building_id", "text", "", "id of the building"),
     Attribute("part", "count", "", "number of the part within its building, from 0"),
     Attribute("type", "text", "", "roof type of the part"),
-    Attribute("area_m2", "number", "m2", "of the outline that it may roof"),
+    Attribute("area_m2", "number", "m2", "in plan, where it shows"),
+    Attribute("x", "number", "m", "of its rectangle's centre in the world"),
+    Attribute("y", "number", "m", "of its rectangle's centre in the world"),
     Attribute("z_eave", "number", "m", "height of its lowest eave in the world; of its ridge or top: z_eave + height"),
     Attribute("rotation", "number", "deg", "from the x axis to its length, counter-clockwise"),
     *(Attribute(name, "number", unit, meaning) for name, (unit, meaning) in SHAPE.items()),
@@ -272,7 +274,7 @@ POSTGIS_BUILDINGS = (
 
 POSTGIS_PARTS = (
     *PARTS_LAYER,
-    Attribute("geom", "geometry", "of the CRS", "the rectangle as a polygon"),
+    Attribute("geom", "geometry", "of the CRS", "where the part shows, as a multipolygon in plan"),
 )
 
 POSTGIS_ROOFS = (
@@ -292,7 +294,7 @@ TABLES = (
     Table("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
     Table(
         "Parts",
-        "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; rectangles",
+        "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; where each shows, in plan",
         PARTS_LAYER,
     ),
     Table(

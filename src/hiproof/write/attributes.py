@@ -31,7 +31,7 @@ from .table_rows import Row, lines_of, table_rows
 from .writer import BuildingWriter
 
 BUILDINGS = "buildings"
-LAYERS = {BUILDINGS: "MultiPolygon", "parts": "Polygon", "roof_surfaces": "Polygon Z"}
+LAYERS = {BUILDINGS: "MultiPolygon", "parts": "MultiPolygon", "roof_surfaces": "Polygon Z"}
 """Tables and the geometry of their rows."""
 
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}

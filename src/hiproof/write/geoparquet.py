@@ -15,7 +15,8 @@ from .head import FileHead
 from .table_rows import Row
 
 GEOMETRY = "geometry"
-GEOMETRY_TYPES = {BUILDINGS: ["Polygon", "MultiPolygon"], "parts": ["Polygon"], "roof_surfaces": ["Polygon Z"]}
+PLAN = ["Polygon", "MultiPolygon"]
+GEOMETRY_TYPES = {BUILDINGS: PLAN, "parts": PLAN, "roof_surfaces": ["Polygon Z"]}
 
 
 class GeoParquetWriter(AttributesWriter):

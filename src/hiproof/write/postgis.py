@@ -1,4 +1,4 @@
-"""Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof surface, a rectangle a part.
+"""Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof surface, the area where a part shows.
 
 The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners of a face that are
 stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a table of their own.
@@ -39,7 +39,7 @@ create table if not exists {roofs} (
     geom geometry(PolygonZ, {srid}), primary key (building_id, number));
 create table if not exists {parts} (
     building_id text references {buildings} (id) on delete cascade, part integer, type text,
-    {measures}, geom geometry(Polygon, {srid}), primary key (building_id, part));
+    {measures}, geom geometry(MultiPolygon, {srid}), primary key (building_id, part));
 create index if not exists {prefix}_buildings_geom on {buildings} using gist (geom);
 create index if not exists {prefix}_roofs_geom on {roofs} using gist (geom);
 create index if not exists {prefix}_roofs_type on {roofs} (type);
@@ -95,7 +95,7 @@ def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
     """Make the tables, or empty those that are there and give them the run's reference system."""
     cursor.execute(SCHEMA.format(srid=srid, measures=MEASURES, **names))
     cursor.execute("delete from {buildings}".format(**names))
-    for key, kind in (("buildings", "PolyhedralSurfaceZ"), ("roofs", "PolygonZ"), ("parts", "Polygon")):
+    for key, kind in (("buildings", "PolyhedralSurfaceZ"), ("roofs", "PolygonZ"), ("parts", "MultiPolygon")):
         table = names[key]
         cursor.execute("select srid from geometry_columns where f_table_name = %s", (table,))
         if {known for (known,) in cursor.fetchall()} != {srid}:

@@ -13,6 +13,7 @@ from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
 from .building_attributes import shape_attributes
 from .roof_figures import RoofFigures, roof_figures
+from .shown import shown_areas
 from .table_rows import part_values
 from .values import metres, plain
 
@@ -106,7 +107,8 @@ def part_shape(building: Building, part: Any, asked: set[str], prefix: str) -> P
 def part_attributes(building: Building, members: tuple[int, ...], figures: RoofFigures, prefix: str) -> dict[str, Any]:
     """Attributes of a building part by name."""
     found = {**shape_attributes(figures), "roof_type": figures.roofer_type, "roof_n_surfaces": figures.roof_faces}
-    primitives = [part_values(building, member) for member in members if member < len(building.parts)]
+    shown = shown_areas(building)
+    primitives = [part_values(building, member, shown[member]) for member in members if member < len(shown)]
     return {
         **{prefix + name: plain(found[name]) for name in OF_PARTS},
         f"{OWN}h_eave": plain(metres(figures.h_eave)),

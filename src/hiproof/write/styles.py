@@ -13,7 +13,7 @@ TYPE_COLUMN = {"buildings": f"{OWN}roof_type", "parts": "type", "roof_surfaces":
 """Column of the roof type by layer."""
 
 FILL_ALPHA = {"buildings": 0.35, "parts": 0.5, "roof_surfaces": 1.0}
-"""Outlines and rectangles let roof surfaces be seen through them."""
+"""Outlines and parts let roof surfaces be seen through them."""
 
 LINE = "50,50,50,255"
 

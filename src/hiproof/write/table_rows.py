@@ -1,4 +1,4 @@
-"""The rows of one building in the tables of a run: its outline, its parts as rectangles, its roof surfaces."""
+"""The rows of one building in the tables of a run: its outline, its parts where they show, its roof surfaces."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from ..frames import METRES, Units
 from ..model import ROOF, Building, Part
 from .attribute_list import PARTS_LAYER, SHAPE
 from .roof_figures import RoofFigures
+from .shown import shown_areas
 from .values import metres, plain_text, rounded
 
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
@@ -69,27 +70,25 @@ def known_outline(building: Building) -> shapely.Geometry | None:
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """A row a part: its rectangle, its type, every parameter and its standard deviation."""
-    if building.built is None:
-        return ()
-    origin = building.roof.frame.origin
+    """A row a part: where it shows, its type, every parameter and its standard deviation."""
     rows = []
-    for number, part in enumerate(building.parts):
-        corners = rectangle_of(part)
-        known = {"building_id": plain_text(building.id), **part_values(building, number)}
+    for number, shown in enumerate(shown_areas(building)):
+        known = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
         values = {a.name: known.pop(a.name, None) for a in PARTS_LAYER} | known
-        rows.append((wkb_of(shapely.Polygon(corners + origin[:2]), units), values))
+        rows.append((wkb_of(None if shown.is_empty else shown, units), values))
     return tuple(rows)
 
 
-def part_values(building: Building, number: int) -> dict[str, Any]:
-    """What is known of a roof part by column: its type, place, parameters and their standard deviations."""
-    part, origin = building.parts[number], building.roof.frame.origin
+def part_values(building: Building, number: int, shown: shapely.Geometry) -> dict[str, Any]:
+    """What is known of a roof part by column: its type, the area where it is `shown`, place, parameters and their standard deviations."""
+    part, (x, y, z) = building.parts[number], building.roof.frame.to_world(building.parts[number].translation)
     return {
         "part": number,
         "type": part.type,
-        "area_m2": metres(part.area),
-        "z_eave": metres(part.translation[2] + origin[2]),
+        "area_m2": metres(shown.area),
+        "x": metres(x),
+        "y": metres(y),
+        "z_eave": metres(z),
         "rotation": rounded(math.degrees(part.kappa)),
         **{name: rounded(value) for name, value in part.parameters.items()},
         **sigmas_of(part),
@@ -104,18 +103,6 @@ def sigmas_of(part: Part) -> dict[str, float]:
         for name, value in part.sigma.items()
         if name in columns
     }
-
-
-def rectangle_of(part: Part) -> np.ndarray:
-    """Corners (4, 2) of the part's rectangle in the roof's frame; of one without sizes those around its outlines."""
-    c, s = math.cos(part.kappa), math.sin(part.kappa)
-    axes = np.array([[c, s], [-s, c]])
-    if "width" in part.parameters and "length" in part.parameters:
-        u, v = 0.5 * part.parameters["length"], 0.5 * part.parameters["width"]
-        return np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ axes + part.translation[:2]
-    uv = np.concatenate([shapely.get_coordinates(piece.outline) for piece in part.pieces]) @ axes.T
-    (u0, v0), (u1, v1) = uv.min(axis=0), uv.max(axis=0)
-    return np.array([(u0, v0), (u1, v0), (u1, v1), (u0, v1)]) @ axes
 
 
 def surface_rows(building: Building, figures: RoofFigures | None, units: Units = METRES) -> tuple[Row, ...]:

@@ -1,0 +1,66 @@
+"""Where each part of a roof shows from above: the plan of its surfaces, so that parts share no area and together are the outline.
+
+A surface that several parts have in common, for they lie in one plane, names one of them: it is cut along their outlines.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from ..model import ROOF, Building, Face, Part, Roof, Solid
+
+SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
+LEAST_M2 = 0.05  # of a common surface; what is less is a sliver between outlines that were rounded
+
+
+def shown_areas(building: Building) -> list[shapely.Geometry]:
+    """Where each part shows, in world coordinates; empty where others hide all of it, none for a building without a model.
+
+    >>> from hiproof import build
+    >>> ring = [[0, 0], [10, 0], [10, 6], [0, 6]]
+    >>> flat = {"type": "flat", "parameters": {"width": 6, "length": 10}, "position": [5, 3, 4]}
+    >>> hut = {"type": "flat", "parameters": {"width": 4, "length": 4}, "position": [9, 3, 6]}
+    >>> record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": [flat, hut]}
+    >>> [area.area for area in shown_areas(build(record))]
+    [48.0, 12.0]
+    """
+    if building.built is None:
+        return []
+    roof, solid = building.roof, building.solid.moved(-building.roof.frame.origin)
+    planes = planes_of(roof)
+    shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
+    for face in solid.of_kind(ROOF):
+        left = plan_of(solid, face)
+        for other in parts_in_plane(face, solid.vertices, planes):
+            beyond = shapely.difference(left, drawn(roof.parts[face.part]))
+            own = shapely.intersection(beyond, drawn(roof.parts[other]))
+            if own.area >= LEAST_M2:
+                left = shapely.difference(left, own)
+                shown[other].append(own)
+        shown[face.part].append(left)
+    return [shapely.transform(shapely.union_all(areas), roof.frame.to_world) for areas in shown]
+
+
+def planes_of(roof: Roof) -> np.ndarray:
+    """All planes of a roof (k, 4): the number of the part, then z = a x + b y + c."""
+    parts = enumerate(roof.parts)
+    return np.array([(number, *plane) for number, part in parts for piece in part.pieces for plane in piece.planes])
+
+
+def parts_in_plane(face: Face, vertices: np.ndarray, planes: np.ndarray) -> list[int]:
+    """The parts, other than its own, that have a plane in which the face over `vertices` (n, 3) lies."""
+    corners = vertices[[vertex for ring in face.rings for vertex in ring]]
+    off = np.abs(corners[:, :2] @ planes[:, 1:3].T + planes[:, 3] - corners[:, 2:]).max(axis=0)
+    return sorted({int(number) for number in planes[off < SAME_PLANE_M, 0]} - {face.part})
+
+
+def drawn(part: Part) -> shapely.Geometry:
+    """The outlines of a part as one area; rounded, an outline may touch itself."""
+    return shapely.union_all(shapely.make_valid([piece.outline for piece in part.pieces]))
+
+
+def plan_of(solid: Solid, face: Face) -> shapely.Polygon:
+    """A face in plan."""
+    outer, *holes = (solid.vertices[list(ring), :2] for ring in face.rings)
+    return shapely.Polygon(outer, holes)

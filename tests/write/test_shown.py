@@ -1,0 +1,72 @@
+"""Where parts show: areas that share nothing, are the outline together, and lie where no other part is higher."""
+
+import numpy as np
+import pytest
+import shapely
+
+from handmade import courtyard, modelled, unmodelled
+from hiproof.compose import compose
+from hiproof.model import Building, Model, Part, Piece, Roof
+from hiproof.status import Status
+from hiproof.write.shown import shown_areas
+from hiproof.write.table_rows import table_rows
+from roof_zoo import FRAME, KINDS, generated
+
+SNAPPED_M = 0.05  # composing moves edges by less than this
+
+
+def composed(roof):
+    return Building("a", Status.MODELLED, built=Model(roof, compose(roof, 0.0)))
+
+
+def flat(z, *box):
+    return Part("flat", (Piece(shapely.box(*box), np.array([[0.0, 0.0, z]])),))
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", KINDS)
+def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
+    building = composed(generated(kind, seed))
+    areas = shown_areas(building)
+    assert len(areas) == len(building.parts)
+    together = shapely.union_all(areas)
+    assert sum(area.area for area in areas) == pytest.approx(together.area, abs=1e-6)
+    assert together.symmetric_difference(building.roof.outline).area < SNAPPED_M * building.roof.outline.length
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["partition", "cross_gables", "steps"])
+def test_where_a_part_shows_none_is_higher(kind, seed):
+    building = composed(generated(kind, seed))
+    roof, rng = building.roof, np.random.default_rng(seed)
+    for part, area in zip(roof.parts, shown_areas(building), strict=True):
+        inner = shapely.buffer(area, -2 * SNAPPED_M)
+        if inner.is_empty:
+            continue
+        xy = rng.uniform(inner.bounds[:2], inner.bounds[2:], (400, 2))
+        xy = xy[shapely.contains_xy(inner, xy[:, 0], xy[:, 1])]
+        covered = np.isfinite(part.height_at(xy))  # elsewhere it fills a gap that no part covers
+        assert (part.height_at(xy)[covered] > roof.height_at(xy)[covered] - 2 * SNAPPED_M).all()
+
+
+def test_parts_in_one_plane_share_a_surface_by_their_outlines():
+    roof = Roof((flat(3.0, 0, 0, 6, 5), flat(3.0, 6, 0, 10, 5), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
+    building = composed(roof)
+    assert len(building.solid.of_kind("RoofSurface")) == 1
+    assert [area.area for area in shown_areas(building)] == pytest.approx([30.0, 20.0, 0.0])
+
+
+def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one():
+    roof = Roof((flat(3.0, -5, -5, 20, 20), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
+    (geometry, values), (hidden, of_hidden) = table_rows(composed(roof), None, {}).parts
+    assert shapely.from_wkb(geometry).equals(shapely.box(0, 0, 10, 5)) and values["area_m2"] == 50.0
+    assert hidden is None and of_hidden["area_m2"] == 0.0
+
+
+def test_a_part_around_a_yard_has_a_hole():
+    (area,) = shown_areas(modelled(courtyard(), kinds=("flat",)))
+    assert area.area == pytest.approx(84.0) and len(area.interiors) == 1
+
+
+def test_a_building_without_a_model_shows_nothing():
+    assert shown_areas(unmodelled()) == []
