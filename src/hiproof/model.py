@@ -153,6 +153,11 @@ class Solid:
     def of_kind(self, kind: str) -> tuple[Face, ...]:
         return tuple(face for face in self.faces if face.kind == kind)
 
+    def plan_of(self, face: Face) -> shapely.Polygon:
+        """A face of the solid in plan, its holes left out."""
+        outer, *holes = (self.vertices[list(ring), :2] for ring in face.rings)
+        return shapely.Polygon(outer, holes)
+
 
 @dataclass(frozen=True)
 class Quality:

@@ -4,6 +4,7 @@ settle            the roof made of exactly the numbers that are written of it
 solid             `compose`: the steps below, one after the other; volume, terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid
+joined            sets that are joined, for it and for the check
 tidy              cells without steps a millimetre long
 levels            which heights meet over every vertex of the plan
 shell             roof, wall and ground faces that share them

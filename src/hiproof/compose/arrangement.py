@@ -15,6 +15,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..parity import flips
+from .joined import join, root_of
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
@@ -27,6 +28,15 @@ def grown(array):
     larger = np.empty((2 * len(array), array.shape[1]), array.dtype)
     larger[: len(array)] = array
     return larger
+
+
+@compiled
+def appended(rows, count, a, b):
+    """`rows` (m, 2), of which `count` are used, with (a, b) as one more, and the count with it; a copy where all were used."""
+    if count == len(rows):
+        rows = grown(rows)
+    rows[count, 0], rows[count, 1] = a, b
+    return rows, count + 1
 
 
 @compiled
@@ -139,11 +149,8 @@ def node(segments, reach):
     edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a run).
     """
     xy, count, ends = numbered_ends(segments, reach)
-    stack, top = np.empty((2 * len(segments) + 16, 2), np.int64), 0
+    stack, top = ends[::-1].copy(), len(ends)  # the first on top
     edges, edge_count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
-    for s in range(len(segments) - 1, -1, -1):
-        stack[top] = ends[s]
-        top += 1
     steps = 0
     while top > 0:
         steps += 1
@@ -153,30 +160,23 @@ def node(segments, reach):
         a, b = stack[top, 0], stack[top, 1]
         if a == b:
             continue
-        while top + 4 + edge_count > len(stack):
+        while top + 1 + edge_count > len(stack):  # what may be taken back, and the segment itself
             stack = grown(stack)
         v = first_vertex_beside(xy, count, a, b, reach)
         if v >= 0:
-            stack[top, 0], stack[top, 1] = v, b
-            stack[top + 1, 0], stack[top + 1, 1] = a, v
-            top += 2
+            stack, top = appended(stack, top, v, b)
+            stack, top = appended(stack, top, a, v)
             continue
         if has_edge(edges, edge_count, a, b):
             continue
         e = first_crossing(xy, edges, edge_count, a, b)
         if e < 0:
-            if edge_count == len(edges):
-                edges = grown(edges)
-            edges[edge_count, 0], edges[edge_count, 1] = a, b
-            edge_count += 1
+            edges, edge_count = appended(edges, edge_count, a, b)
             continue
         x, y = crossing_point(xy[a], xy[b], xy[edges[e, 0]], xy[edges[e, 1]])
-        if count == len(xy):
-            xy = grown(xy)
-        xy[count, 0], xy[count, 1] = x, y
-        count += 1
-        stack[top, 0], stack[top, 1] = a, b
-        top = taken_back(xy, count - 1, e, edges, edge_count, stack, top + 1, reach)
+        xy, count = appended(xy, count, x, y)
+        stack, top = appended(stack, top, a, b)
+        top = taken_back(xy, count - 1, e, edges, edge_count, stack, top, reach)
     live = edges[:edge_count, 0] >= 0
     return xy[:count].copy(), edges[:edge_count][live]
 
@@ -373,23 +373,14 @@ def label_faces(points, soup, soup_start, planes, plane_start, group, patches, p
 
 
 @compiled
-def find(parent, i):
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
-
-
-@compiled
 def regions_of(edges, face, label):
     """Region (f,) of each face: faces joined over edges that have the same label on both sides."""
     parent = np.arange(len(label))
     for e in range(len(edges)):
         if label[face[2 * e]] == label[face[2 * e + 1]]:
-            a, b = find(parent, face[2 * e]), find(parent, face[2 * e + 1])
-            parent[max(a, b)] = min(a, b)
+            join(parent, face[2 * e], face[2 * e + 1])
     for f in range(len(label)):
-        parent[f] = find(parent, f)
+        parent[f] = root_of(parent, f)
     return parent
 
 
@@ -446,15 +437,14 @@ def keep_largest_component(edges, face, area, label):
     for e in range(len(edges)):
         a, b = face[2 * e], face[2 * e + 1]
         if label[a] != OUTSIDE and label[b] != OUTSIDE:
-            a, b = find(parent, a), find(parent, b)
-            parent[max(a, b)] = min(a, b)
+            join(parent, a, b)
     size = np.zeros(len(label))
     for f in range(1, len(label)):
         if label[f] != OUTSIDE:
-            size[find(parent, f)] += area[f]
+            size[root_of(parent, f)] += area[f]
     largest = np.argmax(size)
     for f in range(1, len(label)):
-        if find(parent, f) != largest:
+        if root_of(parent, f) != largest:
             label[f] = OUTSIDE
 
 

@@ -124,7 +124,7 @@ def distinct(group_of: dict[int, set[int]]) -> list[set[int]]:
 
 def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> list[set[int]]:
     """The groups, each smaller than LEAST_PART_M2 taken in by the neighbour with which it shares the longest border, smallest first."""
-    area = {index: plan_area(solid, solid.faces[index]) for group in groups for index in group}
+    area = {index: solid.plan_of(solid.faces[index]).area for group in groups for index in group}
     group_of = {index: group for group in groups for index in group}
     while len(groups := distinct(group_of)) > 1:
         smallest = min(groups, key=lambda group: (sum(area[index] for index in group), min(group)))
@@ -138,12 +138,6 @@ def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> lis
             break
         unite(group_of, max(shared, key=lambda key: (shared[key], -key)), min(smallest))
     return groups
-
-
-def plan_area(solid: Solid, face: Face) -> float:
-    """Plan area [m2] of a roof face."""
-    outer, *holes = (solid.vertices[list(ring), :2] for ring in face.rings)
-    return float(shapely.Polygon(outer, holes).area)
 
 
 def part_of(solid: Solid, group: set[int], borders: Borders, place_of: list[Place]) -> BuildingPart:
@@ -201,5 +195,5 @@ def members_of(solid: Solid, group: set[int]) -> tuple[int, ...]:
     area: dict[int, float] = {}
     for index in sorted(group):
         face = solid.faces[index]
-        area[face.part] = area.get(face.part, 0.0) + plan_area(solid, face)
+        area[face.part] = area.get(face.part, 0.0) + solid.plan_of(face).area
     return tuple(sorted(area, key=lambda part: (-area[part], part)))

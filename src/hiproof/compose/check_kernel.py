@@ -12,19 +12,12 @@ import numpy as np
 from ..compiled import compiled
 from ..parity import flips
 from .bends import SURELY_FLAT_COSINE, dot
+from .joined import join, root_of
 
 SAME_POINT_M = 1e-3  # m; val3dity's snap tolerance
 TOUCH_M = 1e-9  # m; numerically on the segment
 MOST_VERTICES_IN_THREES = 40  # vertices up to which all triples of a ring are looked at: they grow with the cube
 SKEW = np.array([0.43, 0.61, 0.67])  # shorter than one: what is further apart along it is further apart in space
-
-
-@compiled
-def find_root(parent, i):
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return i
 
 
 @compiled
@@ -42,10 +35,9 @@ def weld(vertices, tolerance):
                 break
             d = vertices[v] - vertices[w]
             if d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < tolerance * tolerance:
-                a, b = find_root(same, v), find_root(same, w)
-                same[max(a, b)] = min(a, b)
+                join(same, v, w)
     for v in range(len(same)):
-        same[v] = find_root(same, v)
+        same[v] = root_of(same, v)
     return same
 
 
@@ -215,12 +207,11 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, found, count
             if meet:
                 code = 201
                 break
-            root_r, root_s = find_root(parent, r - first), find_root(parent, s - first)
-            if touches > 1 or (touches == 1 and root_r == root_s):
+            if touches > 1 or (touches == 1 and root_of(parent, r - first) == root_of(parent, s - first)):
                 code = 205
                 break
             if touches == 1:
-                parent[root_r] = root_s
+                join(parent, r - first, s - first)
             if s == first and not ring_in_ring(flat, index, low, high, low2, high2):
                 code = 206
                 break
@@ -388,8 +379,7 @@ def check_edges(edges, faces, found, count):
         stop, balance = start, 0
         while stop < len(edges) and edges[stop, 0] == edges[start, 0] and edges[stop, 1] == edges[start, 1]:
             balance += edges[stop, 2]
-            a, b = find_root(parent, edges[start, 3]), find_root(parent, edges[stop, 3])
-            parent[max(a, b)] = min(a, b)
+            join(parent, edges[start, 3], edges[stop, 3])
             stop += 1
         uses = stop - start
         if uses != 2 or balance != 0:
@@ -400,7 +390,7 @@ def check_edges(edges, faces, found, count):
             count += 1
         start = stop
     for f in range(faces):
-        if find_root(parent, f) != 0:
+        if root_of(parent, f) != 0:
             found[count, 0], found[count, 1], found[count, 2] = 305, f, -1
             return count + 1, False
     return count, clean
@@ -433,13 +423,13 @@ def check_umbrellas(index, ring_start, face_start, found, count):
             for j in range(start, stop):
                 m = by_vertex[j]
                 if index[after[k]] == index[before[m]]:
-                    parent[find_root(parent, k)] = find_root(parent, m)
-        root = find_root(parent, by_vertex[start])
+                    join(parent, k, m)
+        root = root_of(parent, by_vertex[start])
         touching = False
         for i in range(start + 1, stop):  # corners at a vertex come in the order of their faces
             touching = touching or face_of[by_vertex[i]] == face_of[by_vertex[i - 1]]
         for i in range(start + 1, stop):
-            if not touching and find_root(parent, by_vertex[i]) != root:
+            if not touching and root_of(parent, by_vertex[i]) != root:
                 found[count, 0], found[count, 1], found[count, 2] = (
                     303,
                     face_of[by_vertex[i]],

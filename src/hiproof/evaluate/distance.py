@@ -28,8 +28,8 @@ def point_surface_distances(points: np.ndarray, polygons: Sequence[Ring | Sequen
     >>> point_surface_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [3.0, 5.0]
     """
-    points = _checked_points(points)
-    return _nearest(points, *_flattened(polygons))
+    points = checked_points(points)
+    return nearest_distances(points, *flattened(polygons))
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
@@ -39,26 +39,27 @@ def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ri
     >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
     [2.0, inf]
     """
-    points = _checked_points(points)
-    return _nearest_vertical(points, *_flattened(polygons))
+    points = checked_points(points)
+    return vertical_gaps(points, *flattened(polygons))
 
 
 def surface_and_vertical_distances(
     points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
 ) -> tuple[np.ndarray, np.ndarray]:
     """`point_surface_distances` and `vertical_distances` of the same points and polygons."""
-    points, flattened = _checked_points(points), _flattened(polygons)
-    return _nearest(points, *flattened), _nearest_vertical(points, *flattened)
+    points, flat = checked_points(points), flattened(polygons)
+    return nearest_distances(points, *flat), vertical_gaps(points, *flat)
 
 
-def _checked_points(points: np.ndarray) -> np.ndarray:
+def checked_points(points: np.ndarray) -> np.ndarray:
+    """Points as compiled code takes them."""
     points = np.ascontiguousarray(points, float)
     if points.ndim != 2 or points.shape[1] != 3:
         raise InputError(f"expected points of shape (n, 3), got {points.shape}; pass x, y, z as columns")
     return points
 
 
-def _flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """All vertices (m, 3), where each ring starts in them, and each polygon in the rings (both with the end)."""
     rings: list[np.ndarray] = []
     polygon_start = [0]
@@ -76,12 +77,13 @@ def _flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, n
 
 
 @compiled
-def _nearest(points, vertices, ring_start, polygon_start):
+def nearest_distances(points, vertices, ring_start, polygon_start):
+    """Distance (n,) of each point (n, 3) to the nearest polygon, these as `flattened` has them."""
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
         rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
-        normal, origin, is_flat = _plane(vertices, rings)
-        first, second = _plan_axes(normal)
+        normal, origin, is_flat = plane_of(vertices, rings)
+        first, second = plan_axes(normal)
         for i in range(points.shape[0]):
             p = points[i]
             height = 0.0
@@ -92,32 +94,33 @@ def _nearest(points, vertices, ring_start, polygon_start):
                 if abs(height) >= nearest[i]:
                     continue
                 x, y = p[first] - height * normal[first], p[second] - height * normal[second]
-                if _contains(vertices, rings, first, second, x, y):
+                if contains(vertices, rings, first, second, x, y):
                     nearest[i] = abs(height)
                     continue
-            nearest[i] = min(nearest[i], _edge_distance(vertices, rings, p))
+            nearest[i] = min(nearest[i], edge_distance(vertices, rings, p))
     return nearest
 
 
 @compiled
-def _nearest_vertical(points, vertices, ring_start, polygon_start):
+def vertical_gaps(points, vertices, ring_start, polygon_start):
+    """Least height (n,) between each point (n, 3) and a polygon over or under it, inf where there is none."""
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
         rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
-        normal, origin, is_flat = _plane(vertices, rings)
+        normal, origin, is_flat = plane_of(vertices, rings)
         if not is_flat or abs(normal[2]) < 1e-6:
             continue
         for i in range(points.shape[0]):
             x, y = points[i, 0], points[i, 1]
             height = origin[2] - ((x - origin[0]) * normal[0] + (y - origin[1]) * normal[1]) / normal[2]
             gap = abs(points[i, 2] - height)
-            if gap < nearest[i] and _contains(vertices, rings, 0, 1, x, y):
+            if gap < nearest[i] and contains(vertices, rings, 0, 1, x, y):
                 nearest[i] = gap
     return nearest
 
 
 @compiled
-def _plane(vertices, rings):
+def plane_of(vertices, rings):
     """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without area."""
     origin, normal = np.zeros(3), np.zeros(3)
     begin, end = rings[0], rings[1]
@@ -137,14 +140,14 @@ def _plane(vertices, rings):
 
 
 @compiled
-def _plan_axes(normal):
+def plan_axes(normal):
     """The two coordinate axes onto which a polygon of this normal projects with the largest area."""
     largest = np.argmax(np.abs(normal))
     return (largest + 1) % 3, (largest + 2) % 3
 
 
 @compiled
-def _contains(vertices, rings, first, second, x, y):
+def contains(vertices, rings, first, second, x, y):
     """Even-odd rule over all rings, so that holes are outside; a point on a shared edge belongs to one side only."""
     inside = False
     for ring in range(rings.shape[0] - 1):
@@ -157,7 +160,8 @@ def _contains(vertices, rings, first, second, x, y):
 
 
 @compiled
-def _edge_distance(vertices, rings, p):
+def edge_distance(vertices, rings, p):
+    """Distance of the point `p` (3,) to the nearest edge of all rings."""
     nearest_squared = np.inf
     for ring in range(rings.shape[0] - 1):
         j = rings[ring + 1] - 1

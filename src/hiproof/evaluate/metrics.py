@@ -77,7 +77,7 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
     if not np.isfinite(points).all():
         points = points[np.isfinite(points).all(axis=1)]
     polygons = roof_polygons(model)
-    outline = _observed_outline(points) if outline is None else outline
+    outline = observed_outline(points) if outline is None else outline
     outline = None if outline is None or outline.area == 0 else outline
     figures = {}
     if outline is not None:
@@ -139,7 +139,7 @@ def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
     return float(np.count_nonzero(away > total / 2) * CELL_M**2)
 
 
-def _observed_outline(points: np.ndarray) -> shapely.Polygon | None:
+def observed_outline(points: np.ndarray) -> shapely.Polygon | None:
     from ..errors import FitError
     from ..fit.alpha_shape import alpha_shape
 

@@ -33,14 +33,14 @@ class Formula:
     def at(self, shape: Sequence[float] | np.ndarray) -> float:
         """Value at `shape` (6,): V, U, q0, q1, q2, q3."""
         total = 0.0
-        for factor, powers in self._sparse:
+        for factor, powers in self.sparse:
             for k, power in powers:
                 factor *= shape[k] if power == 1 else shape[k] ** power
             total += factor
         return float(total)
 
     @cached_property
-    def _sparse(self) -> tuple[tuple[float, tuple[tuple[int, int], ...]], ...]:
+    def sparse(self) -> tuple[tuple[float, tuple[tuple[int, int], ...]], ...]:
         """The terms with only the exponents that are not zero."""
         return tuple((f, tuple((k, power) for k, power in enumerate(powers) if power)) for f, powers in self.terms)
 

@@ -48,18 +48,19 @@ class Segmentation:
     xyz: np.ndarray
 
     @cached_property
-    def _of_every_point(self) -> tuple[np.ndarray, np.ndarray]:
+    def of_every_point(self) -> tuple[np.ndarray, np.ndarray]:
+        """`labels` and `not_roof`."""
         return carried_back(softmax(self.logits), self.sampled, self.xyz)
 
     @property
     def labels(self) -> np.ndarray:
         """(n,) index of the point's roof type in `types`' order, -1 where it is no roof."""
-        return self._of_every_point[0]
+        return self.of_every_point[0]
 
     @property
     def not_roof(self) -> np.ndarray:
         """(n,) probability that the point is no roof."""
-        return self._of_every_point[1]
+        return self.of_every_point[1]
 
     @property
     def type(self) -> str:

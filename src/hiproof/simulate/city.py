@@ -118,14 +118,14 @@ class Stock:
 
     def __init__(self, city: City):
         self.city, self.terrain = city, city.terrain
-        self.blocks, self.first = self._counted()
+        self.blocks, self.first = self.counted()
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * BLOCK_M
         lower = np.array(self.blocks) * BLOCK_M
         plan = turned((lower[:, None] + corners).reshape(-1, 2), HEADING).reshape(-1, 4, 2) + ORIGIN_XY
         self.low, self.high = plan.min(axis=1), plan.max(axis=1)
-        self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self._lots)
+        self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.lots_of)
 
-    def _counted(self) -> tuple[list[tuple[int, int]], list[int]]:
+    def counted(self) -> tuple[list[tuple[int, int]], list[int]]:
         """Blocks, and the number of buildings before each; the last block may be cut short."""
         blocks, first, total, k = [], [], 0, 0
         while total < self.city.buildings:
@@ -136,7 +136,8 @@ class Stock:
             k += 1
         return blocks, first
 
-    def _lots(self, block: int) -> tuple[Lot, ...]:
+    def lots_of(self, block: int) -> tuple[Lot, ...]:
+        """The lots of a block, drawn by its number alone; `lots` keeps those of the blocks asked for last."""
         start, seed, (i, j) = self.first[block], self.city.seed, self.blocks[block]
         buildings = block_buildings(seed, i, j, self.terrain)[: self.city.buildings - start]
         return tuple(
@@ -197,7 +198,7 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
         lots = stock.near(bounds)
         clouds = survey(stock.patches(bounds), lots, stock.terrain, city.flight, city.seed, settings)
         points = write_laz(folder / "tiles" / f"{name}.laz", clouds, np.array([*bounds[:2], 0.0]))
-        own = [lot for lot in lots if _holds(bounds, lot)]
+        own = [lot for lot in lots if holds(bounds, lot)]
         if own:
             write_footprints(footprints, own, append=footprints.exists())
         with truth.open("a") as file:
@@ -205,6 +206,7 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
         yield Written(name, len(own), points)
 
 
-def _holds(bounds: Bounds, lot: Lot) -> bool:
+def holds(bounds: Bounds, lot: Lot) -> bool:
+    """Whether a lot's building stands in a tile; one on the border stands in one tile alone."""
     x, y, _ = lot.building.roof.frame.origin
     return bounds[0] <= x < bounds[2] and bounds[1] <= y < bounds[3]

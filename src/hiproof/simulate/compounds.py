@@ -32,7 +32,7 @@ COMPOUND_KINDS = (
 DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 
-class _Layout:
+class Layout:
     """The building's axes: parts are placed by their centre (u, v) and a number of quarter turns."""
 
     def __init__(self, kappa: float):
@@ -61,15 +61,15 @@ def random_compound(
     kind = COMPOUND_KINDS[rng.integers(len(COMPOUND_KINDS))] if kind is None else kind
     if kind not in COMPOUND_KINDS:
         raise InputError(f"expected a kind of compound ({', '.join(COMPOUND_KINDS)}), got {kind!r}")
-    layout = _Layout(rng.uniform(-math.pi, math.pi) if kappa is None else kappa)
+    layout = Layout(rng.uniform(-math.pi, math.pi) if kappa is None else kappa)
     if kind in ("L", "T", "U", "cross"):
-        parts = _winged(rng, layout, kind)
+        parts = winged(rng, layout, kind)
     else:
-        parts = _OTHERS[kind](rng, layout)
+        parts = OTHERS[kind](rng, layout)
     return assemble(tuple(parts), kind, origin)
 
 
-def _winged(rng: np.random.Generator, layout: _Layout, kind: str) -> list[Part]:
+def winged(rng: np.random.Generator, layout: Layout, kind: str) -> list[Part]:
     """A main body with one or two wings at right angles, all gables, all hips or all flat."""
     type = str(rng.choice(("gable", "hip", "flat"), p=(0.6, 0.2, 0.2)))
     width, eave = rng.uniform(6.5, 11.0), random_eave(rng)
@@ -77,7 +77,7 @@ def _winged(rng: np.random.Generator, layout: _Layout, kind: str) -> list[Part]:
     wing_width = width * rng.uniform(0.6, 0.95)
     room = (2.3 if kind == "U" else 1.0) * wing_width
     length = room + width * rng.uniform(0.5, 1.3)
-    main = layout.part(type, _regular(type, length, width, slope), 0.0, 0.0, eave)
+    main = layout.part(type, regular(type, length, width, slope), 0.0, 0.0, eave)
     wings = {"L": (1,), "T": (0,), "U": (-1, 1), "cross": (0,)}[kind]
     reach = width * rng.uniform(0.4, 1.0)
     step = rng.uniform(0.8, 2.5) if type == "flat" or rng.random() < 0.3 else 0.0
@@ -86,13 +86,13 @@ def _winged(rng: np.random.Generator, layout: _Layout, kind: str) -> list[Part]:
         # A hip's inner end slopes down, so hipped wings cross the whole main body; gables stop under its ridge.
         inner = -width / 2 - (reach if kind == "cross" else 0.0) if kind == "cross" or type == "hip" else 0.0
         outer = width / 2 + reach
-        parameters = _regular(type, outer - inner, wing_width, slope)
+        parameters = regular(type, outer - inner, wing_width, slope)
         u = side * (length - wing_width) / 2 + (rng.uniform(-0.15, 0.15) * (length - wing_width) if side == 0 else 0.0)
         parts.append(layout.part(type, parameters, u, (inner + outer) / 2, max(2.2, eave - step), quarters=1))
     return parts
 
 
-def _regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
+def regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
     """A gable, hip (all four slopes equal, longer than wide) or flat roof of given plan and slope."""
     parameters = {"length": float(length), "width": float(width)}
     if type != "flat":
@@ -102,7 +102,7 @@ def _regular(type: str, length: float, width: float, slope: float) -> dict[str, 
     return parameters
 
 
-def _extended(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def extended(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """A house with a lower annex along its eave: a flat roof, or a lean-to that rises towards the house."""
     type = str(rng.choice(("gable", "hip", "half_hip", "mansard", "asymmetric_gable", "gambrel")))
     house, eave = random_parameters(rng, type), random_eave(rng) + 2.0
@@ -119,7 +119,7 @@ def _extended(rng: np.random.Generator, layout: _Layout) -> list[Part]:
     ]
 
 
-def _two_level(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def two_level_blocks(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """Two flat blocks side by side, a storey or more apart."""
     low, high = random_parameters(rng, "flat"), random_parameters(rng, "flat")
     high = high | {"width": low["width"] * float(rng.uniform(0.6, 1.0))}
@@ -131,7 +131,7 @@ def _two_level(rng: np.random.Generator, layout: _Layout) -> list[Part]:
     ]
 
 
-def _hall(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def saw_tooth_hall_and_office(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """A saw-tooth hall with a flat-roofed office along the foot of its first tooth."""
     hall, eave = random_parameters(rng, "shed"), rng.uniform(4.5, 7.0)
     office = {"length": hall["length"], "width": float(rng.uniform(5.0, 9.0))}
@@ -142,7 +142,7 @@ def _hall(rng: np.random.Generator, layout: _Layout) -> list[Part]:
     ]
 
 
-def _row(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def houses_in_a_row(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """Terraced houses: slices of one depth whose ridges run along the row, some stepped, now and then a flat one."""
     count, depth = int(rng.integers(3, 7)), rng.uniform(7.5, 11.0)
     slope, eave, u = math.tan(math.radians(rng.uniform(28, 50))), random_eave(rng) + 1.0, 0.0
@@ -151,22 +151,22 @@ def _row(rng: np.random.Generator, layout: _Layout) -> list[Part]:
         span = rng.uniform(4.8, 7.0)
         type = "flat" if rng.random() < 0.12 else "gable"
         z = max(2.2, eave + (rng.normal(0.0, 0.8) if rng.random() < 0.5 else 0.0))
-        parts.append(layout.part(type, _regular(type, span, depth, slope), u + span / 2, 0.0, z))
+        parts.append(layout.part(type, regular(type, span, depth, slope), u + span / 2, 0.0, z))
         u += span
     return parts
 
 
-def _dormered(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def dormered(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """A house with one to four dormers of one shape, on one slope or on both."""
     type = "gable" if rng.random() < 0.75 else "hip"
     width, slope = rng.uniform(8.0, 11.0), math.tan(math.radians(rng.uniform(38, 52)))
     ridge = width * rng.uniform(0.9, 1.4)
     length, eave = ridge + (width if type == "hip" else 0.0), random_eave(rng) + 1.0
-    parts = [layout.part(type, _regular(type, length, width, slope), 0.0, 0.0, eave)]
+    parts = [layout.part(type, regular(type, length, width, slope), 0.0, 0.0, eave)]
     span, both_sides = rng.uniform(2.2, 3.0), rng.random() < 0.4
     room = int((ridge + DORMER_GAP_M) / (span + 2 * DORMER_GAP_M))
     count = int(rng.integers(1, min(2 if both_sides else 3, room) + 1))
-    shape, depth, front, top = _dormer(rng, span, slope, width)
+    shape, depth, front, top = dormer(rng, span, slope, width)
     centres = (np.arange(count) - (count - 1) / 2) * ridge / max(count, 2)
     for side in (-1, 1) if both_sides else (-1,):
         v = side * (width / 2 - front - depth / 2)
@@ -177,7 +177,7 @@ def _dormered(rng: np.random.Generator, layout: _Layout) -> list[Part]:
     return parts
 
 
-def _dormer(
+def dormer(
     rng: np.random.Generator, span: float, slope: float, width: float
 ) -> tuple[str, float, float, tuple[float, float]]:
     """Type, depth, distance of its front from the eave, and (eave over the house's eave, rise) of a dormer of `span` on
@@ -193,7 +193,7 @@ def _dormer(
     return type, float(depth), float(front), (float(front * slope + wall), rise)
 
 
-def _winged_hip(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def winged_hip_roof(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """A hip with two lower wings alike, gables or hips, on one side of it or on both."""
     type = str(rng.choice(("gable", "hip")))
     width, eave = rng.uniform(8.0, 12.0), random_eave(rng)
@@ -203,32 +203,32 @@ def _winged_hip(rng: np.random.Generator, layout: _Layout) -> list[Part]:
     step = rng.uniform(0.8, 2.0) if rng.random() < 0.3 else 0.0
     inner = -width / 2 if type == "hip" else 0.0
     outer = width / 2 + wing_width * rng.uniform(0.6, 1.2)
-    wing = _regular(type, outer - inner, wing_width, slope)
+    wing = regular(type, outer - inner, wing_width, slope)
     place = (length - wing_width) / 2 - rng.uniform(0.8, 0.25 * wing_width + 0.8)
     sides = (1, 1) if rng.random() < 0.6 else (1, -1)
-    return [layout.part("hip", _regular("hip", length, width, slope), 0.0, 0.0, eave)] + [
+    return [layout.part("hip", regular("hip", length, width, slope), 0.0, 0.0, eave)] + [
         layout.part(type, wing, u, side * (inner + outer) / 2, max(2.2, eave - step), quarters=1)
         for u, side in zip((-place, place), sides, strict=True)
     ]
 
 
-def _L_of_hips(rng: np.random.Generator, layout: _Layout) -> list[Part]:
+def hips_that_share_a_corner(rng: np.random.Generator, layout: Layout) -> list[Part]:
     """Two hips of one width, slope and eave that share a corner: their ridges meet there at one height."""
     width, eave = rng.uniform(6.5, 10.5), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(20, 48)))
     length, reach = width * rng.uniform(1.7, 2.6), width * rng.uniform(0.7, 1.4)
     return [
-        layout.part("hip", _regular("hip", length, width, slope), 0.0, 0.0, eave),
-        layout.part("hip", _regular("hip", width + reach, width, slope), (length - width) / 2, reach / 2, eave, 1),
+        layout.part("hip", regular("hip", length, width, slope), 0.0, 0.0, eave),
+        layout.part("hip", regular("hip", width + reach, width, slope), (length - width) / 2, reach / 2, eave, 1),
     ]
 
 
-_OTHERS = {
-    "extension": _extended,
-    "two_level": _two_level,
-    "saw_tooth_hall": _hall,
-    "row": _row,
-    "dormered": _dormered,
-    "winged_hip": _winged_hip,
-    "L_of_hips": _L_of_hips,
+OTHERS = {
+    "extension": extended,
+    "two_level": two_level_blocks,
+    "saw_tooth_hall": saw_tooth_hall_and_office,
+    "row": houses_in_a_row,
+    "dormered": dormered,
+    "winged_hip": winged_hip_roof,
+    "L_of_hips": hips_that_share_a_corner,
 }

@@ -86,7 +86,7 @@ def random_swaths(
 def beams_of(rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius: float, z_ref: float) -> Beams:
     """Beams of `swath` that cross the disc of `radius` about `centre` (2,) at height `z_ref`."""
     cosine, sine = math.cos(swath.heading), math.sin(swath.heading)
-    along_lines, phase, across_steps = _lattice(rng, swath, radius)
+    along_lines, phase, across_steps = lattice(rng, swath, radius)
     jitter = rng.normal(0.0, 0.07, (2, len(along_lines), len(across_steps)))
     along = (along_lines[:, None] + swath.line_spacing * jitter[0]).ravel()
     across = (across_steps + swath.point_spacing * (phase[:, None] + jitter[1])).ravel()
@@ -98,7 +98,7 @@ def beams_of(rng: np.random.Generator, swath: Swath, centre: np.ndarray, radius:
     return Beams(xy_ref - slope * z_ref, slope, np.broadcast_to(swath.shift, (len(tan), 3)))
 
 
-def _lattice(rng: np.random.Generator, swath: Swath, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def lattice(rng: np.random.Generator, swath: Swath, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Scan lines along track (m from the centre), each line's phase (0-1), and steps across track (m from the
     centre)."""
     lines = np.arange(int(2 * radius / swath.line_spacing) + 2)

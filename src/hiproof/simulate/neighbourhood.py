@@ -49,13 +49,14 @@ def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
     buildings: list[SimBuilding] = []
     for names in STREETS:
         side = street_side(rng, names, start, heading, math.inf, math.inf, terrain)
-        top = max(_across(building, start, heading) for building in side)
+        top = max(depth_across(building, start, heading) for building in side)
         start = start + turned(np.array([[0.0, top + STREET_WIDTH_M]]), heading)[0]
         buildings += side
     return [furnished(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)], terrain
 
 
-def _across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
+def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
+    """How far a building reaches from a street that begins at `start` (2,), m."""
     corners = np.array(building.footprint.exterior.coords) - start
     return float(turned(corners, -heading)[:, 1].max())
 

@@ -155,7 +155,7 @@ def superstructures(rng: np.random.Generator, building: SimBuilding, defects: De
     return bodies
 
 
-def _on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarray, Piece]:
+def place_on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarray, Piece]:
     """A point of the plan at least 15 % away from a random piece's border, and that piece."""
     pieces = building.roof.pieces
     piece = pieces[rng.integers(len(pieces))]
@@ -167,14 +167,14 @@ def _on_roof(rng: np.random.Generator, building: SimBuilding) -> tuple[np.ndarra
 
 
 def chimney(rng: np.random.Generator, building: SimBuilding) -> Body:
-    xy, piece = _on_roof(rng, building)
+    xy, piece = place_on_roof(rng, building)
     z_top = piece.height_at(xy[None])[0] + rng.uniform(0.6, 1.8)
     size = (rng.uniform(0.5, 1.1), rng.uniform(0.5, 1.0))
     return Body(box(xy, size, z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
 
 
 def antenna(rng: np.random.Generator, building: SimBuilding) -> Body:
-    xy, piece = _on_roof(rng, building)
+    xy, piece = place_on_roof(rng, building)
     z_top = piece.height_at(xy[None])[0] + rng.uniform(1.0, 3.5)
     return Body(box(xy, (0.25, 0.25), z_top, building.kappa), SOURCE_CLUTTER, SOURCE_CLUTTER)
 
@@ -183,7 +183,7 @@ def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
     """One to three boxes that come out of a slope and meet it at their back; none on a flat roof."""
     bodies = []
     for _ in range(1 + int(2.5 * rng.random() ** 2)):
-        xy, piece = _on_roof(rng, building)
+        xy, piece = place_on_roof(rng, building)
         planes = piece.planes
         gradient = planes[np.argmin(planes[:, :2] @ xy + planes[:, 2]), :2]
         steepness = math.hypot(*gradient)

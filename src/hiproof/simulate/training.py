@@ -45,7 +45,7 @@ def training_sample(
         settings = random_settings(rng, building.outline.area, density, n_points, defects)
         cloud = scan(building, rng, settings)
         if len(cloud) >= low and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * low:
-            return _as_sample(rng, cloud, types, kind, high)
+            return as_sample(rng, cloud, types, kind, high)
     raise InputError(
         f"expected point counts {n_points} that a density of {density} points/m2 can reach, got none in {ATTEMPTS} "
         "buildings; widen one of them"
@@ -75,7 +75,7 @@ def random_settings(
     )
 
 
-def _as_sample(
+def as_sample(
     rng: np.random.Generator, cloud: Scan, types: Sequence[str], kind: int, high: int
 ) -> tuple[np.ndarray, np.ndarray, int]:
     if len(cloud) > high:

@@ -34,6 +34,7 @@ from .naming import UniqueNames, gml_name, srs_name
 from .roof_codes import CODE_SPACES, roof_type_code
 from .roof_figures import RoofFigures, ground_height
 from .shapes import PartShape
+from .values import WIDEST
 from .writer import BuildingWriter
 from .xml_text import attribute_set, generic_attribute, xml_attribute, xml_text
 
@@ -44,7 +45,6 @@ NAMESPACES = {
     "gml": "http://www.opengis.net/gml",
     "xlink": "http://www.w3.org/1999/xlink",
 }
-WIDEST = -123456789.1234  # as many characters as any coordinate takes: room for what is known at the end
 
 
 def write_citygml(

@@ -26,12 +26,11 @@ from .json_text import dump
 from .naming import UniqueNames, reference_system
 from .roof_figures import RoofFigures
 from .shapes import PartShape
-from .values import metres, plain_text
+from .values import WIDEST, metres, plain_text
 from .writer import BuildingWriter
 
 SCALE = 0.0001  # units of the file; tenths of a millimetre, on which solids are composed
 GRID = 1000.0  # units of the file; offsets are whole thousands, so that files of neighbouring tiles often share theirs
-WIDEST = -123456789.1234  # as many characters as any coordinate takes: room for what is known at the end
 
 
 def write_cityjson(

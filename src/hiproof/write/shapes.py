@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import shapely
 
 from ..model import GROUND, Building, Face, Solid
 from ..settings import WriteSettings
@@ -82,8 +81,7 @@ def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
     """LoD1.2: one block over the outline, as high as seven tenths of the roof lie below (as 3DBAG has it)."""
     from ..compose.blocks import block
 
-    outer, *holes = (solid.vertices[list(ring), :2] for ring in ground.rings)
-    return block(shapely.Polygon(outer, holes), figures.h_base, metres(figures.h_70p))
+    return block(solid.plan_of(ground), figures.h_base, metres(figures.h_70p))
 
 
 def stepped(cut: tuple, figures: RoofFigures) -> Solid | None:

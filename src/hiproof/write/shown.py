@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from ..model import ROOF, Building, Face, Part, Roof, Solid
+from ..model import ROOF, Building, Face, Part, Roof
 
 SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
 LEAST_M2 = 0.05  # of a common surface; what is less is a sliver between outlines that were rounded
@@ -31,7 +31,7 @@ def shown_areas(building: Building) -> list[shapely.Geometry]:
     planes = planes_of(roof)
     shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
     for face in solid.of_kind(ROOF):
-        left = plan_of(solid, face)
+        left = solid.plan_of(face)
         for other in parts_in_plane(face, solid.vertices, planes):
             beyond = shapely.difference(left, drawn(roof.parts[face.part]))
             own = shapely.intersection(beyond, drawn(roof.parts[other]))
@@ -58,9 +58,3 @@ def parts_in_plane(face: Face, vertices: np.ndarray, planes: np.ndarray) -> list
 def drawn(part: Part) -> shapely.Geometry:
     """The outlines of a part as one area; rounded, an outline may touch itself."""
     return shapely.union_all(shapely.make_valid([piece.outline for piece in part.pieces]))
-
-
-def plan_of(solid: Solid, face: Face) -> shapely.Polygon:
-    """A face in plan."""
-    outer, *holes = (solid.vertices[list(ring), :2] for ring in face.rings)
-    return shapely.Polygon(outer, holes)

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+WIDEST = -123456789.1234  # as many characters as any coordinate takes: room in a head for what is known at the end
+
 
 def rounded(value: float, digits: int = 6) -> float:
     """`value` rounded, minus zero being zero; NaN and infinities stay."""

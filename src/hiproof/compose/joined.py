@@ -1,0 +1,21 @@
+"""Sets that are joined one after the other (union-find): each member names another of its set, the root names itself."""
+
+from __future__ import annotations
+
+from ..compiled import compiled
+
+
+@compiled
+def root_of(parent, i):
+    """The root of the set of `i`; `parent` (n,) is shortened on the way."""
+    while parent[i] != i:
+        parent[i] = parent[parent[i]]
+        i = parent[i]
+    return i
+
+
+@compiled
+def join(parent, i, j):
+    """Make the sets of `i` and `j` one, whose root is the lower of both."""
+    a, b = root_of(parent, i), root_of(parent, j)
+    parent[max(a, b)] = min(a, b)
