@@ -113,6 +113,14 @@ def test_the_command_writes_both_tables(run_folder, tmp_path):
     assert json.loads((tmp_path / "evaluation.json").read_text())["summary"]["all"]["buildings"] == 3
 
 
+def test_the_tables_fit_a_narrow_terminal(run_folder, tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", "80")
+    points, reference = str(run_folder / "points.xyz"), str(run_folder / "buildings.city.jsonl")
+    evaluate(run_folder, [points], reference=reference, out=tmp_path)
+    said = capsys.readouterr().out
+    assert "…" not in said and said.count("buildings") >= 2 and "volume" in said and "0.000" in said
+
+
 def test_the_clouds_are_the_runs_own_where_none_are_named(run_folder, tmp_path):
     write_sample_run(tmp_path)
     record = json.loads((tmp_path / "run.json").read_text())

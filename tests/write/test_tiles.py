@@ -279,6 +279,13 @@ def test_a_failure_leaves_the_older_tileset(tmp_path):
     assert [file.name for file in tmp_path.iterdir()] == ["a.3dtiles"]
 
 
+def test_a_file_of_that_name_is_left_alone(tmp_path):
+    (tmp_path / "a.gpkg").write_text("x")
+    with pytest.raises(HiproofError, match="expected a new folder"):
+        write_models(tmp_path / "a.gpkg", town(2), "EPSG:7415", GEOID_M)
+    assert (tmp_path / "a.gpkg").read_text() == "x"
+
+
 def test_a_folder_of_something_else_is_left_alone(tmp_path):
     (tmp_path / "photos").mkdir()
     (tmp_path / "photos" / "a.jpg").write_text("x")

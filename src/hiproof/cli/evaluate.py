@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -19,6 +19,7 @@ SHOWN = {
 }
 CAPTION = "<0.2 m: share of the points 0.3 m or more inside the outline that lie within 0.2 m over or under the roof"
 COMPARED = {"ref_ridge_height_m": "ridge", "ref_slope_deg": "slope", "ref_volume_relative": "volume"}
+DIFFERENCES = "ridge in m, slope in degrees, volume as a share of the reference's"
 
 
 def evaluate(
@@ -50,16 +51,24 @@ def evaluate(
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:
-    """A line a roof type, means of the figures over its buildings."""
+    """Means of the figures over the buildings of each roof type; those against a reference in a table of their own, so that
+    both fit a terminal of 80 columns."""
     from rich.console import Console
+
+    console = Console(soft_wrap=True, markup=False)  # a roof type from outside may look like markup
+    console.print(table_of(summary, SHOWN, "mean over buildings", CAPTION))
+    if has_reference:
+        console.print(table_of(summary, COMPARED, "mean difference from the reference", DIFFERENCES))
+
+
+def table_of(summary: dict, columns: dict[str, str], title: str, caption: str) -> Any:
+    """A line a roof type."""
     from rich.table import Column, Table
 
-    columns = SHOWN | (COMPARED if has_reference else {})
     table = Table(
-        Column("type", no_wrap=True), "buildings", *columns.values(), title="mean over buildings", pad_edge=False
+        Column("type", no_wrap=True), "buildings", *columns.values(), title=title, caption=caption, pad_edge=False
     )
-    table.caption = CAPTION
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]
         table.add_row(kind, str(figures["buildings"]), *("" if mean is None else f"{mean:.3f}" for mean in means))
-    Console(soft_wrap=True, markup=False).print(table)  # a roof type from outside may look like markup
+    return table

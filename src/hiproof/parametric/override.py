@@ -123,11 +123,14 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
 
 
 def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
-    """Types that parts may have; a text names several by commas."""
-    types = record.get("types", ())
-    types = tuple(name.strip() for name in types.split(",")) if isinstance(types, str) else tuple(types)
+    """Types that parts may have, none where nothing is said of them; a text names several by commas."""
+    told = record.get("types")
+    names = told.split(",") if isinstance(told, str) else told
+    if names is not None and not (isinstance(names, (list, tuple)) and names):
+        raise InputError(f"expected a list of roof types as types of {where}, got {shown(told)}; name one at least")
+    types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
     for name in (*types, record.get("type", "flat")):
-        if name not in CATALOGUE:
+        if not isinstance(name, str) or name not in CATALOGUE:
             raise InputError(
                 f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {shown(name)}; choose among these"
             )

@@ -81,7 +81,7 @@ def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
                 seen_header = True
                 yield document, place
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
+        raise unreadable(path, error) from error
     if not seen_header:
         raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file")
 
@@ -106,7 +106,13 @@ def read_text(path: Path) -> str:
     try:
         return path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected a readable text file at {path}, got: {error}") from error
+        raise unreadable(path, error) from error
+
+
+def unreadable(path: Path, error: Exception) -> InputError:
+    """What to say of a file that is not there, or whose bytes are no text."""
+    found = "none" if isinstance(error, FileNotFoundError) else f"one that is not: {error}"
+    return InputError(f"expected a readable text file at {path}, got {found}; check the path")
 
 
 def reference_system(document: dict[str, Any]) -> str | None:

@@ -47,8 +47,8 @@ def write_models(
     written or holds something else.
     """
     folder, globe = Path(folder), None if crs is None else Globe.of(crs, geoid_height_m)
-    warn_of(globe)
     make_room(folder)
+    warn_of(globe)
     with scratch(folder) as file:
         city = WaitingCity(file, globe)
         for model in buildings:
@@ -172,7 +172,9 @@ def make_room(folder: Path) -> None:
     """Make the parent of `folder`; raise OutputError where `folder` is no tileset, so that nothing else is ever replaced."""
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        is_ours = not folder.exists() or (folder / TILESET).is_file() or not any(folder.iterdir())
+        is_ours = not folder.exists() or (
+            folder.is_dir() and ((folder / TILESET).is_file() or not any(folder.iterdir()))
+        )
     except OSError as error:
         raise output_error(folder, error) from error
     if not is_ours:
