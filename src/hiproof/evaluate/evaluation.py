@@ -19,7 +19,9 @@ import shapely
 
 from ..frames import LocalFrame
 from ..model import ROOF, Quality, Solid
+from ..write.values import rounded
 from .metrics import iou, plan_outline, quality, share_near
+from .models import BuildingModel
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,12 @@ class BuildingFigures:
 
 
 def evaluate_building(
-    model: Any, points: np.ndarray, footprint: shapely.Polygon | None = None, reference: Any = None
+    model: BuildingModel,
+    points: np.ndarray,
+    footprint: shapely.Polygon | None = None,
+    reference: BuildingModel | None = None,
 ) -> BuildingFigures:
-    """Figures of one `BuildingModel` against its `points` (n, 3) in world metres."""
+    """Figures of one model against its `points` (n, 3), its footprint and another model, all in world metres."""
     if model.solid is None:
         share = share_near(points, np.full(len(points), np.inf), footprint or shapely.Polygon())
         missed = Quality(points=len(points), share_within_20cm=share)
@@ -75,7 +80,7 @@ def evaluate_building(
         model.status,
         quality(solid, local, outline),
         roof_figures(solid).volume_m3 if solid.of_kind(ROOF) else float("nan"),
-        None if reference is None else compare(model.solid, reference.id, reference.solid),
+        None if reference is None or reference.solid is None else compare(model.solid, reference.id, reference.solid),
     )
 
 
@@ -111,7 +116,9 @@ def points_by_outline(points: np.ndarray, outlines: Sequence[shapely.Geometry | 
     return [points[point_of[order[a:b]]] for a, b in pairwise(bounds)]
 
 
-def match_by_id_or_overlap(models: Sequence[Any], others: Sequence[tuple[str, shapely.Geometry]]) -> list[int | None]:
+def match_by_id_or_overlap(
+    models: Sequence[BuildingModel], others: Sequence[tuple[str, shapely.Geometry]]
+) -> list[int | None]:
     """Index of the other area that stands for each model: the one of the same id, else the largest overlap in plan."""
     by_id = {id: i for i, (id, _) in enumerate(others)}
     tree = shapely.STRtree([area for _, area in others]) if others else None
@@ -153,10 +160,6 @@ def figure_names(rows: Sequence[dict[str, Any]]) -> list[str]:
     return [name for name in names if name not in ("id", "type", "status", "ref_id")]
 
 
-def rounded(value: float) -> float:
-    return round(float(value), 6)
-
-
 def to_csv(figures: Sequence[BuildingFigures]) -> str:
     """A header and a line a building; empty where there is no figure."""
     rows = [f.row() for f in figures]
@@ -166,21 +169,18 @@ def to_csv(figures: Sequence[BuildingFigures]) -> str:
     text = io.StringIO()
     writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
     writer.writeheader()
-    writer.writerows({name: plain(value) for name, value in row.items()} for row in rows)
+    writer.writerows({name: known(value) for name, value in row.items()} for row in rows)
     return text.getvalue()
 
 
 def to_json(figures: Sequence[BuildingFigures]) -> str:
     """The summary and every row; null where there is no figure."""
-    rows = [{name: none_for_empty(plain(value)) for name, value in f.row().items()} for f in figures]
+    rows = [{name: known(value) for name, value in f.row().items()} for f in figures]
     return json.dumps({"summary": summarise(figures), "buildings": rows}, indent=1, allow_nan=False) + "\n"
 
 
-def plain(value: Any) -> Any:
+def known(value: Any) -> Any:
+    """A figure rounded, None where it is none; text as it is."""
     if isinstance(value, float):
-        return rounded(value) if np.isfinite(value) else ""
+        return rounded(value) if np.isfinite(value) else None
     return value
-
-
-def none_for_empty(value: Any) -> Any:
-    return None if value == "" else value

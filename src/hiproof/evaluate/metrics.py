@@ -140,6 +140,7 @@ def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
 
 
 def observed_outline(points: np.ndarray) -> shapely.Polygon | None:
+    """The alpha shape of points in plan, None where they have none."""
     from ..errors import FitError
     from ..fit.alpha_shape import alpha_shape
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..loopback import LoopbackServer, own_hosts
 from ..write.colours import type_colours
 
-PARTS = {
+ASSETS = {
     "style": ("hiproof.view", "view.css"),
     "viewer": ("hiproof.evaluate", "viewer.js"),
     "tiles": ("hiproof.view", "tiles.js"),
@@ -31,14 +31,14 @@ def server_of(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
 
 def page_of(title: str) -> str:
     """The page as text, scripts and styles in it."""
-    parts = {name: (files(package) / "assets" / file).read_text("utf-8") for name, (package, file) in PARTS.items()}
+    texts = {name: (files(package) / "assets" / file).read_text("utf-8") for name, (package, file) in ASSETS.items()}
     content = {
         "title": escape(title),
-        "style": parts["style"],
+        "style": texts["style"],
         "colours": json.dumps(type_colours()),
-        "script": parts["viewer"] + parts["tiles"] + parts["page"],
+        "script": texts["viewer"] + texts["tiles"] + texts["page"],
     }
-    page = parts["html"]
+    page = texts["html"]
     for name, text in content.items():
         page = page.replace(f"<!--{name}-->", text)
     return page

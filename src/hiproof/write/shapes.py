@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from .roof_figures import RoofFigures, roof_figures
 from .shown import shown_areas
 from .table_rows import part_values
 from .values import metres, plain
+
+if TYPE_CHECKING:
+    from ..compose.building_parts import BuildingPart
 
 
 @dataclass(frozen=True)
@@ -33,8 +36,8 @@ class PartShape:
 class Shapes:
     """A building's further geometry, None or empty where it is not asked for or there is none.
 
-    `roof_edge` is the outline of LoD0 at the height of the eaves, as a solid's ground is (`outline`, whose face it shares);
-    `lod12` and `lod13` are blocks; `parts` are two or more, and `lod13` then theirs.
+    `outline` is the solid's ground, which at the height of the eaves, `z_edge`, is the roof's edge of LoD0; `lod12` and `lod13` are
+    blocks; `parts` are two or more, and have blocks of their own in place of `lod13`.
     """
 
     outline: Face | None = None
@@ -59,8 +62,7 @@ def shapes_of(building: Building, figures: RoofFigures | None, write: WriteSetti
     solid = building.solid
     ground = solid.of_kind(GROUND)[0]
     cut = cut_into_parts(solid) if write.parts_as == "buildingparts" or "1.3" in asked else ()
-    as_parts = cut if write.parts_as == "buildingparts" else ()
-    parts = tuple(part_shape(building, part, asked, prefix) for part in as_parts)
+    parts = part_shapes(building, cut, asked, prefix) if write.parts_as == "buildingparts" else ()
     lod12 = whole_block(solid, ground, figures) if asked & {"1.2", "1.3"} else None
     return Shapes(
         outline=ground if "0" in asked else None,
@@ -71,7 +73,7 @@ def shapes_of(building: Building, figures: RoofFigures | None, write: WriteSetti
     )
 
 
-def cut_into_parts(solid: Solid) -> tuple:
+def cut_into_parts(solid: Solid) -> tuple[BuildingPart, ...]:
     from ..compose.building_parts import building_parts
 
     return building_parts(solid)
@@ -84,7 +86,7 @@ def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
     return block(solid.plan_of(ground), figures.h_base, metres(figures.h_70p))
 
 
-def stepped(cut: tuple, figures: RoofFigures) -> Solid | None:
+def stepped(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
     """LoD1.3 as one solid: a block for each building part, as high as seven tenths of its own roof lie below."""
     from ..compose.blocks import blocks
 
@@ -92,21 +94,30 @@ def stepped(cut: tuple, figures: RoofFigures) -> Solid | None:
     return blocks([part.outline for part in cut], heights, figures.h_base) if cut else None
 
 
-def part_shape(building: Building, part: Any, asked: set[str], prefix: str) -> PartShape:
-    """A building part with its figures, block and attributes."""
+def part_shapes(
+    building: Building, cut: tuple[BuildingPart, ...], asked: set[str], prefix: str
+) -> tuple[PartShape, ...]:
+    """The building parts with what their roof parts are."""
+    primitives = [part_values(building, number, shown) for number, shown in enumerate(shown_areas(building))]
+    return tuple(
+        part_shape(part, [primitives[member] for member in part.members if member < len(primitives)], asked, prefix)
+        for part in cut
+    )
+
+
+def part_shape(part: BuildingPart, primitives: list[dict[str, Any]], asked: set[str], prefix: str) -> PartShape:
+    """A building part of these roof parts with its figures, block and attributes."""
     from ..compose.blocks import block
 
     figures = roof_figures(part.solid)
-    types = tuple(building.parts[member].type for member in part.members if member < len(building.parts))
+    types = tuple(values["type"] for values in primitives)
     lod13 = block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in asked else None
-    return PartShape(part.solid, figures, lod13, types, part_attributes(building, part.members, figures, prefix))
+    return PartShape(part.solid, figures, lod13, types, part_attributes(primitives, figures, prefix))
 
 
-def part_attributes(building: Building, members: tuple[int, ...], figures: RoofFigures, prefix: str) -> dict[str, Any]:
+def part_attributes(primitives: list[dict[str, Any]], figures: RoofFigures, prefix: str) -> dict[str, Any]:
     """Attributes of a building part by name."""
     found = {**shape_attributes(figures), "roof_type": figures.roofer_type, "roof_n_surfaces": figures.roof_faces}
-    shown = shown_areas(building)
-    primitives = [part_values(building, member, shown[member]) for member in members if member < len(shown)]
     return {
         **{prefix + name: plain(found[name]) for name in OF_PARTS},
         f"{OWN}h_eave": plain(metres(figures.h_eave)),
