@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pyogrio
 import pytest
 import shapely
 
@@ -255,7 +256,40 @@ def test_a_runs_own_parameters_are_overrides_that_change_nothing(town_files, und
         assert now[id]["residuals"] == was[id]["residuals"]
 
 
-def test_tables_and_columns_of_the_footprints_override_too(town_files, tmp_path):
+def columns_request(town_files, tmp_path, pair):
+    """A run over footprints that have a column `daktype`, of whose settings `pair` is the only one of override_columns."""
+    meta, _, outlines, columns = pyogrio.raw.read(town_files[1])
+    types = np.array(["hip", *[None] * (len(outlines) - 1)], object)
+    names, path = [*meta["fields"], "daktype"], tmp_path / "footprints.gpkg"
+    pyogrio.raw.write(path, outlines, [*columns, types], names, geometry_type="Polygon", crs=meta["crs"])
+    settings = PLAIN.replace({"read": {"override_columns": [pair]}})
+    return hiproof.Request((town_files[0],), tmp_path / "out", str(path), settings=settings)
+
+
+def test_columns_of_the_footprints_override_too(town_files, tmp_path):
+    city_run.reconstruct_area(columns_request(town_files, tmp_path, "daktype=type"))
+    rows = by_id(tmp_path / "out")
+    assert rows["house-0"]["type"] == "hip" and "overridden: type hip" in rows["house-0"]["detail"]
+    assert "overridden" not in rows["house-1"]["detail"]
+
+
+@pytest.mark.parametrize(
+    ("pair", "message"),
+    [
+        ("roof=type", r"columns of the footprints \(.*daktype.*\) .*got 'roof'"),
+        ("daktype=tipe", "keys of an override .*got 'tipe'"),
+        ("daktype", "keys of an override .*got ''"),
+    ],
+)
+def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(pair, message, town_files, tmp_path):
+    with pytest.raises(InputError, match=message):
+        city_run.reconstruct_area(columns_request(town_files, tmp_path, pair))
+    (tmp_path / "footprints.gpkg").unlink()
+    city_run.reconstruct_area(columns_request(town_files, tmp_path, "daktype=type"))
+    assert by_id(tmp_path / "out")["house-0"]["type"] == "hip"
+
+
+def test_tables_override_too(town_files, tmp_path):
     (tmp_path / "o.csv").write_text("id,type,ridge_height,leave_out\nhouse-0,hip,,\nhouse-1,,,true\nelsewhere,,9.5,\n")
     with pytest.warns(InputWarning, match="1 of 3 overrides are of no building of this run: elsewhere"):
         city_run.reconstruct_area(

@@ -6,14 +6,14 @@ import functools
 import hashlib
 import json
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, InputWarning
 from ..log import LOGGER
 from ..parametric.file import HEAD, objects
-from ..parametric.override import Override, override_of
+from ..parametric.override import KEYS, Override, override_of
 from ..read.footprints import attribute_rows, reading
 from ..write.files import atomic
 from .ledger import Ledger
@@ -117,8 +117,7 @@ def typed(name: str, value: Any) -> Any:
 
 def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dict[str, Any]]:
     """The overrides by the number of their building, with those that columns of the footprints hold; unknown ones are told."""
-    names = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
-    found, left = {}, dict(records)
+    names, found, left = columns_of(plan), {}, dict(records)
     for job in plan.jobs:
         own = column_override(job, names) | left.pop(job.id, {})
         if own:
@@ -127,6 +126,27 @@ def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dic
         some = ", ".join(list(left)[:SHOWN]) + (" and others" if len(left) > SHOWN else "")
         warnings.warn(f"{len(left)} of {len(records)} overrides are of no building of this run: {some}", InputWarning)
     return found
+
+
+def columns_of(plan: WorkPlan) -> list[tuple[str, str]]:
+    """(column of the footprints, key of an override) as the settings pair them. Raises InputError for those that are not there."""
+    pairs = [pair.partition("=")[::2] for pair in plan.settings.read.override_columns]
+    if not plan.jobs:
+        return []
+    known = {name for job in plan.jobs if job.footprint for name in job.footprint.attributes}
+    refuse_others([column for column, _ in pairs], sorted(known), "columns of the footprints")
+    refuse_others([key for _, key in pairs], KEYS, "keys of an override")
+    return pairs
+
+
+def refuse_others(told: list[str], known: Sequence[str], what: str) -> None:
+    """Raise InputError where something is told in the settings that is not `known`."""
+    other = [name for name in told if name not in known]
+    if other:
+        raise InputError(
+            f"expected {what} ({', '.join(known) or 'there are none'}) in the setting override_columns, got {other[0]!r}; "
+            'write COLUMN=KEY, such as "daktype=type"'
+        )
 
 
 def column_override(job: Job, names: list[tuple[str, str]]) -> dict[str, Any]:

@@ -84,9 +84,10 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
 
 def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | None:
     """The plan of the run that the folder holds, None where it holds none to go on from. Raises OutputError for another's."""
-    if ledger.get("mark") is None:
+    inputs = inputs_of(request)
+    if ledger.get("mark") is None or not (is_of(inputs, ledger) or is_begun(ledger)):
         return None
-    refuse_other_inputs(request.out, inputs_of(request), ledger)
+    refuse_other_inputs(request.out, inputs, ledger)
     if not stands(request.out, ledger):
         return None
     plan = WorkPlan.load(state / PLAN_FILE)
@@ -110,9 +111,19 @@ def enter(request: Request, ledger: Ledger) -> None:
     ledger.set(inputs=told, salt=salt, started=str(time.time()), **marks)
 
 
+def is_of(inputs: dict, ledger: Ledger) -> bool:
+    """Whether the run in the folder is that of these inputs."""
+    return ledger.get("mark") == mark_of(inputs, ledger.get("salt") or "")
+
+
+def is_begun(ledger: Ledger) -> bool:
+    """Whether any task is done: a run that ended before, by a setting that is wrong, is nothing to keep."""
+    return any(task.state == "done" for task in ledger.tasks())
+
+
 def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     """Raise OutputError, naming what differs, where the folder holds a run of another request."""
-    if ledger.get("mark") == mark_of(inputs, ledger.get("salt") or ""):
+    if is_of(inputs, ledger):
         return
     known, told = json.loads(ledger.get("inputs") or "{}"), json.loads(json.dumps(masked_values(inputs), default=str))
     other = [name for name in told | known if told.get(name) != known.get(name)]

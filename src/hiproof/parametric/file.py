@@ -36,8 +36,9 @@ def opened_parameters(path: str | os.PathLike) -> Iterator[tuple[FileHead, Itera
             lines = objects(file, path)
             yield head_of(next(lines, None), path), records(lines, path)
     except (OSError, UnicodeDecodeError) as error:
+        found = "none" if isinstance(error, FileNotFoundError) else f"something else: {error}"
         raise InputError(
-            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got: {error}; check the path"
+            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got {found}; check the path"
         ) from error
 
 

@@ -77,7 +77,10 @@ def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
                 document = parsed(line, place)
                 kind = document.get("type")
                 if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
-                    raise InputError(f"expected a CityJSON line followed by CityJSONFeatures, got {kind!r} in {place}")
+                    raise InputError(
+                        f"expected a CityJSON line followed by CityJSONFeatures, got one of type {kind!r} in {place}; is this another "
+                        "kind of JSON?"
+                    )
                 seen_header = True
                 yield document, place
     except (OSError, UnicodeDecodeError) as error:

@@ -92,7 +92,9 @@ def reprojected(crs: Any, out: Any, own: Units, units: Units) -> Units:
         return units
     plan = best_of(horizontal_crs(crs), horizontal_crs(out), allow_ballpark=False)
     if plan is None:
-        raise InputError(f"expected a CRS that pyproj can go to from {described(crs)}, got {described(out)}")
+        raise InputError(
+            f"expected a CRS that pyproj can go to from {described(crs)}, got {described(out)}; name one of the same part of the Earth"
+        )
     way = height_way(crs, out) if heights else None
     return Reprojected(
         *(units.plan, units.height, units.plan_name, units.height_name), own, plan, way, units_of(out).height
