@@ -33,7 +33,9 @@ def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
     """A part of its own: its type, position, width and length at least are given."""
     missing = [name for name in ("type", "position", "width", "length") if change.get(name) is None]
     if missing:
-        raise InputError(f"expected type, position, width and length of a new part, got none for {', '.join(missing)}")
+        raise InputError(
+            f"expected type, position, width and length of a new part, got none for {', '.join(missing)}; give them too"
+        )
     sizes = {name: change[name] for name in ("width", "length")}
     flat = {"type": "flat", "parameters": sizes, "position": list(change["position"]), "rotation": 0.0}
     return changed_part(flat, change, z_origin)

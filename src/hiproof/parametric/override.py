@@ -193,7 +193,9 @@ def as_given(override: Override, points: np.ndarray, building: Building, terrain
     local = frame.to_local(points)
     rings = override.outline or outline_record(stages.to_local(outline, frame))
     if rings is None:
-        raise InputError("expected an outline, or a footprint, of a building whose parts are given, got neither")
+        raise InputError(
+            "expected an outline, or a footprint, of a building whose parts are given, got neither; give one"
+        )
     area = polygon(rings, "outline")
     ground = given_ground(override, area, local, frame, terrain)
     parts = override.parts
@@ -234,7 +236,7 @@ def given_ground(
         return dataclasses.replace(ground, z=override.z_ground, source="override")
     if not len(points) and ground.source.startswith("assumed"):
         raise InputError(
-            "expected the height of the ground (z_ground) where neither points nor terrain tell it, got none"
+            "expected the height of the ground (z_ground) where neither points nor terrain tell it, got none; give it"
         )
     return ground
 

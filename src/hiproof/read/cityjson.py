@@ -86,7 +86,7 @@ def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
     except (OSError, UnicodeDecodeError) as error:
         raise unreadable(path, error) from error
     if not seen_header:
-        raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file")
+        raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file; write it anew")
 
 
 def parsed(text: str, place: str) -> dict[str, Any]:

@@ -105,7 +105,9 @@ def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "au
             "reproject it first, to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
         )
     if plan.is_vertical:
-        raise InputError(f"expected {source} in a CRS of the plan, got {crs.name}, which is one of heights alone")
+        raise InputError(
+            f"expected {source} in a CRS of the plan, got {crs.name}, which is one of heights alone; name both, such as EPSG:28992+5709"
+        )
     across = plan.axis_info[0]
     up = height.axis_info[0] if height is not None else crs.axis_info[2] if len(crs.axis_info) == 3 else across
     units = Units(across.unit_conversion_factor, up.unit_conversion_factor, across.unit_name, up.unit_name)

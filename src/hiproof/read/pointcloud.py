@@ -198,7 +198,9 @@ def file_kind(path: str | Path) -> str:
         with open(path, "rb") as file:
             head = file.read(8)
     except OSError as error:
-        raise InputError(f"expected a readable point cloud at {path}, got: {error.strerror or error}") from error
+        raise InputError(
+            f"expected a readable point cloud at {path}, got: {error.strerror or error}; check the path"
+        ) from error
     suffix = Path(path).suffix.lower()
     if not head:
         raise InputError(f"expected points in {path}, got an empty file; copy or download it again")

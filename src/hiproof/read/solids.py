@@ -255,7 +255,9 @@ def ring_points(ring: Any, path: Path) -> list[tuple[float, ...]]:
     try:
         values = [float(word) for word in " ".join(texts).split()]
     except ValueError as error:
-        raise InputError(f"expected numbers in a gml:posList of {path}, got: {error}") from error
+        raise InputError(f"expected numbers in a gml:posList of {path}, got: {error}; export the file anew") from error
     if len(values) % 3:
-        raise InputError(f"expected three coordinates a point in a gml:LinearRing of {path}, got {len(values)} numbers")
+        raise InputError(
+            f"expected three coordinates a point in a gml:LinearRing of {path}, got {len(values)} numbers; export the file anew, in 3D"
+        )
     return [tuple(values[k : k + 3]) for k in range(0, len(values), 3)]

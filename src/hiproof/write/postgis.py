@@ -71,7 +71,9 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
             f"expected the output folder of a run, got {folder} without buildings.city.jsonl; check the path"
         )
     if not prefix.isidentifier():
-        raise InputError(f"expected a table prefix of letters, digits and underscores, got {prefix!r}")
+        raise InputError(
+            f"expected a table prefix of letters, digits and underscores, got {prefix!r}; choose another --prefix"
+        )
     psycopg = import_psycopg()
     names = {"prefix": prefix} | {table: f"{prefix}_{table}" for table in ("buildings", "roofs", "parts")}
     try:

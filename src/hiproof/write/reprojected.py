@@ -37,7 +37,9 @@ class Reprojected(Units):
         if world.shape[-1] == 3:
             found = np.concatenate([found, self.height_from(own, world[..., 2])[..., None]], axis=-1)
         if not np.isfinite(found).all() and np.isfinite(world).all():
-            raise InputError("expected buildings inside the area of --out-crs, got some that have no place in it")
+            raise InputError(
+                "expected buildings inside the area of --out-crs, got some that have no place in it; name a CRS of theirs"
+            )
         return found
 
     def to_metres(self, coordinates: np.ndarray) -> np.ndarray:
