@@ -1,14 +1,18 @@
 """Where parts show: areas that share nothing, are the outline together, and lie where no other part is higher."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
+from shapely import affinity
 
-from handmade import courtyard, modelled, unmodelled
+from handmade import RD_ORIGIN, courtyard, modelled, unmodelled
 from hiproof.compose import compose
+from hiproof.frames import LocalFrame
 from hiproof.model import Building, Model, Part, Piece, Roof
 from hiproof.status import Status
-from hiproof.write.shown import shown_areas
+from hiproof.write.shown import shared_out, shown_areas
 from hiproof.write.table_rows import table_rows
 from roof_zoo import FRAME, KINDS, generated
 
@@ -16,7 +20,9 @@ SNAPPED_M = 0.05  # composing moves edges by less than this
 
 
 def composed(roof):
-    return Building("a", Status.MODELLED, built=Model(roof, compose(roof, 0.0)))
+    """A building as it stands in a national grid."""
+    roof = replace(roof, frame=LocalFrame(RD_ORIGIN))
+    return Building("a", Status.MODELLED, built=Model(roof, compose(roof, 0.0).moved(RD_ORIGIN)))
 
 
 def flat(z, *box):
@@ -29,9 +35,11 @@ def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
     building = composed(generated(kind, seed))
     areas = shown_areas(building)
     assert len(areas) == len(building.parts)
+    assert shapely.is_valid(areas).all()
     together = shapely.union_all(areas)
     assert sum(area.area for area in areas) == pytest.approx(together.area, abs=1e-6)
-    assert together.symmetric_difference(building.roof.outline).area < SNAPPED_M * building.roof.outline.length
+    outline = shapely.transform(building.roof.outline, building.roof.frame.to_world)
+    assert together.symmetric_difference(outline).area < SNAPPED_M * outline.length
 
 
 @pytest.mark.parametrize("seed", range(4))
@@ -40,7 +48,7 @@ def test_where_a_part_shows_none_is_higher(kind, seed):
     building = composed(generated(kind, seed))
     roof, rng = building.roof, np.random.default_rng(seed)
     for part, area in zip(roof.parts, shown_areas(building), strict=True):
-        inner = shapely.buffer(area, -2 * SNAPPED_M)
+        inner = shapely.buffer(shapely.transform(area, roof.frame.to_local), -2 * SNAPPED_M)
         if inner.is_empty:
             continue
         xy = rng.uniform(inner.bounds[:2], inner.bounds[2:], (400, 2))
@@ -59,8 +67,30 @@ def test_parts_in_one_plane_share_a_surface_by_their_outlines():
 def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one():
     roof = Roof((flat(3.0, -5, -5, 20, 20), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
     (geometry, values), (hidden, of_hidden) = table_rows(composed(roof), None, {}).parts
-    assert shapely.from_wkb(geometry).equals(shapely.box(0, 0, 10, 5)) and values["area_m2"] == 50.0
+    x, y, _ = RD_ORIGIN
+    assert shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5)) and values["area_m2"] == 50.0
     assert hidden is None and of_hidden["area_m2"] == 0.0
+
+
+def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
+    small, far = shapely.box(0, 0, 0.1, 0.1), shapely.box(5, 5, 6, 6)
+    left, others = shared_out(small, small, far)
+    assert left.equals(small) and others.is_empty
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(seed):
+    rng = np.random.default_rng(seed)
+    first, second = (
+        affinity.rotate(shapely.box(0, 0, 6, 5), 30),
+        affinity.rotate(shapely.box(6, 0, 10, 5), 30, (3, 2.5)),
+    )
+    boxes = [shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4) for box in (first, second)]
+    parts = tuple(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)) for box in boxes)
+    building = composed(Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME))
+    areas = shown_areas(building)
+    assert shapely.is_valid(areas).all() and {area.geom_type for area in areas} == {"Polygon"}
+    assert [area.area for area in areas] == pytest.approx([30.0, 20.0], abs=0.1)
 
 
 def test_a_part_around_a_yard_has_a_hole():

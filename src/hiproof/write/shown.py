@@ -11,7 +11,8 @@ import shapely
 from ..model import ROOF, Building, Face, Part, Roof
 
 SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
-LEAST_M2 = 0.05  # of a common surface; what is less is a sliver between outlines that were rounded
+GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
+LEAST_M2 = 0.05  # of what one part has of a common surface; less is a sliver between outlines that miss one another
 
 
 def shown_areas(building: Building) -> list[shapely.Geometry]:
@@ -33,13 +34,10 @@ def shown_areas(building: Building) -> list[shapely.Geometry]:
     for face in solid.of_kind(ROOF):
         left = solid.plan_of(face)
         for other in parts_in_plane(face, solid.vertices, planes):
-            beyond = shapely.difference(left, drawn(roof.parts[face.part]))
-            own = shapely.intersection(beyond, drawn(roof.parts[other]))
-            if own.area >= LEAST_M2:
-                left = shapely.difference(left, own)
-                shown[other].append(own)
+            left, others_own = shared_out(left, drawn(roof.parts[face.part]), drawn(roof.parts[other]))
+            shown[other].append(others_own)
         shown[face.part].append(left)
-    return [shapely.transform(shapely.union_all(areas), roof.frame.to_world) for areas in shown]
+    return [shapely.transform(shapely.union_all(areas, grid_size=GRID_M), roof.frame.to_world) for areas in shown]
 
 
 def planes_of(roof: Roof) -> np.ndarray:
@@ -53,6 +51,25 @@ def parts_in_plane(face: Face, vertices: np.ndarray, planes: np.ndarray) -> list
     corners = vertices[[vertex for ring in face.rings for vertex in ring]]
     off = np.abs(corners[:, :2] @ planes[:, 1:3].T + planes[:, 3] - corners[:, 2:]).max(axis=0)
     return sorted({int(number) for number in planes[off < SAME_PLANE_M, 0]} - {face.part})
+
+
+def shared_out(
+    area: shapely.Geometry, own: shapely.Geometry, other: shapely.Geometry
+) -> tuple[shapely.Geometry, shapely.Geometry]:
+    """What is left of `area` to the part drawn as `own`, and what goes to the one drawn as `other`: where that one alone is
+    drawn, and slivers beside it."""
+    beyond = shapely.difference(area, own, grid_size=GRID_M)
+    others_own = without_slivers(shapely.intersection(beyond, other, grid_size=GRID_M))
+    if others_own.is_empty:
+        return area, others_own
+    left = without_slivers(shapely.difference(area, others_own, grid_size=GRID_M))
+    return left, shapely.difference(area, left, grid_size=GRID_M)
+
+
+def without_slivers(area: shapely.Geometry) -> shapely.Geometry:
+    """Those polygons of an area that are large enough."""
+    pieces = shapely.get_parts(area)
+    return shapely.multipolygons(pieces[shapely.area(pieces) >= LEAST_M2])
 
 
 def drawn(part: Part) -> shapely.Geometry:
