@@ -13,8 +13,7 @@ import numpy as np
 from ..model import Building
 from ..parametric.building import build
 from ..primitives.catalogue import CATALOGUE
-from ..write.colours import type_colour
-from .view import WALL_COLOUR, SeenFace, projected, seen_faces, shaded
+from .view import SeenFace, colours_of, projected, seen_faces, shaded
 
 WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
 TURN_DEG, TILT_DEG = -38.0, 30.0  # degrees; a view from the front left in which no side hides a parameter
@@ -92,7 +91,7 @@ def measure_of(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
 def primitive_svg(kind: str) -> str:
     """The figure of a roof type."""
     building = typical_building(kind)
-    colours = [type_colour(kind) if face.kind == "RoofSurface" else WALL_COLOUR for face in building.solid.faces]
+    colours = colours_of(building)
     centre = building.solid.vertices.mean(axis=0)
     lines = measures(kind)
     page = {id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None] for m in lines}

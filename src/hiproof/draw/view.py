@@ -9,9 +9,8 @@ import numpy as np
 
 from ..model import ROOF, Building, Solid
 from ..rings import ring_normal
-from ..write.colours import type_colour
+from ..write.viewed import look_of
 
-WALL_COLOUR = "#d9d4cb"
 TURN_DEG, TILT_DEG = -35.0, 35.0  # degrees; from the front left and above, so that two walls and the roof show
 
 
@@ -40,12 +39,8 @@ def turn_of(building: Building) -> float:
 
 def colours_of(building: Building) -> list[str]:
     """A colour a face: that of its part's type for roofs."""
-    return [
-        type_colour(building.parts[face.part].type)
-        if face.kind == ROOF and 0 <= face.part < len(building.parts)
-        else WALL_COLOUR
-        for face in building.solid.faces
-    ]
+    types = {number: part.type for number, part in enumerate(building.parts)}
+    return [look_of(face, types).colour for face in building.solid.faces]
 
 
 def seen_faces(

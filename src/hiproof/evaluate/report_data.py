@@ -9,7 +9,7 @@ import numpy as np
 import shapely
 
 from ..status import Status
-from ..write.colours import type_colour
+from ..write.colours import WALL_COLOUR, type_colour
 from ..write.page_mesh import packed, solid_mesh
 from .metrics import plan_outline, psd
 from .models import BuildingModel
@@ -38,6 +38,7 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
     return {
         "buildings": buildings,
         "colours": {
+            "wall": WALL_COLOUR,
             "type": {name: type_colour(name) for name in types},
             "status": {name: STATUS_COLOURS.get(name, NO_MODEL_COLOUR) for name in statuses},
             "residual": [list(stop) for stop in RESIDUAL_STOPS],

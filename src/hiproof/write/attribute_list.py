@@ -119,7 +119,7 @@ BUILDING_PART = (
         f"{OWN}primitives",
         "list",
         "m, deg",
-        "its roof parts, each with part, type, area_m2, z_eave, rotation, parameters and deviations as in the table Parts"
+        "its roof parts, each with part, type, area_m2, x, y, z_eave, rotation, parameters and deviations as in the table Parts"
         " (in CityGML: attribute sets hiproof_primitive_0, ...)",
     ),
 )

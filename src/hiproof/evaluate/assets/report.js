@@ -19,8 +19,8 @@ const light = lightOf(mesh.corners);
 
 function meshColours() {
   const buildings = data.buildings.map(building => rgb(colourOf(building))), types = Object.values(data.colours.type).map(rgb);
-  const roof = t => mode === "type" ? types[mesh.roof[t] - 1] : buildings[mesh.owner[t]];
-  return shadedColours(light, t => !mesh.roof[t] ? [226, 221, 210] : mesh.owner[t] === selected ? [255, 45, 111] : roof(t));
+  const wall = rgb(data.colours.wall), roof = t => mode === "type" ? types[mesh.roof[t] - 1] : buildings[mesh.owner[t]];
+  return shadedColours(light, t => !mesh.roof[t] ? wall : mesh.owner[t] === selected ? [255, 45, 111] : roof(t));
 }
 
 const viewer = new Viewer(document.getElementById("scene"), mesh.corners, mesh.owner);
