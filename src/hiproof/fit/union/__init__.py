@@ -18,6 +18,7 @@ apart       volumes that show in several places
 sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
 unite       volumes that only skewed walls keep apart, made one
+bays        level volumes over small pieces that walls cut off the outline
 agree       planes, slopes, ridges and eaves that volumes have in common
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
@@ -40,6 +41,7 @@ from ...primitives.family import name_among
 from ...settings import Settings
 from .agree import agreed
 from .apart import told_apart
+from .bays import with_bays
 from .clamp import clamped
 from .fit import BuildingFit
 from .larger import put_together
@@ -49,7 +51,7 @@ from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
 from .regions import places_of, polygons_of, regions_of
-from .search import find_volumes
+from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
 from .shown import that_show
 from .slivers import without_slivers, without_specks
 from .unite import united
@@ -84,7 +86,8 @@ def fit_building(
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
     volumes = told_apart(without_slivers(without_specks(volumes, scene), scene), scene)
-    roof = united(volumes, plan, outline, scene)
+    unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
+    roof = with_bays(united(volumes, plan, outline, scene), outline, plan, scene, unit)
     volumes, sides = roof.volumes, roof.sides
     planes = agreed(volumes, sides, roof.planes, scene)
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))

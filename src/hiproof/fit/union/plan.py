@@ -30,13 +30,17 @@ SHADE = 0.2  # of a point: what the highest of roofs costs for each that is miss
 
 @dataclass(frozen=True)
 class Plan:
-    """Everything the search needs of one building; `density` in points per square metre of covered outline."""
+    """Everything the search needs of one building; `density` in points per square metre of covered outline.
+
+    `border` (3, m): u, v, z of points next to the outline that do not count, for a scanner may have had them of the walls.
+    """
 
     frame: PlanFrame
     cloud: Cloud
     grid: Grid
     ghosts: Ghosts
     density: float
+    border: np.ndarray
 
 
 @compiled
@@ -92,7 +96,9 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     angle = main_direction(outline)
     rotation = np.array([[math.cos(angle), math.sin(angle)], [-math.sin(angle), math.cos(angle)]])
     depth = signed_depth(points_local[:, 0].copy(), points_local[:, 1].copy(), *ring_edges(outline))
-    inside = without_facades(points_local[depth >= 0.0], depth[depth >= 0.0], outline.area)
+    every = points_local[depth >= 0.0]
+    counts = off_facades(every, depth[depth >= 0.0], outline.area)
+    inside = every[counts]
     centroid = shapely.get_coordinates(outline.centroid)[0]
     middle = len(inside) // 2
     height = np.partition(inside[:, 2], middle)[middle] if len(inside) else 0.0
@@ -108,21 +114,20 @@ def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
     grid = Grid(u_lines, v_lines)
     u, v, z = (np.ascontiguousarray(column) for column in uvz.T)
     cloud = Cloud(u, v, z, cells_of(u_lines, u), cells_of(v_lines, v))
-    return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density)
+    border = frame.to_plan(every[~counts]).T
+    return Plan(frame, cloud, grid, lay_ghosts(frame, grid, cloud, outline), density, border)
 
 
-def without_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
-    """Points (n, 3) at `depth` (n,) inside an outline less those near its border that a scanner may have had of the walls."""
+def off_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.ndarray:
+    """Which of the points (n, 3) at `depth` (n,) inside an outline are none near its border that a scanner may have had of the walls."""
     density = len(points) / area_m2
     dense = density >= BORDER_MIN_DENSITY
     near = depth < (min(BORDER_M, BORDER_M_A_POINT * density) if dense else BORDER_M)
-    away = points[~near]
-    if len(away) < max(LEAST_AWAY, LEAST_AWAY_SHARE * len(points)):
-        return points
-    if dense:
-        return away
-    near[near] = on_walls(points[near], points, 1.0 / math.sqrt(density))
-    return points[~near]
+    if len(points) - near.sum() < max(LEAST_AWAY, LEAST_AWAY_SHARE * len(points)):
+        return np.ones(len(points), bool)
+    if not dense:
+        near[near] = on_walls(points[near], points, 1.0 / math.sqrt(density))
+    return ~near
 
 
 def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:

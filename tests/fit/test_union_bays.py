@@ -1,0 +1,88 @@
+"""Bays: pieces that walls cut off an outline, and level volumes where their few points ask for one."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import box
+
+from hiproof.fit.union import fit_building
+from hiproof.fit.union.bays import LEAST_M2, MOST_M2, MOST_SHARE, pieces_of
+
+HOUSE = box(0, 0, 16, 12)
+BUMPS = {
+    "beside a wall": box(16, 5, 17.1, 6.4),
+    "at a corner": box(16, 0, 17.2, 1.3),
+    "a bay window": shapely.Polygon([(16, 4), (17, 4.6), (17, 7), (16, 7.6)]),
+    "turned to the south": box(7, -1.1, 8.4, 0),
+}
+
+
+def scanned(rng, outline, height, density=5.0):
+    """Points (n, 3) spread by chance over `outline`, where the roof is `height` high."""
+    low, high = np.array(outline.bounds[:2]), np.array(outline.bounds[2:])
+    xy = rng.uniform(low, high, (int(density * np.prod(high - low)), 2))
+    xy = xy[shapely.contains_xy(outline, *xy.T)]
+    return np.column_stack([xy, height(*xy.T) + rng.normal(0.0, 0.02, len(xy))])
+
+
+def heights(fit, x, y):
+    return max(float(part.height_at(np.array([[x, y]]))[0]) for part in fit.roof_parts)
+
+
+@pytest.mark.parametrize("name", BUMPS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_small_bay_has_the_height_of_its_own_few_points(name, seed):
+    bump = BUMPS[name]
+    outline = HOUSE.union(bump)
+    rng = np.random.default_rng(seed)
+    points = scanned(rng, outline, lambda x, y: np.where(shapely.contains_xy(bump, x, y), 3.0, 8.0))
+    fit = fit_building(points, outline)
+    middle = bump.centroid
+    assert heights(fit, middle.x, middle.y) == pytest.approx(3.0, abs=0.1)
+    assert heights(fit, 8.0, 6.0) == pytest.approx(8.0, abs=0.1)
+    assert len(fit.roof_parts) == 2
+
+
+@pytest.mark.parametrize("name", BUMPS)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bay_under_the_same_roof_is_none(name, seed):
+    """Level, or a slope that runs on over it."""
+    outline = HOUSE.union(BUMPS[name])
+    rng = np.random.default_rng(seed)
+    for slope in (0.0, 0.5):
+        fit = fit_building(scanned(rng, outline, lambda x, y, k=slope: 8.0 - k * np.hypot(0, x - 8)), outline)
+        assert len(fit.roof_parts) == 1
+
+
+def test_returns_of_its_walls_are_no_roof_of_a_bay():
+    rng, bump = np.random.default_rng(0), BUMPS["beside a wall"]
+    outline = HOUSE.union(bump)
+    roof = scanned(rng, outline, lambda x, y: np.full(len(x), 8.0))
+    along = bump.exterior.intersection(outline.exterior).buffer(0.05).intersection(outline)
+    walls = scanned(rng, along, lambda x, y: rng.uniform(0.0, 7.5, len(x)), density=150.0)
+    assert len(walls) > 8
+    assert len(fit_building(np.vstack([roof, walls]), outline).roof_parts) == 1
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, 10_000))
+def test_pieces_are_what_lines_of_walls_cut_off(seed):
+    """Each lies within the outline, is simple, and all of its border but one line is the outline's."""
+    rng = np.random.default_rng(seed)
+    parts = [box(*(low := rng.uniform(0, 8, 2)), *(low + rng.uniform(1, 8, 2))) for _ in range(3)]
+    outline = max(shapely.get_parts(shapely.union_all(parts)), key=lambda polygon: polygon.area)
+    outline = shapely.Polygon(outline.exterior)
+    for ring in pieces_of(outline):
+        piece = shapely.Polygon(ring)
+        assert piece.is_valid and piece.exterior.is_ccw
+        assert LEAST_M2 <= piece.area <= min(MOST_M2, MOST_SHARE * outline.area) + 1e-9
+        assert piece.difference(outline).area < 1e-9
+        inner = piece.exterior.difference(outline.exterior.buffer(1e-6))
+        assert len(shapely.get_parts(shapely.line_merge(inner))) == 1
+        assert inner.length == pytest.approx(inner.convex_hull.length, abs=1e-4)
+
+
+def test_a_rectangle_has_no_pieces():
+    assert pieces_of(HOUSE) == []
