@@ -26,8 +26,10 @@ from hiproof.city.plan import Job, WorkPlan
 from hiproof.city.request import Request
 from hiproof.city.run import reconstruct_area
 from hiproof.cli.app import app
-from hiproof.errors import OutputError
+from hiproof.errors import InputError, OutputError
+from hiproof.evaluate.models import run_models
 from hiproof.model import Footprint
+from hiproof.parametric.run import build_file
 from hiproof.settings import Settings
 from hiproof.write.fragments import load_fragments, save_fragments
 from hiproof.write.head import FileHead
@@ -161,6 +163,22 @@ def test_a_file_that_was_lost_or_damaged_is_made_again(harm, name, town_files, u
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         reconstruct_area(request)
+
+
+@pytest.mark.parametrize(
+    "asked",
+    [{}, {"city": {"models": "tiles"}}, {"city": {"models": "both"}, "write": {"citygml": "3.0"}}],
+    ids=["merged", "tiles", "both, CityGML 3.0"],
+)
+def test_models_stand_where_the_summary_says(town_files, tmp_path, quick, asked):
+    request = Request((town_files[0],), tmp_path, town_files[1], settings=Settings.from_dict(asked))
+    summary = reconstruct_area(request)
+    assert summary.models and all(place.exists() for place in summary.models)
+    built = build_file(tmp_path / "parameters.jsonl", tmp_path / "built")
+    assert len(built.models) == 2 and all(place.exists() for place in built.models)
+    if (tmp_path / "models") in summary.models and not (tmp_path / "buildings.city.jsonl").exists():
+        with pytest.raises(InputError, match=r"those of work tiles alone, .*; `hiproof build"):
+            run_models(tmp_path)
 
 
 def test_models_of_work_tiles_are_claimed_too(town_files, tmp_path, quick):

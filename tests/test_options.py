@@ -117,7 +117,7 @@ def begun(monkeypatch):
     def check_only(request, progress):
         refuse_unusable(request)
         requests.append(request)
-        return Summary(request.out, 0, {}, {}, None, None, (), (), {})
+        return Summary((), 0, {}, {}, None, None, (), (), {})
 
     monkeypatch.setattr("hiproof.cli.running.reconstruct_area", check_only)
     return requests

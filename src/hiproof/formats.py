@@ -127,6 +127,8 @@ OF_MODELS = {name: format for name, format in FORMATS.items() if not format.frag
 OF_TILES = {name: format for name, format in FORMATS.items() if format.tile_ending}
 """What a work tile may have of its own."""
 
+TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a run writes these
+
 
 def asked_files(settings: Settings, folder: Path) -> dict[str, Path]:
     """Paths in `folder` of the files that a run of these settings writes for the whole area, by format.
@@ -146,6 +148,16 @@ def asked_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, P
     by_tile = settings.city.models != "merged"
     asked = {name: format for name, format in asked_formats(settings.write).items() if by_tile and format.tile_ending}
     return {name: folder / f"{tile}{format.tile_ending}" for name, format in asked.items()}
+
+
+def places_of_models(settings: Settings, folder: Path) -> list[Path]:
+    """Where the models of such a run stand in `folder`: files of the whole area, the folder of those of work tiles.
+
+    >>> [path.name for path in places_of_models(Settings.from_dict({"write": {"citygml": "3.0"}}), Path("out"))]
+    ['buildings.citygml3.gml', 'buildings.city.jsonl']
+    """
+    whole = [path for name, path in asked_files(settings, folder).items() if name in OF_TILES]
+    return whole if settings.city.models == "merged" else [*whole, folder / TILE_FOLDER]
 
 
 def asked_fragments(write: WriteSettings) -> list[str]:

@@ -6,12 +6,11 @@ import re
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
-from ..formats import FORMATS, OF_TILES, asked_files, asked_tile_files
+from ..formats import FORMATS, OF_TILES, TILE_FOLDER, asked_files, asked_tile_files
 from ..write.fragments import Fragments, load_fragments
 from ..write.run_files import join_fragments
 from .plan import WorkPlan
 
-TILE_FOLDER = "models"
 ENDINGS = "|".join(re.escape(format.tile_ending) for format in OF_TILES.values())
 TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: unfinished
 

@@ -17,6 +17,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import InputError, OutputError
+from ..formats import places_of_models
 from ..frames import METRES, Units
 from ..log import LOGGER
 from ..masking import masked, masked_values
@@ -41,9 +42,9 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Summary:
-    """What came of it: buildings by status and type, figures, input that could not be used, seconds by step."""
+    """What came of it: where the models are, buildings by status and type, figures, input that could not be used, seconds by step."""
 
-    out: Path
+    models: tuple[Path, ...]
     buildings: int
     by_status: dict[str, int]
     by_type: dict[str, int]
@@ -238,7 +239,7 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
     failed = [task for task in ledger.tasks() if task.state == "failed"]
     broken = tuple((request_name(task.name, request), task.message) for task in failed)
     return Summary(
-        out=Path(request.out),
+        models=tuple(places_of_models(plan.settings, Path(request.out))),
         buildings=sum(ledger.counts("status").values()),
         by_status=ledger.counts("status"),
         by_type=ledger.counts("type"),

@@ -52,5 +52,5 @@ def build(
     for id, why in built.not_built:
         typer.echo(f"not built: building {id}: {why}", err=True)
     typer.echo(f"{built.buildings} buildings: " + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common()))
-    typer.echo(f"models: {out / 'buildings.gml'}, {out / 'buildings.city.jsonl'}")
+    typer.echo("models: " + ", ".join(map(str, built.models)))
     raise typer.Exit(built.exit_code)

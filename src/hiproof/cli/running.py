@@ -79,4 +79,4 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
         show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
     for id, why in summary.failures:
         show(Text.assemble(("internal error:", "red"), f" building {id}: {why}"))
-    show(Text(f"models: {summary.out / 'buildings.gml'}, {summary.out / 'buildings.city.jsonl'}"))
+    show(Text("models: " + ", ".join(map(str, summary.models))))

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..formats import FORMATS
+from ..formats import FORMATS, TILE_FOLDER
 from ..frames import METRES, Units
 from ..model import GROUND, ROOF, WALL, Face, Solid
 from ..read.cityjson import UNUSABLE, features
@@ -50,7 +50,12 @@ class BuildingModel:
 
 def run_models(folder: Path) -> Path:
     """Path of the models in the output folder of a run. Raises InputError where there are none."""
-    path = Path(folder) / RUN_MODELS
+    path, tiles = Path(folder) / RUN_MODELS, Path(folder) / TILE_FOLDER
+    if not path.is_file() and any(tiles.glob(f"*{FORMATS['cityjson'].tile_ending}")):
+        raise InputError(
+            f"expected models of the whole area in {folder}, got those of work tiles alone, in {tiles}; "
+            f"`hiproof build {Path(folder) / FORMATS['parameters'].file} --out OTHER` makes them"
+        )
     if not path.is_file():
         raise InputError(
             f"expected the output folder of `hiproof reconstruct`, got {folder} without {RUN_MODELS}; "

@@ -17,7 +17,7 @@ import shapely
 
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError
-from ..formats import asked_files
+from ..formats import asked_files, places_of_models
 from ..masking import masked, masked_values
 from ..model import Building
 from ..settings import Settings
@@ -38,8 +38,10 @@ MOST_TOLD = 1000  # sentences kept of buildings that could not be built; a wrong
 
 @dataclass
 class Built:
-    """What came of a file: buildings by status, and (id, sentence) of those that could not be built, the first MOST_TOLD."""
+    """What came of a file: where the models are, buildings by status, and (id, sentence) of those that could not be built, the first
+    MOST_TOLD."""
 
+    models: list[Path] = field(default_factory=list)
     by_status: Counter = field(default_factory=Counter)
     by_type: Counter = field(default_factory=Counter)
     not_built: list[tuple[str, str]] = field(default_factory=list)
@@ -79,6 +81,7 @@ def build_file(
     with opened_parameters(path) as (head, records):
         settings = Settings(write=head.write).replace(changes or {})
         offset = head.offset if settings.write.out_crs == head.write.out_crs else None
+        built.models = places_of_models(settings, out)
         maker = Maker(dataclasses.replace(head, write=settings.write, offset=offset))
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
