@@ -71,7 +71,7 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
         told = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
         raise InputError(
             f"expected planes that rise from the eaves by less than {STEEPEST_DEG:g} degrees, got a {kind} roof of {told} "
-            f"in {where}; is one of its lengths too long?"
+            f"in {where}; is one of its sizes negative, or too long?"
         )
 
 
