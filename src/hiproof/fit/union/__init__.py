@@ -32,6 +32,8 @@ fit         the outcome
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import shapely
 
@@ -98,7 +100,8 @@ def fit_building(
     parts = that_show(parts, plan, scene)
     parts = in_own_shapes(put_together(parts, types), points_local, settings)
     parts = [as_allowed(part, types, points_local) for part in parts]
-    parts = clamped(parts, *(plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max())))
+    low, high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
+    parts = clamped(parts, low, high, 1.0 / math.sqrt(plan.density))
     parts = that_show(parts, plan, scene, widest_m2=0.0)
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, far)

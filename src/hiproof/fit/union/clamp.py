@@ -12,11 +12,19 @@ from ...rings import GRID_M
 from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
+MISSED_SPACINGS = (
+    0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner
+)
 
 
-def clamped(parts: list[Part], low: float, high: float) -> list[Part]:
-    """`parts` within `low` and `high` by CLAMP_M, and level parts in place of what lies beyond."""
-    return [part for own in parts for part in clamped_part(own, low - CLAMP_M, high + CLAMP_M)]
+def clamped(parts: list[Part], low: float, high: float, spacing: float) -> list[Part]:
+    """`parts` within `low` and `high` but for what points `spacing` (m) apart miss, and level parts in place of what lies beyond."""
+    found = []
+    for part in parts:
+        steepest = max(float(np.hypot(*piece.planes[:, :2].T).max()) for piece in part.pieces)
+        margin = CLAMP_M + MISSED_SPACINGS * spacing * steepest
+        found += clamped_part(part, low - margin, high + margin)
+    return found
 
 
 def clamped_part(part: Part, low: float, high: float) -> list[Part]:
