@@ -64,6 +64,23 @@ ROOFS = {
         (box(12, 0, 16, 8), level(4)),
         (box(4.3, 0.6, 7.7, 4), level(8.1)),
     ],
+    "a hip with a flatter skirt": [
+        (box(0, 0, 14, 10), hip(0, 14, 0, 10, slope=0.35)),
+        (box(1.6, 1.6, 12.4, 8.4), hip(1.6, 12.4, 1.6, 8.4, 5.56, 1.2)),
+    ],
+    "a pyramid with a flatter skirt": [
+        (box(0, 0, 11, 11), hip(0, 11, 0, 11, slope=0.3)),
+        (box(1.8, 1.8, 9.2, 9.2), hip(1.8, 9.2, 1.8, 9.2, 5.54, 1.1)),
+    ],
+    "slopes back to back with a step between": [
+        (box(0, 0, 12, 5), lambda x, y: 6 + 0.35 * y),
+        (box(0, 5, 12, 10), lambda x, y: 7.2 + 0.35 * (10 - y)),
+    ],
+    "a clerestory": [
+        (box(0, 0, 14, 5), lambda x, y: 5 + 0.3 * y),
+        (box(0, 5, 14, 10), lambda x, y: 7.5 - 0.3 * (y - 5)),
+    ],
+    "a steeple": [(box(0, 0, 18, 8), gable(0, 8, slope=1.2)), (box(-4, 1.5, 1, 6.5), hip(-4, 1, 1.5, 6.5, 14, 1.8))],
     "a mansard and an annex": [
         (box(0, 0, 12, 8), lambda x, y: np.minimum(hip(0, 12, 0, 8, 5.0, 1.3)(x, y), 7.2)),
         (box(12, 1, 16, 7), level(4)),

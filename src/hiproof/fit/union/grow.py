@@ -22,6 +22,9 @@ MOST_PLANES, MOST_NEW_PLANES = 16, 10  # candidate planes from all points at fir
 TRIED_EACH_WAY = 2  # candidates of the largest gain that are tried in earnest
 # of the highest misfit, from which on a point counts as unexplained; points worth a further volume
 UNEXPLAINED, FEWEST_UNEXPLAINED = 0.98, 4
+# of the highest misfit, from which on points count in a roof that leaves none unexplained but costs so many units: the base half way up a
+# skirt lies within a quarter of a metre of it all
+POORLY, WORTH_UNITS = 0.3, 5.0
 BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs but not below a stray point
 MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
 FINAL_ROUNDS = 3  # of all moves at the end
@@ -116,9 +119,13 @@ def has_come_back(
 
 
 def unexplained(volumes: np.ndarray, scene: Scene) -> np.ndarray:
-    """Points (m,) that the roof leaves unexplained."""
+    """Points (m,) that the roof leaves unexplained; where there are none, those that it explains poorly if that is dear."""
     z, _ = roof_heights(volumes, scene.U, scene.V)
-    return np.nonzero(costs(z, scene)[: scene.n] > UNEXPLAINED)[0]
+    cost = costs(z, scene)[: scene.n]
+    far = np.nonzero(cost > UNEXPLAINED)[0]
+    if len(far) < FEWEST_UNEXPLAINED and cost.sum() > WORTH_UNITS * scene.evidence:
+        return np.nonzero(cost > POORLY)[0]
+    return far
 
 
 def typical_slopes(candidates: np.ndarray) -> np.ndarray:

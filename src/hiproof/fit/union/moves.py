@@ -8,6 +8,8 @@
     add an end, a level top               a gable becomes a hip, a hip a mansard
     let it join again                     a volume that replaces becomes part of the max
     merge                                 one volume over the rectangles of two
+    surround                              slopes around a volume become one that it stands on
+    hand over                             a plane goes to the volume that runs on in it
 
 All functions take volumes (k, COLUMNS) and the objective's value, and return the better of what they got and what they found.
 """
@@ -24,6 +26,7 @@ from .objective import objective
 from .refit import refit
 from .volumes import (
     DIRECTION,
+    FREE,
     LEAN,
     LEVEL,
     OFFSET,
@@ -52,6 +55,9 @@ from .volumes import (
 HOPELESS_UNITS, HOPELESS_SHARE = 2.0, 0.01  # a trial that starts further above the best than this is given up
 MOST_SLOPES, SLOPES_APART = 9, 0.02  # slopes a plane is tried at, and rise over run between two of them
 END_SEEDS = 16  # points through which a new plane is tried
+ALIKE_M = 0.4  # m between two planes that may be one: as far as points reach from a plane, and half as far again
+# m within which a volume begins beyond the side of another, or under it, where edges are hidden and lie anywhere
+BESIDE_M, UNDER_M = 0.6, 2.0
 MERGE_REACH_M = 2.0  # m that edges may move when one volume takes another's place
 ALMOST_LEVEL = 0.15  # rise over run; below it a plane may as well be level
 AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
@@ -417,6 +423,95 @@ def merge_with_others(volumes, scene, value, k, steepest):
 
 
 @compiled
+def surround(volumes, scene, value, k):
+    """The volumes that slope towards volume k on several of its sides become one that it stands on: a mansard's lower slopes, a skirt."""
+    beside = np.zeros(SIDES, np.int64)
+    for side in range(SIDES):
+        beside[side] = sloping_towards(volumes, k, side)
+    first = beside.max()
+    if first == 0 or ((beside == 0) | (beside == first)).all():
+        return volumes, value
+    own = volumes[first].copy()
+    kept = np.ones(len(volumes), np.bool_)
+    own[OFFSET : OFFSET + PLANES], own[SLOPE : SLOPE + SIDES], own[LEAN : LEAN + SIDES] = np.inf, 0.0, 0.0
+    for side in range(SIDES):
+        j = beside[side]
+        own[U0 + side] = volumes[j if j > 0 else k, U0 + side]
+        if j > 0:
+            kept[j] = False
+            for column in (OFFSET + side, SLOPE + side, LEAN + side):
+                own[column] = volumes[j, column]
+    own[TIE], own[REPLACES] = FREE, 0.0
+    top = volumes[k : k + 1].copy()
+    top[0, REPLACES] = 1.0
+    for side in range(SIDES):
+        if beside[side] > 0:
+            top[0, U0 + side] = volumes[beside[side], U0 + (side ^ 1)]
+    kept[0] = kept[k] = False
+    trial = np.concatenate((volumes[:1], own.reshape(1, -1), top, volumes[kept]))
+    trial, found = settled(trial, scene, 1, value, MERGE_REACH_M)
+    return (trial, found) if found < np.inf else (volumes, value)
+
+
+@compiled
+def hand_over(volumes, scene, value, k):
+    """A plane of volume k goes to the volume that runs on in it: two slopes with a step between them are no gable with a strip beside."""
+    for side in range(SIDES):
+        j = running_on(volumes, k, side)
+        if j == 0:
+            continue
+        trial = volumes.copy()
+        remove_plane(trial[k], side)
+        trial[j, U0 + side], trial[k, U0 + side] = volumes[k, U0 + side], volumes[j, U0 + (side ^ 1)]
+        trial, found = settled(trial, scene, k, value, MERGE_REACH_M)
+        if found < np.inf:
+            return trial, found
+    return volumes, value
+
+
+@compiled
+def running_on(volumes, k, side):
+    """The volume that begins within volume k, over all its length, and has its plane of that side, and no other, all but as high; 0
+    where there is none."""
+    if volumes[k, OFFSET + side] == np.inf or plane_count(volumes[k]) < 2:
+        return 0
+    across = 2 - 2 * (side // 2)
+    for j in range(1, len(volumes)):
+        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or volumes[j, OFFSET + side] == np.inf:
+            continue
+        along = np.abs(volumes[j, U0 + across : U0 + across + 2] - volumes[k, U0 + across : U0 + across + 2]).max()
+        within = volumes[k, U0 + 2 * (side // 2)] < volumes[j, U0 + (side ^ 1)] < volumes[k, U1 + 2 * (side // 2)]
+        if along < BESIDE_M and within and plane_count(volumes[j]) == 1 and is_alike(volumes, k, j, side):
+            return j
+    return 0
+
+
+@compiled
+def is_alike(volumes, k, j, plane):
+    """Whether a plane of two volumes is all but as high in the middle of volume k."""
+    u, v = 0.5 * (volumes[k, U0] + volumes[k, U1]), 0.5 * (volumes[k, V0] + volumes[k, V1])
+    own = volumes[k, OFFSET + plane] + volumes[k, SLOPE + plane] * distance_up(volumes[k], plane, u, v)
+    other = volumes[j, OFFSET + plane] + volumes[j, SLOPE + plane] * distance_up(volumes[j], plane, u, v)
+    return abs(own - other) < ALIKE_M
+
+
+@compiled
+def sloping_towards(volumes, k, side):
+    """The volume that begins at a side of volume k, along half of it at least, and rises towards it; 0 where there is none."""
+    across, sign = 2 - 2 * (side // 2), -1.0 if side % 2 == 0 else 1.0
+    low, high = volumes[k, U0 + across], volumes[k, U1 + across]
+    for j in range(1, len(volumes)):
+        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION] or volumes[j, OFFSET + side] == np.inf:
+            continue
+        overlap = min(high, volumes[j, U1 + across]) - max(low, volumes[j, U0 + across])
+        begins = sign * (volumes[j, U0 + (side ^ 1)] - volumes[k, U0 + side])
+        ends = sign * (volumes[j, U0 + side] - volumes[k, U0 + side])
+        if -UNDER_M < begins < BESIDE_M and ends > 0.0 and overlap > 0.5 * (high - low):
+            return j
+    return 0
+
+
+@compiled
 def max_slope(volumes, j, k):
     return max(volumes[j, SLOPE : SLOPE + SIDES].max(), volumes[k, SLOPE : SLOPE + SIDES].max())
 
@@ -456,6 +551,9 @@ def improve(volumes, scene, value, slopes, rounds):
             if is_unsettled(volumes, k):
                 volumes, value = change_planes(volumes, scene, value, k, slopes)
                 volumes, value = merge_with_others(volumes, scene, value, k, np.inf)
+                if k < len(volumes):
+                    volumes, value = surround(volumes, scene, value, k)
+                    volumes, value = hand_over(volumes, scene, value, min(k, len(volumes) - 1))
                 if value == start:
                     volumes[k, SETTLED] = surroundings(volumes, k)
             k = k + 1 if len(volumes) == count else 1
