@@ -14,6 +14,7 @@ import shapely
 from .grow import UNEXPLAINED
 from .objective import base_shows
 from .plan import Plan
+from .regions import misfits
 from .scene import Scene
 from .sides import lines_of
 from .unite import Drawn, drawn
@@ -76,8 +77,9 @@ def level_over(bay: np.ndarray, volumes: np.ndarray, seen: Seen, scene: Scene, u
     if not base_shows(volumes, scene):  # what little there is of the base is drawn as the roof beside
         beside, _ = roof_heights(continued(volumes, min(bay[2] - bay[1], bay[4] - bay[3])), *where)
         now = np.where(top > 0, now, misfits(z, beside, scene))
-    each = misfits(z[:, None], z, scene)
-    near = each[:, np.argmin(each.sum(axis=0))] < 1.0
+    reach = scene.dead + scene.width
+    first, last = np.searchsorted(z, z - reach, "right"), np.searchsorted(z, z + reach, "left")
+    near = slice(*max(zip(first, last, strict=True), key=lambda ends: ends[1] - ends[0]))
     height = float(np.median(z[near]))
     row[OFFSET : OFFSET + PLANES] = np.inf
     row[OFFSET + LEVEL], row[DIRECTION], row[REPLACES] = height, direction, height < np.median(roof)
@@ -93,11 +95,6 @@ def continued(volumes: np.ndarray, by_m: float) -> np.ndarray:
     wider[:, [U0, V0]] -= by_m
     wider[:, [U1, V1]] += by_m
     return wider
-
-
-def misfits(z: np.ndarray, height: np.ndarray | float, scene: Scene) -> np.ndarray:
-    """What each point at `z` costs under a roof so high."""
-    return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
 
 
 def rectangles_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[np.ndarray]:

@@ -423,6 +423,16 @@ def merge_with_others(volumes, scene, value, k, steepest):
 
 
 @compiled
+def join_neighbours(volumes, scene, value, k):
+    """Volume k merged with another, those around it made one, or a plane of it handed to its neighbour: what helps first."""
+    count, start = len(volumes), value
+    volumes, value = merge_with_others(volumes, scene, value, k, np.inf)
+    if len(volumes) == count:
+        volumes, value = surround(volumes, scene, value, k)
+    return hand_over(volumes, scene, value, k) if value == start else (volumes, value)
+
+
+@compiled
 def surround(volumes, scene, value, k):
     """The volumes that slope towards volume k on several of its sides become one that it stands on: a mansard's lower slopes, a skirt."""
     beside = np.zeros(SIDES, np.int64)
@@ -550,10 +560,7 @@ def improve(volumes, scene, value, slopes, rounds):
             count, start = len(volumes), value
             if is_unsettled(volumes, k):
                 volumes, value = change_planes(volumes, scene, value, k, slopes)
-                volumes, value = merge_with_others(volumes, scene, value, k, np.inf)
-                if k < len(volumes):
-                    volumes, value = surround(volumes, scene, value, k)
-                    volumes, value = hand_over(volumes, scene, value, min(k, len(volumes) - 1))
+                volumes, value = join_neighbours(volumes, scene, value, k)
                 if value == start:
                     volumes[k, SETTLED] = surroundings(volumes, k)
             k = k + 1 if len(volumes) == count else 1

@@ -108,7 +108,7 @@ def rises_through(
     xy, z = points_in(region, plan, scene)
     height = heights_over(volume, planes, xy, plan, scene)
     below = height < base
-    return misfit(z[below], np.full(below.sum(), base), scene) <= misfit(z[below], height[below], scene)
+    return bool(misfits(z[below], base, scene).sum() <= misfits(z[below], height[below], scene).sum())
 
 
 def points_in(region: shapely.Geometry, plan: Plan, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
@@ -118,9 +118,9 @@ def points_in(region: shapely.Geometry, plan: Plan, scene: Scene) -> tuple[np.nd
     return xy[inside], scene.z[: scene.n][inside]
 
 
-def misfit(z: np.ndarray, height: np.ndarray, scene: Scene) -> float:
-    """What points at `z` (n,) cost under a roof so high (n,)."""
-    return float((np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2).sum())
+def misfits(z: np.ndarray, height: np.ndarray | float, scene: Scene) -> np.ndarray:
+    """What each point at `z` (n,) costs under a roof so high (n,)."""
+    return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
 
 
 def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan, scene: Scene) -> np.ndarray:
@@ -199,5 +199,5 @@ def is_base(
         return False
     xy, z = points_in(gap, plan, scene)
     continued = heights_over(volume, planes, xy, plan, scene)
-    level = np.full(len(z), base[OFFSET + LEVEL])
-    return not len(z) or misfit(z, continued, scene) > misfit(z, level, scene) + SHAPE_UNITS * scene.evidence
+    gain = misfits(z, continued, scene).sum() - misfits(z, base[OFFSET + LEVEL], scene).sum()
+    return not len(z) or bool(gain > SHAPE_UNITS * scene.evidence)
