@@ -22,7 +22,9 @@ from .volumes import COLUMNS, DIRECTION, LEVEL, OFFSET, PLANES, REPLACES, U0, U1
 
 # m2 of a bay, and its share of the outline at most: what is larger has points enough for the search; m of its narrower side
 LEAST_M2, MOST_M2, MOST_SHARE, LEAST_WIDTH_M = 0.25, 12.0, 0.34, 0.3
-FILLED = 1.25  # of a bay's area: so much of the outline lies at most within the rectangle around it
+# of a bay's area: so much of the outline lies at most within the rectangle around it; of that: so much is the bay at least, which a bay window
+# fills to 0.7 and a wedge beside a wall that bends to a half; how many times as long as wide it is at most
+FILLED, FULL, SLENDER = 1.25, 0.6, 10.0
 SAME_M = 0.1  # rectangles whose sides all lie nearer are one bay's
 FEWEST = 2  # points that the roof leaves unexplained and the level volume explains
 # units, of a common house's points: The Hague's even places at 2 and 5 points/m2 84.3, 86.8 %; 0.6: 84.5, 86.8; 1.5: 84.3, 86.7
@@ -109,13 +111,15 @@ def rectangles_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[np
 
 def rectangle_around(ring: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> np.ndarray | None:
     """Around a piece's ring (m, 2) in the direction in which it holds least of the outline besides; None where that is too much."""
-    own, best, least = (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T, None, FILLED * shapely.Polygon(ring).area
+    own, area = (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T, shapely.Polygon(ring).area
+    best, least = None, FILLED * area
     for direction, (c, s) in enumerate(scene.turn):
         turned = own @ np.array([[c, -s], [s, c]])
         low, high = turned.min(axis=0), turned.max(axis=0)
         corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) @ np.array([[c, s], [-s, c]])
         held = shapely.intersection(shapely.Polygon(plan.frame.xy_local(corners)), outline).area
-        if held < least and (high - low).min() >= LEAST_WIDTH_M:
+        narrow, wide = np.sort(high - low)
+        if held < least and area > FULL * narrow * wide and narrow >= max(LEAST_WIDTH_M, wide / SLENDER):
             best, least = np.array([direction, low[0], high[0], low[1], high[1]]), held
     return best
 
