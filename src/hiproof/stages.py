@@ -341,3 +341,18 @@ def judge(
         types=fitted.types,
     )
     return settled_building(judged)
+
+
+def doubled(building: Building, points: np.ndarray) -> str:
+    """A sentence where the points (n, 3), in the roof's frame, lie on two surfaces one over the other; empty otherwise."""
+    from .evaluate.layers import two_surfaces
+
+    if building.built is None:
+        return ""
+    share, apart_m = two_surfaces(points, building.roof)
+    return (
+        f"over {100 * share:.0f} % of its area points lie on two surfaces, {apart_m:.2f} m apart: two flights, two dates or "
+        "glass; use a cloud of one"
+        if share
+        else ""
+    )

@@ -1,0 +1,66 @@
+"""Points of two surfaces, one over the other, are told from those of one roof, and by how much they lie apart."""
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hiproof
+from hiproof.evaluate.layers import split_cells, two_surfaces
+from hiproof.simulate import random_compound
+from points_of_roofs import sampled
+
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+def compound(seed, density=6.0, noise_m=0.03):
+    """A compound roof, and points (n, 3) on it in its own frame."""
+    roof = random_compound(np.random.default_rng(seed)).roof
+    return roof, sampled(lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, noise_m, seed)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(2.0, 20.0), st.floats(0.0, 0.3))
+def test_points_of_one_roof_are_one_surface_whatever_their_noise(seed, density, noise_m):
+    roof, points = compound(seed, density, noise_m)
+    assert two_surfaces(points, roof) == (0.0, 0.0)
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(0.3, 6.0), st.floats(0.35, 0.65), st.sampled_from([-1.0, 1.0]), st.floats(0.0, 1.0))
+def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(seed, apart_m, share, side, between):
+    roof, points = compound(seed)
+    raised = np.random.default_rng(seed).random(len(points)) < share
+    points[:, 2] += side * apart_m * (raised - between)
+    found, distance_m = two_surfaces(points, roof)
+    assert found > 0.4
+    assert distance_m == pytest.approx(apart_m, abs=0.05)
+
+
+@settings(max_examples=20, deadline=None)
+@given(SEEDS, st.floats(0.5, 5.0))
+def test_a_part_that_the_model_lacks_is_no_second_surface(seed, height_m):
+    roof, points = compound(seed)
+    x0, _, x1, _ = roof.outline.bounds
+    points[:, 2] += height_m * (points[:, 0] > x0 + 0.6 * (x1 - x0))
+    assert two_surfaces(points, roof) == (0.0, 0.0)
+
+
+def test_the_split_of_a_cell_is_the_best_of_all():
+    rng = np.random.default_rng(3)
+    xy, values = rng.uniform(0, 4, (60, 2)), rng.normal(size=60)
+    counts, smaller, apart, within = split_cells(xy, values, 100.0)
+    ordered = np.sort(values)
+    k = min(range(1, 60), key=lambda k: ordered[:k].var() * k + ordered[k:].var() * (60 - k))
+    left = (ordered[:k].var() * k + ordered[k:].var() * (60 - k)) / 60 / values.var()
+    assert counts.tolist() == [60] and smaller.tolist() == [min(k, 60 - k)]
+    assert (apart[0], within[0]) == pytest.approx((ordered[k:].mean() - ordered[:k].mean(), left))
+
+
+def test_a_building_says_that_its_points_lie_on_two_surfaces():
+    outline = shapely.box(0, 0, 12, 8)
+    points = sampled(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
+    assert "two surfaces" not in hiproof.reconstruct(points, outline).detail
+    points[::2, 2] += 0.4
+    assert "points lie on two surfaces, 0.40 m apart" in hiproof.reconstruct(points, outline).detail
