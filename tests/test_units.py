@@ -20,6 +20,7 @@ import planted
 from hiproof import read_parameters
 from hiproof.city import run as city_run
 from hiproof.city.ledger import Ledger
+from hiproof.city.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, InputWarning
 from hiproof.evaluate.models import read_models
@@ -296,3 +297,14 @@ def test_a_unit_that_is_not_the_crs_is_refused(tmp_path):
 
 def test_units_have_names():
     assert str(METRES) == "metre" and str(Units(0.3048, 1.0, "foot", "metre")) == "foot, heights in metre"
+
+
+def test_a_run_says_that_a_clouds_heights_come_in_coarse_steps(tmp_path):
+    xyz = np.column_stack([TOWN.xyz[:, :2], np.rint(TOWN.xyz[:, 2] * 10) / 10])
+    np.savetxt(
+        tmp_path / "cloud.xyzc", np.column_stack([xyz, TOWN.classification]), "%.3f", header="x y z classification"
+    )
+    footprints = write_footprints(tmp_path / "footprints.gpkg", TOWN.footprints)
+    request = Request((str(tmp_path / "cloud.xyzc"),), tmp_path / "out", str(footprints))
+    with pytest.warns(InputWarning, match=r"cloud\.xyzc: coordinates come in steps of 0\.1 m in height, and roofs"):
+        make_plan(request)

@@ -1,15 +1,17 @@
 """Point clouds come back as they were written, in every format; what cannot be read gets one sentence."""
 
 import struct
+from dataclasses import replace
 
 import laspy
 import numpy as np
 import pytest
 
 from hiproof.errors import InputError, InputWarning
+from hiproof.frames import METRES
 from hiproof.read.columns import find_columns
 from hiproof.read.las import is_copc
-from hiproof.read.pointcloud import expand_paths, iter_points, read_header, read_points
+from hiproof.read.pointcloud import expand_paths, iter_points, read_header, read_points, say_how_coarse
 from hiproof.settings import Settings
 
 
@@ -173,6 +175,46 @@ def test_withheld_points_are_left_out_with_a_warning(tmp_path):
     las.write(tmp_path / "b.las")
     with pytest.warns(InputWarning, match="4 points flagged as withheld"):
         assert np.allclose(read_points(tmp_path / "b.las").xyz, xyz[4:], atol=1e-6)
+
+
+def write_coarse_las(path, xyz, plan, height):
+    header = laspy.LasHeader(version="1.2", point_format=1)
+    header.scales = (plan, plan, height)
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = xyz.T
+    las.write(path)
+    return path
+
+
+def write_rounded_text(path, xyz, plan, height):
+    steps = np.array([plan, plan, height])
+    return write_text(path, np.rint(xyz / steps) * steps, np.zeros(len(xyz), int))
+
+
+@pytest.mark.parametrize(("write", "name"), [(write_coarse_las, "a.las"), (write_rounded_text, "a.csv")])
+@pytest.mark.parametrize(
+    ("plan", "height", "told"), [(1.0, 0.1, "1 m in plan and 0.1 m in height"), (0.001, 0.1, "0.1 m in height")]
+)
+def test_coordinates_in_coarse_steps_are_told_of_once(tmp_path, write, name, plan, height, told):
+    header = read_header(write(tmp_path / name, some_points()[0], plan, height))
+    others = [replace(header, path=other) for other in ("b", "c")]
+    with pytest.warns(InputWarning, match=f"{name} and 2 more: coordinates come in steps of {told}, and") as caught:
+        say_how_coarse([header, *others], METRES)
+    assert len(caught) == 1
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_of_coordinates_in_fine_steps_nothing_is_said(tmp_path, name, recwarn):
+    path = FORMATS[name](tmp_path, *some_points())
+    say_how_coarse([read_header(path)], METRES)
+    read_points(path)
+    assert not recwarn.list
+
+
+def test_steps_in_feet_are_told_in_metres(tmp_path):
+    path = write_coarse_las(tmp_path / "a.las", some_points()[0], 0.1, 1.0)
+    with pytest.warns(InputWarning, match="steps of 0.305 m in height, and"):
+        read_points(path, settings=Settings.from_dict({"read": {"unit": "foot"}}))
 
 
 AS_TOLD = {

@@ -13,7 +13,7 @@ from ..frames import Units
 from ..read.crs import described, parse_crs, units_of
 from ..read.footprints import footprint_crs
 from ..read.overlap import doubtful_place, refuse_degrees
-from ..read.pointcloud import PointFileHeader, common_crs
+from ..read.pointcloud import PointFileHeader, common_crs, say_how_coarse
 
 
 @dataclass(frozen=True)
@@ -45,6 +45,7 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     frame = AreaFrame(cloud, footprints, units_of(cloud or footprints, named=read.unit))
     if cloud is None and (footprints is not None or read.unit == "auto"):
         say_what_is_assumed(headers[0].path, frame)
+    say_how_coarse(headers, frame.units)
     if frame.crs is not None:
         say_where_it_lies(headers, frame)
     return frame

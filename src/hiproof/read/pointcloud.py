@@ -46,18 +46,28 @@ FORMATS = " or ".join(", ".join(reader.name for reader in READERS.values()).rspl
 PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
 CHUNK_POINTS = 5 * RUN_POINTS  # 30 MB while they are sorted
 
+COARSE_M = (
+    0.05  # coordinates in larger steps are told of: they add a third of it to the noise, as much as a good scanner has
+)
+STEPS = (1.0, 0.5, 0.25, 0.2, 0.125, 0.1, 0.0625)  # that text rounds to, or 32 bits at a national grid's coordinates
+STEP_POINTS = (100, 10_000)  # fewer say nothing of steps, more nothing new
+
 Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
 
 
 @dataclass(frozen=True)
 class PointFileHeader:
-    """What a point file says of itself; `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit."""
+    """What a point file says of itself; `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit.
+
+    `steps` are those in which its coordinates come, in plan and in height, in its unit too: 0 where they are fine or not known.
+    """
 
     path: str
     bounds: tuple[float, float, float, float, float, float]
     count: int
     crs: Any = None
     point_format: int | None = None
+    steps: tuple[float, float] = (0.0, 0.0)
 
 
 def read_points(*paths: str | Path, settings: Settings | None = None, box: Box | None = None) -> PointCloud:
@@ -68,8 +78,10 @@ def read_points(*paths: str | Path, settings: Settings | None = None, box: Box |
     were. Raises InputError for what is missing, unreadable, empty, in degrees, or in different CRSs.
     """
     files, read = expand_paths(paths), (settings or Settings()).read
-    crs = common_crs({str(file): file_crs(file) for file in files}, parse_crs(read.crs))
+    headers = {str(file): las_file_header(file) for file in files}
+    crs = common_crs({file: header and header.crs for file, header in headers.items()}, parse_crs(read.crs))
     units = units_of(crs, "the point cloud", read.unit)
+    say_how_coarse([header for header in headers.values() if header], units)
     clouds = [chunk for file in files for chunk in iter_points(file, box=box, units=units)]
     xyz = np.concatenate([cloud.xyz for cloud in clouds]) if clouds else np.empty((0, 3))
     if not len(xyz):
@@ -144,18 +156,64 @@ def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
 
 def read_header(path: str | Path) -> PointFileHeader:
     """Bounds, count and CRS of one file: from the header of LAS, LAZ and COPC, by one pass over text and PLY."""
-    if file_kind(path) == "las":
-        header = las.read_las_header(path)
-        (xmin, ymin, zmin), (xmax, ymax, zmax) = header.mins.tolist(), header.maxs.tolist()
-        crs = las.las_crs(header, path)
-        bounds = (xmin, ymin, zmin, xmax, ymax, zmax)
-        return PointFileHeader(str(path), bounds, header.point_count, crs, header.point_format.id)
-    count, low, high = 0, np.full(3, np.inf), np.full(3, -np.inf)
+    header = las_file_header(path)
+    if header is not None:
+        return header
+    count, low, high, steps = 0, np.full(3, np.inf), np.full(3, -np.inf), (0.0, 0.0)
     for cloud in iter_points(path):
+        steps = steps if count else steps_of(cloud.xyz)
         count += len(cloud)
         lowest, highest = bounds_of(cloud.xyz)
         low, high = np.minimum(low, lowest), np.maximum(high, highest)
-    return PointFileHeader(str(path), (*low.tolist(), *high.tolist()), count)
+    return PointFileHeader(str(path), (*low.tolist(), *high.tolist()), count, steps=steps)
+
+
+def las_file_header(path: str | Path) -> PointFileHeader | None:
+    """What the header of a LAS, LAZ or COPC file says; None for a file of another kind."""
+    if file_kind(path) != "las":
+        return None
+    header = las.read_las_header(path)
+    bounds = (*header.mins.tolist(), *header.maxs.tolist())
+    steps = (float(max(header.scales[:2])), float(header.scales[2]))
+    return PointFileHeader(
+        str(path), bounds, header.point_count, las.las_crs(header, path), header.point_format.id, steps
+    )
+
+
+def steps_of(xyz: np.ndarray) -> tuple[float, float]:
+    """The largest of STEPS in which coordinates (n, 3) come, in plan and in height; 0 where they are finer or too few.
+
+    >>> steps_of(np.arange(600.0).reshape(-1, 3) * [0.5, 1.0, 0.01])
+    (0.5, 0.0)
+    """
+    fewest, most = STEP_POINTS
+    apart = xyz[:most] - xyz[:1]
+    if len(xyz) < fewest:
+        return 0.0, 0.0
+
+    def step_of(values: np.ndarray) -> float:
+        return next(
+            (step for step in STEPS if np.allclose(values, step * np.rint(values / step), rtol=0, atol=1e-4)), 0.0
+        )
+
+    return step_of(apart[:, :2]), step_of(apart[:, 2])
+
+
+def say_how_coarse(headers: list[PointFileHeader], units: Units) -> None:
+    """One line where coordinates, in `units`, come in larger steps than COARSE_M: roofs are then no finer."""
+    coarse = {}
+    for header in headers:
+        plan_m, height_m = header.steps[0] * units.plan, header.steps[1] * units.height
+        told = [f"{m:.3g} m in {way}" for m, way in ((plan_m, "plan"), (height_m, "height")) if m > COARSE_M]
+        if told:
+            coarse[header.path] = " and ".join(told)
+    if coarse:
+        path, steps = next(iter(coarse.items()))
+        warnings.warn(
+            f"{path}{and_others(list(coarse))}: coordinates come in steps of {steps}, and roofs are no finer; "
+            "write the file anew from its source with steps of 0.01 m or less",
+            InputWarning,
+        )
 
 
 def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
@@ -219,7 +277,8 @@ def file_kind(path: str | Path) -> str:
 
 def file_crs(path: str | Path) -> Any:
     """The CRS that a point file names, None where it names none: text and PLY never do."""
-    return las.las_crs(las.read_las_header(path), path) if file_kind(path) == "las" else None
+    header = las_file_header(path)
+    return header and header.crs
 
 
 def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
