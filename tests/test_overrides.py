@@ -291,7 +291,7 @@ def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(pair, me
 
 def test_tables_override_too(town_files, tmp_path):
     (tmp_path / "o.csv").write_text("id,type,ridge_height,leave_out\nhouse-0,hip,,\nhouse-1,,,true\nelsewhere,,9.5,\n")
-    with pytest.warns(InputWarning, match="1 of 3 overrides are of no building of this run: elsewhere"):
+    with pytest.warns(InputWarning, match="no building of this run for 1 of 3 overrides: elsewhere"):
         city_run.reconstruct_area(
             hiproof.Request(
                 (town_files[0],), tmp_path / "out", town_files[1], settings=PLAIN, overrides=str(tmp_path / "o.csv")

@@ -200,7 +200,7 @@ def test_parts_that_became_flat_although_not_asked_for_are_told():
     points = np.column_stack([gable_points()[:, :2], np.full(len(gable_points()), 6.0)])
     building = hiproof.reconstruct(points, FOOTPRINT, settings=asked)
     assert {part.type for part in building.parts} <= {"flat", "hip"}
-    assert building.detail == "1 of 1 parts are flat: none of the types asked for (hip) explains their points"
+    assert building.detail == "1 of 1 part made flat: none of the types asked for (hip) explains the points there"
     assert hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).detail == ""
 
 

@@ -33,6 +33,15 @@ class Level(StrEnum):
         return getattr(logging, self.name.upper())
 
 
+def counted(number: int, one: str, many: str = "") -> str:
+    """So many things in words; `many` is their plural where that is not `one` with an s.
+
+    >>> counted(1, "building"), counted(2000, "vertex", "vertices")
+    ('1 building', '2,000 vertices')
+    """
+    return f"{number:,} {one if number == 1 else many or one + 's'}"
+
+
 class Masking(logging.Formatter):
     """Formats a record and masks the passwords in all of it, tracebacks too."""
 

@@ -12,6 +12,7 @@ import shapely
 
 from .errors import CompositionError, FitError
 from .frames import LocalFrame
+from .log import counted
 from .model import Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
 from .settings import Settings
 from .status import Status
@@ -212,9 +213,7 @@ def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
     flat = sum(part.type == "flat" for part in parts)
     if not types or "flat" in types or not flat:
         return ""
-    return (
-        f"{flat} of {len(parts)} parts are flat: none of the types asked for ({', '.join(types)}) explains their points"
-    )
+    return f"{flat} of {counted(len(parts), 'part')} made flat: none of the types asked for ({', '.join(types)}) explains the points there"
 
 
 def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:

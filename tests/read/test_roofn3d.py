@@ -38,7 +38,7 @@ def buildings(tmp_path):
 
 
 def test_buildings_come_back_once_with_our_names_of_their_types(buildings):
-    with pytest.warns(InputWarning, match="1 rows repeat the id"):
+    with pytest.warns(InputWarning, match="1 row with the id"):
         records = list(read_roofn3d(buildings))
     assert [(r.id, r.type) for r in records] == [("7", "gable"), ("8", "hip"), ("9", "pyramid"), ("10", None)]
     assert records[3].class_name == "Onion dome"

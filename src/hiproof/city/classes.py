@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, InputWarning
+from ..log import counted
 from ..read.pointcloud import iter_points
 from ..settings import ReadSettings, Settings
 
@@ -32,7 +33,7 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     from ..classify.scene import NO_ROOFS  # with scipy.ndimage: not where the clouds have a building class
 
     others = tuple(sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes))
-    present = ", ".join(f"{c} ({n:,} points)" for c, n in sorted(counts.items()))
+    present = ", ".join(f"{c} ({counted(n, 'point')})" for c, n in sorted(counts.items()))
     if not others:
         raise InputError(
             f"expected points that may be roofs, got classes {present}, all of them ground, water, noise, low vegetation "

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError, InputWarning
-from ..log import LOGGER
+from ..log import LOGGER, counted
 from ..parametric.file import HEAD, objects
 from ..parametric.override import KEYS, Override, override_of
 from ..read.footprints import attribute_rows, reading
@@ -124,7 +124,9 @@ def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dic
             found[job.index] = {**own, "id": job.id}
     if left:
         some = ", ".join(list(left)[:SHOWN]) + (" and others" if len(left) > SHOWN else "")
-        warnings.warn(f"{len(left)} of {len(records)} overrides are of no building of this run: {some}", InputWarning)
+        warnings.warn(
+            f"no building of this run for {len(left)} of {counted(len(records), 'override')}: {some}", InputWarning
+        )
     return found
 
 

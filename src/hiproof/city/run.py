@@ -19,7 +19,7 @@ from .. import __version__
 from ..errors import InputError, OutputError
 from ..formats import places_of_models
 from ..frames import METRES, Units
-from ..log import LOGGER
+from ..log import LOGGER, counted
 from ..masking import masked, masked_values
 from ..status import Status
 from ..write.files import atomic
@@ -188,7 +188,7 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
             for outcome in result:
                 level = logging.ERROR if outcome.status == Status.INTERNAL_ERROR.code else logging.DEBUG
                 LOGGER.log(level, "building %s: %s", outcome.id, outcome.detail)
-        LOGGER.info("%s is done: %s", name, f"{len(result)} buildings" if kind == "solve" else result)
+        LOGGER.info("%s is done: %s", name, counted(len(result), "building") if kind == "solve" else result)
     elif kind == "sort" and isinstance(error, InputError):
         ledger.finish(name, "failed", str(error))
         LOGGER.error("%s could not be read: %s", name, error)
@@ -227,7 +227,7 @@ def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
             classes.update({int(c): n for c, n in json.loads(task.message)["classes"].items()})
     wanted = plan.settings.read.building_classes
     if sum(classes.values()) and not any(classes[c] for c in wanted):
-        present = ", ".join(f"{c} ({n:,} points)" for c, n in sorted(classes.items()))
+        present = ", ".join(f"{c} ({counted(n, 'point')})" for c, n in sorted(classes.items()))
         raise InputError(
             f"expected points of building class {', '.join(map(str, wanted))}, got classes {present}; "
             "say which class holds roofs with --building-class"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
+from ..log import counted
 from ..model import PointCloud
 from .buildings import BUILDING, GROUND, classify
 
@@ -27,7 +28,7 @@ def roofs_by_shape(cloud: PointCloud, ground_classes: tuple[int, ...], is_small:
         return roofs, False
     where = ", ".join(cloud.sources) or "the cloud"
     raise InputError(
-        f"expected buildings in {where}, got {len(cloud):,} points none of which lies on a smooth surface "
+        f"expected buildings in {where}, got {counted(len(cloud), 'point')} none of which lies on a smooth surface "
         "above the ground; give --footprints, or name the class that holds roofs with --building-class"
     )
 

@@ -11,6 +11,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError, InputWarning
+from ..log import counted
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
 from .cells import plan_density
@@ -67,7 +68,7 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
     left_out = len(groups) - len(large)
     if left_out:
         warnings.warn(
-            f"{left_out} groups of building points were left out as too small (fewer than {read.split_min_points} points "
+            f"{counted(left_out, 'group')} of building points left out as too small (fewer than {read.split_min_points} points "
             f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
             InputWarning,
         )
@@ -123,10 +124,10 @@ def single_building(cloud: PointCloud) -> np.ndarray | None:
 
 def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
     if cloud.classification is None:
-        got = f"{len(cloud)} points without classes, too many or too scattered for a single building"
+        got = f"{counted(len(cloud), 'point')} without classes, too many or too scattered for a single building"
     else:
         counts = sorted(Counter(cloud.classification.tolist()).items())
-        got = "classes " + ", ".join(f"{number} ({count} points)" for number, count in counts)
+        got = "classes " + ", ".join(f"{number} ({counted(count, 'point')})" for number, count in counts)
     return (
         f"expected points of class {classes_text(wanted)} (building), got {got}; name the class that holds the roofs with "
         "--building-class, give --footprints, or classify the cloud first"

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+from ..log import counted
 from .options import with_settings
 
 
@@ -51,6 +52,9 @@ def build(
         built = build_file(parameters, out, lambda done: bar.update("build", done, None), changes)
     for id, why in built.not_built:
         typer.echo(f"not built: building {id}: {why}", err=True)
-    typer.echo(f"{built.buildings} buildings: " + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common()))
+    typer.echo(
+        f"{counted(built.buildings, 'building')}: "
+        + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common())
+    )
     typer.echo("models: " + ", ".join(map(str, built.models)))
     raise typer.Exit(built.exit_code)

@@ -8,6 +8,8 @@ from typing import Annotated
 
 import typer
 
+from ..log import counted
+
 
 def check(
     files: Annotated[list[Path], typer.Argument(help="CityJSON, CityJSONSeq or CityGML files")],
@@ -36,6 +38,6 @@ def count_invalid(files: list[Path], planarity_m: float) -> int:
                 codes.update({finding.code for finding in findings})
                 typer.echo(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
         by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
-        typer.echo(f"{path}: {total} solids, {total - bad} valid, {bad} invalid{by_code}")
+        typer.echo(f"{path}: {counted(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}")
         invalid += bad
     return invalid

@@ -10,6 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..formats import OF_MODELS, module_of
+from ..log import counted
 
 Made = StrEnum("Made", {name: name for name in OF_MODELS})  # type: ignore[misc]
 KINDS = ", ".join(f"{name} ({format.what})" for name, format in OF_MODELS.items())
@@ -39,7 +40,7 @@ def convert(
     path = out or Path(folder) / OF_MODELS[name].file
     buildings = run_buildings(folder)
     count = module_of(OF_MODELS[name].module).write_models(path, buildings, crs or run_crs_text(folder), **given)
-    typer.echo(f"{path}: {count} buildings")
+    typer.echo(f"{path}: {counted(count, 'building')}")
 
 
 def format_of(out: Path | None) -> str:

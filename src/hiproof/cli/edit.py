@@ -9,6 +9,8 @@ from typing import Annotated
 
 import typer
 
+from ..log import counted
+
 
 def edit(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
@@ -32,7 +34,7 @@ def edit(
     service = Service(Desk(folder, who or user_name(), clouds))
     with Server(service, port) as server:
         desk = service.desk
-        typer.echo(f"{len(desk.run.rows)} buildings, the most doubtful first; edits go into {folder / FILE}")
+        typer.echo(f"{counted(len(desk.run.rows), 'building')}, the most doubtful first; edits go into {folder / FILE}")
         if desk.points.missing:
             typer.echo(desk.points.missing, err=True)
         typer.echo(f"open {service.address}")

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import typer
 
 from ..errors import InputError
+from ..log import counted
 
 SHOWN = {
     "psd_mean": "PSD",
@@ -47,7 +48,7 @@ def evaluate(
         with atomic_file(place / name) as file:
             file.write(text.encode())
     print_summary(summarise(run.figures), reference is not None)
-    typer.echo(f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {len(run.figures)} buildings")
+    typer.echo(f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {counted(len(run.figures), 'building')}")
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:

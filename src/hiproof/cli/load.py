@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..log import counted
+
 
 def load(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
@@ -17,4 +19,4 @@ def load(
     from ..write.postgis import load_postgis
 
     count = load_postgis(folder, database, prefix)
-    typer.echo(f"{count} buildings loaded into {prefix}_buildings, {prefix}_roofs and {prefix}_parts")
+    typer.echo(f"{counted(count, 'building')} loaded into {prefix}_buildings, {prefix}_roofs and {prefix}_parts")

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..log import counted
+
 
 def report(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
@@ -24,4 +26,4 @@ def report(
     path = out or Path(folder) / "report.html"
     run = evaluate_run(folder, clouds or (), footprints, layer=layer)
     write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
-    typer.echo(f"{path}: {len(run.models)} buildings, {path.stat().st_size / 1e6:.1f} MB")
+    typer.echo(f"{path}: {counted(len(run.models), 'building')}, {path.stat().st_size / 1e6:.1f} MB")

@@ -8,6 +8,7 @@ from typing import Any, ClassVar
 
 from ..city.run import Request, Summary, reconstruct_area
 from ..compiled import news
+from ..log import counted
 from ..status import Status
 
 
@@ -61,7 +62,7 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
 
     console = Console(soft_wrap=True, markup=False)  # names from outside may look like markup
     show = show or console.print
-    table = Table("buildings", "outcome", title=f"{summary.buildings} buildings")
+    table = Table("buildings", "outcome", title=counted(summary.buildings, "building"))
     for code, number in summary.by_status.items():
         table.add_row(str(number), Status[code.upper()].value)
     show(table)

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..log import counted
 from ..model import Building
 from .view import TILT_DEG, colours_of, lightness, shaded, turn_of
 
@@ -38,7 +39,13 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
         gap = local[:, 2] - model.roof.height_at(local[:, :2])
         near = np.abs(gap) <= NEAR_M
         for chosen, colour, label in ((near, "#1f5fbf", "within 0.2 m"), (~near, "#c8321e", "further")):
-            ax.scatter(*local[chosen].T, s=2, color=colour, label=f"{label}: {chosen.sum()} points", depthshade=False)
+            ax.scatter(
+                *local[chosen].T,
+                s=2,
+                color=colour,
+                label=f"{label}: {counted(chosen.sum(), 'point')}",
+                depthshade=False,
+            )
         ax.legend(loc="upper left", fontsize="small")
         shown = np.concatenate([vertices, local])
     low, high = shown.min(axis=0), shown.max(axis=0)

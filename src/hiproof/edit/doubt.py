@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from ..log import counted
 from ..status import Status
 
 POOR_SHARE = 0.9  # of points within 0.2 m of the roof
@@ -66,7 +67,7 @@ def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
     loose = sum(is_loose(part.get("sigma") or {}) for part in parts)
     if not loose:
         return None
-    return 0.3 * loose / len(parts), f"{loose} of {len(parts)} parts on few points"
+    return 0.3 * loose / len(parts), f"{loose} of {counted(len(parts), 'part')} on few points"
 
 
 def is_loose(sigma: Mapping[str, float]) -> bool:

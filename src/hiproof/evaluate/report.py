@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..log import counted
 from ..masking import masked_values
 from ..status import Status
 from .evaluation import summarise
@@ -85,10 +86,12 @@ def lead(run: EvaluatedRun, shown: int) -> str:
     version = run.record.get("hiproof") or run.record.get("version") or __version__
     modelled = sum(model.solid is not None for model in run.models)
     points = sum(map(len, run.points))
-    measured = f"measured against {points:,} points" if points else "no points given: residuals are those of the run"
+    measured = (
+        f"measured against {counted(points, 'point')}" if points else "no points given: residuals are those of the run"
+    )
     part = f" Map and 3D view show {shown:,} of them." if shown < len(run.models) else ""
     made = f"Made by hiproof {escape(str(version))}."
-    return f"{len(run.models):,} buildings, {modelled:,} with a model, {measured}.{part} {made}"
+    return f"{counted(len(run.models), 'building')}, {modelled:,} with a model, {measured}.{part} {made}"
 
 
 def status_table(run: EvaluatedRun) -> str:

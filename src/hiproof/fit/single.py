@@ -9,6 +9,7 @@ import shapely
 
 from ..errors import FitError
 from ..frames import LocalFrame
+from ..log import counted
 from ..model import Fit
 from ..primitives import CATALOGUE, get
 from ..primitives.contract import HALF_WIDTH, KAPPA, placed
@@ -92,7 +93,9 @@ def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shape
     narrow, wide = plan_extents(cloud[:, :2])
     if narrow <= max(THINNEST * wide, 1e-6):
         shape = "in one place" if wide < 1e-6 else "on one line in plan"
-        raise FitError(f"expected points spread over a roof, got {len(cloud)} points {shape}; add points beside it")
+        raise FitError(
+            f"expected points spread over a roof, got {counted(len(cloud), 'point')} {shape}; add points beside it"
+        )
     return cloud
 
 

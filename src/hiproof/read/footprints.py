@@ -15,6 +15,7 @@ from pyproj import CRS, Transformer
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
+from ..log import counted
 from ..model import Footprint
 from ..settings import Settings
 from .crs import described, parse_crs, same_horizontal, units_of
@@ -202,7 +203,9 @@ def feature_ids(
         ids = [id_text(row.get(name)) for row in rows]
         missing = ids.count("")
         if missing:
-            warnings.warn(f"{path}: {missing} features have no {name}; they go by their number", InputWarning)
+            warnings.warn(
+                f"{path}: {counted(missing, 'feature')} without {name}; the number stands in for it", InputWarning
+            )
         return [id or number for id, number in zip(ids, by_number, strict=True)]
     usual = [names[name] for name in ID_NAMES if name in names]
     for name in usual:
@@ -261,13 +264,13 @@ def split_features(
             parts = enumerate(polygons, start=1)
             footprints += [Footprint(f"{id}-{number}", polygon, {**row, "part_of": id}) for number, polygon in parts]
     if split:
-        many = "1 feature of several polygons" if len(split) == 1 else f"{len(split)} features of several polygons"
+        many = counted(len(split), "feature") + " of several polygons"
         warnings.warn(f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...", InputWarning)
     if mended:
-        warnings.warn(f"{path}: {mended} invalid footprints were repaired", InputWarning)
+        warnings.warn(f"{path}: {counted(mended, 'invalid footprint')} repaired", InputWarning)
     if empty:
         warnings.warn(
-            f"{path}: {empty} features enclose no area that a building could have; they get no model, but a status",
+            f"{path}: {counted(empty, 'feature')} with no area that a building could have; such get no model, but a status",
             InputWarning,
         )
     return footprints
@@ -292,9 +295,13 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
             attributes, copies = {**attributes, "copy_of": original}, copies + 1
         result.append(Footprint(id, footprint.polygon, attributes))
     if renamed:
-        warnings.warn(f"{path}: {renamed} footprints share an id; the later ones got a suffix such as _2", InputWarning)
+        warnings.warn(
+            f"{path}: {counted(renamed, 'footprint')} with the id of an earlier one got a suffix such as _2",
+            InputWarning,
+        )
     if copies:
         warnings.warn(
-            f"{path}: {copies} footprints repeat another's polygon; see their attribute copy_of", InputWarning
+            f"{path}: {counted(copies, 'footprint')} with the polygon of another; see the attribute copy_of",
+            InputWarning,
         )
     return result

@@ -16,6 +16,7 @@ import laspy
 import numpy as np
 
 from ..errors import InputError, InputWarning
+from ..log import counted
 from .copc import check_nodes, copc_record
 from .crs import combine
 from .geokeys import heights_of_keys
@@ -121,7 +122,7 @@ def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) ->
                 count = min(chunk_points, end - start)
                 record = reader.read_points(count)
                 if len(record) != count:
-                    raise ValueError(f"it ends {count - len(record)} points too early")
+                    raise ValueError(f"it ends {counted(count - len(record), 'point')} too early")
                 yield record
 
 
@@ -160,6 +161,6 @@ def present(xyz: np.ndarray, record, path: str | Path) -> Chunk:
     classification = np.asarray(record["classification"], np.uint8)
     withheld = np.asarray(record["withheld"], bool)
     if withheld.any():
-        warnings.warn(f"{path}: {int(withheld.sum())} points flagged as withheld were left out", InputWarning)
+        warnings.warn(f"{path}: {counted(int(withheld.sum()), 'point')} flagged as withheld left out", InputWarning)
         xyz, classification = xyz[~withheld], classification[~withheld]
     return xyz, classification

@@ -11,6 +11,7 @@ from typing import BinaryIO
 import numpy as np
 
 from ..errors import InputError
+from ..log import counted
 from .columns import find_columns
 from .las import Chunk
 from .remote import opened
@@ -54,7 +55,7 @@ def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) ->
     least = len("0 0 0") if layout.byte_order == "" else record_type(layout).itemsize
     if layout.count * least > end - start:
         raise InputError(
-            f"expected {layout.count} vertices in {path} as its header says, got {end - start} bytes of them; "
+            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, got {end - start} bytes of them; "
             "the file is truncated: copy or download it again"
         )
 
@@ -77,7 +78,7 @@ def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Pat
         table = np.column_stack([records[layout.properties[column][0]].astype(float) for column in layout.columns])
     if found < count:
         raise InputError(
-            f"expected {layout.count} vertices in {path} as its header says, got {read + found}; "
+            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, got {read + found}; "
             "the file is truncated: copy or download it again"
         )
     return table

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..frames import METRES, Units
+from ..log import counted
 from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
@@ -128,7 +129,7 @@ def iter_points(
         if len(xyz):
             yield PointCloud(xyz, classes, None, (str(path),), units)
     if dropped:
-        warnings.warn(f"{path}: {dropped} points with NaN or infinite coordinates were left out", InputWarning)
+        warnings.warn(f"{path}: {counted(dropped, 'point')} with NaN or infinite coordinates left out", InputWarning)
 
 
 def as_input_error(error: Exception, path: str | Path) -> InputError:

@@ -16,6 +16,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError, InputWarning
+from ..log import counted
 
 TYPES = {"saddleback roof": "gable", "two-sided hip roof": "hip", "pyramid roof": "pyramid"}
 """Our catalogue's name of each RoofN3D class."""
@@ -54,7 +55,7 @@ def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
         class_name = (row["class"] or "").strip()
         yield RoofN3DRecord(row["id"], TYPES.get(class_name.lower()), class_name, points, outline)
     if repeated:
-        warnings.warn(f"{path}: {repeated} rows repeat the id of an earlier one and were left out", InputWarning)
+        warnings.warn(f"{path}: {counted(repeated, 'row')} with the id of an earlier one left out", InputWarning)
 
 
 def read_roofn3d_labels(
@@ -137,7 +138,7 @@ def coordinates(wkt: str) -> np.ndarray:
     numbers = wkt[start + 1 : end].replace(",", " ").replace("(", " ").replace(")", " ").split()
     values = np.array(numbers, dtype=float)
     if len(values) % 3:
-        raise ValueError(f"{len(values)} numbers, which is no whole number of x y z")
+        raise ValueError(f"{counted(len(values), 'number')}, which is no whole number of x y z")
     return values.reshape(-1, 3)
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..frames import METRES
+from ..log import counted
 from ..model import WALL, Face, Solid
 from .cityjson import UNUSABLE, Feature, features
 from .crs import units_named
@@ -258,6 +259,6 @@ def ring_points(ring: Any, path: Path) -> list[tuple[float, ...]]:
         raise InputError(f"expected numbers in a gml:posList of {path}, got: {error}; export the file anew") from error
     if len(values) % 3:
         raise InputError(
-            f"expected three coordinates a point in a gml:LinearRing of {path}, got {len(values)} numbers; export the file anew, in 3D"
+            f"expected three coordinates a point in a gml:LinearRing of {path}, got {counted(len(values), 'number')}; export the file anew, in 3D"
         )
     return [tuple(values[k : k + 3]) for k in range(0, len(values), 3)]

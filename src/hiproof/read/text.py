@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import InputError
+from ..log import counted
 from .columns import find_columns
 from .las import Chunk
 from .remote import opened
@@ -52,7 +53,7 @@ def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int
             )
     except (ValueError, IndexError) as error:
         raise InputError(
-            f"expected three numbers x y z on every line of {path}, got another after {read} points ({error}); "
+            f"expected three numbers x y z on every line of {path}, got another after {counted(read, 'point')} ({error}); "
             "write one point a line with a decimal point, the columns separated by blanks, commas, semicolons or tabs"
         ) from error
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FitError, InputError, SettingsError
+from ..log import counted
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
 from .nearest import nearest_of
@@ -182,7 +183,7 @@ def checked_points(points: np.ndarray) -> np.ndarray:
     if not finite.all():
         raise FitError(f"expected finite coordinates, got NaN or infinity in {np.sum(~finite)} of {len(xyz)} points")
     if np.ptp(xyz[:, :2], axis=0).max() < 1e-6:
-        raise FitError(f"expected points spread over a roof, got {len(xyz)} points all in one place")
+        raise FitError(f"expected points spread over a roof, got {counted(len(xyz), 'point')} all in one place")
     return xyz - xyz[0]
 
 

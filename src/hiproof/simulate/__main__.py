@@ -6,6 +6,7 @@ from typing import Annotated
 import typer
 
 from ..errors import HiproofError
+from ..log import counted
 
 app = typer.Typer(add_completion=False, no_args_is_help=True, help="Simulated towns with their truth.")
 
@@ -23,7 +24,7 @@ def neighbourhood(
     except HiproofError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error
-    typer.echo(f"{counts['buildings']} buildings, {counts['points']} points in {out}")
+    typer.echo(f"{counted(counts['buildings'], 'building')}, {counted(counts['points'], 'point')} in {out}")
 
 
 @app.command()
@@ -41,11 +42,11 @@ def city(
     try:
         for counts in write_city(out, City(buildings, seed, density, tile)):
             total += counts.points
-            typer.echo(f"{counts.tile}: {counts.buildings} buildings, {counts.points} points")
+            typer.echo(f"{counts.tile}: {counted(counts.buildings, 'building')}, {counted(counts.points, 'point')}")
     except HiproofError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error
-    typer.echo(f"{buildings} buildings, {total} points in {out}")
+    typer.echo(f"{counted(buildings, 'building')}, {counted(total, 'point')} in {out}")
 
 
 if __name__ == "__main__":
