@@ -93,6 +93,13 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0], abs=0.1)
 
 
+def test_a_part_drawn_with_a_spike_of_no_width_shares_its_surface_all_the_same():
+    spiked = shapely.Polygon([(0, 0), (6, 0), (6, 3), (9, 3), (6, 3), (6, 5), (0, 5)])
+    parts = (Part("flat", (Piece(spiked, np.array([[0.0, 0.0, 3.0]])),)), flat(3.0, 6, 0, 10, 5))
+    areas = shown_areas(composed(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)))
+    assert [area.area for area in areas] == pytest.approx([30.0, 20.0])
+
+
 def test_a_part_around_a_yard_has_a_hole():
     (area,) = shown_areas(modelled(courtyard(), kinds=("flat",)))
     assert area.area == pytest.approx(84.0) and len(area.interiors) == 1

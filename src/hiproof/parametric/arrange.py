@@ -10,7 +10,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Roof
-from .change import with_sizes
+from .change import polygon_of, with_sizes
 
 INNER = {"length": ("ridge_length", "top_length"), "width": ("top_width", "break_width", "ridge_offset")}
 """Parameters that grow with a side of the rectangle."""
@@ -136,11 +136,6 @@ def outlines_beyond(outlines: list, place: np.ndarray, direction: np.ndarray) ->
     if not found:
         raise InputError("expected a cut through what the part roofs, got one beside it; cut elsewhere")
     return found
-
-
-def polygon_of(rings: list) -> shapely.Geometry:
-    polygon = shapely.Polygon(rings[0], rings[1:])
-    return polygon if polygon.is_valid else shapely.make_valid(polygon)
 
 
 def rings_of(geometry: shapely.Geometry) -> list:

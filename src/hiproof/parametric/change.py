@@ -51,7 +51,7 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
     """The part with a width and a length; one that has none gets those of the smallest rectangle around its outlines."""
     if all(name in part["parameters"] for name in PLAN):
         return part
-    outlines = shapely.union_all([shapely.make_valid(shapely.Polygon(o[0], o[1:])) for o in part["outlines"]])
+    outlines = shapely.union_all([polygon_of(outline) for outline in part["outlines"]])
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(outlines))[:4]
     sides = corners[1:3] - corners[:2]
     lengths = np.hypot(*sides.T)
@@ -65,6 +65,11 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
         "position": [x, y, part["position"][2]],
         "rotation": rotation,
     }
+
+
+def polygon_of(rings: list) -> shapely.Geometry:
+    """The area of a part's outline, rings of (x, y), the outer first; a spike of no width is none."""
+    return shapely.make_valid(shapely.Polygon(rings[0], rings[1:]), method="structure", keep_collapsed=False)
 
 
 def of_type(part: dict[str, Any], kind: str) -> dict[str, Any]:

@@ -166,7 +166,8 @@ def by_teeth(
 
 
 def valid(polygon: shapely.Polygon) -> shapely.Geometry:
-    return polygon if polygon.is_valid else shapely.make_valid(polygon)
+    """The areas of a polygon whose rings cross or touch; a spike of no width is none."""
+    return shapely.make_valid(polygon, method="structure", keep_collapsed=False)
 
 
 def refuse_alike(parts: list) -> None:

@@ -73,5 +73,6 @@ def without_slivers(area: shapely.Geometry) -> shapely.Geometry:
 
 
 def drawn(part: Part) -> shapely.Geometry:
-    """The outlines of a part as one area; rounded, an outline may touch itself."""
-    return shapely.union_all(shapely.make_valid([piece.outline for piece in part.pieces]))
+    """The outlines of a part as one area; rounded, an outline may touch itself, and a spike of no width is none."""
+    outlines = [piece.outline for piece in part.pieces]
+    return shapely.union_all(shapely.make_valid(outlines, method="structure", keep_collapsed=False))
