@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import BASE_SHARE, costs, edge_cost, walls_of
+from .objective import BASE_SHARE, among_vertices, costs, edge_cost, walls_of
 from .volumes import (
     BASE_COST,
     DIRECTION,
@@ -159,16 +159,19 @@ def is_repeated(places, q):
 
 @compiled
 def charge_all(volumes, walls, direction, charge, boxes):
-    """Fill the cost of every edge (k, 4) and its bounds (k, 4, 4) in the axes of `direction`."""
+    """Fill the cost of every edge (k, 4) and its bounds (k, 4, 4) in the axes of `direction`, none where it lies outside the outline."""
     c, s = walls.turn[direction]
     for j in range(1, len(volumes)):
         other = int(volumes[j, DIRECTION])
         cosine = walls.turn[other, 0] * c + walls.turn[other, 1] * s
         sine = walls.turn[other, 1] * c - walls.turn[other, 0] * s
         for e in range(4):
-            charge[j, e] = edge_cost(volumes, walls, j, e)
+            charge[j, e] = 0.0
             boxes[j, e, 0] = boxes[j, e, 2] = np.inf
             boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
+            if not among_vertices(walls, other, e // 2, volumes[j, U0 + e])[0]:
+                continue  # it shows nowhere, whatever moves beside it
+            charge[j, e] = edge_cost(volumes, walls, j, e)
             for end in range(2):
                 a = volumes[j, U0 + e] if e < 2 else volumes[j, U0 + end]
                 b = volumes[j, V0 + end] if e < 2 else volumes[j, U0 + e]
@@ -188,7 +191,7 @@ def charged(volumes, walls, k, edge, t, trial, best, charge, boxes):
     for j in range(1, len(volumes)):
         for e in range(4):
             if j == k:
-                touched[j, e] = e != edge ^ 1
+                touched[j, e] = e == edge or (e != edge ^ 1 and boxes[j, e, 0] < np.inf)
             else:
                 box = boxes[j, e]
                 meets = box[along] <= high and box[along + 1] >= low

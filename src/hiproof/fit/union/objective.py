@@ -116,18 +116,37 @@ def base_shows(volumes, scene):
 @compiled
 def edge_cost(volumes, walls, k, edge):
     """Units of complexity for what shows of one edge (0 u low, 1 u high, 2 v low, 3 v high) of volume k."""
-    direction, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
+    direction, axis, at = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
+    inside, in_line = among_vertices(walls, direction, axis, at)
+    if not inside:
+        return 0.0
     any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
     first, last, shown, low = what_shows(volumes, walls, k, edge, low_step)
     if shown < LEAST_STEP_LENGTH_M:
         return 0.0
     cost = any_step + a_metre * shown + low_a_metre * low
-    if not is_vertex_line(walls.vertices[direction, edge // 2], at):
+    if not in_line:
         return cost + loose
-    return cost - at_corner * ends_at_corners(walls.corners[direction], edge // 2, at, first, last)
+    return cost - at_corner * ends_at_corners(walls, direction, axis, at, first, last)
 
 
 @compiled
+def among_vertices(walls, direction, axis, at):
+    """Whether a line of one axis of a direction comes far enough inside the outline for a step to show there, and whether it is in line
+    with one of the outline's vertices."""
+    low = high = walls.vertices[direction, axis, 0]
+    in_line = False
+    for q in range(walls.vertices.shape[2]):
+        x = walls.vertices[direction, axis, q]
+        if x == np.inf:
+            break
+        high = x
+        in_line = in_line or abs(x - at) < 1e-6
+    off_a_node = math.sqrt(0.5) * walls.pitch  # the depth is that of the nearest node of the raster
+    return min(at - low, high - at) + off_a_node >= INSIDE_M, in_line
+
+
+@compiled(inline="always")
 def what_shows(volumes, walls, k, edge, low_step):
     """Of an edge of volume k where its samples inside the outline begin and end, for how many metres it shows there, and for how
     many with a step of less than `low_step`."""
@@ -135,7 +154,7 @@ def what_shows(volumes, walls, k, edge, low_step):
     start, end = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     count = min(MOST_SAMPLES, max(2, int((end - start) / SAMPLE_M) + 1))
     step = (end - start) / count
-    turn, depth, c, s = walls.turn, walls.depth, walls.turn[own, 0], walls.turn[own, 1]
+    c, s = walls.turn[own, 0], walls.turn[own, 1]
     first = last = shown = low = 0.0
     m = 0
     for q in range(count):
@@ -143,9 +162,9 @@ def what_shows(volumes, walls, k, edge, low_step):
         a, b = (at, t) if edge < 2 else (t, at)
         i = math.floor((c * a - s * b - walls.corner_u) / walls.pitch + 0.5)
         j = math.floor((s * a + c * b - walls.corner_v) / walls.pitch + 0.5)
-        if 0 <= i < depth.shape[0] and 0 <= j < depth.shape[1] and depth[i, j] >= INSIDE_M:
+        if 0 <= i < walls.depth.shape[0] and 0 <= j < walls.depth.shape[1] and walls.depth[i, j] >= INSIDE_M:
             first, last, m = t if m == 0 else first, t, m + 1
-            gap = gap_at(volumes, k, turn, a, b)
+            gap = gap_at(volumes, k, walls.turn, a, b)
             if gap > STEP_M:
                 shown += step
                 if gap < low_step:
@@ -176,19 +195,12 @@ def gap_at(volumes, k, turn, u, v):
 
 
 @compiled
-def ends_at_corners(corners, axis, at, first, last):
-    """How many of the two ends of what lies of the line `at` inside the outline are at `corners` (c, 2) of it."""
+def ends_at_corners(walls, direction, axis, at, first, last):
+    """How many of the two ends of what lies of the line `at` inside the outline are at corners of it."""
     low = high = 0
-    for q in range(len(corners)):
-        if abs(corners[q, axis] - at) < AT_CORNER_M:
-            low = max(low, int(abs(corners[q, 1 - axis] - first) < END_AT_CORNER_M))
-            high = max(high, int(abs(corners[q, 1 - axis] - last) < END_AT_CORNER_M))
+    for q in range(walls.corners.shape[1]):
+        if abs(walls.corners[direction, q, axis] - at) < AT_CORNER_M:
+            along = walls.corners[direction, q, 1 - axis]
+            low = max(low, int(abs(along - first) < END_AT_CORNER_M))
+            high = max(high, int(abs(along - last) < END_AT_CORNER_M))
     return low + high
-
-
-@compiled
-def is_vertex_line(vertices, at):
-    for q in range(len(vertices)):
-        if abs(vertices[q] - at) < 1e-6:
-            return True
-    return False

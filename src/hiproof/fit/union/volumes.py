@@ -48,9 +48,11 @@ def base_only(height: float) -> np.ndarray:
 @compiled
 def coefficients(volumes, k):
     """The numbers of volume k's planes: five offsets, four slopes, four slopes across (as scalars they stay in registers)."""
-    r = volumes[k]
-    across = r[5] * r[16], r[6] * r[17], r[7] * r[18], r[8] * r[19]
-    return r[9], r[10], r[11], r[12], r[13], r[5], r[6], r[7], r[8], across[0], across[1], across[2], across[3]
+    # no view of a row: counting the references to one costs more than reading the numbers
+    along = volumes[k, 5], volumes[k, 6], volumes[k, 7], volumes[k, 8]
+    lean = volumes[k, 16], volumes[k, 17], volumes[k, 18], volumes[k, 19]
+    across = along[0] * lean[0], along[1] * lean[1], along[2] * lean[2], along[3] * lean[3]
+    return (volumes[k, 9], volumes[k, 10], volumes[k, 11], volumes[k, 12], volumes[k, 13], *along, *across)
 
 
 @compiled(inline="always")
