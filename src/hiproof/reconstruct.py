@@ -56,5 +56,5 @@ def reconstruct(
     roof = Roof(fitted.parts, fitted.outline, frame)
     roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, ground, settings)
-    building = stages.remarked(building, stages.doubled(building, points))
+    building = stages.cautioned(building, points)
     return stages.remarked(stages.remarked(building, of_footprint), remark)

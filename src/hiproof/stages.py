@@ -342,16 +342,21 @@ def judge(
     return settled_building(judged)
 
 
-def doubled(building: Building, points: np.ndarray) -> str:
-    """A sentence where the points (n, 3), in the roof's frame, lie on two surfaces one over the other; empty otherwise."""
-    from .evaluate.layers import two_surfaces
+def cautioned(building: Building, points: np.ndarray) -> Building:
+    """The building with what its points (n, 3), in the roof's frame, leave to doubt: places without any, or two surfaces one over
+    the other."""
+    from .evaluate.layers import two_surfaces, unseen_share
 
     if building.built is None:
-        return ""
+        return building
+    unseen = unseen_share(points, building.roof.outline)
+    if unseen:
+        building = remarked(building, f"{100 * unseen:.0f} % of its outline hold no points; the roof there is a guess")
     share, apart_m = two_surfaces(points, building.roof)
-    return (
-        f"over {100 * share:.0f} % of its area points lie on two surfaces, {apart_m:.2f} m apart: two flights, two dates or "
-        "glass; use a cloud of one"
-        if share
-        else ""
-    )
+    if share:
+        building = remarked(
+            building,
+            f"over {100 * share:.0f} % of its area points lie on two surfaces, {apart_m:.2f} m apart: two flights, two "
+            "dates, glass or leaves; use a cloud of one",
+        )
+    return building

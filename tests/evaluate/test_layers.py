@@ -1,4 +1,4 @@
-"""Points of two surfaces, one over the other, are told from those of one roof, and by how much they lie apart."""
+"""Points of two surfaces, one over the other, are told from those of one roof, and a roof of which a part has no points."""
 
 import numpy as np
 import pytest
@@ -7,10 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hiproof
-from hiproof.evaluate.layers import split_cells, two_surfaces
+from hiproof.evaluate.layers import split_cells, two_surfaces, unseen_share
+from hiproof.settings import Settings
 from hiproof.simulate import random_compound
 from points_of_roofs import sampled
 
+UNMOVED = Settings.from_dict({"reconstruct": {"align": "off"}})
 SEEDS = st.integers(0, 2**32 - 1)
 
 
@@ -64,3 +66,20 @@ def test_a_building_says_that_its_points_lie_on_two_surfaces():
     assert "two surfaces" not in hiproof.reconstruct(points, outline).detail
     points[::2, 2] += 0.4
     assert "points lie on two surfaces, 0.40 m apart" in hiproof.reconstruct(points, outline).detail
+
+
+@settings(max_examples=40, deadline=None)
+@given(SEEDS, st.floats(5.0, 20.0), st.floats(0.45, 0.6))
+def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, cut):
+    roof, points = compound(seed, density)
+    assert unseen_share(points, roof.outline) == 0.0
+    seen = points[points[:, 0] > np.quantile(points[:, 0], cut)]
+    assert unseen_share(seen, roof.outline) == pytest.approx(cut, abs=0.2)
+
+
+def test_a_building_says_that_half_of_it_has_no_points():
+    outline = shapely.box(0, 0, 12, 8)
+    points = sampled(lambda x, y: 8 - 0.5 * abs(y - 4), outline)
+    assert hiproof.reconstruct(points, outline).detail == ""
+    detail = hiproof.reconstruct(points[points[:, 0] < 6], outline, settings=UNMOVED).detail
+    assert "% of its outline hold no points; the roof there is a guess" in detail

@@ -1,4 +1,4 @@
-"""Do the points of a building lie on one roof or on two, one over the other: two flights, two dates, a floor seen through glass?
+"""Do the points of a building lie all over it, and on one roof, or on two, one over the other: two flights, two dates, glass?
 
 Heights over the modelled roof, so that slopes do not matter, are split in small plan cells at the place that leaves the least
 variance within the two groups (Otsu 1979). Where a cell holds two surfaces little variance is left; noise leaves more than a
@@ -13,7 +13,7 @@ import numpy as np
 import shapely
 
 from ..model import Roof
-from .metrics import FACADE_M, NEAR_M
+from .metrics import FACADE_M, NEAR_M, nodata_share
 
 CELL_POINTS = 8.0
 """Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large as what stands on a roof."""
@@ -32,6 +32,17 @@ SMALLER_GROUP = 0.2
 
 LEAST_SHARE = 0.4
 """Share of the points in cells of two surfaces above which it is said: in single roofs of Delft up to 0.35."""
+
+LEAST_GAP = 0.2
+"""Share of the outline without points above which it is said: none of Delft's or the towns' reach it, a half or a third cut off do."""
+
+
+def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
+    """Share of the outline that none of the `points` (n, 2 or 3) inside it are near, whatever their density; 0 where it is small."""
+    if len(points) < FEWEST_POINTS:
+        return 0.0
+    share = nodata_share(points, outline, math.sqrt(CELL_POINTS * outline.area / len(points)))
+    return share if share > LEAST_GAP else 0.0
 
 
 def two_surfaces(points: np.ndarray, roof: Roof) -> tuple[float, float]:
