@@ -2,6 +2,7 @@
 
 import json
 
+import laspy
 import numpy as np
 import pytest
 import shapely
@@ -54,6 +55,17 @@ def test_shape_can_be_asked_for_although_there_is_a_class(tmp_path):
     wrong = np.where(np.arange(len(town.xyz)) % 2, town.classification, 1)
     rows = run(tmp_path, town.xyz, wrong, settings=Settings.from_dict({"read": {"roofs": "shape"}}))
     assert [row["status"] for row in rows.values()] == ["modelled"] * 4
+
+
+def test_the_first_look_at_the_classes_leaves_the_news_of_a_file_to_the_one_that_sorts_it(tmp_path):
+    town = make_town(1)
+    cloud = laspy.read(write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification))
+    cloud.withheld = np.arange(len(town.xyz)) % 2
+    cloud.write(tmp_path / "cloud.laz")
+    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    with pytest.warns(InputWarning, match="withheld") as told:
+        reconstruct_area(Request((str(tmp_path / "cloud.laz"),), tmp_path / "out", str(footprints)))
+    assert len(told) == 1
 
 
 def test_how_points_are_cut_into_files_changes_no_building(tmp_path):

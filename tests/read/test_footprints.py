@@ -125,6 +125,17 @@ def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
     }
 
 
+def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_not(tmp_path, recwarn):
+    ring = shapely.Polygon(shifted(SQUARE, 50).buffer(5).exterior, [shifted(SQUARE, 50).exterior])
+    apart = [SQUARE, shifted(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shifted(SQUARE, 50)]
+    read_footprints(write(tmp_path / "a.gpkg", apart))
+    assert not recwarn.list
+    ids = np.array(["house", "annex", "block"], object)
+    path = write(tmp_path / "b.gpkg", [SQUARE, SQUARE.buffer(-2), shifted(SQUARE, 20)], id=ids)
+    with pytest.warns(InputWarning, match=r"1 footprint on top of a larger one \(annex on house\): models of both"):
+        assert len(read_footprints(path)) == 3
+
+
 def test_features_without_area_stay_with_an_empty_polygon(tmp_path):
     line = shapely.Polygon([(0, 0), (5, 5), (2, 2), (0, 0)])
     path = write(

@@ -147,6 +147,19 @@ def test_folders_wildcards_and_repeats_name_each_file_once(tmp_path):
     assert len(cloud) == 40 and cloud.sources == (str(a), str(b))
 
 
+def test_notes_and_lists_of_a_delivery_are_left_aside_and_said(tmp_path):
+    xyz, classes = some_points(20)
+    cloud, points = write_las(tmp_path / "a.laz", xyz), write_text(tmp_path / "b.csv", xyz, classes)
+    (tmp_path / "notes.txt").write_text("The delivery\nof 2023")
+    (tmp_path / "tiles.csv").write_text("name,area\na,1\n")
+    with pytest.warns(InputWarning, match=r"text without points is left aside: notes\.txt, tiles\.csv"):
+        assert expand_paths((tmp_path,)) == [cloud, points]
+    cloud.unlink()
+    points.unlink()
+    with pytest.raises(InputError, match="expected lines of x y z in"):
+        read_points(tmp_path)
+
+
 @pytest.mark.parametrize(
     "text",
     ["1 2 3\n4 5 6\n", "2\n1 2 3 9 9\n4 5 6 9 9\n", "id;z;y;x\n7;3;2;1\n8;6;5;4\n", "\n# made by\n1\t2\t3\n4\t5\t6"],
@@ -227,6 +240,7 @@ AS_TOLD = {
     "two columns": ("bad.csv", b"1,2\n3,4\n"),
     "binary text": ("bad.xyz", bytes(range(256))),
     "other ending": ("cloud.jpg", b"\xff\xd8\xff\xe0"),
+    "E57": ("cloud.e57", b"ASTM-E57" + bytes(40)),
 }
 """Name and content of files that nobody has to damage."""
 
@@ -280,7 +294,7 @@ BAD = {
     **{"truncated ply": "the file is truncated", "ply of faces": "'face' before the vertices"},
     **{"ply without end": "does not end", "prose": "Dear reader", "word among numbers": "after 0 points"},
     **{"two columns": "nothing like a point", "binary text": "binary data"},
-    **{"degrees": "in degrees", "other ending": r"ending in \.jpg"},
+    **{"degrees": "in degrees", "other ending": r"ending in \.jpg", "E57": r"got E57; convert it first .*cloud\.laz"},
 }
 
 

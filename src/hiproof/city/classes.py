@@ -27,7 +27,9 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
     read = settings.read
     if read.roofs == "class" or (read.roofs == "auto" and read.building_classes != ReadSettings().building_classes):
         return settings
-    counts = count_classes(clouds, read.building_classes if read.roofs == "auto" else ())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # what is to be said of the points the step that sorts them says
+        counts = count_classes(clouds, read.building_classes if read.roofs == "auto" else ())
     if read.roofs == "auto" and (not counts or any(counts[c] for c in read.building_classes)):
         return settings
     from ..classify.scene import NO_ROOFS  # with scipy.ndimage: not where the clouds have a building class

@@ -59,6 +59,7 @@ def read_footprints(
     units = units_of(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
     footprints = tuple(unique_ids(split_features(ids, geometries, attributes, path), path))
+    say_which_overlie(footprints, path)
     return footprints if bbox is None else tuple(f for f in footprints if meets(f.polygon, bbox, units))
 
 
@@ -305,3 +306,19 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
             InputWarning,
         )
     return result
+
+
+def say_which_overlie(footprints: Sequence[Footprint], path: str | Path) -> None:
+    """One line where footprints lie on larger ones: each gets a model of the same points, and the models overlap."""
+    polygons = np.array([footprint.polygon for footprint in footprints])
+    pairs = shapely.STRtree(polygons).query(shapely.point_on_surface(polygons), predicate="within")
+    pairs = pairs[:, pairs[0] != pairs[1]]
+    pairs = pairs[:, ~shapely.equals(*polygons[pairs])]  # of copies is told elsewhere
+    if pairs.size:
+        smaller, larger = np.take_along_axis(pairs, np.argsort(shapely.area(polygons[pairs]), axis=0), axis=0)
+        warnings.warn(
+            f"{path}: {counted(len(np.unique(smaller)), 'footprint')} on top of a larger one "
+            f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have the same points and overlap; "
+            "keep one of them",
+            InputWarning,
+        )

@@ -45,6 +45,7 @@ READERS = {
 POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
 FORMATS = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
 PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
+ELSEWHERE = {b"ASTM-E57": "E57", b"# .PCD": "PCD"}  # point clouds of other kinds, by their first bytes
 CHUNK_POINTS = 5 * RUN_POINTS  # 30 MB while they are sorted
 
 COARSE_M = (
@@ -236,13 +237,24 @@ def expand_path(path: str | Path) -> list[str | Path]:
         found = sorted(p for p in folder.iterdir() if p.suffix.lower() in POINT_SUFFIXES and p.is_file())
         if not found:
             raise InputError(f"expected point files in the folder {path}, got none; it may hold {FORMATS}")
-        return list(found)
+        return without_other_text(found)
     if folder.exists():
         return [folder]
     matches = sorted(match for match in glob.glob(str(path), recursive=True) if Path(match).is_file())
     if not matches:
         raise InputError(f"expected a point cloud at {path}, got no such file; check the path (or the wildcard)")
     return [Path(match) for match in matches]
+
+
+def without_other_text(files: list[Path]) -> list[str | Path]:
+    """The point files of a folder without text that holds no points, as long as there are others: a delivery's notes and lists."""
+    points = [file for file in files if file.suffix.lower() not in TEXT_SUFFIXES or text.is_of_points(file)]
+    if not points:
+        return list(files)
+    if len(points) < len(files):
+        left = ", ".join(file.name for file in files if file not in points)
+        warnings.warn(f"{files[0].parent}: text without points is left aside: {left}", InputWarning)
+    return list(points)
 
 
 def file_kind(path: str | Path) -> str:
@@ -266,6 +278,11 @@ def file_kind(path: str | Path) -> str:
     for kind, reader in READERS.items():
         if head.startswith(reader.start) if reader.start else suffix in reader.suffixes:
             return kind
+    for start, name in ELSEWHERE.items():
+        if head.startswith(start):
+            raise InputError(
+                f"expected {FORMATS} at {path}, got {name}; convert it first (`pdal translate {path} {Path(path).with_suffix('.laz')}`)"
+            )
     for start, program in PACKED.items():
         if head.startswith(start):
             raise InputError(f"expected {FORMATS} at {path}, got a packed file; unpack it first: {program} {path}")

@@ -90,8 +90,17 @@ def sniff(path: str | Path) -> TextLayout:
     start = lines[0][:60] if lines else ""
     raise InputError(
         f"expected lines of x y z in {path}, got {start!r} and nothing like a point after it; "
-        "give LAS, LAZ, COPC, PLY or text with one point a line"
+        "give LAS, LAZ, COPC, PLY or text with one point a line and decimal points"
     )
+
+
+def is_of_points(path: str | Path) -> bool:
+    """Whether the first lines of a text file are points."""
+    try:
+        sniff(path)
+    except (InputError, OSError):
+        return False
+    return True
 
 
 def strip_comment(line: str) -> str:
