@@ -32,13 +32,10 @@ from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, 
 SIDES = ("left", "right", "front", "back")
 AXIS = np.array([0, 0, 1, 1])
 SIGN = np.array([1.0, -1.0, 1.0, -1.0])  # the plane from the left rises to +u, from the right to -u, ...
-QUARTER_TURN = [
-    FRONT,
-    BACK,
-    RIGHT,
-    LEFT,
-]  # which side becomes left, right, front, back when the axes turn by 90 degrees
-LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])  # the sign that their leans take then
+# which side becomes left, right, front, back when the axes turn by 90, 180, 270 degrees, and the sign that their leans take then
+QUARTER_TURN, HALF_TURN, OTHER_TURN = [FRONT, BACK, RIGHT, LEFT], [RIGHT, LEFT, BACK, FRONT], [BACK, FRONT, LEFT, RIGHT]
+LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])
+TURNS = {1: (QUARTER_TURN, LEANS_TURN), 2: (HALF_TURN, -np.ones(4)), 3: (OTHER_TURN, -LEANS_TURN)}
 SAME = 1e-9  # m; numerically equal
 ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
 HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
@@ -130,22 +127,19 @@ class Member:
         """The member with its eaves and slopes over a rectangle of other half extents (2,)."""
         return replace(self, half=half)
 
-    def turned(self) -> Member:
-        """The same surface with its axes turned by 90 degrees."""
-        kappa = math.remainder(self.kappa + 0.5 * math.pi, 2.0 * math.pi)
-        eaves, slopes, leans = (
-            self.eaves[QUARTER_TURN],
-            self.slopes[QUARTER_TURN],
-            self.leans[QUARTER_TURN] * LEANS_TURN,
-        )
-        return Member(kappa, self.centre, self.half[::-1].copy(), eaves, slopes, self.top, leans)
+    def turned(self, quarters: int = 1) -> Member:
+        """The same surface with its axes turned by so many times 90 degrees, 0 to 3."""
+        if quarters == 0:
+            return self
+        kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
+        sides, leans_turn = TURNS[quarters]
+        half = self.half[::-1].copy() if quarters % 2 else self.half
+        eaves, slopes, leans = self.eaves[sides], self.slopes[sides], self.leans[sides] * leans_turn
+        return Member(kappa, self.centre, half, eaves, slopes, self.top, leans)
 
     def canonical(self) -> Member:
         """The same surface in the direction in which it is named: the ridge along u, planes on the sides that SHAPES says."""
-        member = self
-        for _ in range(self.quarter_turns):
-            member = member.turned()
-        return member
+        return self.turned(self.quarter_turns)
 
     @cached_property
     def quarter_turns(self) -> int:
@@ -222,7 +216,7 @@ class Member:
         that is told, so that a small change does not turn it round."""
         if kappa is not None:
             opposite = math.cos(self.kappa - kappa) < 0.0
-            theta = (self.turned().turned() if opposite else self).theta(shape)
+            theta = (self.turned(2) if opposite else self).theta(shape)
             if math.cos(theta[KAPPA] - kappa) > ALONG:
                 return shape.from_theta(theta)
         return shape.from_theta(shape.canonical_theta(self.theta(shape)))

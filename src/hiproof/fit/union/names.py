@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -49,35 +48,28 @@ def part_of(
     sides = [moved(side, k, turn) for k, side in enumerate(sides)]
     low, high = rectangle_of(sides, corners @ axes.T)
     kappa = math.atan2(axes[0, 1], axes[0, 0])
-    member = regular(rows, low, high, kappa)
-    modes = [*(turned(mode, turn) for mode in planes.modes), np.tile((0.0, 0.0, REGISTERED_M), (SIDES + 1, 1))]
-    loose = [regular(rows, *ends, kappa) for ends in ends_moved(sides, low, high, known=True)]
-    loose += [regular(rows + turned(change, turn), low, high, kappa) for change in registrations]
-    unknown = [regular(rows, *ends, kappa) for ends in ends_moved(sides, low, high, known=False)]
-    changes, unknown = (
-        alike_turned(own, member.quarter_turns) for own in (changed(member, np.array(modes)) + loose, unknown)
-    )
+    modes = np.concatenate([turned(planes.modes, turn), np.tile((0.0, 0.0, REGISTERED_M), (1, SIDES + 1, 1))])
+    known, unknown = (ends_moved(sides, low, high, known) for known in (True, False))
+    ends = np.array([(low, high), (low, high), (low, high), *known, *unknown])
+    every = np.tile(rows, (len(ends), 1, 1))
+    every[1:3] += turned(registrations, turn)
+    member, *others = regular(every, ends, kappa)
+    told, turns = len(registrations) + len(known), member.quarter_turns
+    changes = [own.turned(turns) for own in changed(member, modes) + others[:told]]
     member = replace(member.canonical(), centre=member.centre @ axes + plan.frame.origin[:2])
     part = member.part(regions, name_among(member.name, allowed), changes)
-    untold = member.sigma(unknown, part.type == member.name)
+    untold = member.sigma([own.turned(turns) for own in others[told:]], part.type == member.name)
     return replace(part, sigma={name: value for name, value in part.sigma.items() if name not in untold})
 
 
-def registered(planes: Planes, rows: np.ndarray, corners: np.ndarray) -> list[np.ndarray]:
-    """By how much planes (5, 3) change were their points' swath to lie further along u or along v by a standard deviation: as those
+def registered(planes: Planes, rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """By how much (2, 5, 3) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
     that show (`rows`) can over `corners` (n, 2), tied to sides of the outline as they are."""
     there, at = np.isfinite(rows[:, 2]), np.column_stack([corners, np.ones(len(corners))])
     design = (at @ planes.design[there]).reshape(there.sum() * len(at), planes.design.shape[2])
     shifted = -REGISTERED_PLAN_M * rows[there, :2].repeat(len(corners), axis=0)
     unknowns = np.linalg.lstsq(design, shifted, rcond=None)[0]
-    return [planes.design @ own for own in unknowns.T]
-
-
-def alike_turned(members: list[Member], quarter_turns: int) -> list[Member]:
-    """The members seen from axes so many quarter turns on."""
-    for _ in range(quarter_turns):
-        members = [member.turned() for member in members]
-    return members
+    return np.moveaxis(planes.design @ unknowns, 2, 0)
 
 
 def showing(rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
@@ -103,14 +95,13 @@ def common_lean(rows: np.ndarray) -> float:
 
 
 def turned(rows: np.ndarray, angle: float) -> np.ndarray:
-    """Planes over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
+    """Planes (..., 5, 3) over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
     if angle == 0.0:
         return rows
     c, s = math.cos(angle), math.sin(angle)
     rows = rows @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    for k in range(SIDES):
-        if abs(rows[k, 1 - AXIS[k]]) < 1e-8:
-            rows[k, 1 - AXIS[k]] = 0.0
+    along = rows[..., EACH, 1 - AXIS]
+    rows[..., EACH, 1 - AXIS] = np.where(np.abs(along) < 1e-8, 0.0, along)
     return rows
 
 
@@ -134,37 +125,35 @@ def rectangle_of(sides: list[Side], corners: np.ndarray) -> tuple[np.ndarray, np
     return np.where(narrow, least, low), np.where(narrow, most, high)
 
 
-def ends_moved(
-    sides: list[Side], low: np.ndarray, high: np.ndarray, known: bool
-) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """The rectangle from `low` to `high` (2,) after each of its sides moved by its standard deviation, if that is `known`; or else
+def ends_moved(sides: list[Side], low: np.ndarray, high: np.ndarray, known: bool) -> list[np.ndarray]:
+    """The lowest and highest u, v (2, 2) of the rectangle from `low` to `high` (2,) after each of its sides moved by its standard deviation, if that is `known`; or else
     a little, of those that stand where no points tell."""
-    middle = 0.5 * (low + high)
+    middle, found = 0.5 * (low + high), []
     for k, side in enumerate(sides):
         ends = np.array([low, high])
         given = side.anchored or abs(ends[k % 2, AXIS[k]] - side.at - side.lean * middle[1 - AXIS[k]]) > GIVEN_M
         if side.sigma == math.inf and not known:
             ends[k % 2, AXIS[k]] += PROBE_M
-            yield ends[0], ends[1]
+            found.append(ends)
         elif known and not given and 0.0 < side.sigma < math.inf:
             ends[k % 2, AXIS[k]] += side.sigma
-            yield ends[0], ends[1]
+            found.append(ends)
+    return found
 
 
-def regular(rows: np.ndarray, low: np.ndarray, high: np.ndarray, kappa: float) -> Member:
-    """The member over a rectangle with planes `rows` (5, 3), with eaves and an apex in common where they nearly are."""
-    return with_one_apex(level(member_of(rows, low, high, kappa)))
-
-
-def member_of(rows: np.ndarray, low: np.ndarray, high: np.ndarray, kappa: float) -> Member:
-    """The member over the rectangle with planes `rows` (5, 3), in the axes they are given in, whose first is at `kappa`."""
-    centre, half = 0.5 * (low + high), 0.5 * (high - low)
-    sides, has = rows[:SIDES], np.isfinite(rows[:SIDES, 2])
-    slopes = np.where(has, SIGN * sides[EACH, AXIS], 0.0)
-    leans = np.divide(sides[EACH, 1 - AXIS], slopes, out=np.zeros(SIDES), where=has)
-    eaves = np.where(has, sides[:, :2] @ centre + sides[:, 2] - slopes * half[AXIS], np.inf)
-    top = float(rows[LEVEL, 2]) if np.isfinite(rows[LEVEL, 2]) else math.inf
-    return Member(kappa, centre, half, eaves, slopes, top, leans)
+def regular(rows: np.ndarray, ends: np.ndarray, kappa: float) -> list[Member]:
+    """Members over m rectangles, lowest and highest u, v `ends` (m, 2, 2), with planes `rows` (m, 5, 3), which all have the same sides,
+    in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are."""
+    centre, half = 0.5 * (ends[:, 0] + ends[:, 1]), 0.5 * (ends[:, 1] - ends[:, 0])
+    sides, has = rows[:, :SIDES], np.isfinite(rows[:, :SIDES, 2])
+    slopes = np.where(has, SIGN * sides[:, EACH, AXIS], 0.0)
+    leans = np.divide(sides[:, EACH, 1 - AXIS], slopes, out=np.zeros_like(slopes), where=has)
+    middles = (sides[:, :, :2] * centre[:, None]).sum(axis=2)
+    eaves = np.where(has, middles + sides[:, :, 2] - slopes * half[:, AXIS], np.inf)
+    centre, half, eaves = level(centre, half, eaves, slopes, leans)
+    tops = np.where(np.isfinite(rows[:, LEVEL, 2]), rows[:, LEVEL, 2], np.inf).tolist()
+    members = zip(centre, half, eaves, slopes, tops, leans, strict=True)
+    return [with_one_apex(Member(kappa, *member)) for member in members]
 
 
 def changed(member: Member, changes: np.ndarray) -> list[Member]:
@@ -178,26 +167,28 @@ def changed(member: Member, changes: np.ndarray) -> list[Member]:
     return [Member(kappa, centre, half, *own, leans) for own in zip(eaves, slopes, tops.tolist(), strict=True)]
 
 
-def level(member: Member) -> Member:
-    """The member with sides moved out to the lowest eave's height where that is near."""
-    if not member.has.any():
-        return member
-    lowest = member.eaves.min()
-    further = np.divide(member.eaves - lowest, member.slopes, out=np.full(SIDES, np.inf), where=member.has)
+def level(
+    centre: np.ndarray, half: np.ndarray, eaves: np.ndarray, slopes: np.ndarray, leans: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Centres and halves (m, 2) and eaves (m, 4) of members with sides moved out to the lowest eave's height where that is near."""
+    has, lowest = np.isfinite(eaves), eaves.min(axis=1, keepdims=True)
+    if not has.any():
+        return centre, half, eaves
+    further = np.divide(eaves - lowest, slopes, out=np.full_like(eaves, np.inf), where=has)
     outwards = np.where(further < LEVEL_EAVE_M, further, 0.0)
-    low, high = outwards[[0, 2]], outwards[[1, 3]]
-    shift, half = 0.5 * (high - low), member.half + 0.5 * (high + low)
-    eaves = member.eaves + member.slopes * (member.leans * shift[1 - AXIS] - outwards)
-    near = member.has & (np.abs(eaves - lowest) < 1e-6)
-    return replace(member, centre=member.centre + shift, half=half, eaves=np.where(near, lowest, eaves))
+    low, high = outwards[:, [0, 2]], outwards[:, [1, 3]]
+    shift = 0.5 * (high - low)
+    lower = eaves + slopes * (leans * shift[:, 1 - AXIS] - outwards)
+    near = has & (np.abs(lower - lowest) < 1e-6)
+    return centre + shift, half + 0.5 * (high + low), np.where(near, lowest, lower)
 
 
 def with_one_apex(member: Member) -> Member:
     """A hip whose two pairs of sides meet at nearly the same height with all four meeting in one point, eaves where they are."""
-    one, other = member.apex(0), member.apex(1)
-    if not (math.isfinite(one) and math.isfinite(other)) or math.isfinite(member.top) or abs(one - other) > APEX_M:
+    if not member.has.all() or math.isfinite(member.top) or member.leans.any():
         return member
-    if member.leans.any():
+    one, other = member.apex(0), member.apex(1)
+    if abs(one - other) > APEX_M:
         return member
     runs = (np.array([one, one, other, other]) - member.eaves) / member.slopes  # from each eave to the point in plan
     return replace(member, slopes=(0.5 * (one + other) - member.eaves) / runs)
