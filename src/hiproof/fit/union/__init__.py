@@ -52,7 +52,7 @@ from .objective import base_shows
 from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
-from .regions import places_of, polygons_of, regions_of
+from .regions import besides, places_of, polygons_of, regions_of
 from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
 from .shown import that_show
 from .slivers import without_slivers, without_specks
@@ -97,12 +97,13 @@ def fit_building(
         part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)
         for k, own in places_of(regions, outline, plan)
     ]
-    parts = that_show(parts, plan, scene)
-    parts = in_own_shapes(put_together(parts, types), points_local, settings)
+    shown = that_show(parts, plan, scene)
+    parts = in_own_shapes(put_together(shown, types), points_local, settings)
     parts = [as_allowed(part, types, points_local) for part in parts]
     low, high = (plan.frame.origin[2] + z for z in (plan.cloud.z.min(), plan.cloud.z.max()))
     parts = clamped(parts, low, high, 1.0 / math.sqrt(plan.density))
-    parts = that_show(parts, plan, scene, widest_m2=0.0)
+    if besides(parts, shown):  # new ones, which may hide others
+        parts = that_show(parts, plan, scene, widest_m2=0.0)
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, far)
 

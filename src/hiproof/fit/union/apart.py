@@ -41,8 +41,7 @@ def pieces_of(
     low, cross = U0 + 2 * axis, U0 + 2 * (1 - axis)
     if np.isfinite(own[[OFFSET + LEVEL, OFFSET + 2 * axis, OFFSET + 2 * axis + 1]]).all():
         return volumes[:0]  # what stands on a top between two slopes is the upper part of a gambrel
-    x = np.stack([U, V])[axis, int(own[DIRECTION])]
-    y = np.stack([U, V])[1 - axis, int(own[DIRECTION])]
+    x, y = (U, V)[axis][int(own[DIRECTION])], (U, V)[1 - axis][int(own[DIRECTION])]
     within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])
     seen = x[within & (top == k)]
     starts, ends, counts = runs_of(seen, scene.pitch) if len(seen) else (seen, seen, seen)

@@ -116,10 +116,12 @@ def rectangle_around(ring: np.ndarray, outline: shapely.Polygon, plan: Plan, sce
     for direction, (c, s) in enumerate(scene.turn):
         turned = own @ np.array([[c, -s], [s, c]])
         low, high = turned.min(axis=0), turned.max(axis=0)
+        narrow, wide = sorted((high - low).tolist())
+        if area <= FULL * narrow * wide or narrow < max(LEAST_WIDTH_M, wide / SLENDER):
+            continue
         corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) @ np.array([[c, s], [-s, c]])
         held = shapely.intersection(shapely.Polygon(plan.frame.xy_local(corners)), outline).area
-        narrow, wide = np.sort(high - low)
-        if held < least and area > FULL * narrow * wide and narrow >= max(LEAST_WIDTH_M, wide / SLENDER):
+        if held < least:
             best, least = np.array([direction, low[0], high[0], low[1], high[1]]), held
     return best
 

@@ -29,10 +29,11 @@ def clamped(parts: list[Part], low: float, high: float, spacing: float) -> list[
 
 def clamped_part(part: Part, low: float, high: float) -> list[Part]:
     """The part where it is between `low` and `high`, and a level part where it is below or above."""
+    if all(is_within(piece, low, high) for piece in part.pieces):
+        return [part]
     kept, beneath, above = [], [], []
     for piece in part.pieces:
-        z = shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
-        if z.min() >= low and z.max(axis=0).min() <= high:
+        if is_within(piece, low, high):
             kept.append(piece)
             continue
         beneath_low = [half_plane([0.0, 0.0, low] - plane, piece.outline) for plane in piece.planes]
@@ -46,6 +47,12 @@ def clamped_part(part: Part, low: float, high: float) -> list[Part]:
         kept += [Piece(polygon, piece.planes) for polygon in polygons_of(rest)]
     found = [dataclasses.replace(part, pieces=tuple(kept))] if kept else []
     return found + [level_part(polygons, z) for polygons, z in ((beneath, low), (above, high)) if polygons]
+
+
+def is_within(piece: Piece, low: float, high: float) -> bool:
+    """Whether a piece is nowhere below `low`, and one of its planes nowhere above `high`."""
+    z = shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
+    return bool(z.min() >= low and z.max(axis=0).min() <= high)
 
 
 def level_part(polygons: list[shapely.Polygon], z: float) -> Part:

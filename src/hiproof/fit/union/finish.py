@@ -7,6 +7,7 @@ the eaves on the outline are at one height. Everything is linear in c and s, so 
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -304,6 +305,5 @@ def cost_of(rows, points, dead, width):
 
 def proper(rows: np.ndarray) -> bool:
     """Whether every inclined plane rises from its own side, neither too flat nor too steep."""
-    slope = SIGN * np.array([rows[0, 0], rows[1, 0], rows[2, 1], rows[3, 1]])
-    slope = slope[np.isfinite(slope)]
-    return bool((slope > FLATTEST).all() and (slope < SLOPE_HIGH).all())
+    slopes = rows[0, 0], -rows[1, 0], rows[2, 1], -rows[3, 1]
+    return all(FLATTEST < slope < SLOPE_HIGH for slope in slopes if math.isfinite(slope))

@@ -132,7 +132,8 @@ def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan,
 
 
 def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
-    return [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon" and g.area > 1e-9]
+    parts = getattr(geometry, "geoms", (geometry,))
+    return [part for part in parts if part.geom_type == "Polygon" and part.area > 1e-9]
 
 
 def area_of(parts: Iterable[Part]) -> shapely.Geometry:

@@ -92,12 +92,14 @@ def plan_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
 
 def plan_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     """Starts and ends (2, m, 2) of the straight lines inside the outline between two of its corners; none of too many."""
-    corners = np.unique(shapely.get_coordinates(outline), axis=0)
+    corners = np.array(sorted(set(map(tuple, shapely.get_coordinates(outline).tolist()))))
     if len(corners) > MOST_CORNERS:
         return np.zeros((2, 0, 2))
     i, j = np.triu_indices(len(corners), 1)
     lines = shapely.linestrings(np.stack([corners[i], corners[j]], axis=1))
-    within = shapely.covers(shapely.buffer(outline, ALONG_M), lines)
+    wider = shapely.buffer(outline, ALONG_M)
+    shapely.prepare(wider)
+    within = shapely.covers(wider, lines)
     ends = np.stack([corners[i][within], corners[j][within]])
     return (ends - plan.frame.origin[:2]) @ plan.frame.rotation.T
 

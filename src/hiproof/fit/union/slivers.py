@@ -35,7 +35,8 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     U, V = nodes(scene)
     _, top = roof_heights(volumes, U, V)
     for k in range(1, len(volumes)):
-        for plane in narrow_planes(volumes[k], np.stack([U, V])[:, int(volumes[k, DIRECTION]), top == k]):
+        direction, seen = int(volumes[k, DIRECTION]), top == k
+        for plane in narrow_planes(volumes[k], U[direction, seen], V[direction, seen]):
             if np.isfinite(volumes[k, OFFSET : OFFSET + PLANES]).sum() < 2:
                 break
             trial = volumes.copy()
@@ -48,15 +49,14 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     return volumes
 
 
-def narrow_planes(volume: np.ndarray, seen: np.ndarray) -> list[int]:
-    """Inclined planes of a volume that show nowhere, or over a strip narrower than NARROW_M; it shows at `seen` (2, n), u and v."""
-    u, v = seen
-    if len(u) == 0:
+def narrow_planes(volume: np.ndarray, u: np.ndarray, v: np.ndarray) -> list[int]:
+    """Inclined planes of a volume that show nowhere, or over a strip narrower than NARROW_M; it shows at `u`, `v` (n,)."""
+    there = [p for p in range(SIDES) if volume[OFFSET + p] < np.inf]
+    if len(u) == 0 or not there:
         return []
     slopes = np.append(volume[SLOPE : SLOPE + SIDES], 0.0)
     falls = np.stack([*distances_up(volume, u, v), np.zeros_like(u)])
     lowest = np.argmin(volume[OFFSET : OFFSET + PLANES, None] + slopes[:, None] * falls, axis=0)
-    there = [p for p in range(SIDES) if volume[OFFSET + p] < np.inf]
     return [p for p in there if width_of(falls[p, lowest == p]) < NARROW_M]
 
 

@@ -52,8 +52,8 @@ def runs_of(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.nda
     """Where the runs of places x (n,) begin and end (m,) that follow each other by no more than a few steps of the raster, and how
     many places each has."""
     x = np.sort(x)
-    first = np.r_[0, np.nonzero(np.diff(x) > max(GAP_M, GAP_NODES * pitch))[0] + 1]
-    last = np.r_[first[1:], len(x)] - 1
+    gaps = np.flatnonzero(x[1:] - x[:-1] > max(GAP_M, GAP_NODES * pitch))
+    first, last = np.append(0, gaps + 1), np.append(gaps, len(x) - 1)
     return x[first], x[last], last - first + 1
 
 
