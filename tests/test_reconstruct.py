@@ -101,6 +101,7 @@ def test_terrain_above_the_eaves_still_gives_a_valid_solid():
     building = hiproof.reconstruct(gable_points(), FOOTPRINT, Above(), PLAIN)
     assert building.built is not None
     assert check_solid(building.solid) == ()
+    assert "the ground (a wrong terrain model) lies 45.0 m above its eaves" in building.detail
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import shapely
 from .errors import CompositionError, FitError
 from .frames import LocalFrame
 from .log import counted
-from .model import Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
+from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
 from .settings import Settings
 from .status import Status
 
@@ -28,6 +28,9 @@ FEWEST_POINTS = 4
 
 MOST_OUTLINE_VERTICES = 500
 """Of an outline that roofs are fitted over; the time grows with the square of them, and a building has no more corners."""
+
+SUNK_M = 0.2
+"""Of ground above the lowest eave; less is how well both are known, where a roof comes down to the ground."""
 
 ASSUMED_WALL_M = 3.0
 """Height of the lowest wall where nothing is known of the terrain."""
@@ -343,12 +346,19 @@ def judge(
 
 
 def cautioned(building: Building, points: np.ndarray) -> Building:
-    """The building with what its points (n, 3), in the roof's frame, leave to doubt: places without any, or two surfaces one over
-    the other."""
+    """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in the roof's frame, places without
+    any, or two surfaces one over the other."""
     from .evaluate.layers import two_surfaces, unseen_share
 
     if building.built is None:
         return building
+    roof = [building.solid.vertices[list(ring), 2] for face in building.solid.of_kind(ROOF) for ring in face.rings]
+    sunk = building.z_ground - float(np.concatenate(roof).min())
+    if sunk > SUNK_M:
+        building = remarked(
+            building,
+            f"the ground ({building.ground_source}) lies {sunk:.1f} m above its eaves; check the heights of both",
+        )
     unseen = unseen_share(points, building.roof.outline)
     if unseen:
         building = remarked(building, f"{100 * unseen:.0f} % of its outline hold no points; the roof there is a guess")

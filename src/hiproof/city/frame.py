@@ -12,8 +12,10 @@ from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..read.crs import described, parse_crs, units_of
 from ..read.footprints import footprint_crs
-from ..read.overlap import doubtful_place, refuse_degrees
+from ..read.overlap import doubtful_place, refuse_degrees, stretch
 from ..read.pointcloud import PointFileHeader, common_crs, say_how_coarse
+
+MOST_STRETCH = 0.01  # of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
 
 
 @dataclass(frozen=True)
@@ -52,11 +54,21 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
 
 
 def say_where_it_lies(headers: list[PointFileHeader], frame: AreaFrame) -> None:
-    """One line where the CRS puts the clouds far from the area it is made for: it is another, or of another unit."""
+    """One line where the CRS puts the clouds far from the area it is made for, so that it is another or of another unit, or where
+    its lengths there are not those on the ground."""
     bounds = plan_bounds(headers)
-    doubt = doubtful_place(frame.crs, (bounds[:, :2] + bounds[:, 2:]) / 2) if len(bounds) else None
+    if not len(bounds):
+        return
+    middles = (bounds[:, :2] + bounds[:, 2:]) / 2
+    doubt = doubtful_place(frame.crs, middles)
     if doubt:
         warnings.warn(f"{headers[0].path}: lies at {doubt}; check the CRS and its unit", InputWarning)
+    elif abs((times := stretch(frame.crs, middles)) - 1.0) > MOST_STRETCH:
+        warnings.warn(
+            f"{headers[0].path}: in {described(frame.crs)} a metre on the ground is {times:.2f} m long there, and so are "
+            "roofs, but not their heights; reproject clouds and footprints to the UTM zone or the national grid",
+            InputWarning,
+        )
 
 
 def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:

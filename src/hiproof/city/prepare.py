@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import shapely
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
+from ..masking import masked
 from ..read.overlap import told_box
 from ..settings import Settings
 from ..write.naming import FileUnits
@@ -19,6 +20,9 @@ from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
 from .plan import Job, WorkPlan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
 from .request import Box, Request
+
+if TYPE_CHECKING:
+    from ..read.terrain import RasterTerrain
 
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
 MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
@@ -32,15 +36,16 @@ def make_plan(request: Request) -> WorkPlan:
     headers = read_headers(request.clouds)
     frame = settle_frame(request, headers)
     refuse_box_elsewhere(request.bbox, plan_bounds(headers))
-    if request.terrain:
-        # only to be told now if it cannot be read, and not after all points are sorted
-        read_terrain(request.terrain, frame.crs, frame.units)
+    # opened only to be told now if it cannot be read, and not after all points are sorted
+    terrain = read_terrain(request.terrain, frame.crs, frame.units) if request.terrain else None
     settings = settle_classes(request.clouds, request.settings)
     if request.footprints:
         jobs = jobs_from_footprints(request, headers, frame)
     else:
         jobs, settings = jobs_from_cloud(request.clouds, settings)
         jobs = jobs_in_box(jobs, request, frame.units)
+    if terrain is not None:
+        say_if_terrain_lies_elsewhere(terrain, jobs)
     units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
     if settings.write.out_crs:
         say_where_files_lie(jobs, crs_of_files(frame.crs, settings.write.out_crs), units)
@@ -64,6 +69,17 @@ def say_where_files_lie(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> No
     if doubt:
         warnings.warn(
             f"--out-crs: the buildings lie at {doubt}; name the UTM zone or the national grid there", InputWarning
+        )
+
+
+def say_if_terrain_lies_elsewhere(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
+    """One line where no building stands on the terrain model: what stands in for it would else be taken in silence."""
+    boxes = shapely.bounds([job.area for job in jobs])
+    middles = (boxes[:, :2] + boxes[:, 2:])[np.isfinite(boxes).all(axis=1)] / 2
+    if len(middles) and not terrain.pixels_at(middles)[2].any():
+        warnings.warn(
+            f"{masked(terrain.path)}: no building stands on it, so the ground is taken from the points; check its CRS",
+            InputWarning,
         )
 
 

@@ -34,6 +34,10 @@ from .sort import load_points
 
 NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
 
+FAR_GROUND_M = (
+    2.0  # between a terrain model and ground points: other heights (a geoid's are 10 to 100 m) or another date
+)
+
 
 class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
@@ -75,6 +79,18 @@ class Surroundings:
         grounds = self.grounds_of(job)
         lowest = LowestAround(self.low, neighbourhood(job, self.plan.terrain_reach_m))
         return TerrainChain([*grounds, None if grounds[-1] is None else lowest])
+
+    def doubt_of_terrain(self, job: Job) -> str:
+        """A remark where the terrain model lies far above or below the ground points around a building; empty otherwise."""
+        if self.model is None or job.area.is_empty:
+            return ""
+        xy = shapely.get_coordinates(job.area)
+        model, points = self.model, GroundAround(self.ground, neighbourhood(job, self.plan.terrain_reach_m))
+        apart = model.height_at(xy) - points.height_at(xy)
+        above = float(np.median(apart[np.isfinite(apart)])) if np.isfinite(apart).any() else 0.0
+        way = "above" if above > 0 else "below"
+        far = abs(above) > FAR_GROUND_M
+        return f"the {model.source} lies {abs(above):.1f} m {way} the ground points around it" if far else ""
 
 
 def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
@@ -141,7 +157,7 @@ def solve_one(
         building = reconstruct(*known, id=job.id) if override is None else overridden(override, *known, id=job.id)
         if len(used) < len(points) and building.status is Status.MODELLED:
             building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
-        building = remarked(building, found.remark)
+        building = remarked(remarked(building, found.remark), surroundings.doubt_of_terrain(job))
         return fragments(building, plan.names_of(job), plan.head)
     except MemoryError:
         raise

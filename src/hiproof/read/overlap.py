@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 import shapely
-from pyproj import CRS, Transformer
-from pyproj.exceptions import CRSError
+from pyproj import CRS, Proj, Transformer
+from pyproj.exceptions import CRSError, ProjError
 
 from ..errors import InputError
 from ..frames import METRES, Units
@@ -136,6 +136,19 @@ def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
     where = f"{lon:.1f} E {lat:.1f} N" if np.isfinite((lon, lat)).all() else "nowhere on Earth"
     place = f"{area.west:.0f} to {area.east:.0f} E, {area.south:.0f} to {area.north:.0f} N"
     return f"{where}, far from where {described(crs)} is used ({place})"
+
+
+def stretch(crs: CRS, xy: np.ndarray) -> float:
+    """How many metres of `crs` a metre on the ground is at positions (n, 2), in the worse of its directions; 1 where unknown."""
+    plan = horizontal_crs(crs)
+    lon, lat = np.median(reprojected(xy, plan, parse_crs("EPSG:4326")), axis=0)
+    if not (plan.is_projected and np.isfinite((lon, lat)).all()):
+        return 1.0
+    try:
+        factors = Proj(plan).get_factors(lon, lat)
+    except ProjError:
+        return 1.0
+    return max(factors.meridional_scale, factors.parallel_scale, key=lambda scale: abs(scale - 1.0))
 
 
 def extent(low: np.ndarray, high: np.ndarray) -> str:

@@ -122,19 +122,23 @@ class RasterTerrain:
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Height (n,) in metres at `xy_world` (n, 2), NaN outside the raster and where it has no data."""
-        xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
-        if self.transformer is not None:
-            xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
-        heights = np.full(len(xy), np.nan)
-        to_pixel = ~self.dataset.transform
-        column = to_pixel.a * xy[:, 0] + to_pixel.b * xy[:, 1] + to_pixel.c
-        row = to_pixel.d * xy[:, 0] + to_pixel.e * xy[:, 1] + to_pixel.f
-        inside = (column >= 0) & (row >= 0) & (column <= self.dataset.width) & (row <= self.dataset.height)
+        row, column, inside = self.pixels_at(xy_world)
+        heights = np.full(len(row), np.nan)
         # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its centre's value.
         column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
         row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
         heights[inside] = self.interpolate(row, column) * self.metres_in_height
         return heights
+
+    def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Rows and columns (n,) of the raster at `xy_world` (n, 2), and whether (n,) they are inside it."""
+        xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
+        if self.transformer is not None:
+            xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
+        to_pixel = ~self.dataset.transform
+        column = to_pixel.a * xy[:, 0] + to_pixel.b * xy[:, 1] + to_pixel.c
+        row = to_pixel.d * xy[:, 0] + to_pixel.e * xy[:, 1] + to_pixel.f
+        return row, column, (column >= 0) & (row >= 0) & (column <= self.dataset.width) & (row <= self.dataset.height)
 
     def interpolate(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Heights (n,) at fractional pixel-centre positions inside the raster, tile by tile."""
