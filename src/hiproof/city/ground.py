@@ -7,10 +7,12 @@ answer is the same whatever tile the cells were gathered for, and costs a few ta
 from __future__ import annotations
 
 import functools
+from collections.abc import Callable
 
 import numpy as np
 
 from ..compiled import compiled
+from ..read.terrain import Terrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
 
 RINGS = (2, 5, 9)  # cells looked at around a position, the next where fewer than three are known; within the reach
@@ -90,6 +92,17 @@ class LowestAround:
         """Height (n,) at `xy_world` (n, 2), NaN where no cell is known."""
         xy = np.ascontiguousarray(xy_world, float)
         return lowest_heights(xy, self.cells.z, self.cells.low, self.box.astype(np.int64))
+
+
+class WhereSeen:
+    """A terrain that knows nothing unless `is_seen`, which is asked only where all better ones do not know."""
+
+    def __init__(self, terrain: Terrain, is_seen: Callable[[], bool]):
+        self.terrain, self.is_seen, self.source = terrain, is_seen, terrain.source
+
+    def height_at(self, xy_world: np.ndarray) -> np.ndarray:
+        """The terrain's height (n,) at `xy_world` (n, 2), NaN where it knows none."""
+        return self.terrain.height_at(xy_world) if self.is_seen() else np.full(len(xy_world), np.nan)
 
 
 @compiled

@@ -25,7 +25,7 @@ from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
 from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
-from .ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
 from .overrides import load_overrides, load_redo
@@ -63,7 +63,7 @@ class Surroundings:
     def grounds_of(self, job: Job) -> list[Terrain | None]:
         """The terrain model, the ground points in the whole-metre box around the building, and the ground found there."""
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        found = BareAround(self.low, box) if self.is_seen_around(job, box) else None
+        found = WhereSeen(BareAround(self.low, box), lambda: self.is_seen_around(job, box))
         return [self.model, GroundAround(self.ground, box), found]
 
     def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
@@ -76,9 +76,9 @@ class Surroundings:
         """What answers for the ground around the building: that of `grounds_of`, else the lowest points."""
         if job.area.is_empty:
             return None
-        grounds = self.grounds_of(job)
-        lowest = LowestAround(self.low, neighbourhood(job, self.plan.terrain_reach_m))
-        return TerrainChain([*grounds, None if grounds[-1] is None else lowest])
+        box = neighbourhood(job, self.plan.terrain_reach_m)
+        lowest = WhereSeen(LowestAround(self.low, box), lambda: self.is_seen_around(job, box))
+        return TerrainChain([*self.grounds_of(job), lowest])
 
     def doubt_of_terrain(self, job: Job) -> str:
         """A remark where the terrain model lies far above or below the ground points around a building; empty otherwise."""

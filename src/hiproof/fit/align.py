@@ -136,11 +136,11 @@ def costs_at(depth):
 @compiled
 def slid_costs(xy, costs, low, pitch, moves):
     """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first node lies at `low`."""
-    found = np.zeros(len(moves))
+    found, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
     for m in range(len(moves)):
         for k in range(len(xy)):
-            i = int((xy[k, 0] - moves[m, 0] - low[0]) / pitch + 0.5)
-            j = int((xy[k, 1] - moves[m, 1] - low[1]) / pitch + 0.5)
+            i = int((xy[k, 0] - moves[m, 0] - low[0]) * nodes_a_metre + 0.5)
+            j = int((xy[k, 1] - moves[m, 1] - low[1]) * nodes_a_metre + 0.5)
             found[m] += costs[min(max(i, 0), costs.shape[0] - 1), min(max(j, 0), costs.shape[1] - 1)]
     return found
 

@@ -194,8 +194,9 @@ def eave_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float:
     Eaves are level edges of one roof face alone that does not fall away from them; of a roof without one, all its outer edges.
     """
     along = edges[:, 1] - edges[:, 0]
-    _, inverse, count = np.unique(undirected(ends), return_inverse=True, return_counts=True)
-    outer = count[inverse.ravel()] == 1
+    key = undirected(ends)
+    ordered = np.sort(key)
+    outer = np.searchsorted(ordered, key, side="right") - np.searchsorted(ordered, key) == 1
     eaves = outer & (np.abs(along[:, 2]) < LEVEL_RIDGE_M) & ~falls_away(along, area)
     chosen = eaves if eaves.any() else outer
     # Rounding as for ridges: neither the order nor the half hangs on the last bit.

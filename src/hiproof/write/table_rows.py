@@ -109,7 +109,7 @@ def surface_rows(building: Building, figures: RoofFigures | None, units: Units =
     """A row a roof surface of the solid: its polygon, slope, azimuth, area and part."""
     if figures is None:
         return ()
-    vertices = units.from_metres(building.solid.vertices)
+    vertices = np.round(units.from_metres(building.solid.vertices), 4)
     rows: list[Row] = []
     for index, face in enumerate(building.solid.faces):
         if face.kind != ROOF:
@@ -125,7 +125,7 @@ def surface_rows(building: Building, figures: RoofFigures | None, units: Units =
             "azimuth_deg": rounded(azimuth, 3) if math.isfinite(azimuth) else None,
             "area_m2": metres(figures.face_area_m2[index]),
         }
-        outer, *holes = (np.round(vertices[list(ring)], 4) for ring in face.rings)
+        outer, *holes = (vertices[list(ring)] for ring in face.rings)
         rows.append((shapely.to_wkb(shapely.Polygon(outer, holes)), values))
     return tuple(rows)
 

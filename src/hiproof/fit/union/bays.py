@@ -133,6 +133,8 @@ def pieces_of(outline: shapely.Polygon) -> list[np.ndarray]:
     after = np.roll(ring, -1, axis=0) - ring
     before = np.roll(after, 1, axis=0)
     inwards = np.nonzero(cross(before, after) < 0.0)[0]
+    if not len(inwards):
+        return []
     corners, ways = np.tile(inwards, 2), np.concatenate([before[inwards], -after[inwards]])
     edges, places = first_crossings(ring, corners, ways)
     firsts, lasts, places = np.r_[corners, edges + 1], np.r_[edges, corners], np.tile(places, (2, 1))

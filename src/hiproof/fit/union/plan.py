@@ -88,7 +88,8 @@ def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> np
 
 
 def cells_of(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
-    return np.clip(np.searchsorted(lines, x, side="right") - 1, 0, len(lines) - 2)
+    """Which of the cells between neighbouring `lines`, few and ascending, each of x (n,) lies in; the first or last where beyond all."""
+    return (lines[1:-1, None] <= x).sum(axis=0)
 
 
 def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
