@@ -162,7 +162,12 @@ def test_notes_and_lists_of_a_delivery_are_left_aside_and_said(tmp_path):
 
 @pytest.mark.parametrize(
     "text",
-    ["1 2 3\n4 5 6\n", "2\n1 2 3 9 9\n4 5 6 9 9\n", "id;z;y;x\n7;3;2;1\n8;6;5;4\n", "\n# made by\n1\t2\t3\n4\t5\t6"],
+    [
+        "1 2 3\n4 5 6\n",
+        "2\n1 2 3 9 9\n4 5 6 9 9\n",
+        "id;z;y;x\n7;3;2;1\n8;6;5;4\n",
+        "\n# made by\n1\t2\t3\n4\t5\t6",
+    ],
 )
 def test_text_layouts_are_recognised(tmp_path, text):
     (tmp_path / "a.pts").write_text(text)
@@ -240,6 +245,8 @@ AS_TOLD = {
     "two columns": ("bad.csv", b"1,2\n3,4\n"),
     "binary text": ("bad.xyz", bytes(range(256))),
     "other ending": ("cloud.jpg", b"\xff\xd8\xff\xe0"),
+    "UTF-16": ("bad.txt", "1 2 3\n4 5 6\n".encode("utf-16")),
+    "grid": ("dsm.asc", b"NCOLS 3\nNROWS 2\nXLLCORNER 85000\n5 5 5\n5 5 5\n"),
     "E57": ("cloud.e57", b"ASTM-E57" + bytes(40)),
 }
 """Name and content of files that nobody has to damage."""
@@ -294,7 +301,13 @@ BAD = {
     **{"truncated ply": "the file is truncated", "ply of faces": "'face' before the vertices"},
     **{"ply without end": "does not end", "prose": "Dear reader", "word among numbers": "after 0 points"},
     **{"two columns": "nothing like a point", "binary text": "binary data"},
-    **{"degrees": "in degrees", "other ending": r"ending in \.jpg", "E57": r"got E57; convert it first .*cloud\.laz"},
+    **{
+        "degrees": "in degrees",
+        "other ending": r"ending in \.jpg",
+        "UTF-16": "got UTF-16",
+        "grid": "ESRI ASCII grid",
+        "E57": r"got E57; convert it first .*cloud\.laz",
+    },
 }
 
 

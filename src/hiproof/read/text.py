@@ -49,7 +49,12 @@ def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", UserWarning)  # NumPy warns of an empty rest, which is the normal end
             return np.loadtxt(
-                file, delimiter=layout.delimiter, usecols=layout.columns, max_rows=count, comments=COMMENTS, ndmin=2
+                file,
+                delimiter=layout.delimiter,
+                usecols=layout.columns,
+                max_rows=count,
+                comments=COMMENTS,
+                ndmin=2,
             )
     except (ValueError, IndexError) as error:
         raise InputError(
@@ -68,6 +73,13 @@ def sniff(path: str | Path) -> TextLayout:
     """Find the layout from the first lines. Raises InputError when they are no text or hold no three numbers."""
     with opened(path) as file:
         head = file.read(65536)
+    if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise InputError(f"expected text in UTF-8 in {path}, got UTF-16; save it as UTF-8 or plain text")
+    if head[:16].lstrip().lower().startswith(b"ncols"):
+        raise InputError(
+            f"expected lines of x y z in {path}, got an ESRI ASCII grid; convert a surface model to points (`gdal2xyz`), "
+            "or name a model of the ground with --terrain"
+        )
     if b"\0" in head:
         raise InputError(f"expected text with x y z on each line in {path}, got binary data; rename it")
     lines = head.decode("utf-8-sig", errors="replace").splitlines()
