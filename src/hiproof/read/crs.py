@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 from typing import Any
 
@@ -68,8 +69,9 @@ def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
     return code is not None and code == epsg_code(second)
 
 
+@functools.lru_cache(maxsize=64)
 def epsg_code(crs: CRS) -> int | None:
-    """EPSG number of `crs` where pyproj is sure of it, else None."""
+    """EPSG number of `crs` where pyproj is sure of it, else None; kept, for looking it up takes a millisecond or several."""
     authority = crs.to_authority("EPSG", min_confidence=70)
     return int(authority[1]) if authority else None
 

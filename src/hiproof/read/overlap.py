@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -102,9 +103,14 @@ def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
 
 def reprojected(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
     """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either is unknown."""
-    if source is None or target is None or same_horizontal(source, target):
-        return xy
-    return np.column_stack(Transformer.from_crs(source, target, always_xy=True).transform(*xy.T))
+    transformer = None if source is None or target is None else transformer_between(source, target)
+    return xy if transformer is None else np.column_stack(transformer.transform(*xy.T))
+
+
+@functools.lru_cache(maxsize=8)
+def transformer_between(source: CRS, target: CRS) -> Transformer | None:
+    """From `source` to `target`, None where they are the same; kept, for PROJ takes long to choose among its ways."""
+    return None if same_horizontal(source, target) else Transformer.from_crs(source, target, always_xy=True)
 
 
 def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:

@@ -135,7 +135,9 @@ def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
     """How empty (nu, nv) cells and those beside them are of the points `expected` (nu, nv): 1 quite, 0 from half of them on."""
     count = np.zeros(expected.shape)
     np.add.at(count, (cloud.i, cloud.j), 1.0)
-    (rows, columns), padded = expected.shape, np.pad([count, expected], ((0, 0), (1, 1), (1, 1)))
+    rows, columns = expected.shape
+    padded = np.zeros((2, rows + 2, columns + 2))
+    padded[:, 1:-1, 1:-1] = count, expected
     windows = [padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3)]
     around = np.sum(windows, axis=0)
     return np.clip(1.0 - around[0] / np.maximum(0.5 * around[1], 1e-9), 0.0, 1.0)

@@ -46,7 +46,7 @@ def regions_of(
                 [q for p in before for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
                 for before in regions
             ]
-        elif not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, plan, scene):
+        elif regions[0] and not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, plan, scene):
             regions[0] = [q for p in regions[0] for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
         regions.append(polygons_of(own))
     return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, quads, outline, plan, scene)
