@@ -218,3 +218,21 @@ def test_the_papers_objective_fits_only_what_is_asked_for_or_seen():
     assert candidates(seen, paper.replace({"fit": {"types": ["hip", "flat"]}})) == ("hip",)
     assert candidates(seen, paper.replace({"fit": {"types": ["flat"]}})) == ("flat",)
     assert candidates({}, paper) == candidates(seen, Settings()) == ()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"points": gable_points().T}, r"shape \(n, 3\), got \(3, 700\)"),
+        ({"points": gable_points()[:, [0, 1, 2, 2]]}, r"shape \(n, 3\), got \(700, 4\)"),
+        ({"points": gable_points()[:, :2]}, r"shape \(n, 3\), got \(700, 2\)"),
+        ({"points": None}, "got "),
+        ({"points": hiproof.PointCloud(gable_points())}, "got PointCloud"),
+        ({"footprint": [(0, 0), (12, 0), (12, 8)]}, "polygon of shapely as footprint, got list"),
+        ({"terrain": "dtm.tif"}, r"answers height_at, got str; read a raster by hiproof\.read_terrain"),
+        ({"settings": {"fit": {}}}, r"got dict; make them by Settings\.from_dict"),
+    ],
+)
+def test_arguments_of_another_shape_or_kind_are_refused(arguments, words):
+    with pytest.raises(hiproof.InputError, match=words):
+        hiproof.reconstruct(**{"points": gable_points(), "footprint": FOOTPRINT, **arguments})

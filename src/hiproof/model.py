@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import shapely
 
-from .errors import NoModelError
+from .errors import InputError, NoModelError
 from .frames import METRES, LocalFrame, Units
 from .status import Status
 
@@ -38,6 +38,21 @@ class PointCloud:
 
     def __len__(self) -> int:
         return len(self.xyz)
+
+
+def as_xyz(points: Any) -> np.ndarray:
+    """Points as float64 (n, 3), none as (0, 3). Raises InputError for another shape: columns taken for rows make a roof of anything."""
+    try:
+        xyz = np.asarray(points, float)
+    except (TypeError, ValueError):
+        raise InputError(
+            f"expected points of shape (n, 3), got {type(points).__name__}; pass x, y, z as columns of one array"
+        ) from None
+    if xyz.size == 0:
+        return np.zeros((0, 3))
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise InputError(f"expected points of shape (n, 3), got {xyz.shape}; pass x, y, z as columns")
+    return xyz
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ import shapely
 
 from . import stages
 from .frames import LocalFrame
-from .model import Building, Footprint, Roof
+from .model import Building, Footprint, Roof, as_xyz
 from .settings import Settings
 from .status import Status
 
@@ -31,14 +31,16 @@ def reconstruct(
     ones are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
     beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
     `hiproof.Terrain`; without one the ground is assumed below the lowest point.
-    What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why.
+    What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError
+    for points of another shape, and for a footprint, a terrain or settings of another kind.
 
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
     >>> roof = np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)])
     >>> reconstruct(roof).type
     'gable'
     """
-    settings = settings or Settings()
+    stages.refuse_other_kinds(footprint, terrain, settings)
+    points, settings = as_xyz(points), settings or Settings()
     building = stages.asked_for(footprint, id)
     building, footprint, of_footprint = stages.aligned(building, points, settings)
     points, outline, status = stages.usable(points, footprint)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import shapely
 
-from .errors import CompositionError, FitError
+from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
 from .log import counted
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
@@ -66,6 +66,22 @@ class Ground:
     intersection: tuple[np.ndarray, ...] = ()
 
 
+def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> None:
+    """Raise InputError for arguments of another kind, by their own names: what they hold may be anything."""
+    if footprint is not None and not isinstance(footprint, (shapely.Geometry, Footprint)):
+        raise InputError(
+            f"expected a polygon of shapely as footprint, got {type(footprint).__name__}; make a shapely.Polygon of it"
+        )
+    if settings is not None and not isinstance(settings, Settings):
+        raise InputError(
+            f"expected hiproof.Settings as settings, got {type(settings).__name__}; make them by Settings.from_dict"
+        )
+    if terrain is not None and not hasattr(terrain, "height_at"):
+        raise InputError(
+            f"expected a terrain that answers height_at, got {type(terrain).__name__}; read a raster by hiproof.read_terrain"
+        )
+
+
 def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
     """The outcome to start from: the building's name, its footprint and the attributes it came with."""
     if isinstance(footprint, Footprint):
@@ -89,7 +105,7 @@ def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple
 
     polygon = largest_polygon(footprint)
     origin = np.floor(polygon.bounds[:2])
-    xy = np.asarray(points, float).reshape(-1, 3)[:, :2]
+    xy = points[:, :2]
     found = find_shift(xy[np.isfinite(xy).all(axis=1)] - origin, shapely.transform(polygon, lambda c: c - origin))
     remarks = []
     if found.is_clear:
@@ -112,7 +128,6 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
         footprint = largest_polygon(footprint)
         if footprint.is_empty or not footprint.area >= 0.1:
             return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
-    points = np.asarray(points, float).reshape(-1, 3)
     if not np.isfinite(points).all():
         points = points[np.isfinite(points).all(axis=1)]
     if footprint is not None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..compiled import compiled
 from ..errors import InputError
+from ..model import as_xyz
 from ..parity import flips
 
 Ring = np.ndarray
@@ -53,10 +54,7 @@ def surface_and_vertical_distances(
 
 def checked_points(points: np.ndarray) -> np.ndarray:
     """Points as compiled code takes them."""
-    points = np.ascontiguousarray(points, float)
-    if points.ndim != 2 or points.shape[1] != 3:
-        raise InputError(f"expected points of shape (n, 3), got {points.shape}; pass x, y, z as columns")
-    return points
+    return np.ascontiguousarray(as_xyz(points))
 
 
 def flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

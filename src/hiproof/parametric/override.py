@@ -25,7 +25,7 @@ import shapely
 from .. import stages
 from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
-from ..model import Building, Footprint
+from ..model import Building, Footprint, as_xyz
 from ..primitives.catalogue import CATALOGUE
 from ..settings import Settings
 from ..status import Status
@@ -160,7 +160,7 @@ def overridden(
     id: str = "building",
 ) -> Building:
     """The building reconstructed as its override says; arguments and outcome as of `hiproof.reconstruct`."""
-    settings = settings or Settings()
+    points, settings = as_xyz(points), settings or Settings()
     building = stages.asked_for(footprint, id)
     if override.leave_out:
         return dataclasses.replace(building, status=Status.LEFT_OUT, detail=override.told)

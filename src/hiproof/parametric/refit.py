@@ -17,7 +17,7 @@ import shapely
 
 from ..compose.settle import pieces_of
 from ..errors import FitError, InputError
-from ..model import Building, Part, Roof
+from ..model import Building, Part, Roof, as_xyz
 from ..settings import Settings
 from ..status import Status
 from ..write.parameters import building_record
@@ -62,7 +62,7 @@ def refit(
 
 def within(roof: Roof, points: np.ndarray) -> np.ndarray:
     """Those of the world `points` (n, 3) that are finite and lie inside the outline, about the origin of the roof."""
-    local = roof.frame.to_local(np.asarray(points, float).reshape(-1, 3))
+    local = roof.frame.to_local(as_xyz(points))
     local = local[np.isfinite(local).all(axis=1)]
     return local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
 
