@@ -45,7 +45,7 @@ class Member:
 
     `rows` (5, 3) are its planes in its own axes, by all p unknowns `own` (5, 3, p) there and `common` (5, 3, p) in the first
     direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's, `plane`
-    (n,) that on which each lies.
+    (n,) that on which each lies, `shown` (5,) whether any does on each.
     """
 
     rows: np.ndarray
@@ -54,6 +54,7 @@ class Member:
     points: np.ndarray
     places: np.ndarray
     plane: np.ndarray
+    shown: np.ndarray
     sides: list[Side]
 
 
@@ -117,7 +118,8 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         z = rows @ np.stack([points[0], points[1], one])
         plane = np.argmin(np.where(np.isfinite(z), z, np.inf), axis=0)
         places = np.stack([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
-        found[k] = Member(rows, own, common, points, places, plane, sides[k])
+        on_each = np.bincount(plane, minlength=LEVEL + 1) > 0
+        found[k] = Member(rows, own, common, points, places, plane, on_each, sides[k])
     return found
 
 
@@ -169,7 +171,7 @@ def likely(members: list[Member], start: np.ndarray) -> Iterator[tuple[float, tu
 
 
 def seen_planes(member: Member, start: np.ndarray) -> list[Seen]:
-    numbers = [p for p in range(LEVEL + 1) if (member.plane == p).any()]
+    numbers = np.flatnonzero(member.shown).tolist()
     return [Seen(p, member.common[p] @ start, member.common[p], member.places[:, member.plane == p]) for p in numbers]
 
 
@@ -193,8 +195,8 @@ def one_plane(one: Seen, other: Seen) -> np.ndarray:
 def slopes(member: Member, start: np.ndarray) -> Iterator[Measure]:
     """The slopes of a member's inclined planes; half of how far their points reach along the fall makes them heights."""
     for p in range(SIDES):
-        along = member.points[p // 2, member.plane == p]
-        if len(along):
+        if member.shown[p]:
+            along = member.points[p // 2, member.plane == p]
             equation = SIGN[p] * member.own[p, p // 2]
             yield Measure(float(equation @ start), equation, 0.5 * float(along.max() - along.min()))
 
@@ -202,7 +204,7 @@ def slopes(member: Member, start: np.ndarray) -> Iterator[Measure]:
 def ridges(member: Member, start: np.ndarray) -> Iterator[Measure]:
     """The heights of a member's ridges, as they change from `start`."""
     for p, q in ((0, 1), (2, 3)):
-        if (member.plane == p).any() and (member.plane == q).any():
+        if member.shown[p] and member.shown[q]:
             axis, rows = p // 2, member.own[[p, q]] @ start
             rise, fall = rows[0, axis], -rows[1, axis]
             at = np.ones(3)
@@ -215,7 +217,7 @@ def ridges(member: Member, start: np.ndarray) -> Iterator[Measure]:
 def eaves(member: Member, start: np.ndarray) -> Iterator[Measure]:
     """The heights of a member's eaves on the outline."""
     for p in range(SIDES):
-        if member.sides[p].anchored and (member.plane == p).any():
+        if member.sides[p].anchored and member.shown[p]:
             equation = member.own[p, 2] + member.sides[p].at * member.own[p, p // 2]
             yield Measure(float(equation @ start), equation, 1.0)
 

@@ -32,7 +32,8 @@ def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]
 
 def with_gambrels(parts: list[Part]) -> list[Part]:
     """`parts` with every gable on a truncated gable's top, or between two steeper slopes, united with these."""
-    for upper in parts:
+    gables = [part for part in parts if part.type == "gable" and tuple(part.parameters) == get("gable").parameters]
+    for upper in gables:
         below = [part for part in parts if part is not upper]
         for lower in [(part,) for part in below] + list(combinations(below, 2)):
             found = gambrel_of(upper, slopes_below(upper, lower))
@@ -77,7 +78,7 @@ def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
 def gambrel_of(upper: Part, below: list[Slope]) -> Part | None:
     """The gable `upper` and the slopes on its two sides as one gambrel, None where they are none."""
     top = upper.parameters
-    if upper.type != "gable" or tuple(top) != get("gable").parameters or len(below) != 2:
+    if len(below) != 2:
         return None
     front, back = below
     slope, upper_slope = 0.5 * (front.slope + back.slope), 2.0 * top["height"] / top["width"]

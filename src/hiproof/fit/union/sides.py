@@ -8,6 +8,7 @@ it, up to the price of a loose edge.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -92,16 +93,13 @@ def plan_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
 
 def plan_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     """Starts and ends (2, m, 2) of the straight lines inside the outline between two of its corners; none of too many."""
-    corners = np.array(sorted(set(map(tuple, shapely.get_coordinates(outline).tolist()))))
+    corners = sorted(set(map(tuple, shapely.get_coordinates(outline).tolist())))
     if len(corners) > MOST_CORNERS:
         return np.zeros((2, 0, 2))
-    i, j = np.triu_indices(len(corners), 1)
-    lines = shapely.linestrings(np.stack([corners[i], corners[j]], axis=1))
-    wider = shapely.buffer(outline, ALONG_M)
+    ends, wider = np.array(list(combinations(corners, 2))), shapely.buffer(outline, ALONG_M)
     shapely.prepare(wider)
-    within = shapely.covers(wider, lines)
-    ends = np.stack([corners[i][within], corners[j][within]])
-    return (ends - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    within = shapely.covers(wider, shapely.linestrings(ends))
+    return (np.moveaxis(ends[within], 1, 0) - plan.frame.origin[:2]) @ plan.frame.rotation.T
 
 
 def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: int) -> Lines:
