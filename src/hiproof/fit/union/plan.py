@@ -46,19 +46,16 @@ class Plan:
 @compiled
 def signed_depth(x, y, starts, ends):
     """Distance (n,) of points to the nearest of the edges `starts`, `ends` (m, 2), negative outside (even-odd rule)."""
-    depth = np.empty(len(x))
-    for i in range(len(x)):
-        inside, nearest = False, np.inf
-        for e in range(len(starts)):
-            x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
-            dx, dy = x1 - x0, y1 - y0
-            if flips(x0, y0, x1, y1, x[i], y[i]):
-                inside = not inside
-            t = ((x[i] - x0) * dx + (y[i] - y0) * dy) / max(dx * dx + dy * dy, 1e-18)
-            t = min(max(t, 0.0), 1.0)
-            nearest = min(nearest, (x0 + t * dx - x[i]) ** 2 + (y0 + t * dy - y[i]) ** 2)
-        depth[i] = math.sqrt(nearest) if inside else -math.sqrt(nearest)
-    return depth
+    inside, nearest = np.zeros(len(x), np.bool_), np.full(len(x), np.inf)
+    for e in range(len(starts)):  # one edge after the other, so that the processor takes several points at once
+        x0, y0, x1, y1 = starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1]
+        dx, dy = x1 - x0, y1 - y0
+        square = max(dx * dx + dy * dy, 1e-18)
+        for i in range(len(x)):
+            inside[i] ^= flips(x0, y0, x1, y1, x[i], y[i])
+            t = min(max(((x[i] - x0) * dx + (y[i] - y0) * dy) / square, 0.0), 1.0)
+            nearest[i] = min(nearest[i], (x0 + t * dx - x[i]) ** 2 + (y0 + t * dy - y[i]) ** 2)
+    return np.where(inside, np.sqrt(nearest), -np.sqrt(nearest))
 
 
 def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
