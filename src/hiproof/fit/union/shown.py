@@ -8,9 +8,11 @@ from dataclasses import replace
 import numpy as np
 import shapely
 
+from ...compiled import compiled
 from ...model import Part, Piece
+from ...parity import flips
 from ...rings import GRID_M
-from .plan import Plan
+from .plan import Plan, ring_edges
 from .regions import area_of, polygons_of, shares_most
 from .scene import Scene, nodes
 
@@ -24,12 +26,36 @@ def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = ma
         return parts
     u, v = nodes(scene, BORDER_M)
     xy = plan.frame.xy_local(np.column_stack([u[0], v[0]]))
-    top = set(np.argmax([part.height_at(xy) for part in parts], axis=0).tolist())
+    top = set(np.argmax(heights_of(parts, xy), axis=0).tolist())
     shown, hidden = ([part for k, part in enumerate(parts) if (k in top) == seen] for seen in (True, False))
     for part in hidden:
         taken = shown and with_slivers(shown, part, widest_m2)
         shown = taken or [*shown, part]
     return shown
+
+
+def heights_of(parts: list[Part], xy: np.ndarray) -> np.ndarray:
+    """Heights (parts, n) at `xy` (n, 2), minus infinity beside a part: `Part.height_at` for many points. On a border that two
+    pieces share it is one of them that holds a point."""
+    heights, (x, y) = np.full((len(parts), len(xy)), -np.inf), np.ascontiguousarray(xy.T)
+    for part, z in zip(parts, heights, strict=True):
+        for piece in part.pieces:
+            raise_over(z, x, y, *ring_edges(piece.outline), np.ascontiguousarray(piece.planes))
+    return heights
+
+
+@compiled
+def raise_over(z, x, y, starts, ends, planes):
+    """Raise heights z (n,) at x, y to the lowest of `planes` (k, 3) inside the edges `starts`, `ends` (m, 2)."""
+    inside = np.zeros(len(x), np.bool_)
+    for e in range(len(starts)):
+        for i in range(len(x)):
+            inside[i] ^= flips(starts[e, 0], starts[e, 1], ends[e, 0], ends[e, 1], x[i], y[i])
+    for k in np.nonzero(inside)[0]:
+        lowest = np.inf
+        for a, b, c in planes:
+            lowest = min(lowest, a * x[k] + b * y[k] + c)
+        z[k] = max(z[k], lowest)
 
 
 def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part] | None:
