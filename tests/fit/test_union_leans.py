@@ -7,7 +7,7 @@ import pytest
 import shapely
 
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.moves import face_walls, turn_plane
+from hiproof.fit.union.facings import face_walls, turn_plane
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.scene import MOST_LEAN, leans_along
 from hiproof.fit.union.volumes import LEAN, OFFSET, SIDES, coefficients, lowest_plane

@@ -5,22 +5,22 @@ import pytest
 
 from hiproof.fit.union.candidates import best_rectangles, gains_enough
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
-from hiproof.fit.union.moves import improve, merge_volumes, refit_each, settled, simplify, surroundings
-from hiproof.fit.union.objective import (
+from hiproof.fit.union.improve import improve, simplify, surroundings
+from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
+from hiproof.fit.union.moves import refit_each, settled
+from hiproof.fit.union.objective import BASE_SHARE, costs, objective
+from hiproof.fit.union.refit import refit
+from hiproof.fit.union.scene import nodes
+from hiproof.fit.union.steps import (
     AT_CORNER_M,
-    BASE_SHARE,
     END_AT_CORNER_M,
     INSIDE_M,
     LEAST_STEP_LENGTH_M,
     STEP_M,
     TOUCH_M,
-    costs,
     edge_cost,
-    objective,
     walls_of,
 )
-from hiproof.fit.union.refit import refit
-from hiproof.fit.union.scene import nodes
 from hiproof.fit.union.trim import NEAR_EDGE_M, NEAR_VERTEX_M, SLACK_UNITS, drawn_in, drawn_out, trim
 from hiproof.fit.union.volumes import (
     BASE_COST,
@@ -277,6 +277,7 @@ MOVES = {
     "improve": lambda volumes, scene, value: improve(volumes, scene, value, SLOPES, 2),
     "simplify": lambda volumes, scene, value: simplify(volumes, scene, value, 0.6),
     "merge": lambda volumes, scene, value: merge_volumes(volumes, scene, value, np.inf),
+    "join": lambda volumes, scene, value: join_neighbours(volumes, scene, value, len(volumes) - 1),
 }
 
 
@@ -290,6 +291,32 @@ def test_a_move_gives_the_true_objective_and_never_a_higher_one(move, seed):
         return
     assert found <= value + 1e-9
     assert is_true(moved, scene, found)
+
+
+def volume(u, v, **planes):
+    """A row over `u` and `v` with planes by the names of their places: (slope, offset), of the level one the offset."""
+    row = base_only(0.0)[0]
+    row[U0:SLOPE], row[OFFSET + LEVEL] = (*u, *v), np.inf
+    for place, (slope, offset) in planes.items():
+        k = ("left", "right", "front", "back").index(place)
+        row[SLOPE + k], row[OFFSET + k] = slope, offset
+    return row
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_steep_end_found_by_itself_becomes_an_end_of_its_neighbour(seed):
+    """A gable over u -6 .. 6, v -4 .. 4, its ridge 2.4 m above its eaves, that ends steeply from u = 4.8."""
+    gable = volume((-6.0, 6.0), (-4.0, 4.0), front=(0.6, 2.4), back=(0.6, 2.4))
+    end = volume((4.8, 6.0), (-4.0, 4.0), right=(2.0, 12.0))
+    whole = volume((-6.0, 6.0), (-4.0, 4.0), front=(0.6, 2.4), back=(0.6, 2.4), right=(2.0, 12.0))
+    end[REPLACES] = 1.0
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng, np.vstack([base_only(-3.0), whole]))
+    found = np.vstack([base_only(-3.0), gable, end])
+    value = objective(found, scene, np.inf)
+    taken, better = take_in(found, scene, value, 1)
+    assert len(taken) == 2 and better < value and is_true(taken, scene, better)
+    assert np.isfinite(taken[1, OFFSET : OFFSET + LEVEL]).tolist() == [False, True, True, True]
 
 
 @pytest.mark.parametrize("seed", SEEDS)

@@ -33,7 +33,7 @@ def house() -> np.ndarray:
 def moves() -> None:
     """The search for volumes; their moves come first, so that `planes` is ready elsewhere when it is needed."""
     from ..fit.union import fit_building
-    from ..fit.union.moves import improve, simplify
+    from ..fit.union.improve import improve, simplify
     from ..fit.union.objective import objective
     from ..fit.union.volumes import base_only
 

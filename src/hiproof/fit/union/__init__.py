@@ -8,8 +8,10 @@ scene       these in each of the building's directions, as the compiled search r
 planes      compiled: planes and gables that explain rectangles of points
 candidates  volumes of these planes, and where each would gain most
 volumes     compiled: a volume as a row of numbers, heights of the roof
+steps       compiled: what an edge of a volume costs that shows
 objective   compiled: what a roof costs: misfit, volumes, edges that show
-edges, refit, moves  compiled: a volume's edges and planes, structure that comes and goes
+edges, refit  compiled: a volume's edges moved, its planes refitted
+moves, facings, joins, improve  compiled: structure that comes and goes: of one volume, the ways planes face, of several, all in turn
 grow        volumes added one by one from a level base, all improved after each
 trim        hidden edges drawn in
 search      these in order, and the simplification that a draughtsman would make

@@ -9,7 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import BASE_SHARE, among_vertices, costs, edge_cost, walls_of
+from .objective import BASE_SHARE, costs
+from .steps import among_vertices, edge_cost, walls_of
 from .volumes import (
     BASE_COST,
     DIRECTION,
@@ -50,7 +51,7 @@ def move_edges(volumes, scene, k, value, reach):
     for j in range(1, len(volumes)):
         fixed += scene.evidence * volume_cost(volumes[j])
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
-    walls, known = walls_of(scene), False
+    walls, is_charged = walls_of(scene), False
     for edge in range(4):
         places, m = places_of(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
@@ -68,15 +69,14 @@ def move_edges(volumes, scene, k, value, reach):
                 trial += scene.evidence * BASE_COST
             if trial >= best:
                 continue
-            if not known:
-                charge_all(volumes, walls, int(volumes[k, DIRECTION]), charge, boxes)
-                known = True
+            if not is_charged:
+                charge, is_charged = charge_all(volumes, walls, int(volumes[k, DIRECTION]), boxes), True
             trial = charged(volumes, walls, k, edge, t, trial, best, charge, boxes)
             if trial < best:
                 best, chosen = trial, t
         if chosen != start:
             volumes[k, U0 + edge] = chosen
-            value, known = best, False
+            value, is_charged = best, False
     return value
 
 
@@ -158,15 +158,16 @@ def is_repeated(places, q):
 
 
 @compiled
-def charge_all(volumes, walls, direction, charge, boxes):
-    """Fill the cost of every edge (k, 4) and its bounds (k, 4, 4) in the axes of `direction`, none where it lies outside the outline."""
+def charge_all(volumes, walls, direction, boxes):
+    """The cost of every edge (k, 4); its bounds in the axes of `direction`, none where it lies outside the outline, go to `boxes`
+    (k, 4, 4)."""
     c, s = walls.turn[direction]
+    charge = np.zeros((len(volumes), 4))
     for j in range(1, len(volumes)):
         other = int(volumes[j, DIRECTION])
         cosine = walls.turn[other, 0] * c + walls.turn[other, 1] * s
         sine = walls.turn[other, 1] * c - walls.turn[other, 0] * s
         for e in range(4):
-            charge[j, e] = 0.0
             boxes[j, e, 0] = boxes[j, e, 2] = np.inf
             boxes[j, e, 1] = boxes[j, e, 3] = -np.inf
             if not among_vertices(walls, other, e // 2, volumes[j, U0 + e])[0]:
@@ -178,6 +179,7 @@ def charge_all(volumes, walls, direction, charge, boxes):
                 x, y = cosine * a - sine * b, sine * a + cosine * b
                 boxes[j, e, 0], boxes[j, e, 1] = min(boxes[j, e, 0], x), max(boxes[j, e, 1], x)
                 boxes[j, e, 2], boxes[j, e, 3] = min(boxes[j, e, 2], y), max(boxes[j, e, 3], y)
+    return charge
 
 
 @compiled

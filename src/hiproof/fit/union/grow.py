@@ -9,7 +9,8 @@ import numpy as np
 from ...compiled import compiled
 from .candidates import best_rectangles, candidates_of
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
-from .moves import improve, without
+from .improve import improve
+from .moves import without
 from .objective import costs, objective
 from .plan import MIN_STRUCTURE_POINTS, Plan, cells_of
 from .planes import Grid

@@ -9,7 +9,8 @@ import shapely
 
 from .allowed import allowed_shapes
 from .grow import grids_of, grow
-from .moves import move_all_edges, refit_each, simplify
+from .improve import simplify
+from .moves import move_all_edges, refit_each
 from .objective import objective
 from .plan import Plan
 from .scene import Scene, directions_of, scene_of, seen_through

@@ -15,7 +15,7 @@ import shapely
 
 from .finish import SQUARE, Planes, finished
 from .moves import refit_each, without
-from .objective import base_shows, edge_cost, objective, walls_of
+from .objective import base_shows, edges_cost, objective
 from .plan import Plan
 from .scene import Scene
 from .sides import Lines, Side, lines_of, sides_of
@@ -73,9 +73,8 @@ def drawn(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> Drawn:
     """The volumes with the sides, on the outline's `lines` where these are near, and the planes that suit them."""
     sides = sides_of(volumes, lines, scene)
     planes = finished(volumes, sides, scene)
-    walls, units = walls_of(scene), sum(volume_cost(volume) for volume in volumes[1:])
-    units += sum(edge_cost(volumes, walls, k, edge) for k in range(1, len(volumes)) for edge in range(4))
-    return Drawn(volumes, sides, planes, sum(own.cost for own in planes) + scene.evidence * units)
+    structure = scene.evidence * sum(volume_cost(volume) for volume in volumes[1:]) + edges_cost(volumes, scene, np.inf)
+    return Drawn(volumes, sides, planes, sum(own.cost for own in planes) + structure)
 
 
 def alike(one: np.ndarray, other: np.ndarray) -> bool:

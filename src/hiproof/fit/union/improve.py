@@ -1,0 +1,138 @@
+"""All moves in turn as long as they lower the objective, and the simplification under a more tolerant one. Compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...compiled import compiled
+from .edges import EVERYWHERE, LEAST_GAIN, move_edges
+from .facings import face_walls
+from .joins import join_neighbours, merge_volumes
+from .moves import (
+    HOPELESS_SHARE,
+    HOPELESS_UNITS,
+    add_planes,
+    change_ties,
+    drop_planes,
+    drop_volumes,
+    flatten,
+    move_all_edges,
+    refit_each,
+    refitted,
+    without,
+)
+from .objective import objective
+from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1
+
+AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
+DIGEST_STEP = 0.02  # of metres and of slopes: changes smaller than this are none
+# of a digest: primes whose product float64 holds, and m above which all heights are one
+DIGEST_FACTOR, DIGEST_PRIME, HIGH_ABOVE = 1_000_003.0, 2_147_483_647.0, 1e5
+
+
+@compiled
+def improve(volumes, scene, value, slopes, rounds):
+    """All moves in turn, for at most `rounds` rounds or until one brings next to nothing.
+
+    A volume that no move changed is left alone until something around it is another.
+    """
+    for _ in range(rounds):
+        before = value
+        for k in range(len(volumes)):
+            if k == 0 or is_unsettled(volumes, k):
+                volumes, value = refitted(volumes, scene, value, k)
+        for k in range(1, len(volumes)):
+            if is_unsettled(volumes, k):
+                value = move_edges(volumes, scene, k, value, EVERYWHERE)
+        volumes, value = drop_volumes(volumes, scene, value)
+        k = 1
+        while k < len(volumes):
+            count, start = len(volumes), value
+            if is_unsettled(volumes, k):
+                volumes, value = change_planes(volumes, scene, value, k, slopes)
+                volumes, value = join_neighbours(volumes, scene, value, k)
+                if value == start:
+                    volumes[k, SETTLED] = surroundings(volumes, k)
+            k = k + 1 if len(volumes) == count else 1
+        volumes, value = without_base(volumes, scene, value)
+        if value > before - 0.05 * scene.evidence:
+            break
+    return volumes, value
+
+
+@compiled
+def change_planes(volumes, scene, value, k, slopes):
+    """All moves that change which planes volume k has, how they are tied and where they face."""
+    volumes, value = drop_planes(volumes, scene, value, k, np.inf)
+    volumes, value = flatten(volumes, scene, value, k)
+    volumes, value = change_ties(volumes, scene, value, k)
+    volumes, value = face_walls(volumes, scene, value, k)
+    return add_planes(volumes, scene, value, k, slopes)
+
+
+@compiled
+def without_base(volumes, scene, value):
+    """The base below everything, where the volumes can cover the outline by themselves."""
+    if volumes[0, OFFSET + LEVEL] <= scene.low - 0.6 or not is_unsettled(volumes, 0):
+        return volumes, value
+    volumes[0, SETTLED] = surroundings(volumes, 0)
+    trial = volumes.copy()
+    trial[0, OFFSET + LEVEL] = scene.low - 0.7
+    found = objective(trial, scene, value + 0.3 * scene.n)
+    if found < np.inf:
+        found = move_all_edges(trial, scene, found, EVERYWHERE)
+    return (trial, found) if found < value - LEAST_GAIN else (volumes, value)
+
+
+@compiled
+def is_unsettled(volumes, k):
+    """Whether volume k or what is around it changed since no move helped there."""
+    return volumes[k, SETTLED] != surroundings(volumes, k)
+
+
+@compiled
+def surroundings(volumes, k):
+    """A digest of volume k, of those whose rectangles meet its own or lie in another direction, and of the base's height."""
+    total = math.floor(volumes[0, OFFSET + LEVEL] / DIGEST_STEP)
+    for j in range(1, len(volumes)):
+        if volumes[j, DIRECTION] == volumes[k, DIRECTION] and (
+            volumes[j, U0] > volumes[k, U1] + AROUND_M
+            or volumes[j, U1] < volumes[k, U0] - AROUND_M
+            or volumes[j, V0] > volumes[k, V1] + AROUND_M
+            or volumes[j, V1] < volumes[k, V0] - AROUND_M
+        ):
+            continue
+        term = 1.0
+        for q in range(SETTLED):
+            x = volumes[j, q]
+            term = (term * DIGEST_FACTOR + math.floor(min(x, HIGH_ABOVE) / DIGEST_STEP + 0.5)) % DIGEST_PRIME
+        total += term
+    return total + 1.0
+
+
+@compiled
+def simplify(volumes, scene, value, steepest):
+    """Volumes and planes no steeper than `steepest` that do not pay under `scene` (a more tolerant one) go or are merged."""
+    for _ in range(4):
+        before = value
+        k = 1
+        while k < len(volumes):
+            if volumes[k, SLOPE : SLOPE + SIDES].max() <= steepest:
+                trial = without(volumes, k)
+                found = objective(
+                    trial, scene, value + HOPELESS_UNITS * scene.evidence + 2.0 * HOPELESS_SHARE * scene.n
+                )
+                if found < np.inf:
+                    found = move_all_edges(trial, scene, found, EVERYWHERE)
+                    trial, found = refit_each(trial, scene, found)
+                    if found < value - LEAST_GAIN:
+                        volumes, value = trial, found
+                        continue
+            volumes, value = drop_planes(volumes, scene, value, k, steepest)
+            k += 1
+        volumes, value = merge_volumes(volumes, scene, value, steepest)
+        if value > before - LEAST_GAIN:
+            break
+    return volumes, value

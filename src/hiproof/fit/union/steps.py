@@ -1,0 +1,153 @@
+"""What an edge of a volume costs that shows: a step in the roof. Compiled.
+
+It costs a fixed sum, more by the metre, most for low steps, which nearly always stand for a valley or a needless cut, and
+something extra where no corner of the outline lies in line with it. It is looked at in samples along it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import namedtuple
+
+import numpy as np
+
+from ...compiled import compiled
+from .volumes import DIRECTION, REPLACES, U0, U1, V0, V1, coefficients, lowest
+
+STEP_M, INSIDE_M, LEAST_STEP_LENGTH_M = 0.05, 0.2, 0.55  # a gap that is a step; how far inside the outline it shows
+# m from an outline's corner within which an edge is in line with it, and within which it ends there
+AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
+# m between the places at which a step between volumes is judged, and how many at most of an edge
+SAMPLE_M, MOST_SAMPLES = 0.5, 40
+TOUCH_M = 0.03  # m; a volume that reaches so near covers the place
+
+
+# Of a scene what the cost of edges depends on, and room (3, MOST_SAMPLES) to work in; fewer arrays are fewer to count references
+# of, a million times.
+Walls = namedtuple("Walls", "turn depth corner_u corner_v pitch vertices corners room prices evidence")
+
+
+@compiled
+def walls_of(scene):
+    where = scene.corner_u, scene.corner_v, scene.pitch
+    corners, prices = (scene.vertices, scene.corners), scene.edge_prices
+    return Walls(scene.turn, scene.depth, *where, *corners, np.empty((3, MOST_SAMPLES)), prices, scene.evidence)
+
+
+@compiled
+def edge_cost(volumes, walls, k, edge):
+    """Units of complexity for what shows of one edge (0 u low, 1 u high, 2 v low, 3 v high) of volume k."""
+    direction, axis, at = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
+    inside, in_line = among_vertices(walls, direction, axis, at)
+    if not inside:
+        return 0.0
+    any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
+    first, last, shown, low = what_shows(volumes, walls, k, edge, low_step)
+    if shown < LEAST_STEP_LENGTH_M:
+        return 0.0
+    cost = any_step + a_metre * shown + low_a_metre * low
+    if not in_line:
+        return cost + loose
+    return cost - at_corner * ends_at_corners(walls, direction, axis, at, first, last)
+
+
+@compiled
+def among_vertices(walls, direction, axis, at):
+    """Whether a line of one axis of a direction comes far enough inside the outline for a step to show there, and whether it is in line
+    with one of the outline's vertices."""
+    low = high = walls.vertices[direction, axis, 0]
+    in_line = False
+    for q in range(walls.vertices.shape[2]):
+        x = walls.vertices[direction, axis, q]
+        if x == np.inf:
+            break
+        high = x
+        in_line = in_line or abs(x - at) < 1e-6
+    off_a_node = math.sqrt(0.5) * walls.pitch  # the depth is that of the nearest node of the raster
+    return min(at - low, high - at) + off_a_node >= INSIDE_M, in_line
+
+
+@compiled
+def what_shows(volumes, walls, k, edge, low_step):
+    """Of an edge of volume k where its samples inside the outline begin and end, for how many metres it shows there, and for how
+    many with a step of less than `low_step`."""
+    across = U0 + 2 - 2 * (edge // 2)
+    start, length = volumes[k, across], volumes[k, across + 1] - volumes[k, across]
+    count = min(MOST_SAMPLES, max(2, int(length / SAMPLE_M) + 1))
+    step = length / count
+    places = walls.room[0]
+    m = samples_inside(volumes, walls, k, edge, start, step, count)
+    if m * step < LEAST_STEP_LENGTH_M:
+        return 0.0, 0.0, 0.0, 0.0
+    heights_beside(volumes, walls.turn, k, edge, places[:m], walls.room[1], walls.room[2])
+    shown = low = 0.0
+    for q in range(m):
+        gap = abs(walls.room[1, q] - walls.room[2, q])
+        if gap > STEP_M:
+            shown += step
+            if gap < low_step:
+                low += step
+    return places[0], places[m - 1], shown, low
+
+
+@compiled
+def samples_inside(volumes, walls, k, edge, start, step, count):
+    """How many of an edge's `count` samples are inside the outline; where along the edge they are goes to walls.room[0]."""
+    own, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
+    c, s = walls.turn[own, 0], walls.turn[own, 1]
+    m = 0
+    for q in range(count):
+        t = start + (q + 0.5) * step
+        a, b = (at, t) if edge < 2 else (t, at)
+        i = math.floor((c * a - s * b - walls.corner_u) / walls.pitch + 0.5)
+        j = math.floor((s * a + c * b - walls.corner_v) / walls.pitch + 0.5)
+        if 0 <= i < walls.depth.shape[0] and 0 <= j < walls.depth.shape[1] and walls.depth[i, j] >= INSIDE_M:
+            walls.room[0, m] = t
+            m += 1
+    return m
+
+
+@compiled
+def heights_beside(volumes, turn, k, edge, places, inside, outside):
+    """Fill `inside` and `outside` with the heights just inside and just outside of volume k at `places` (m,) along its edge.
+
+    All places in one volume after another, so that a processor does several at once.
+    """
+    own, at, m = int(volumes[k, DIRECTION]), volumes[k, U0 + edge], len(places)
+    inside[:m] = outside[:m] = -np.inf
+    for j in range(len(volumes)):
+        other, cosine, sine = int(volumes[j, DIRECTION]), 1.0, 0.0
+        if other != own:
+            cosine = turn[other, 0] * turn[own, 0] + turn[other, 1] * turn[own, 1]
+            sine = turn[other, 1] * turn[own, 0] - turn[other, 0] * turn[own, 1]
+        # along the edge the place in the axes of volume j is (a0 + a t, b0 + b t)
+        a0, a, b0, b = (cosine * at, sine, -sine * at, cosine) if edge < 2 else (sine * at, cosine, cosine * at, -sine)
+        u0, u1 = volumes[j, U0] - TOUCH_M, volumes[j, U1] + TOUCH_M
+        v0, v1 = volumes[j, V0] - TOUCH_M, volumes[j, V1] + TOUCH_M
+        ends_u, ends_v = (a0 + a * places[0], a0 + a * places[-1]), (b0 + b * places[0], b0 + b * places[-1])
+        if j != k and (max(ends_u) < u0 or min(ends_u) > u1 or max(ends_v) < v0 or min(ends_v) > v1):
+            continue
+        c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
+        if j == k:
+            for q in range(m):
+                h = lowest(c, a0 + a * places[q], b0 + b * places[q])
+                inside[q] = h if replaces or h > inside[q] else inside[q]
+            continue
+        for q in range(m):
+            u, v = a0 + a * places[q], b0 + b * places[q]
+            h = lowest(c, u, v)
+            there = (u0 <= u) & (u <= u1) & (v0 <= v) & (v <= v1)
+            inside[q] = h if there & (replaces | (h > inside[q])) else inside[q]
+            outside[q] = h if there & (replaces | (h > outside[q])) else outside[q]
+
+
+@compiled
+def ends_at_corners(walls, direction, axis, at, first, last):
+    """How many of the two ends of what lies of the line `at` inside the outline are at corners of it."""
+    low = high = 0
+    for q in range(walls.corners.shape[1]):
+        if abs(walls.corners[direction, q, axis] - at) < AT_CORNER_M:
+            along = walls.corners[direction, q, 1 - axis]
+            low = max(low, int(abs(along - first) < END_AT_CORNER_M))
+            high = max(high, int(abs(along - last) < END_AT_CORNER_M))
+    return low + high
