@@ -78,6 +78,17 @@ def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
     assert left.equals(small) and others.is_empty
 
 
+def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
+    area = shapely.Polygon(
+        [(-4.72, 0.253), (-2.038, 2), (-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)]
+    )
+    own = shapely.Polygon([(-2.039, 1.999), (-4.604, 0.098), (-4.72, 0.253)])
+    other = shapely.Polygon([(-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)])
+    left, others = shared_out(area, own, other)
+    assert {left.geom_type, others.geom_type} == {"MultiPolygon"}
+    assert left.area + others.area == pytest.approx(area.area, abs=1e-2)
+
+
 @pytest.mark.parametrize("seed", range(20))
 def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(seed):
     rng = np.random.default_rng(seed)

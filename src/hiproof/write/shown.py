@@ -58,18 +58,19 @@ def shared_out(
 ) -> tuple[shapely.Geometry, shapely.Geometry]:
     """What is left of `area` to the part drawn as `own`, and what goes to the one drawn as `other`: where that one alone is
     drawn, and slivers beside it."""
-    beyond = shapely.difference(area, own, grid_size=GRID_M)
+    beyond = without_slivers(shapely.difference(area, own, grid_size=GRID_M))
     others_own = without_slivers(shapely.intersection(beyond, other, grid_size=GRID_M))
     if others_own.is_empty:
         return area, others_own
     left = without_slivers(shapely.difference(area, others_own, grid_size=GRID_M))
-    return left, shapely.difference(area, left, grid_size=GRID_M)
+    return left, without_slivers(shapely.difference(area, left, grid_size=GRID_M), least_m2=0.0)
 
 
-def without_slivers(area: shapely.Geometry) -> shapely.Geometry:
-    """Those polygons of an area that are large enough."""
+def without_slivers(area: shapely.Geometry, least_m2: float = LEAST_M2) -> shapely.Geometry:
+    """Those polygons of an area that are large enough, without the lines to which others shrank on the grid."""
     pieces = shapely.get_parts(area)
-    return shapely.multipolygons(pieces[shapely.area(pieces) >= LEAST_M2])
+    polygons = shapely.get_dimensions(pieces) == 2
+    return shapely.multipolygons(pieces[polygons & (shapely.area(pieces) >= least_m2)])
 
 
 def drawn(part: Part) -> shapely.Geometry:
