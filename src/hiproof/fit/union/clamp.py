@@ -36,11 +36,13 @@ def clamped_part(part: Part, low: float, high: float) -> list[Part]:
         if is_within(piece, low, high):
             kept.append(piece)
             continue
-        beneath_low = [half_plane([0.0, 0.0, low] - plane, piece.outline) for plane in piece.planes]
-        sunken = shapely.union_all(beneath_low, grid_size=GRID_M)
-        risen = shapely.intersection_all(
-            [half_plane(plane - [0.0, 0.0, high], piece.outline) for plane in piece.planes]
-        )
+        z, sunken, risen = corner_heights(piece), shapely.Polygon(), shapely.Polygon()
+        if z.min() < low:
+            beneath_low = [half_plane([0.0, 0.0, low] - plane, piece.outline) for plane in piece.planes]
+            sunken = shapely.union_all(beneath_low, grid_size=GRID_M)
+        if z.max(axis=0).min() > high:
+            above_high = [half_plane(plane - [0.0, 0.0, high], piece.outline) for plane in piece.planes]
+            risen = shapely.intersection_all(above_high)
         beneath += polygons_of(shapely.intersection(piece.outline, sunken, grid_size=GRID_M))
         above += polygons_of(shapely.intersection(piece.outline, risen, grid_size=GRID_M))
         rest = shapely.difference(piece.outline, shapely.union(sunken, risen), grid_size=GRID_M)
@@ -51,8 +53,13 @@ def clamped_part(part: Part, low: float, high: float) -> list[Part]:
 
 def is_within(piece: Piece, low: float, high: float) -> bool:
     """Whether a piece is nowhere below `low`, and one of its planes nowhere above `high`."""
-    z = shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
+    z = corner_heights(piece)
     return bool(z.min() >= low and z.max(axis=0).min() <= high)
+
+
+def corner_heights(piece: Piece) -> np.ndarray:
+    """Heights (n, k) of a piece's k planes at the corners of its outline."""
+    return shapely.get_coordinates(piece.outline) @ piece.planes[:, :2].T + piece.planes[:, 2]
 
 
 def level_part(polygons: list[shapely.Polygon], z: float) -> Part:
