@@ -3,6 +3,7 @@
 import errno
 import json
 import sqlite3
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -108,6 +109,15 @@ def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(town_files, tm
     with pytest.raises(OutputError, match="--restart"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
     assert reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True)).buildings == 4
+
+
+def test_a_full_disk_is_no_fault_of_the_ledger(town_files, tmp_path, monkeypatch):
+    (tmp_path / ".hiproof").mkdir()
+    (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(b"cut off where the disk was full" * 9)
+    monkeypatch.setattr("hiproof.city.resume.shutil.disk_usage", lambda _: SimpleNamespace(free=4096))
+    for restart in (False, True):
+        with pytest.raises(OutputError, match="free some space, the same command then goes on"):
+            reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=restart))
 
 
 def test_files_without_points_are_said_and_harm_none(town_files, undisturbed, tmp_path, monkeypatch):

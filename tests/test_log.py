@@ -76,7 +76,7 @@ def test_the_file_tells_of_every_step_and_of_lost_workers(town_files, tmp_path, 
     reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], processes=2))
     lines = said(tmp_path / "run.log")
     told = "\n".join(f"{level} {text}" for level, text in lines)
-    assert "INFO version" in told and "4 buildings in 1 work tiles" in told
+    assert "INFO version" in told and "4 buildings in 1 work tile\n" in told
     assert "INFO sort:0 is done" in told and "is done: 4 buildings" in told
     assert "WARNING solve:" in told and "was lost (a worker process died) and is tried again" in told
     assert sum(level == "DEBUG" and text.startswith("building house-") for level, text in lines) == 4

@@ -57,7 +57,7 @@ def take_over(new: WorkPlan, old: WorkPlan, state: Path, ledger: Ledger) -> bool
     )
     gone, fresh = len(old.jobs) - len(kept), len(new.jobs) - len(kept)
     LOGGER.warning(
-        "the footprints changed: %d buildings stay as they are, %d are gone or changed, %d are done now",
+        "the footprints changed: buildings kept: %d, gone or changed: %d, done now: %d",
         len(kept),
         gone,
         fresh,

@@ -42,7 +42,7 @@ def settle_overrides(path: str | None, plan: WorkPlan, state: Path, ledger: Ledg
     redo = tiles_to_redo(changed, plan, state, ledger)
     with atomic(state / REDO) as beside:
         Path(beside).write_text(json.dumps(redo), encoding="utf-8")
-    LOGGER.info("%d buildings have another override than before and are redone", len(changed))
+    LOGGER.info("%s with another override than before to be redone", counted(len(changed), "building"))
     ledger.open_again([f"solve:{tile}" for tile in redo], digests)
 
 

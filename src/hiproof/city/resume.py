@@ -12,7 +12,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import OutputError, OutputWarning
-from ..log import LOGGER
+from ..log import LOGGER, counted
 from ..masking import masked_values
 from ..write.files import atomic
 from . import noted
@@ -25,6 +25,8 @@ from .overrides import REDO, settle_overrides
 from .plan import PLAN_FILE, WorkPlan
 from .prepare import make_plan
 from .request import Request
+
+LEDGER_BYTES = 200_000  # of an empty one with its journal; where less is free that is what ails it
 
 
 def open_state(out: Path) -> Path:
@@ -48,10 +50,14 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
         ledger = Ledger(path)
         ledger.reopen()
     except sqlite3.Error as error:
-        if restart:
+        if restart and shutil.disk_usage(state).free >= LEDGER_BYTES:
             for end in ("", "-wal", "-shm"):
                 path.with_name(path.name + end).unlink(missing_ok=True)
             return open_ledger(state, False)
+        if shutil.disk_usage(state).free < LEDGER_BYTES:
+            raise OutputError(
+                f"expected to write the ledger in {state}, got: {error}; free some space, the same command then goes on"
+            ) from error
         raise OutputError(
             f"expected the ledger of a run of this version in {state}, got: {error}; begin anew with --restart, or "
             "choose another --out"
@@ -72,12 +78,12 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
         enter(request, ledger)
     settle_overrides(request.overrides, plan, state, ledger, fresh=fresh)
     LOGGER.info(
-        "version %s %s in %s: %d buildings in %d work tiles",
+        "version %s %s in %s: %s in %s",
         __version__,
         "begins" if fresh else "goes on",
         request.out,
-        len(plan.jobs),
-        len(plan.tiles),
+        counted(len(plan.jobs), "building"),
+        counted(len(plan.tiles), "work tile"),
     )
     return plan
 

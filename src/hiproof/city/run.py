@@ -95,7 +95,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         if ledger.get("merged") != "yes":
             merge(plan, state, Path(request.out), progress)
         summary = summarise(request, plan, ledger, clock)
-        LOGGER.info("%d buildings: %s; seconds: %s", summary.buildings, summary.by_status, summary.seconds)
+        LOGGER.info("%s: %s; seconds: %s", counted(summary.buildings, "building"), summary.by_status, summary.seconds)
         write_run_record(request, plan, summary)
         if ledger.get("merged") != "yes":
             ledger.claim(claims(output_files(plan, Path(request.out)), Path(request.out)))
@@ -198,7 +198,7 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
 
 def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple) -> None:
     """A task whose process died again and again, in a process of its own; see quarantine.py."""
-    LOGGER.warning("%s was lost %d times and is now tried alone", name, ledger.losses(name))
+    LOGGER.warning("%s was lost %s and is now tried alone", name, counted(ledger.losses(name), "time"))
     with closing(executor.isolated()) as alone:
         result, error = (solve_in_quarantine if kind == "solve" else run_alone)(alone, function, task)
     if is_loss(error):
