@@ -331,3 +331,11 @@ def test_unknown_layers_and_attributes_are_answered_with_the_known_ones(tmp_path
 def test_degrees_without_a_cloud_crs_are_refused(tmp_path):
     with pytest.raises(InputError, match="in a projected CRS"):
         read_footprints(write(tmp_path / "a.gpkg", [shapely.box(4, 52, 4.001, 52.001)], crs="EPSG:4326"))
+
+
+def test_a_geojson_in_a_national_grid_that_names_no_crs_is_told_how_to_name_it(tmp_path):
+    geometry = shapely.geometry.mapping(SQUARE)
+    feature = {"type": "Feature", "properties": {}, "geometry": geometry}
+    (tmp_path / "a.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
+    with pytest.raises(InputError, match=r"they are no degrees: name their CRS in the file, .* \(`ogr2ogr -a_srs`\)"):
+        read_footprints(tmp_path / "a.geojson", target_crs="EPSG:28992")

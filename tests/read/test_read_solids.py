@@ -175,6 +175,8 @@ def test_broken_file_raises_a_sentence(tmp_path, name):
 
 
 def test_missing_and_binary_files_raise_a_sentence(tmp_path):
+    with pytest.raises(InputError, match=r"got the folder .*; name one in it, such as buildings\.city\.jsonl"):
+        list(read_solids(tmp_path))
     with pytest.raises(InputError, match="got none"):
         list(read_solids(tmp_path / "none.json"))
     (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00\x81")

@@ -244,9 +244,16 @@ def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, 
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         raise InputError(
             f"expected footprints of {path} that can be moved from {source.name} to the cloud's {target.name}, got "
-            "coordinates outside that system; check which CRS each file names"
+            f"coordinates outside that system; {advice_on(source)}"
         )
     return moved
+
+
+def advice_on(source: CRS) -> str:
+    """What to do about coordinates that the CRS `source` cannot have."""
+    if source.is_geographic:
+        return "they are no degrees: name their CRS in the file, for a GeoJSON that names none counts as WGS 84 (`ogr2ogr -a_srs`)"
+    return "check which CRS each file names"
 
 
 def split_features(

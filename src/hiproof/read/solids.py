@@ -44,6 +44,10 @@ def read_solids(path: str | Path) -> Iterator[tuple[str, Solid]]:
         ".xml": citygml_solids,
         ".citygml": citygml_solids,
     }
+    if path.is_dir():
+        raise InputError(
+            f"expected a file of solids, got the folder {path}; name one in it, such as buildings.city.jsonl"
+        )
     if suffix not in readers:
         raise InputError(
             f"expected a CityJSON (.json), CityJSONSeq (.jsonl) or CityGML (.gml) file, got {path};"
