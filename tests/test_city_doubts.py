@@ -9,8 +9,10 @@ from rasterio.transform import from_origin
 from hiproof import read_parameters
 from hiproof.city.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli.running import print_summary
 from hiproof.errors import InputWarning
 from hiproof.read.overlap import stretch
+from hiproof.status import Doubt
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints, write_town
 
 TOWN = make_town(houses=1)
@@ -85,3 +87,16 @@ def test_national_grids_and_utm_keep_lengths(epsg, lon_lat):
     crs = pyproj.CRS(epsg)
     xy = np.array([pyproj.Transformer.from_crs(4326, crs, always_xy=True).transform(*lon_lat)[:2]])
     assert stretch(crs, xy) == pytest.approx(1.0, abs=0.001)
+
+
+def test_a_run_counts_what_its_details_leave_in_doubt(tmp_path, capsys):
+    town = make_town(houses=2)
+    xyz = town.xyz.copy()
+    on_first = (town.classification == 6) & (xyz[:, 0] < ORIGIN[0] + 30)
+    xyz[np.flatnonzero(on_first)[::2], 2] += 0.5
+    cloud = write_cloud(tmp_path / "cloud.laz", xyz, town.classification)
+    footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
+    summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
+    assert summary.doubts == {Doubt.TWO_SURFACES: 1}
+    print_summary(summary)
+    assert "read the detail of 1 building (two surfaces)\n" in capsys.readouterr().out

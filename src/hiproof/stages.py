@@ -15,7 +15,7 @@ from .frames import LocalFrame
 from .log import counted
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
 from .settings import Settings
-from .status import Status
+from .status import Doubt, Status
 
 if TYPE_CHECKING:
     from .read.terrain import Terrain
@@ -372,16 +372,18 @@ def cautioned(building: Building, points: np.ndarray) -> Building:
     if sunk > SUNK_M:
         building = remarked(
             building,
-            f"the ground ({building.ground_source}) lies {sunk:.1f} m above its eaves; check the heights of both",
+            f"the ground ({building.ground_source}) lies {sunk:.1f} {Doubt.GROUND_ABOVE_EAVES.value}; check the heights of both",
         )
     unseen = unseen_share(points, building.roof.outline)
     if unseen:
-        building = remarked(building, f"{100 * unseen:.0f} % of its outline hold no points; the roof there is a guess")
+        building = remarked(
+            building, f"{100 * unseen:.0f} % {Doubt.PLACES_WITHOUT_POINTS.value}; the roof there is a guess"
+        )
     share, apart_m = two_surfaces(points, building.roof)
     if share:
         building = remarked(
             building,
-            f"over {100 * share:.0f} % of its area points lie on two surfaces, {apart_m:.2f} m apart: two flights, two "
+            f"over {100 * share:.0f} % of its area {Doubt.TWO_SURFACES.value}, {apart_m:.2f} m apart: two flights, two "
             "dates, glass or leaves; use a cloud of one",
         )
     return building

@@ -25,3 +25,16 @@ class Status(Enum):
     def code(self) -> str:
         """Stable lower-case name for files and tables."""
         return self.name.lower()
+
+
+class Doubt(Enum):
+    """What the detail of a building may leave to doubt, by the words that stand in it; a run counts them at its end."""
+
+    TWO_SURFACES = "points lie on two surfaces"
+    PLACES_WITHOUT_POINTS = "of its outline hold no points"
+    GROUND_ABOVE_EAVES = "m above its eaves"
+    TERRAIN_UNLIKE_GROUND_POINTS = "the ground points around it"
+
+    @property
+    def told(self) -> str:
+        return self.name.lower().replace("_", " ")

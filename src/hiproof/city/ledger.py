@@ -13,6 +13,8 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
+from ..status import Doubt
+
 SCHEMA = """
 create table if not exists run (key text primary key, value text);
 create table if not exists task (
@@ -208,6 +210,12 @@ class Ledger:
         """Buildings by `column` ("status" or "type"), most frequent first."""
         sql = f"select {column}, count(*) from building group by 1 order by 2 desc, 1"
         return {key: number for key, number in self.database.execute(sql) if key is not None}
+
+    def doubts(self) -> dict[Doubt, int]:
+        """Buildings whose detail tells of a doubt, of those doubts that any has."""
+        sql = "select count(*) from building where instr(detail, ?)"
+        counts = {doubt: self.database.execute(sql, (doubt.value,)).fetchone()[0] for doubt in Doubt}
+        return {doubt: count for doubt, count in counts.items() if count}
 
     def column(self, name: str) -> list:
         return [value for (value,) in self.database.execute(f"select {name} from building order by position")]

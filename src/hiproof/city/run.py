@@ -12,7 +12,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import closing, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from .. import __version__
@@ -21,7 +21,7 @@ from ..formats import places_of_models
 from ..frames import METRES, Units
 from ..log import LOGGER, counted
 from ..masking import masked, masked_values
-from ..status import Status
+from ..status import Doubt, Status
 from ..write.files import atomic
 from .checks import refuse_unusable
 from .executors import make_executor
@@ -54,6 +54,7 @@ class Summary:
     failures: tuple[Failure, ...]
     seconds: dict[str, float]
     units: Units = METRES
+    doubts: dict[Doubt, int] = field(default_factory=dict)
 
     @property
     def exit_code(self) -> int:
@@ -249,6 +250,7 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
         failures=tuple(ledger.failures()),
         seconds=clock.seconds,
         units=plan.head.units.gml,
+        doubts=ledger.doubts(),
     )
 
 

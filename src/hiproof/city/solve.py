@@ -20,7 +20,7 @@ from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
 from ..reconstruct import reconstruct
 from ..stages import remarked
-from ..status import Status
+from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
@@ -90,7 +90,11 @@ class Surroundings:
         above = float(np.median(apart[np.isfinite(apart)])) if np.isfinite(apart).any() else 0.0
         way = "above" if above > 0 else "below"
         far = abs(above) > FAR_GROUND_M
-        return f"the {model.source} lies {abs(above):.1f} m {way} the ground points around it" if far else ""
+        return (
+            f"the {model.source} lies {abs(above):.1f} m {way} {Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}"
+            if far
+            else ""
+        )
 
 
 def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:

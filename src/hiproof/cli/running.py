@@ -73,6 +73,9 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
     if summary.mean_share is not None:
         share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
         show(f"mean over buildings: {share} lie within 0.2 m of the roof")
+    if summary.doubts:
+        doubtful = (f"{counted(count, 'building')} ({doubt.told})" for doubt, count in summary.doubts.items())
+        show("read the detail of " + ", ".join(doubtful))
     if not summary.units.are_metres:
         show(f"coordinates are in {summary.units}; attributes and parameters in metres")
     show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
