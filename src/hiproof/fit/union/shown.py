@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -34,7 +35,7 @@ def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = ma
     return shown
 
 
-def heights_of(parts: list[Part], xy: np.ndarray) -> np.ndarray:
+def heights_of(parts: Sequence[Part], xy: np.ndarray) -> np.ndarray:
     """Heights (parts, n) at `xy` (n, 2), minus infinity beside a part: `Part.height_at` for many points. On a border that two
     pieces share it is one of them that holds a point."""
     heights, (x, y) = np.full((len(parts), len(xy)), -np.inf), np.ascontiguousarray(xy.T)
