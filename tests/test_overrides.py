@@ -50,6 +50,18 @@ def test_a_ridge_is_obeyed_and_the_contradiction_is_said(scanned):
     assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith("ridge_height 8.0 (seen, anna)")
 
 
+def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(scanned):
+    class Above:
+        source = "a wrong terrain model"
+
+        def height_at(self, xy):
+            return np.full(len(xy), 50.0)
+
+    for said, is_told in (({"type": "gable"}, True), ({"z_ground": 1.0}, False)):
+        house = overridden(override_of({"id": "a", **said}), *scanned, Above(), settings=PLAIN, id="a")
+        assert ("above its eaves" in house.detail) == is_told
+
+
 def test_a_ground_above_the_eaves_is_said(scanned):
     assert "ground given" not in obeyed(scanned, z_ground=1.0).detail
     assert "ground given" not in obeyed(scanned, z_ground=-500.0).detail

@@ -188,6 +188,11 @@ def remarked(building: Building, remark: str) -> Building:
     )
 
 
+def without_doubt(detail: str, doubt: Doubt) -> str:
+    """A building's detail without the remark that tells of a doubt which no longer holds."""
+    return "; ".join(remark for remark in detail.split("; ") if doubt.value not in remark)
+
+
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
     """The network's opinion of the points (paper section 3.1), none where nobody heeds or asks for it, or it cannot tell."""
     heeded = settings.fit.parts == "one" or settings.fit.objective == "paper"
@@ -372,7 +377,7 @@ def cautioned(building: Building, points: np.ndarray) -> Building:
     if sunk > SUNK_M:
         building = remarked(
             building,
-            f"the ground ({building.ground_source}) lies {sunk:.1f} {Doubt.GROUND_ABOVE_EAVES.value}; check the heights of both",
+            f"the ground ({building.ground_source}) lies {sunk:.1f} {Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
         )
     unseen = unseen_share(points, building.roof.outline)
     if unseen:

@@ -28,7 +28,7 @@ from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
 from ..primitives.catalogue import CATALOGUE
 from ..settings import Settings
-from ..status import Status
+from ..status import Doubt, Status
 from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
 from .building import build
@@ -273,7 +273,8 @@ def fitted_within(
     if override.z_ground is not None:
         record = building_record(building) | {"z_ground": override.z_ground, "ground_source": "override"}
         again = built(building, record)
-        building = dataclasses.replace(again, quality=building.quality, status=building.status, detail=building.detail)
+        detail = stages.without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
+        building = dataclasses.replace(again, quality=building.quality, status=building.status, detail=detail)
     return building
 
 
