@@ -80,6 +80,12 @@ ROOFS = {
         (box(0, 0, 14, 5), lambda x, y: 5 + 0.3 * y),
         (box(0, 5, 14, 10), lambda x, y: 7.5 - 0.3 * (y - 5)),
     ],
+    "a monopitch that falls to a corner": [(box(0, 0, 12, 8), lambda x, y: 5 + 0.12 * x + 0.2 * y)],
+    "a butterfly": [(box(0, 0, 12, 4.5), lambda x, y: 6.5 - 0.3 * y), (box(0, 4.5, 12, 9), lambda x, y: 3.8 + 0.3 * y)],
+    "a shed dormer": [
+        (box(0, 0, 12, 9), gable(0, 9, slope=1.0)),
+        (box(1.5, 0.5, 10.5, 4.5), lambda x, y: 7.2 + 0.25 * y),
+    ],
     "a steeple": [(box(0, 0, 18, 8), gable(0, 8, slope=1.2)), (box(-4, 1.5, 1, 6.5), hip(-4, 1, 1.5, 6.5, 14, 1.8))],
     "a mansard and an annex": [
         (box(0, 0, 12, 8), lambda x, y: np.minimum(hip(0, 12, 0, 8, 5.0, 1.3)(x, y), 7.2)),

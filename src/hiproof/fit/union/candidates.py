@@ -62,7 +62,7 @@ def candidates_of(scene: Scene, members: np.ndarray, grids: list[Grid], most_pla
 def candidates_in(
     scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int
 ) -> list[list[np.ndarray]]:
-    """The planes of each in one direction: every plane of the pool along an axis, the gables, all pairs that form a ridge."""
+    """The planes of each in one direction: every plane of the pool, along an axis if need be, the gables, all pairs that form a ridge."""
     every = members[np.arange(min(len(members), POOL_POINTS)) * len(members) // min(len(members), POOL_POINTS)]
     u, v, z = (np.ascontiguousarray(x[every]) for x in (scene.U[direction], scene.V[direction], scene.z))
     few = Cloud(u, v, z, cells_of(grid.u, u), cells_of(grid.v, v))
@@ -87,7 +87,8 @@ def larger_groups(planes: list[np.ndarray], pairs: list[list[np.ndarray]]) -> li
 
 
 def facings(plane: np.ndarray, middle: np.ndarray, leans: np.ndarray) -> list[np.ndarray]:
-    """The plane facing along an axis, and square to the walls that lean by `leans` (2, m), where it very nearly does.
+    """The plane facing along an axis, and square to the walls that lean by `leans` (2, m), where it very nearly does; as it is where it
+    does neither.
 
     It is turned about the points' `middle`.
     """
@@ -101,7 +102,7 @@ def facings(plane: np.ndarray, middle: np.ndarray, leans: np.ndarray) -> list[np
         if abs(turned[1 - axis] - plane[1 - axis]) < ALONG_AXIS * abs(plane[axis]):
             turned[2] += (plane - turned)[:2] @ middle
             found.append(turned)
-    return found
+    return found or [plane]
 
 
 @compiled

@@ -16,7 +16,7 @@ from .plan import MIN_STRUCTURE_POINTS, Plan, cells_of
 from .planes import Grid
 from .refit import refit
 from .scene import Scene
-from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, base_only, roof_heights
+from .volumes import DIRECTION, LEAN, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, base_only, roof_heights
 
 MOST_VOLUMES, MOST_ADDITIONS = 24, 20  # of one building, and additions tried: a bound on time
 MOST_PLANES, MOST_NEW_PLANES = 16, 10  # candidate planes from all points at first, from unexplained ones later
@@ -34,6 +34,8 @@ STARTING_ROUNDS, REGROWN_UNITS = 2, 0.5  # less is gained by cutting finer, too
 SAME_UNITS, SAME_BEFORE_UNITS = 0.1, 2.0
 MOST_REGROWN = 3  # volumes, those that grew first: of 40 that were better anew none had grown later
 HOPELESS_AT_FIRST, HOPELESS_ONCE_MOVED = 6.0, 1.0  # units above the best: of 334 best additions 324 are still found
+FREELY_UNITS = 8.0  # units that a new volume must gain besides, where a plane faces neither along an axis nor a wall
+ALONG_WALL = 1e-6  # of a lean; numerically the same
 CUT_LEAST_M, CUT_MOST_SHARE = 0.3, 0.6  # how much a neighbour may be cut back for a new volume
 
 
@@ -170,11 +172,19 @@ def best_addition(
             volume, grid = candidates[m].copy(), grids[int(candidates[m, DIRECTION])]
             (i0, i1), (j0, j1) = cells[m, :2], cells[m, 2:]
             volume[U0 : V1 + 1] = grid.u[i0], grid.u[i1], grid.v[j0], grid.v[j1]
+            least = FREELY_UNITS * scene.evidence if leans_freely(volume, scene) else 0.0
             for trial in ways_in(volumes, volume, replacing and len(volumes) > 1):
-                trial, found = inserted(trial, scene, value if best is None else best[1])
+                trial, found = inserted(trial, scene, (value if best is None else best[1]) - least)
                 if found < np.inf:
                     best = trial, found
     return best
+
+
+def leans_freely(volume: np.ndarray, scene: Scene) -> bool:
+    """Whether a plane of the volume faces neither along an axis nor a wall."""
+    walls = scene.leans[int(volume[DIRECTION])]
+    lean = np.abs(volume[LEAN : LEAN + SIDES].reshape(2, 2))
+    return any(x > 0.0 and np.abs(np.abs(walls[axis]) - x).min() > ALONG_WALL for axis in (0, 1) for x in lean[axis])
 
 
 def ways_in(volumes: np.ndarray, volume: np.ndarray, replacing: bool) -> list[np.ndarray]:
