@@ -5,6 +5,7 @@ from itertools import pairwise, product
 import numpy as np
 import pytest
 import shapely
+from scipy.stats import norm
 
 from hiproof import Status, reconstruct
 from hiproof.compose import check_solid
@@ -13,6 +14,17 @@ from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline, with_courts
 from hiproof.fit.outline.cost import Border, changed, cost_of_change, drawing_of, structure_cost
 from hiproof.fit.outline.lines import BACK, dropped, find_corners, lines_through, replaced, replaced_by
+from hiproof.fit.outline.settle import (
+    BLURS_M,
+    DEEP_M,
+    OFFSETS_M,
+    SHALLOW_M,
+    STRAY,
+    WALLS_M,
+    log_densities,
+    log_likelihoods,
+)
+from hiproof.fit.outline.soft import SURE_BLURS
 from hiproof.fit.outline.spread import unevenness
 from hiproof.fit.outline.steps import RUN, best_levels, stepped
 from hiproof.fit.walls import on_walls
@@ -240,3 +252,16 @@ def test_the_given_direction_is_that_of_the_edges():
 def test_points_that_span_no_area_are_an_error_with_a_sentence(xy):
     with pytest.raises(FitError, match="expected points that span an area"):
         estimate_outline(xy)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_kept_densities_say_of_a_side_what_its_points_do(seed):
+    rng = np.random.default_rng(seed)
+    depth, a_metre = rng.uniform(-0.79, DEEP_M, 60), rng.uniform(2.0, 90.0)
+    near = depth[depth < SHALLOW_M - OFFSETS_M[0]]
+    for row, (blur, walls) in enumerate(product(BLURS_M, WALLS_M)):
+        away = (near[:, None] + OFFSETS_M) / blur
+        density = np.where(np.abs(away) > SURE_BLURS, away > 0.0, norm.cdf(away) + walls * norm.pdf(away) / blur)
+        logs = np.log(a_metre * (density + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
+        off = np.abs(log_likelihoods(depth, a_metre, log_densities())[row] - logs)
+        assert np.median(off) < 1e-3 * len(near) and off.max() < 0.6  # where it is cut off the density jumps by a third

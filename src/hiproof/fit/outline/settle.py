@@ -8,6 +8,7 @@ then lies half a gap beyond the last row.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -20,8 +21,12 @@ BLURS_M, WALLS_M = (
     (0.02, 0.06, 0.12),
     (0.0, 0.3, 1.0),
 )  # points on the wall a metre, as the depth of roof that holds as many
-# m across a side at which it is tried: outlines of points lie inside of walls more than outside
-OFFSETS_M = np.arange(-0.5, 0.7, 0.02)
+# m across a side at which it is tried, and between two of them: outlines of points lie inside of walls more than outside
+STEP_M = 0.02
+OFFSETS_M = np.arange(-0.5, 0.7, STEP_M)
+FINE = (
+    32  # places a step at which densities are kept; between them they are straight, to a thousandth of their logarithm
+)
 DEEP_M, SHALLOW_M, OUTSIDE_M = (
     2.0,
     0.4,
@@ -43,16 +48,48 @@ def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
     return moved if find_corners(moved, corners) else lines
 
 
-@compiled
-def side_offsets(xy, normals, distances, ends, density):
+def side_offsets(
+    xy: np.ndarray, normals: np.ndarray, distances: np.ndarray, ends: np.ndarray, density: float
+) -> np.ndarray:
     """How far (m,) outwards the points `xy` (n, 2) put sides that have `normals` (m, 2), lie `distances` (m,) from the origin along
     these and run between `ends` (m, 2, 2)."""
+    return offsets_by(xy, normals, distances, ends, density, log_densities())
+
+
+@functools.cache
+def log_densities() -> np.ndarray:
+    """Logarithms of the density of points across a side, relative to that inside: (blurs x walls, FINE, k), the places FINE apart in
+    a row, so that those of one point under all offsets lie side by side."""
+    count = round((SHALLOW_M - OFFSETS_M[0] + OUTSIDE_M + OFFSETS_M[-1] - OFFSETS_M[0]) / STEP_M) + 2
+    return log_densities_at(OFFSETS_M[0] - OUTSIDE_M, count)
+
+
+@compiled
+def log_densities_at(first, count):
+    """What `log_densities` says, from the depth `first` on for `count` steps."""
+    table = np.empty((len(BLURS_M) * len(WALLS_M), FINE, count))
+    for b, blur in enumerate(BLURS_M):
+        for m, walls in enumerate(WALLS_M):
+            for p in range(FINE):
+                for k in range(count):
+                    away = (first + (k + p / FINE) * STEP_M) / blur
+                    density = 1.0 if away > 0.0 else 0.0
+                    if abs(away) <= SURE_BLURS:
+                        wall = math.exp(-0.5 * away * away) / (blur * math.sqrt(2.0 * math.pi))
+                        density = share_inside(away) + walls * wall
+                    table[len(WALLS_M) * b + m, p, k] = math.log(density + STRAY)
+    return table
+
+
+@compiled
+def offsets_by(xy, normals, distances, ends, density, table):
+    """What `side_offsets` says, by the `log_densities`."""
     offsets = np.empty(len(normals))
     for m in range(len(normals)):
         low, high = span_of(normals[m], ends[m])
         if high - low > LONG_M:
             low, high = low + END_M, high - END_M
-        offsets[m] = offset(depths_across(xy, normals[m], distances[m], low, high), high - low, density)
+        offsets[m] = offset(depths_across(xy, normals[m], distances[m], low, high), high - low, density, table)
     return offsets
 
 
@@ -76,7 +113,7 @@ def depths_across(xy, normal, distance, low, high):
 
 
 @compiled
-def offset(depth, length, density):
+def offset(depth, length, density, table):
     """How far (m) outwards a side of `length` lies of where points `depth` (n,) were measured from."""
     if len(depth) < FEWEST:
         return 0.0
@@ -84,7 +121,7 @@ def offset(depth, length, density):
     for d in depth:
         inside += d > SHALLOW_M
     a_metre = max(inside / ((DEEP_M - SHALLOW_M) * length), LEAST_DENSITY * density) * length
-    logs = log_likelihoods(depth, a_metre)
+    logs = log_likelihoods(depth, a_metre, table)
     likely = np.exp(logs - logs.max())
     mean = (likely.sum(axis=0) * OFFSETS_M).sum() / likely.sum()
     behind = depth[depth + mean > -ROW_M]
@@ -92,28 +129,26 @@ def offset(depth, length, density):
 
 
 @compiled
-def log_likelihoods(depth, a_metre):
+def log_likelihoods(depth, a_metre, table):
     """Log likelihoods (blurs x walls, offsets) of the points `depth` (n,) across a side with `a_metre` points a metre of depth."""
     logs = np.empty((len(BLURS_M) * len(WALLS_M), len(OFFSETS_M)))
     for m, walls in enumerate(WALLS_M):
         for q in range(len(OFFSETS_M)):
             logs[m :: len(WALLS_M), q] = -a_metre * (DEEP_M + OFFSETS_M[q] + walls)
-    far_in, far_out = math.log(a_metre * (1.0 + STRAY)), math.log(a_metre * STRAY)
+    counted = 0
     for d in depth:
         if d >= SHALLOW_M - OFFSETS_M[0]:  # inside wherever the side lies
             continue
-        for b, blur in enumerate(BLURS_M):
+        counted += 1
+        place = (d + OUTSIDE_M) / STEP_M
+        k = int(place)
+        p = int((place - k) * FINE)
+        beyond = (place - k) * FINE - p
+        then, after = (k, p + 1) if p + 1 < FINE else (k + 1, 0)
+        for row in range(len(logs)):
             for q in range(len(OFFSETS_M)):
-                away = (d + OFFSETS_M[q]) / blur
-                row = len(WALLS_M) * b
-                if abs(away) > SURE_BLURS:
-                    logs[row : row + len(WALLS_M), q] += far_in if away > 0.0 else far_out
-                    continue
-                inner = share_inside(away)
-                wall = math.exp(-0.5 * away * away) / (blur * math.sqrt(2.0 * math.pi))
-                for m, walls in enumerate(WALLS_M):
-                    logs[row + m, q] += math.log(a_metre * (inner + walls * wall + STRAY))
-    return logs
+                logs[row, q] += (1.0 - beyond) * table[row, p, k + q] + beyond * table[row, after, then + q]
+    return logs + counted * math.log(a_metre)
 
 
 @compiled
