@@ -31,6 +31,7 @@ FEWEST = 2  # points that the roof leaves unexplained and the level volume expla
 PRICE_UNITS = 1.0
 LEAST_TURN = 1e-9  # of two walls, by their directions: numerically parallel
 NEAREST = 1e-3  # of a wall's length from its end: the line begins there
+SAME_PLACE_M = 1e-6  # numerically one place
 
 
 class Seen(NamedTuple):
@@ -139,10 +140,17 @@ def pieces_of(outline: shapely.Polygon) -> list[np.ndarray]:
     edges, places = first_crossings(ring, corners, ways)
     firsts, lasts, places = np.r_[corners, edges + 1], np.r_[edges, corners], np.tile(places, (2, 1))
     areas, most = areas_of(ring, firsts, lasts, places), min(MOST_M2, MOST_SHARE * outline.area)
+    small = np.nonzero((areas >= LEAST_M2) & (areas <= most))[0]
     return [
-        np.vstack([ring[(firsts[k] + np.arange((lasts[k] - firsts[k]) % len(ring) + 1)) % len(ring)], places[k]])
-        for k in np.nonzero((areas >= LEAST_M2) & (areas <= most))[0]
+        closed_at(ring[np.arange(firsts[k], firsts[k] + (lasts[k] - firsts[k]) % len(ring) + 1) % len(ring)], places[k])
+        for k in small
     ]
+
+
+def closed_at(corners: np.ndarray, place: np.ndarray) -> np.ndarray:
+    """The `corners` (m, 2) and a `place` after them, where that is none of the two beside it: a line may end at a corner."""
+    beside = np.abs(corners[[0, -1]] - place).max(axis=1).min()
+    return np.vstack([corners, place]) if beside > SAME_PLACE_M else corners
 
 
 def areas_of(ring: np.ndarray, firsts: np.ndarray, lasts: np.ndarray, places: np.ndarray) -> np.ndarray:
