@@ -178,7 +178,7 @@ def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
         "one line of 1e300": (".xyz", f"{rows}1e300 447500 5 6\n".encode(), r"1e\+300"),
         "height of 1e300": (".xyz", f"{rows}85000 446000 1e300\n".encode(), r"1e\+300"),
         "only a byte order mark": (".xyz", b"\xef\xbb\xbf", "x y z"),
-        "utf-16": (".txt", rows.encode("utf-16"), "binary data"),
+        "utf-16": (".txt", rows.encode("utf-16"), "UTF-16"),
         "only blank lines": (".csv", b"\n" * 50, "x y z"),
         "repeated property": (".ply", (ply.format(binary, 3, xyz + "property float x\n")).encode() + three, "twice"),
         "superscript count": (".ply", ply.format("ascii", "²", xyz).encode() + b"1 2 3\n", "vertices"),

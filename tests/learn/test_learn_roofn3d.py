@@ -61,7 +61,7 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
 @pytest.fixture
 def source(tmp_path):
     write_roofn3d(tmp_path)
-    with pytest.warns(UserWarning, match="repeat"):
+    with pytest.warns(UserWarning, match="id of an earlier one"):
         return open_source(f"roofn3d:{tmp_path}")
 
 
