@@ -69,12 +69,19 @@ def test_a_building_says_that_its_points_lie_on_two_surfaces():
 
 
 @settings(max_examples=40, deadline=None)
-@given(SEEDS, st.floats(8.0, 20.0), st.floats(0.5, 0.6))
+@given(SEEDS, st.floats(2.0, 20.0), st.floats(0.5, 0.6))
 def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, cut):
     roof, points = compound(seed, density)
     assert unseen_share(points, roof.outline) == 0.0
     seen = points[points[:, 0] > np.quantile(points[:, 0], cut)]
     assert 0.2 < unseen_share(seen, roof.outline) < cut + 0.2
+
+
+def test_a_score_of_points_in_a_corner_of_a_large_outline_leaves_the_rest_unseen():
+    points = sampled(lambda x, y: np.full(len(x), 5.0), shapely.box(0, 0, 2.5, 2.5), density=3.5)
+    assert 12 <= len(points) < 30
+    assert unseen_share(points, shapely.box(0, 0, 15, 10)) > 0.6
+    assert unseen_share(points, shapely.box(0, 0, 2.5, 2.5)) == 0.0
 
 
 def test_a_building_says_that_half_of_it_has_no_points():

@@ -14,7 +14,7 @@ import shapely
 
 from ..fit.union.shown import heights_of
 from ..model import Roof
-from .metrics import FACADE_M, NEAR_M, nodata_share
+from .metrics import FACADE_M, NEAR_M
 
 CELL_POINTS = 8.0
 """Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large as what stands on a roof."""
@@ -34,16 +34,34 @@ SMALLER_GROUP = 0.2
 LEAST_SHARE = 0.4
 """Share of the points in cells of two surfaces above which it is said: in single roofs of Delft up to 0.35."""
 
+FEWEST_OF_ALL, MOST_OF_ALL, PLACES = 12, 200, 120
+"""Points below which nothing is said of places without any, points that are enough to say it, and places that are asked."""
+
+REACH = 1.5
+"""Distances between points, were they even, within which a place has one: by chance one place in a thousand has none."""
+
 LEAST_GAP = 0.2
-"""Share of the outline without points above which it is said: none of Delft's or the towns' reach it, a half or a third cut off do."""
+"""Share of the outline without points above which it is said: none of Delft's or the towns' reach it, half of an outline cut off does."""
 
 
 def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the outline that none of the `points` (n, 2 or 3) inside it are near, whatever their density; 0 where it is small."""
-    if len(points) < FEWEST_POINTS:
+    """Share of the outline that none of the `points` (n, 2 or 3) are near, whatever their density; 0 where it is small."""
+    if len(points) < FEWEST_OF_ALL:
         return 0.0
-    share = nodata_share(points, outline, math.sqrt(CELL_POINTS * outline.area / len(points)))
-    return share if share > LEAST_GAP else 0.0
+    some = points[np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2]
+    places = places_in(outline)
+    gap = ((places[:, None] - some) ** 2).sum(axis=2).min(axis=1)
+    share = np.mean(gap > REACH**2 * outline.area / len(some)) if len(places) else 0.0
+    return float(share) if share > LEAST_GAP else 0.0
+
+
+def places_in(outline: shapely.Polygon) -> np.ndarray:
+    """Some PLACES places (m, 2), evenly spread over the outline."""
+    apart = math.sqrt(outline.area / PLACES)
+    west, south, east, north = outline.bounds
+    x, y = np.meshgrid(np.arange(west + 0.5 * apart, east, apart), np.arange(south + 0.5 * apart, north, apart))
+    inside = shapely.intersects_xy(outline, x.ravel(), y.ravel())
+    return np.column_stack([x.ravel()[inside], y.ravel()[inside]])
 
 
 def two_surfaces(points: np.ndarray, roof: Roof) -> tuple[float, float]:

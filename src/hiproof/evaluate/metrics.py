@@ -120,17 +120,17 @@ def percentile(values: np.ndarray, share: float) -> float:
     return float(above - (above - below) * (1 - (place - low)))
 
 
-def nodata_share(xy: np.ndarray, outline: shapely.Polygon, cell_m: float = CELL_M) -> float:
-    """Share of the cells centred in `outline` that hold none of the points `xy` (n, 2 or 3); NaN without cells."""
-    west, south, east, north = np.array(outline.bounds) / cell_m
+def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
+    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2 or 3); NaN without cells."""
+    west, south, east, north = np.array(outline.bounds) / CELL_M
     west, south = math.floor(west), math.floor(south)
     columns, rows = math.ceil(east) - west, math.ceil(north) - south
     row, column = np.divmod(np.arange(rows * columns), columns)
     shapely.prepare(outline)
-    wanted = shapely.intersects_xy(outline, (column + west + 0.5) * cell_m, (row + south + 0.5) * cell_m)
+    wanted = shapely.intersects_xy(outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M)
     if not wanted.any():
         return float("nan")
-    column, row = np.floor(xy[:, 0] / cell_m) - west, np.floor(xy[:, 1] / cell_m) - south
+    column, row = np.floor(xy[:, 0] / CELL_M) - west, np.floor(xy[:, 1] / CELL_M) - south
     near = (column >= 0) & (column < columns) & (row >= 0) & (row < rows)
     seen = np.zeros(rows * columns, bool)
     seen[(row[near] * columns + column[near]).astype(np.int64)] = True
