@@ -68,7 +68,7 @@ def merge_with_others(volumes, scene, value, k, steepest):
 
 @compiled
 def join_neighbours(volumes, scene, value, k):
-    """Volume k merged with another, those around it made one, or a plane of it handed to its neighbour: what helps first."""
+    """Volume k merged with another, an end taken in, those around it made one, or a plane handed to its neighbour: what helps first."""
     count, start = len(volumes), value
     volumes, value = merge_with_others(volumes, scene, value, k, np.inf)
     if len(volumes) == count:
