@@ -14,6 +14,7 @@ from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
 from .log import counted
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
+from .rings import enclosed
 from .settings import Settings
 from .status import Doubt, Status
 
@@ -142,7 +143,7 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
 
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
     """The largest polygon of a geometry, made valid; an empty polygon where there is none."""
-    geometry = geometry if geometry.is_valid else shapely.make_valid(geometry, method="structure", keep_collapsed=False)
+    geometry = geometry if geometry.is_valid else enclosed(geometry)
     polygons = [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon"]
     return max(polygons, key=lambda polygon: polygon.area, default=shapely.Polygon())
 

@@ -50,11 +50,12 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
         ledger = Ledger(path)
         ledger.reopen()
     except sqlite3.Error as error:
-        if restart and shutil.disk_usage(state).free >= LEDGER_BYTES:
+        is_full = shutil.disk_usage(state).free < LEDGER_BYTES
+        if restart and not is_full:
             for end in ("", "-wal", "-shm"):
                 path.with_name(path.name + end).unlink(missing_ok=True)
             return open_ledger(state, False)
-        if shutil.disk_usage(state).free < LEDGER_BYTES:
+        if is_full:
             raise OutputError(
                 f"expected to write the ledger in {state}, got: {error}; free some space, the same command then goes on"
             ) from error

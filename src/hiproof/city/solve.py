@@ -34,9 +34,8 @@ from .sort import load_points
 
 NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
 
-FAR_GROUND_M = (
-    2.0  # between a terrain model and ground points: other heights (a geoid's are 10 to 100 m) or another date
-)
+# m between a terrain model and ground points: other heights (a geoid's are 10 to 100 m) or another date
+FAR_GROUND_M = 2.0
 
 
 class Surroundings:
@@ -88,13 +87,10 @@ class Surroundings:
         model, points = self.model, GroundAround(self.ground, neighbourhood(job, self.plan.terrain_reach_m))
         apart = model.height_at(xy) - points.height_at(xy)
         above = float(np.median(apart[np.isfinite(apart)])) if np.isfinite(apart).any() else 0.0
+        if abs(above) <= FAR_GROUND_M:
+            return ""
         way = "above" if above > 0 else "below"
-        far = abs(above) > FAR_GROUND_M
-        return (
-            f"the {model.source} lies {abs(above):.1f} m {way} {Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}"
-            if far
-            else ""
-        )
+        return f"the {model.source} lies {abs(above):.1f} m {way} {Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}"
 
 
 def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:

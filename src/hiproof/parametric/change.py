@@ -15,6 +15,7 @@ import shapely
 from ..errors import InputError
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import Member, member_of
+from ..rings import enclosed
 from .shape import SIDED
 
 PLAN = ("width", "length")
@@ -69,7 +70,7 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
 
 def polygon_of(rings: list) -> shapely.Geometry:
     """The area of a part's outline, rings of (x, y), the outer first; a spike of no width is none."""
-    return shapely.make_valid(shapely.Polygon(rings[0], rings[1:]), method="structure", keep_collapsed=False)
+    return enclosed(shapely.Polygon(rings[0], rings[1:]))
 
 
 def of_type(part: dict[str, Any], kind: str) -> dict[str, Any]:

@@ -13,9 +13,10 @@ import shapely
 
 from ..errors import InputError
 from ..model import Roof
+from ..rings import enclosed
 from .arrange import BLOCK_HEIGHT_M, BLOCK_M, GRID_M, corners_of, rings_of
 from .change import with_sizes
-from .record import list_at, number, numbers_by_name, place, polygon, valid
+from .record import list_at, number, numbers_by_name, place, polygon
 
 LEAST_M2 = 0.1  # m2 that two rectangles share; less is a sliver along an edge
 CLEAR = 0.02  # of what they share: a part that roofs no more of it leaves it to the other
@@ -71,7 +72,7 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
     """What a part roofs in plan: its outlines, else its rectangle."""
     if part.get("outlines") is None:
         return covered(part)
-    outlines = [valid(polygon(outline, "an outline")) for outline in list_at(part, "outlines")]
+    outlines = [enclosed(polygon(outline, "an outline")) for outline in list_at(part, "outlines")]
     return with_area(shapely.union_all(outlines, grid_size=GRID_M))
 
 

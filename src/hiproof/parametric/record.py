@@ -13,6 +13,7 @@ from ..compose.settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, se
 from ..errors import InputError
 from ..frames import LocalFrame
 from ..model import Building, Part, Quality, Roof
+from ..rings import enclosed
 from ..status import Status
 from ..write.attribute_list import PARAMETERS, PART
 from .shape import refuse_no_shape
@@ -138,7 +139,7 @@ def rectangle_within(
     u, v = 0.5 * parameters["length"], 0.5 * parameters["width"]
     c, s = math.cos(kappa), math.sin(kappa)
     corners = np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
-    covered = shapely.intersection(shapely.Polygon(corners), valid(outline), grid_size=1e-4)
+    covered = shapely.intersection(shapely.Polygon(corners), enclosed(outline), grid_size=1e-4)
     return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
 
 
@@ -160,14 +161,9 @@ def by_teeth(
         for k in own:
             uv = np.array([(-FAR_M, edges[k]), (FAR_M, edges[k]), (FAR_M, edges[k + 1]), (-FAR_M, edges[k + 1])])
             strip = shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
-            found = shapely.get_parts(shapely.intersection(strip, valid(outline), grid_size=1e-4))
+            found = shapely.get_parts(shapely.intersection(strip, enclosed(outline), grid_size=1e-4))
             cut += [g for g in found if g.geom_type == "Polygon"]
     return cut
-
-
-def valid(polygon: shapely.Polygon) -> shapely.Geometry:
-    """The areas of a polygon whose rings cross or touch; a spike of no width is none."""
-    return shapely.make_valid(polygon, method="structure", keep_collapsed=False)
 
 
 def refuse_alike(parts: list) -> None:

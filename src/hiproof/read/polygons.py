@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
+from ..rings import enclosed
 from .plausible import is_plausible
 
 SLIVER_SHARE = 0.01  # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
@@ -61,7 +62,7 @@ def mended(polygon: shapely.Polygon) -> shapely.Geometry | None:
     """The area its rings enclose, what they enclose twice counted once; None where too many edges meet to say."""
     if meetings(polygon) > MOST_MEETINGS:
         return None
-    return shapely.make_valid(polygon, method="structure", keep_collapsed=False)
+    return enclosed(polygon)
 
 
 def meetings(polygon: shapely.Polygon) -> int:

@@ -9,6 +9,7 @@ import numpy as np
 import shapely
 
 from ..model import ROOF, Building, Face, Part, Roof
+from ..rings import enclosed
 
 SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
 GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
@@ -75,5 +76,4 @@ def without_slivers(area: shapely.Geometry, least_m2: float = LEAST_M2) -> shape
 
 def drawn(part: Part) -> shapely.Geometry:
     """The outlines of a part as one area; rounded, an outline may touch itself, and a spike of no width is none."""
-    outlines = [piece.outline for piece in part.pieces]
-    return shapely.union_all(shapely.make_valid(outlines, method="structure", keep_collapsed=False))
+    return shapely.union_all(enclosed([piece.outline for piece in part.pieces]))

@@ -24,9 +24,8 @@ BLURS_M, WALLS_M = (
 # m across a side at which it is tried, and between two of them: outlines of points lie inside of walls more than outside
 STEP_M = 0.02
 OFFSETS_M = np.arange(-0.5, 0.7, STEP_M)
-FINE = (
-    32  # places a step at which densities are kept; between them they are straight, to a thousandth of their logarithm
-)
+# places a step at which densities are kept; between them they are straight, to a thousandth of their logarithm
+FINE = 32
 DEEP_M, SHALLOW_M, OUTSIDE_M = (
     2.0,
     0.4,

@@ -58,12 +58,24 @@ def merge_with_others(volumes, scene, value, k, steepest):
             continue
         trial = volumes.copy()
         for edge in range(4):
-            a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
-            trial[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
-        trial, found = settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
+            reach_over(trial, k, j, edge)
+        trial, found = settled_without(trial, scene, k, value, j)
         if found < np.inf:
             return trial, found
     return volumes, value
+
+
+@compiled
+def reach_over(volumes, k, j, edge):
+    """Have an edge of volume k lie as far out as that of volume j, in place."""
+    a, b = volumes[k, U0 + edge], volumes[j, U0 + edge]
+    volumes[k, U0 + edge] = min(a, b) if edge % 2 == 0 else max(a, b)
+
+
+@compiled
+def settled_without(trial, scene, k, value, j):
+    """`trial` without volume j, and with volume k, which took its place, settled; what `settled` says of it."""
+    return settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
 
 
 @compiled
@@ -91,10 +103,8 @@ def take_in(volumes, scene, value, k):
         for column in (OFFSET + side, SLOPE + side, LEAN + side):
             trial[k, column] = volumes[j, column]
         trial[k, TIE] = FREE
-        outer = U0 + side
-        a, b = volumes[k, outer], volumes[j, outer]
-        trial[k, outer] = min(a, b) if side % 2 == 0 else max(a, b)
-        trial, found = settled(without(trial, j), scene, k if k < j else k - 1, value, MERGE_REACH_M)
+        reach_over(trial, k, j, side)
+        trial, found = settled_without(trial, scene, k, value, j)
         if found < np.inf:
             return trial, found
     return volumes, value
