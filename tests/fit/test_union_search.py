@@ -8,16 +8,16 @@ from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.improve import improve, simplify, surroundings
 from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
 from hiproof.fit.union.moves import refit_each, settled
-from hiproof.fit.union.objective import BASE_SHARE, costs, objective
+from hiproof.fit.union.objective import BASE_SHARE, costs, edges_cost, objective
 from hiproof.fit.union.refit import refit
 from hiproof.fit.union.scene import nodes
 from hiproof.fit.union.steps import (
     AT_CORNER_M,
     END_AT_CORNER_M,
     INSIDE_M,
-    LEAST_STEP_LENGTH_M,
     STEP_M,
     TOUCH_M,
+    WHOLE_STEP_M,
     edge_cost,
     walls_of,
 )
@@ -41,6 +41,7 @@ from hiproof.fit.union.volumes import (
     SLOPE_LOW,
     TIE,
     U0,
+    U1,
     V0,
     V1,
     base_only,
@@ -177,17 +178,17 @@ def slow_edge_cost(volumes, scene, k, edge, spacing):
     gap = np.abs(inside - outside)[deep >= INSIDE_M]
     prices = scene.edge_prices
     shown, low_steps = step * (gap > STEP_M).sum(), step * ((gap > STEP_M) & (gap < prices.low_step)).sum()
-    if shown < LEAST_STEP_LENGTH_M:
+    if shown == 0.0:
         return 0.0
     corner = np.abs(scene.vertices[int(volumes[k, DIRECTION]), edge // 2] - volumes[k, U0 + edge]).min() < 1e-6
-    cost = prices.any_step + prices.a_metre * shown + prices.low_a_metre * low_steps
+    by_length, whole = prices.a_metre * shown + prices.low_a_metre * low_steps, min(shown / WHOLE_STEP_M, 1.0)
     if not corner:
-        return cost + prices.loose
+        return (prices.any_step + prices.loose) * whole + by_length
     within = (low + (np.arange(count) + 0.5) * step)[deep >= INSIDE_M]
     axis, vertices = edge // 2, scene.corners[int(volumes[k, DIRECTION])]
     beside = vertices[np.abs(vertices[:, axis] - volumes[k, U0 + edge]) < AT_CORNER_M, 1 - axis]
     ends = sum((np.abs(beside - end) < END_AT_CORNER_M).any() for end in within[[0, -1]])
-    return cost - prices.at_corner * ends
+    return (prices.any_step - prices.at_corner * ends) * whole + by_length
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -197,6 +198,24 @@ def test_an_edge_costs_what_shows_of_it(seed):
         for edge in range(4):
             cost = edge_cost(volumes, walls_of(scene), k, edge)
             assert cost == pytest.approx(slow_edge_cost(volumes, scene, k, edge, 0.5), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_straight_recess_costs_no_more_than_one_in_steps(seed):
+    # a bay of The Hague was drawn as two recesses that overlap, for each of their sides was too short to cost anything
+    rng = np.random.default_rng(seed)
+    scene = random_scene(rng)
+    (u, v), (length, depth) = rng.uniform(-3.0, -1.0, 2), rng.uniform((2.0, 1.0), (4.0, 1.4))
+    recess = np.repeat(base_only(-2.0), 2, axis=0)
+    recess[:, U0:REPLACES] = [u, u + length, v, v + depth, *recess[0, SLOPE:REPLACES]]
+    recess[:, REPLACES] = 1.0
+    recess[0, V0] += rng.uniform(0.3, 0.45)
+    recess[1, [U0, U1]] += rng.uniform(0.1, 0.5), -rng.uniform(0.1, 0.5)
+    straight = np.vstack([base_only(0.0), recess[:1]])
+    straight[1, V0] = v
+    stepped = np.vstack([base_only(0.0), recess])
+    paid = [edges_cost(volumes, scene, np.inf) for volumes in (straight, stepped)]
+    assert 0.0 < paid[0] < paid[1]
 
 
 def test_an_edge_costs_nearly_what_dense_samples_of_it_say():

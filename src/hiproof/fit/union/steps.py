@@ -1,7 +1,7 @@
 """What an edge of a volume costs that shows: a step in the roof. Compiled.
 
-It costs a fixed sum, more by the metre, most for low steps, which nearly always stand for a valley or a needless cut, and
-something extra where no corner of the outline lies in line with it. It is looked at in samples along it.
+It costs a fixed sum (less where it is very short), more by the metre, most for low steps, which nearly always stand for a valley or a
+needless cut, and something extra where no corner of the outline lies in line with it. It is looked at in samples along it.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ import numpy as np
 from ...compiled import compiled
 from .volumes import DIRECTION, REPLACES, U0, U1, V0, V1, coefficients, lowest
 
-STEP_M, INSIDE_M, LEAST_STEP_LENGTH_M = 0.05, 0.2, 0.55  # a gap that is a step; how far inside the outline it shows
+STEP_M, INSIDE_M = 0.05, 0.2  # a gap that is a step; how far inside the outline it shows
+# m from which on an edge costs the whole of its fixed sum; were shorter ones free, a flight of small steps would cost less than one straight edge
+WHOLE_STEP_M = 0.55
 # m from an outline's corner within which an edge is in line with it, and within which it ends there
 AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
 # m between the places at which a step between volumes is judged, and how many at most of an edge
@@ -43,12 +45,10 @@ def edge_cost(volumes, walls, k, edge):
         return 0.0
     any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
     first, last, shown, low = what_shows(volumes, walls, k, edge, low_step)
-    if shown < LEAST_STEP_LENGTH_M:
+    if shown == 0.0:
         return 0.0
-    cost = any_step + a_metre * shown + low_a_metre * low
-    if not in_line:
-        return cost + loose
-    return cost - at_corner * ends_at_corners(walls, direction, axis, at, first, last)
+    once = any_step + (-at_corner * ends_at_corners(walls, direction, axis, at, first, last) if in_line else loose)
+    return once * min(shown / WHOLE_STEP_M, 1.0) + a_metre * shown + low_a_metre * low
 
 
 @compiled
@@ -77,7 +77,7 @@ def what_shows(volumes, walls, k, edge, low_step):
     step = length / count
     places = walls.room[0]
     m = samples_inside(volumes, walls, k, edge, start, step, count)
-    if m * step < LEAST_STEP_LENGTH_M:
+    if m == 0:
         return 0.0, 0.0, 0.0, 0.0
     heights_beside(volumes, walls.turn, k, edge, places[:m], walls.room[1], walls.room[2])
     shown = low = 0.0
