@@ -193,6 +193,9 @@ def test_withheld_points_are_left_out_with_a_warning(tmp_path):
     las.write(tmp_path / "b.las")
     with pytest.warns(InputWarning, match="4 points flagged as withheld"):
         assert np.allclose(read_points(tmp_path / "b.las").xyz, xyz[4:], atol=1e-6)
+    with pytest.warns(InputWarning) as told:
+        assert sum(len(cloud) for cloud in iter_points(tmp_path / "b.las", chunk_points=3)) == 6
+    assert len(told) == 1, "a file's withheld points are told once, not by the chunk"
 
 
 def write_coarse_las(path, xyz, plan, height):

@@ -99,7 +99,7 @@ def las_chunks(
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
         return
-    facts, low, high = facts_of(path), np.full(3, np.inf), np.full(3, -np.inf)
+    facts, low, high, left_out = facts_of(path), np.full(3, np.inf), np.full(3, -np.inf), 0
     with explained(path):
         for record in records(path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()):
             xyz = coordinates(record)
@@ -107,9 +107,12 @@ def las_chunks(
             low, high = np.minimum(low, lowest), np.maximum(high, highest)
             if noted is not None:
                 noted.append(boxes_of_runs(xyz))
-            yield present(xyz, record, path)
+            chunk = present(xyz, record)
+            left_out += len(xyz) - len(chunk[0])
+            yield chunk
         if runs is None and facts.count:
             check_all_points(low, high, facts)
+    tell_of_withheld(left_out, path)
 
 
 def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Any]:
@@ -144,7 +147,9 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
         check_nodes(xyz, nodes, facts, facts.octree)
         if 0 < len(xyz) == facts.count:
             check_all_points(low, high, facts)
-        return present(xyz, record, path)
+        chunk = present(xyz, record)
+    tell_of_withheld(len(xyz) - len(chunk[0]), path)
+    return chunk
 
 
 def coordinates(record) -> np.ndarray:
@@ -156,11 +161,14 @@ def coordinates(record) -> np.ndarray:
     return xyz
 
 
-def present(xyz: np.ndarray, record, path: str | Path) -> Chunk:
+def present(xyz: np.ndarray, record) -> Chunk:
     """Coordinates (n, 3) and classes of a record without the points flagged as withheld, that is, deleted."""
     classification = np.asarray(record["classification"], np.uint8)
     withheld = np.asarray(record["withheld"], bool)
-    if withheld.any():
-        warnings.warn(f"{path}: {counted(int(withheld.sum()), 'point')} flagged as withheld left out", InputWarning)
-        xyz, classification = xyz[~withheld], classification[~withheld]
-    return xyz, classification
+    return (xyz[~withheld], classification[~withheld]) if withheld.any() else (xyz, classification)
+
+
+def tell_of_withheld(count: int, path: str | Path) -> None:
+    """Say once how many points of a file were left out as withheld: by the chunk, a tile of a country takes a thousand lines."""
+    if count:
+        warnings.warn(f"{path}: {counted(count, 'point')} flagged as withheld left out", InputWarning)
