@@ -18,6 +18,7 @@ noted         where the points of each file lie, for whoever wants some of them 
 solve         each work tile reconstructs its own buildings and writes them as text, ready to join
 ground        the ground around a building, from its tile's cells
 found         the roof of one building among points without classes
+other_classes what the points of other classes say of a building
 merge         the tiles' parts are joined in plan order into the files of the output folder
 outputs       digests of what was written
 ledger        which tasks are done, what came of each building: SQLite

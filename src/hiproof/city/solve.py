@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import threading
 import time
@@ -28,6 +29,7 @@ from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
+from .other_classes import ground_under_roof, why_no_points
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, load_plan, neighbourhood
 from .sort import load_points
@@ -91,6 +93,19 @@ class Surroundings:
             return ""
         way = "above" if above > 0 else "below"
         return f"the {model.source} lies {abs(above):.1f} m {way} {Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}"
+
+    def looked_at(self, building: Building, job: Job, roof: np.ndarray) -> Building:
+        """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
+        if self.plan.settings.read.roofs == "shape" or job.area.is_empty:
+            return building
+        box = neighbourhood(job, 0.0)
+        if building.status is Status.NO_POINTS:
+            other, around = self.low.inside(box), TerrainChain(self.grounds_of(job))
+            above = other[:, 2] - around.height_at(other) if len(other) else np.zeros(0)
+            classes = self.plan.settings.read.building_classes
+            why = why_no_points(job.area, other, above, self.ground.inside(box), classes)
+            return dataclasses.replace(building, detail=why) if why else building
+        return remarked(building, ground_under_roof(job.area, roof, self.ground.inside(box)))
 
 
 def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
@@ -158,6 +173,7 @@ def solve_one(
         if len(used) < len(points) and building.status is Status.MODELLED:
             building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
         building = remarked(remarked(building, found.remark), surroundings.doubt_of_terrain(job))
+        building = surroundings.looked_at(building, job, points)
         return fragments(building, plan.names_of(job), plan.head)
     except MemoryError:
         raise

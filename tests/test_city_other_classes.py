@@ -1,0 +1,86 @@
+"""What a run says of buildings by the points that are not of the building's class."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof import read_parameters
+from hiproof.city.other_classes import ground_under_roof, why_no_points
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.settings import Settings
+from hiproof.status import Doubt
+from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
+
+TOWN = make_town(houses=3)
+ON_FIRST = (TOWN.classification == 6) & (TOWN.xyz[:, 0] < ORIGIN[0] + 30)
+
+
+def run_of(folder, xyz, classification, settings=None):
+    """What a run says of the buildings of TOWN by id, and what it counts, over other points."""
+    folder.mkdir(exist_ok=True)
+    cloud = write_cloud(folder / "cloud.laz", xyz, classification)
+    footprints = write_footprints(folder / "footprints.geojson", TOWN.footprints)
+    settings = settings or Settings()
+    summary = reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), settings=settings))
+    rows = read_parameters(folder / "out" / "parameters.jsonl")
+    return {row["id"]: (row["status"], row["detail"]) for row in rows}, summary.doubts
+
+
+def ground_for(points):
+    """Ground points below others."""
+    return np.column_stack([points[:, :2], ORIGIN[2] + 0.01 * (points[:, 0] - ORIGIN[0])])
+
+
+def test_a_roof_of_another_class_is_not_taken_for_missing(tmp_path):
+    classes = np.where(ON_FIRST, 1, TOWN.classification)
+    told, doubts = run_of(tmp_path, TOWN.xyz, classes)
+    status, detail = told["house-0"]
+    assert status == "no_points" and "add a cloud" not in detail
+    assert "no points of class 6" in detail and "points of other classes" in detail and "--roofs shape" in detail
+    assert doubts == {Doubt.POINTS_OF_OTHER_CLASSES: 1}
+    by_shape, _ = run_of(tmp_path / "shape", TOWN.xyz, classes, Settings.from_dict({"read": {"roofs": "shape"}}))
+    assert by_shape["house-0"][0] == "modelled", "what the detail advises helps"
+
+
+def test_bare_ground_where_a_house_should_stand_is_told_of(tmp_path):
+    xyz = np.concatenate([TOWN.xyz[~ON_FIRST], ground_for(TOWN.xyz[ON_FIRST])])
+    classes = np.concatenate([TOWN.classification[~ON_FIRST], np.full(ON_FIRST.sum(), 2, np.uint8)])
+    told, doubts = run_of(tmp_path, xyz, classes)
+    assert "its ground lies bare: nothing stood there" in told["house-0"][1]
+    assert doubts == {Doubt.BARE_GROUND: 1}
+
+
+def test_nothing_seen_keeps_its_advice(tmp_path):
+    far = TOWN.xyz[:, 0] > ORIGIN[0] + 32
+    told, doubts = run_of(tmp_path, TOWN.xyz[far], TOWN.classification[far])
+    assert "add a cloud that covers it" in told["house-0"][1] and not doubts
+
+
+def test_a_house_pulled_down_between_two_flights_is_told_of(tmp_path):
+    later = ground_for(TOWN.xyz[ON_FIRST] + [0.2, 0.1, 0.0])
+    xyz = np.concatenate([TOWN.xyz, later])
+    classes = np.concatenate([TOWN.classification, np.full(len(later), 2, np.uint8)])
+    told, doubts = run_of(tmp_path, xyz, classes)
+    assert told["house-0"][0] == "modelled" and "ground points lie under the roof: two dates" in told["house-0"][1]
+    assert "ground" not in told["house-1"][1] and doubts == {Doubt.GROUND_UNDER_ROOF: 1}
+
+
+@pytest.mark.parametrize("cells", [0, 20, 60])
+def test_ground_beside_walls_and_in_a_corner_says_nothing(cells):
+    """Of the 64 cells more than a metre inside the outline, so many hold ground."""
+    x, y = (grid.ravel() + 0.5 for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
+    all_over = np.column_stack([x, y, np.zeros(100)])
+    inside = (abs(x - 5) < 4) & (abs(y - 5) < 4)
+    ground = np.concatenate([all_over[~inside], all_over[inside][:cells]])
+    assert bool(ground_under_roof(shapely.box(0, 0, 10, 10), all_over + [0, 0, 6], ground)) == (cells > 0.4 * 64)
+
+
+@pytest.mark.parametrize("shift", [(0, 0), (-4e6, 1e7)])
+def test_leaves_over_bare_ground_are_no_roof(shift):
+    x, y = (grid.ravel() + 0.5 for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
+    ground = np.column_stack([x + shift[0], y + shift[1], np.zeros(100)])
+    area = shapely.box(*shift, shift[0] + 10, shift[1] + 10)
+    crown, unknown = np.full(100, 8.0), np.full(100, np.nan)
+    assert "lies bare" in why_no_points(area, ground, crown, ground, (6,))
+    assert "class 6 or 67 inside" in why_no_points(area, ground, crown, ground[:30], (6, 67))
+    assert why_no_points(area, ground, unknown, ground[:30], (6,)) == ""
