@@ -3,6 +3,7 @@
 import dataclasses
 import os
 import pickle
+import shutil
 import signal
 import sqlite3
 import subprocess
@@ -109,6 +110,18 @@ def test_another_setting_is_refused_by_name_and_the_same_request_is_not(town_fil
     one = Settings.from_dict({"fit": {"parts": "one"}})
     with pytest.raises(OutputError, match=r"differs in settings\.fit\.parts; .*--restart"):
         reconstruct_area(dataclasses.replace(request, settings=one))
+
+
+def test_a_replaced_tile_is_named(town_files, tmp_path, quick):
+    tiles = tmp_path / "tiles"
+    tiles.mkdir()
+    for name in ("a.laz", "b.laz"):
+        shutil.copy(town_files[0], tiles / name)
+    request = Request((str(tiles / "a.laz"), str(tiles / "b.laz")), tmp_path / "out", town_files[1])
+    reconstruct_area(request)
+    os.utime(tiles / "b.laz", (0, 0))
+    with pytest.raises(OutputError, match=r"differs in clouds \(b\.laz\); .*--restart"):
+        reconstruct_area(request)
 
 
 def test_a_second_run_in_the_folder_is_refused_while_status_reads(town_files, tmp_path, quick):

@@ -20,6 +20,7 @@ from .request import Request
 
 BESIDE = (".dbf", ".shx", ".prj", ".cpg", ".tfw")  # parts of one file that formats keep beside it
 APPENDED = ("-wal", ".aux.xml", ".ovr", ".msk")
+SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was replaced
 
 
 def inputs_of(request: Request) -> dict[str, Any]:
@@ -66,6 +67,26 @@ def file_stamps(path: Path) -> list[tuple[str, int, int]]:
         stamps = [(file.relative_to(folder).as_posix(), file.stat()) for file in files]
         return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stamps)
     return []
+
+
+def changed_files(told: Any, known: Any) -> str:
+    """Which files of an input differ, in brackets, from the values of `with_files` as JSON gives them; empty where it names none.
+
+    >>> changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20, 2]]])
+    ' (b.laz)'
+    """
+    names = sorted({name for name, *_ in stamps_in(told) ^ stamps_in(known)})
+    more = f" and {len(names) - SHOWN_FILES} more" if len(names) > SHOWN_FILES else ""
+    return f" ({', '.join(names[:SHOWN_FILES])}{more})" if names else ""
+
+
+def stamps_in(value: Any) -> set[tuple[str, int, int]]:
+    """All (name, bytes, time in ns) in nested lists."""
+    if not isinstance(value, list):
+        return set()
+    if len(value) == 3 and isinstance(value[0], str) and all(type(number) is int for number in value[1:]):
+        return {(value[0], value[1], value[2])}
+    return set().union(*map(stamps_in, value))
 
 
 def mark_of(inputs: dict[str, Any], salt: str) -> str:

@@ -18,7 +18,7 @@ from ..write.files import atomic
 from . import noted
 from .changed import take_over
 from .ledger import Ledger, Task
-from .marks import choice_of, inputs_of, mark_of
+from .marks import changed_files, choice_of, inputs_of, mark_of
 from .merge import remove_tiles, tile_parts
 from .outputs import broken_claims
 from .overrides import REDO, settle_overrides
@@ -133,7 +133,11 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     if is_of(inputs, ledger):
         return
     known, told = json.loads(ledger.get("inputs") or "{}"), json.loads(json.dumps(masked_values(inputs), default=str))
-    other = [name for name in told | known if told.get(name) != known.get(name)]
+    other = [
+        name + changed_files(told.get(name), known.get(name))
+        for name in told | known
+        if told.get(name) != known.get(name)
+    ]
     raise OutputError(
         f"expected {out} to be new or to hold a run of the same inputs, settings and version, got a run that differs in "
         f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or begin anew with --restart"
