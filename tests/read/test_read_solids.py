@@ -156,6 +156,7 @@ BROKEN = {
     "list.json": ("[1, 2]", "expected a JSON object"),
     "geo.json": ('{"type": "FeatureCollection"}', '"type": "CityJSON"'),
     "index.json": (json.dumps({**city(), "vertices": [[0, 0, 0]]}), "vertices"),
+    "model.jsonl": (gml(), "got XML, such as CityGML; name a CityJSON file"),
     "headless.jsonl": (seq().split("\n")[1], "expected a CityJSON line"),
     "empty.jsonl": ("", "got an empty file"),
     "cut.gml": (gml()[:900], "damaged or cut off"),

@@ -94,6 +94,8 @@ def parsed(text: str, place: str) -> dict[str, Any]:
     try:
         value = json.loads(text, parse_constant=refuse_constant)
     except (ValueError, RecursionError) as error:  # a ValueError too for numbers of thousands of digits
+        if text.lstrip("\ufeff \t\r\n").startswith("<"):
+            raise InputError(f"expected JSON in {place}, got XML, such as CityGML; name a CityJSON file") from error
         raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error
     if not isinstance(value, dict):
         raise InputError(f"expected a JSON object in {place}, got {type(value).__name__}; is this the right file?")
