@@ -35,12 +35,17 @@ ROOFER = (
     Attribute("h_roof_50p", "number", "m", "height that half of the roof's area lies below"),
     Attribute("h_roof_70p", "number", "m", "height that seven tenths of the roof's area lie below"),
     Attribute("h_roof_max", "number", "m", "highest height of the roof"),
-    Attribute("h_roof_ridge", "number", "m", "height of the highest ridge, of the roof where it has none"),
+    Attribute("h_roof_ridge", "number", "m", "height of the longest level ridge, null where there is none"),
     Attribute("volume_lod22", "number", "m3", "volume of the solid"),
     Attribute("roof_type", "text", "", "roofer's type: horizontal, multiple horizontal, slanted, no points, unknown"),
     Attribute("roof_n_surfaces", "count", "", "roof faces of the solid"),
-    Attribute("slope", "number", "deg", "slope of the roof, by area"),
-    Attribute("azimuth", "number", "deg", "compass direction in which the roof falls, by area"),
+    Attribute("slope", "number", "deg", "slope of the largest roof face"),
+    Attribute(
+        "azimuth",
+        "number",
+        "deg",
+        "compass direction in which the largest roof face falls, of two equal ones either; null where level",
+    ),
     Attribute(
         "rmse_lod22", "number", "m", "root mean square distance of the points from the roof, facade points included"
     ),
