@@ -65,6 +65,14 @@ def test_a_house_pulled_down_between_two_flights_is_told_of(tmp_path):
     assert "ground" not in told["house-1"][1] and doubts == {Doubt.GROUND_UNDER_ROOF: 1}
 
 
+def test_ground_that_nobody_saw_is_told_of(tmp_path):
+    """As of a house in a yard that other houses close in: its walls are drawn 3 m high, whatever its height."""
+    roofs = TOWN.classification == 6
+    told, doubts = run_of(tmp_path, TOWN.xyz[roofs], TOWN.classification[roofs])
+    assert all("its ground is assumed, for none is seen near it" in detail for _, detail in told.values())
+    assert doubts == {Doubt.ASSUMED_GROUND: 3}
+
+
 @pytest.mark.parametrize("cells", [0, 20, 60])
 def test_ground_beside_walls_and_in_a_corner_says_nothing(cells):
     """Of the 64 cells more than a metre inside the outline, so many hold ground."""

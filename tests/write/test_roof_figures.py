@@ -123,3 +123,11 @@ def test_figures_move_with_the_solid(shift):
         assert getattr(there, name) - shift[2] == pytest.approx(getattr(here, name), abs=1e-6)
     for name in ("volume_m3", "plan_area_m2", "roof_area_m2", "slope_deg", "azimuth_deg"):
         assert getattr(there, name) == pytest.approx(getattr(here, name), rel=1e-6)
+
+
+@pytest.mark.parametrize("top", [2.37151, 2.37155, 9.99996])
+def test_eaves_of_a_level_roof_are_at_its_height(top):
+    """The eave's height is rounded to choose it, about the middle of the solid: it stood a tenth of a millimetre above the roof."""
+    for base in (0.0, 0.01234, -3.33335):
+        figures = roof_figures(prism([[(0, 0), (4, 0), (4, 5), (0, 5)]], base, top))
+        assert figures.h_min <= figures.h_eave <= figures.h_max

@@ -173,13 +173,20 @@ def solve_one(
         if len(used) < len(points) and building.status is Status.MODELLED:
             building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
         building = remarked(remarked(building, found.remark), surroundings.doubt_of_terrain(job))
-        building = surroundings.looked_at(building, job, points)
+        building = remarked(surroundings.looked_at(building, job, points), doubt_of_ground(building))
         return fragments(building, plan.names_of(job), plan.head)
     except MemoryError:
         raise
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+
+
+def doubt_of_ground(building: Building) -> str:
+    """A remark where no ground was found around a building: volume and height over ground then hang on a wall's usual height."""
+    if building.built is None or not building.ground_source.startswith("assumed"):
+        return ""
+    return f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over ground are guesses"
 
 
 def not_seen(job: Job, detail: str) -> Building:

@@ -88,12 +88,14 @@ def roof_figures(solid: Solid) -> RoofFigures:
     roof = is_roof[face_of]
     plan = triangles[roof, 2]
     edges = corners[roof, 1:], fan[roof, 1:], area[face_of[roof]]
+    heights = roof_heights(np.sort(corners[roof, :, 2], axis=1), plan, float(origin[2]))
+    eave = eave_height(*edges) + float(origin[2])
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
-        **roof_heights(np.sort(corners[roof, :, 2], axis=1), plan, float(origin[2])),
+        **heights,
         h_ridge=ridge_height(*edges) + float(origin[2]),
-        h_eave=eave_height(*edges) + float(origin[2]),
+        h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),  # it is rounded, and no eave leaves the roof
         h_base=base_height(solid),
         volume_m3=volume(solid),
         plan_area_m2=float(plan.sum()),
