@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from hiproof import read_parameters
-from hiproof.city.other_classes import ground_under_roof, why_no_points
+from hiproof.city.other_classes import OtherPoints, ground_under_roof, roof_of_other_classes, why_no_points
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.settings import Settings
 from hiproof.status import Doubt
@@ -73,22 +73,54 @@ def test_ground_that_nobody_saw_is_told_of(tmp_path):
     assert doubts == {Doubt.ASSUMED_GROUND: 3}
 
 
+def test_a_roof_of_which_half_has_the_class_is_told_of(tmp_path):
+    west = ON_FIRST & (TOWN.xyz[:, 0] < ORIGIN[0] + 14)
+    told, doubts = run_of(tmp_path, TOWN.xyz, np.where(west, 1, TOWN.classification))
+    assert "without points of its class, points of other classes lie high" in told["house-0"][1]
+    assert doubts[Doubt.POINTS_OF_OTHER_CLASSES] == 1
+
+
+X, Y = (grid.ravel() + 0.5 for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
+ALL_OVER = np.column_stack([X, Y, np.zeros(100)])  # a point in each cell of a building of 10 x 10 m
+SQUARE = shapely.box(0, 0, 10, 10)
+
+
+class Level:
+    """The ground at some height, NaN for unknown."""
+
+    source = "a level"
+
+    def __init__(self, height):
+        self.height = height
+
+    def height_at(self, xy):
+        return np.full(len(xy), self.height)
+
+
 @pytest.mark.parametrize("cells", [0, 20, 60])
 def test_ground_beside_walls_and_in_a_corner_says_nothing(cells):
     """Of the 64 cells more than a metre inside the outline, so many hold ground."""
-    x, y = (grid.ravel() + 0.5 for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
-    all_over = np.column_stack([x, y, np.zeros(100)])
-    inside = (abs(x - 5) < 4) & (abs(y - 5) < 4)
-    ground = np.concatenate([all_over[~inside], all_over[inside][:cells]])
-    assert bool(ground_under_roof(shapely.box(0, 0, 10, 10), all_over + [0, 0, 6], ground)) == (cells > 0.4 * 64)
+    inside = (abs(X - 5) < 4) & (abs(Y - 5) < 4)
+    ground = np.concatenate([ALL_OVER[~inside], ALL_OVER[inside][:cells]])
+    points = OtherPoints.inside(SQUARE, ground, ALL_OVER[:0], Level(0.0))
+    assert bool(ground_under_roof(points, ALL_OVER + [0, 0, 6])) == (cells > 0.4 * 64)
 
 
-@pytest.mark.parametrize("shift", [(0, 0), (-4e6, 1e7)])
+@pytest.mark.parametrize("shift", [(0, 0, 0), (-4e6, 1e7, 100)])
 def test_leaves_over_bare_ground_are_no_roof(shift):
-    x, y = (grid.ravel() + 0.5 for grid in np.meshgrid(np.arange(10.0), np.arange(10.0)))
-    ground = np.column_stack([x + shift[0], y + shift[1], np.zeros(100)])
-    area = shapely.box(*shift, shift[0] + 10, shift[1] + 10)
-    crown, unknown = np.full(100, 8.0), np.full(100, np.nan)
-    assert "lies bare" in why_no_points(area, ground, crown, ground, (6,))
-    assert "class 6 or 67 inside" in why_no_points(area, ground, crown, ground[:30], (6, 67))
-    assert why_no_points(area, ground, unknown, ground[:30], (6,)) == ""
+    cells, crown, area = (
+        ALL_OVER + shift,
+        ALL_OVER + shift + [0, 0, 8.0],
+        shapely.box(*shift[:2], shift[0] + 10, shift[1] + 10),
+    )
+    level = Level(shift[2])
+    assert "lies bare" in why_no_points(OtherPoints.inside(area, cells, crown, level), (6,))
+    assert "class 6 or 67 inside" in why_no_points(OtherPoints.inside(area, cells[:30], crown, level), (6, 67))
+    unknown = OtherPoints.inside(area, cells[:30], crown, Level(np.nan))
+    assert why_no_points(unknown, (6,)) == roof_of_other_classes(unknown, cells[:0]) == ""
+
+
+@pytest.mark.parametrize("classified, told", [(100, False), (85, False), (70, True)])
+def test_what_stands_beside_a_roof_of_its_class_is_told_of_where_it_is_much(classified, told):
+    points = OtherPoints.inside(SQUARE, ALL_OVER[:0], ALL_OVER + [0, 0, 8.0], Level(0.0))
+    assert bool(roof_of_other_classes(points, ALL_OVER[:classified])) == told

@@ -7,53 +7,75 @@ All is told in whole-metre cells, as the ground and the lowest of the other poin
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import shapely
 
+from ..read.terrain import Terrain
 from ..status import Doubt
 
 CELL_M2 = 1.0  # of the cells
 HIGH_M = 2.0  # over the ground: what is lower is a hedge, a car or the ground itself
 MOSTLY = 0.5  # of the outline's cells, which say why it has no points of the class
+HALF_CLASSIFIED = 0.2  # of the outline's cells, as for places without points (evaluate/layers.py)
 BESIDE_WALL_M = 1.0  # m inside the outline, where points of the ground beside a wall may lie
 FEWEST_CELLS = 10  # with roof points, below which chance decides
 UNDER_ROOF = 0.4  # of these, with ground points as well: of Delft's buildings none, of simulated ones pulled down between two flights all
 ROWS = 2**32  # cells from north to south, more than a world has metres
 
 
-def why_no_points(
-    area: shapely.Geometry, other: np.ndarray, above: np.ndarray, ground: np.ndarray, classes: Sequence[int]
-) -> str:
-    """The detail of a building without points of the building `classes`, empty where nothing else was seen either.
+@dataclass(frozen=True)
+class OtherPoints:
+    """What lies inside a building's `area` beside the points of its class: of each cell the ground (m, 3) and, where they lie
+    high above it, the lowest of the other points (n, 3)."""
 
-    `other` (n, 3) and `ground` (m, 3) are the lowest of the other points of a cell and its ground, around the building;
-    `above` (n,) how high `other` lie above the ground [m], NaN where that is unknown.
-    """
-    bare = cells_of(ground[within(area, ground)])
-    high = np.setdiff1d(cells_of(other[within(area, other) & (above >= HIGH_M)]), bare)
-    share, share_bare = (min(1.0, len(cells) * CELL_M2 / area.area) for cells in (high, bare))
-    named = " or ".join(str(number) for number in classes)
+    area: shapely.Geometry
+    ground: np.ndarray
+    high: np.ndarray
+
+    @classmethod
+    def inside(cls, area: shapely.Geometry, ground: np.ndarray, other: np.ndarray, terrain: Terrain) -> OtherPoints:
+        """Those among the `ground` and the lowest `other` points (k, 3) around the building; `terrain` says how high they lie."""
+        ground, other = (points[within(area, points)] for points in (ground, other))
+        return cls(area, ground, other[other[:, 2] - terrain.height_at(other) >= HIGH_M] if len(other) else other)
+
+    def share(self, cells: np.ndarray) -> float:
+        """The share of the area that so many cells are."""
+        return min(1.0, len(cells) * CELL_M2 / self.area.area)
+
+
+def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
+    """The detail of a building without points of the building `classes`, empty where nothing else was seen either."""
+    bare = cells_of(points.ground)
+    share, share_bare = points.share(np.setdiff1d(cells_of(points.high), bare)), points.share(bare)
+    none = f"no model: no points of class {' or '.join(map(str, classes))} inside the footprint"
     if share > MOSTLY:
-        return (
-            f"no model: no points of class {named} inside the footprint, but over {100 * share:.0f} % of it "
-            f"{Doubt.POINTS_OF_OTHER_CLASSES.value}; --roofs shape looks for roofs among them"
-        )
+        lie = f"over {100 * share:.0f} % of it {Doubt.POINTS_OF_OTHER_CLASSES.value}"
+        return f"{none}, but {lie}; --roofs shape looks for roofs among them"
     if share_bare > MOSTLY:
-        return (
-            f"no model: no points of class {named} inside the footprint, and over {100 * share_bare:.0f} % of it "
-            f"{Doubt.BARE_GROUND.value}: nothing stood there when it was scanned"
-        )
+        return f"{none}, and over {100 * share_bare:.0f} % of it {Doubt.BARE_GROUND.value}: nothing stood there when it was scanned"
     return ""
 
 
-def ground_under_roof(area: shapely.Geometry, roof: np.ndarray, ground: np.ndarray) -> str:
-    """A remark where ground points, one a cell of `ground` (m, 3), lie under much of a building's `roof` points (n, 3); empty otherwise.
+def roof_of_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
+    """A remark where, over much of a building, only points of other classes lie high: in cells without `roof` points (n, 3)
+    and without ground. Empty otherwise."""
+    high = np.setdiff1d(cells_of(points.high), cells_of(np.concatenate([roof, points.ground])))
+    share = points.share(high)
+    if share <= HALF_CLASSIFIED or len(high) < FEWEST_CELLS:
+        return ""
+    lie = f"over {100 * share:.0f} % of its outline, without points of its class, {Doubt.POINTS_OF_OTHER_CLASSES.value}"
+    return f"{lie}: leaves, or a roof that --roofs shape finds"
+
+
+def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
+    """A remark where ground points lie under much of a building's `roof` points (n, 3), empty otherwise.
 
     One flight sees no ground through a roof, but two do where a house was built or pulled down between them.
     """
-    inner = shapely.buffer(area, -BESIDE_WALL_M)
-    ground = ground[within(inner, ground)]
+    inner = shapely.buffer(points.area, -BESIDE_WALL_M)
+    ground = points.ground[within(inner, points.ground)]
     if len(ground) < UNDER_ROOF * FEWEST_CELLS:
         return ""
     seen = cells_of(roof[within(inner, roof)])

@@ -29,7 +29,7 @@ from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
-from .other_classes import ground_under_roof, why_no_points
+from .other_classes import OtherPoints, ground_under_roof, roof_of_other_classes, why_no_points
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, load_plan, neighbourhood
 from .sort import load_points
@@ -99,13 +99,12 @@ class Surroundings:
         if self.plan.settings.read.roofs == "shape" or job.area.is_empty:
             return building
         box = neighbourhood(job, 0.0)
+        terrain = TerrainChain(self.grounds_of(job))
+        points = OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
         if building.status is Status.NO_POINTS:
-            other, around = self.low.inside(box), TerrainChain(self.grounds_of(job))
-            above = other[:, 2] - around.height_at(other) if len(other) else np.zeros(0)
-            classes = self.plan.settings.read.building_classes
-            why = why_no_points(job.area, other, above, self.ground.inside(box), classes)
+            why = why_no_points(points, self.plan.settings.read.building_classes)
             return dataclasses.replace(building, detail=why) if why else building
-        return remarked(building, ground_under_roof(job.area, roof, self.ground.inside(box)))
+        return remarked(remarked(building, roof_of_other_classes(points, roof)), ground_under_roof(points, roof))
 
 
 def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
