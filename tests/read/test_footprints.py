@@ -9,6 +9,7 @@ import pytest
 import shapely
 from pyproj import CRS, Transformer
 
+import hiproof.read.attribute_columns
 import hiproof.read.polygons
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
@@ -43,6 +44,7 @@ def shifted(polygon, x):
 
 def test_examples_in_the_docstrings_run():
     assert doctest.testmod(hiproof.read.polygons).failed == 0
+    assert doctest.testmod(hiproof.read.attribute_columns).failed == 0
 
 
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
@@ -62,6 +64,49 @@ def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
     assert built.startswith("1931-05-17") and first.attributes == {"name": "A", "floors": 2, "height": 7.5}
     assert "height" not in second.attributes
     json.dumps(second.attributes)
+
+
+def write_with_gaps(path, **fields):
+    """Three squares, of which the second has none of the `fields`."""
+    squares = np.array([shapely.to_wkb(shifted(SQUARE, 20 * i)) for i in range(3)], object)
+    gap = np.array([False, True, False])
+    columns = [np.array(["A", "B", "C"], object), *fields.values()]
+    pyogrio.raw.write(
+        str(path),
+        squares,
+        columns,
+        ["name", *fields],
+        [None] + [gap] * len(fields),
+        geometry_type="Polygon",
+        crs="EPSG:28992",
+    )
+    return path
+
+
+@pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
+@pytest.mark.parametrize("where", [None, "name <> 'D' or name = 'E'"])
+def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, ending, where):
+    """They became decimals: a year 1931.0, a yes 1.0, and an id beyond 2^53 that of its neighbour."""
+    path = write_with_gaps(
+        tmp_path / f"a.{ending}",
+        year=np.array([1931, 0, 2001], np.int32),
+        listed=np.array([True, False, False]),
+        number=2**53 + np.array([1, 0, 3], np.int64),
+        height=np.array([7.5, 0, 8.0]),
+    )
+    by_name = {f.id: f.attributes for f in read_footprints(path, id_attribute="name", where=where)}
+    assert by_name["B"] == {"name": "B"}
+    assert [by_name["A"][k] for k in ("year", "listed", "number", "height")] == [1931, True, 2**53 + 1, 7.5]
+    assert [by_name["C"][k] for k in ("year", "listed", "number", "height")] == [2001, False, 2**53 + 3, 8.0]
+    for attributes in (by_name["A"], by_name["C"]):
+        assert [type(attributes[k]) for k in ("year", "listed", "number", "height")] == [int, bool, int, float]
+
+
+def test_ids_of_many_digits_stay_apart_where_a_feature_has_none(tmp_path):
+    path = write_with_gaps(tmp_path / "a.gpkg", number=2**53 + np.array([0, 0, 1], np.int64))
+    with pytest.warns(InputWarning, match="1 feature without number"):
+        ids = [footprint.id for footprint in read_footprints(path, id_attribute="number")]
+    assert ids[::2] == ["9007199254740992", "9007199254740993"]
 
 
 def test_heights_of_the_outline_are_left_out(tmp_path):

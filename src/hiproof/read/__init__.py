@@ -15,6 +15,7 @@ plausible     what no input may say
 thin          one point a cell
 crs           reference systems and their units
 footprints    building polygons; `read_footprints`
+attribute_columns  their attributes as they are declared
 polygons      polygons put right
 database      footprints from PostGIS
 overlap       whether footprints lie where the cloud does

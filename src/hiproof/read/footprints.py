@@ -18,6 +18,7 @@ from ..frames import Units
 from ..log import counted
 from ..model import Footprint
 from ..settings import Settings
+from .attribute_columns import as_declared, where_known
 from .crs import described, parse_crs, same_horizontal, units_of
 from .database import is_database, read_table, table_crs
 from .overlap import refuse_degrees, told_box
@@ -103,11 +104,7 @@ def read_features(
     """
     if is_database(path):
         return read_table(str(path), where)
-    if not is_url(path) and not str(path).startswith(("/vsi", "PG:")):
-        if not Path(path).exists():
-            raise InputError(f"expected footprints at {path}, got no such file; check the path")
-        if Path(path).is_file() and Path(path).stat().st_size == 0:
-            raise InputError(f"expected footprints in {path}, got an empty file; copy or download it again")
+    refuse_missing(path)
     layer = one_layer(path, layer)
     info = reading(lambda: pyogrio.read_info(str(path), layer=layer), path)
     chosen = {"where": where, "bbox": bbox and box_in(parse_crs(info["crs"]), bbox, bbox_crs)}
@@ -131,7 +128,24 @@ def read_features(
         raise InputError(
             f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or close the lines first"
         )
-    return meta, numbers, geometries, columns
+
+    def known_of(name: str) -> np.ndarray:
+        # of all columns: in some formats those left out are empty to the condition as well
+        known = {**chosen, "layer": layer, "where": where_known(name, where)}
+        told, _, _, values = reading(lambda: pyogrio.raw.read(str(path), read_geometry=False, **known), path, info)
+        return values[list(told["fields"]).index(name)]
+
+    return meta, numbers, geometries, as_declared(meta["fields"], meta["dtypes"], columns, known_of)
+
+
+def refuse_missing(path: str | Path) -> None:
+    """Raise InputError where a local file is not there, or empty."""
+    if is_url(path) or str(path).startswith(("/vsi", "PG:")):
+        return
+    if not Path(path).exists():
+        raise InputError(f"expected footprints at {path}, got no such file; check the path")
+    if Path(path).is_file() and Path(path).stat().st_size == 0:
+        raise InputError(f"expected footprints in {path}, got an empty file; copy or download it again")
 
 
 def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
