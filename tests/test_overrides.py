@@ -12,6 +12,7 @@ from hiproof.city import run as city_run
 from hiproof.city import solve
 from hiproof.city.ledger import Ledger
 from hiproof.city.noted import noted_file, save_noted
+from hiproof.city.overrides import table_records
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.override import overridden, override_of
@@ -137,6 +138,8 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
         ({"id": "a", "types": [["hip"]]}, r"got \['hip'\]"),
         ({"id": "a", "type": ["hip"]}, r"got \['hip'\]"),
         ({"id": "a", "leave_out": True, "type": "hip"}, "leave_out without"),
+        ({"id": "a", "leave_out": "false"}, "true or false as leave_out of the override of 'a', got 'false'"),
+        ({"id": "a", "leave_out": ["no"]}, "true or false as leave_out"),
         ({"id": "a", "block_height": 3, "ridge_height": 3}, "block_height without"),
         ({"id": "a", "block_height": -3}, "positive block_height"),
         ({"id": "a", "parts": 1.5}, "whole number"),
@@ -299,6 +302,29 @@ def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(pair, me
     (tmp_path / "footprints.gpkg").unlink()
     city_run.reconstruct_area(columns_request(town_files, tmp_path, "daktype=type"))
     assert by_id(tmp_path / "out")["house-0"]["type"] == "hip"
+
+
+def test_a_table_of_typed_columns_says_what_it_says_where_rows_leave_gaps(tmp_path):
+    """A yes beside a row without one was read as 1.0, which said nothing: the house that was pulled down stayed."""
+    gaps = np.array([True, False, False])
+    columns = [np.array([7, 8, 9]), np.array([False, True, False]), np.array([0, 0, 2], np.int32)]
+    path = str(tmp_path / "o.gpkg")
+    masks = [None, gaps, np.array([True, True, False])]
+    pyogrio.raw.write(path, None, columns, ["id", "leave_out", "parts"], masks)
+    rows = table_records(path)
+    assert rows == [{"id": "7"}, {"id": "8", "leave_out": True}, {"id": "9", "leave_out": False, "parts": 2}]
+
+
+@pytest.mark.parametrize(
+    "text, told", [("yes", True), ("Y", True), ("1.0", True), ("no", False), ("0", False), ("", None)]
+)
+def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, text, told):
+    (tmp_path / "o.csv").write_text(f"id,leave_out\na,{text}\n")
+    (row,) = table_records(str(tmp_path / "o.csv"))
+    assert override_of(row).leave_out == bool(told)
+    (tmp_path / "o.csv").write_text("id,leave_out\na,perhaps\n")
+    with pytest.raises(InputError, match="true or false as leave_out"):
+        override_of(*table_records(str(tmp_path / "o.csv")))
 
 
 def test_tables_override_too(town_files, tmp_path):

@@ -10,10 +10,13 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError, InputWarning
 from ..log import LOGGER, counted
 from ..parametric.file import HEAD, objects
 from ..parametric.override import KEYS, Override, override_of
+from ..read.attribute_columns import as_declared, where_known
 from ..read.footprints import attribute_rows, reading
 from ..write.files import atomic
 from .ledger import Ledger
@@ -98,15 +101,25 @@ def table_records(path: str) -> list[dict[str, Any]]:
     """The rows of a table; numbers that a CSV holds as text become numbers."""
     import pyogrio
 
-    meta, _, _, columns = reading(lambda: pyogrio.raw.read(str(path), read_geometry=False), path)
-    rows = attribute_rows(list(meta["fields"]), columns, len(columns[0]) if columns else 0)
+    def read(where: str | None = None) -> tuple[list[str], list[str], list[np.ndarray]]:
+        meta, _, _, columns = reading(lambda: pyogrio.raw.read(str(path), read_geometry=False, where=where), path)
+        return list(meta["fields"]), list(meta["dtypes"]), columns
+
+    names, declared, columns = read()
+    columns = as_declared(names, declared, columns, lambda name: read(where_known(name, None))[2][names.index(name)])
+    rows = attribute_rows(names, columns, len(columns[0]) if columns else 0)
     return [{name: typed(name, value) for name, value in row.items()} for row in rows]
+
+
+YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fromkeys(
+    ("0", "0.0", "false", "no", "f", "n", ""), False
+)
 
 
 def typed(name: str, value: Any) -> Any:
     """A table's value as the override's key wants it."""
     if name == "leave_out":
-        return str(value).strip().lower() in ("1", "true", "yes", "t")
+        return YES_OR_NO.get(str(value).strip().lower(), value)
     if name in ("parts", "ridge_height", "eave_height", "z_ground", "block_height") and isinstance(value, str):
         try:
             return float(value) if value.strip() else None

@@ -105,7 +105,9 @@ def override_of(record: Mapping[str, Any]) -> Override:
 
 
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
-    """Raise InputError where two things are said of which only one can be."""
+    """Raise InputError where two things are said of which only one can be, or neither yes nor no."""
+    if record.get("leave_out", False) not in (True, False):
+        raise InputError(f"expected true or false as leave_out of {where}, got {shown(record['leave_out'])}; say which")
     alone = {
         "leave_out": (bool(record.get("leave_out")), (*SHAPING, "parts", "block_height")),
         "block_height": ("block_height" in record, (*SHAPING, "parts")),
