@@ -121,6 +121,15 @@ def test_the_tables_fit_a_narrow_terminal(run_folder, tmp_path, monkeypatch, cap
     assert "…" not in said and said.count("buildings") >= 2 and "volume" in said and "0.000" in said
 
 
+def test_buildings_that_no_mean_holds_are_counted(run_folder, tmp_path, capsys):
+    cloud = str(run_folder / "points.xyz")
+    evaluate(run_folder, [cloud], out=tmp_path)
+    said = capsys.readouterr().out
+    rows = json.loads((tmp_path / "evaluation.json").read_text())["buildings"]
+    without = sum(row["psd_mean"] is None for row in rows)
+    assert 0 < without < len(rows) and f"no distances of {without} building" in said
+
+
 def test_the_clouds_are_the_runs_own_where_none_are_named(run_folder, tmp_path):
     write_sample_run(tmp_path)
     record = json.loads((tmp_path / "run.json").read_text())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -49,6 +50,10 @@ def evaluate(
             file.write(text.encode())
     print_summary(summarise(run.figures), reference is not None)
     typer.echo(f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {counted(len(run.figures), 'building')}")
+    unmeasured = sum(math.isnan(figures.quality.psd_mean) for figures in run.figures)
+    if unmeasured:
+        told = counted(unmeasured, "building")
+        typer.echo(f"no distances of {told} (no model, or no points): their means are the others'")
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:
