@@ -99,6 +99,14 @@ def test_the_most_doubtful_come_first(desk):
     ("said", "reason"),
     [
         ({"status": "poor_fit"}, "modelled"),
+        ({"detail": "modelled; over 60 % of its area points lie on two surfaces, 0.4 m apart"}, "two surfaces"),
+        (
+            {
+                "status": "no_points",
+                "detail": "no points of class 6, but points of other classes lie high above the ground",
+            },
+            "points of other classes",
+        ),
         ({"types": {"hip": 0.5, "gable": 0.45}}, "hip or gable"),
         ({"parts": [{"sigma": {"t_z": 0.5}}, {"sigma": {"rotation": 5.0}}]}, "1 of 2 parts on few points"),
         ({"unexplained_area_m2": 12.0, "outline": [[[0, 0], [10, 0], [10, 8], [0, 8]]]}, "12 m² unexplained"),

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..log import counted
+from ..status import Doubt as Remark
 from ..status import Status
 
 POOR_SHARE = 0.9  # of points within 0.2 m of the roof
@@ -14,6 +15,7 @@ CLOSE_CALL = 0.2  # by which the most probable type leads
 LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
 LOOSE_M = 0.3  # standard deviation of a part that few points support
 UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT)
+REMARKED = 0.3  # for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
 ANGLES = ("pitch_", "skew_", "rotation")  # beginnings of names: their deviations are degrees
 
 
@@ -31,7 +33,8 @@ def doubt_of(record: Mapping[str, Any]) -> Doubt:
     >>> doubt_of({"status": "modelled", "parts": [], "residuals": {"share_within_20cm": 0.6}})
     Doubt(amount=0.4, reasons=('60 % within 0.2 m',))
     """
-    found = [poor_share(record), unsure_status(record), unexplained(record), loose_parts(record), close_call(record)]
+    found = [poor_share(record), unsure_status(record), remarked(record), unexplained(record)]
+    found += [loose_parts(record), close_call(record)]
     told = [pair for pair in found if pair is not None]
     return Doubt(round(sum(amount for amount, _ in told), 4), tuple(reason for _, reason in told if reason))
 
@@ -49,6 +52,12 @@ def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
     unsure = {status.code: status for status in UNSURE}
     status = unsure.get(record.get("status", ""))
     return None if status is None else (0.5, status.value.split(":")[0].split(",")[0])
+
+
+def remarked(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """What the run says in the detail that it is not sure of: two surfaces, places without points, an assumed ground, ..."""
+    told = [remark.told for remark in Remark if remark.value in (record.get("detail") or "")]
+    return (REMARKED, ", ".join(told)) if told else None
 
 
 def unexplained(record: Mapping[str, Any]) -> tuple[float, str] | None:
