@@ -104,7 +104,7 @@ class CompoundSettings:
         option="--detail",
     )
     tolerance_m: float = setting(0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
-    evidence_points: float = setting(1.1, "points that one unit of structure must explain at least", "", 0.1, 100.0)
+    evidence_points: float = setting(1.0, "points that one unit of structure must explain at least", "", 0.1, 100.0)
     evidence_area_m2: float = setting(0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0)
 
 

@@ -26,7 +26,7 @@ ALONG_M, BESIDE_M, SHORTEST_M = 0.12, 6.0, 0.7  # outline so near a line lies al
 CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line between corners may be
 SHARED_M = 0.3  # m within which a side takes its neighbour's line
 # units of evidence: for a side along no line, for one with no wall below, and for each metre off
-LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 0.45, 0.4, 0.1
+LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 1.2, 0.3, 0.1
 FACING = 1e-9  # m; numerically along the axis
 SHOWN_M = 0.5  # m next to a side in which points need its volume, or else it lies hidden
 MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
