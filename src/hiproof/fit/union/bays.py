@@ -14,7 +14,7 @@ import shapely
 from .grow import UNEXPLAINED
 from .objective import base_shows
 from .plan import Plan
-from .regions import misfits
+from .regions import THICK_M, misfits
 from .scene import Scene
 from .sides import lines_of
 from .unite import Drawn, drawn
@@ -77,8 +77,9 @@ def level_over(bay: np.ndarray, volumes: np.ndarray, seen: Seen, scene: Scene, u
     where = [np.ascontiguousarray(axis[:, within]) for axis in (seen.U, seen.V)]
     roof, top = roof_heights(volumes, *where)
     now = misfits(z, roof, scene)
-    if not base_shows(volumes, scene):  # what little there is of the base is drawn as the roof beside
-        beside, _ = roof_heights(continued(volumes, min(bay[2] - bay[1], bay[4] - bay[3])), *where)
+    narrow = min(bay[2] - bay[1], bay[4] - bay[3])
+    if narrow < 2.0 * THICK_M or not base_shows(volumes, scene):  # what little there is of the base is drawn as the roof beside
+        beside, _ = roof_heights(continued(volumes, narrow), *where)
         now = np.where(top > 0, now, misfits(z, beside, scene))
     reach = scene.dead + scene.width
     first, last = np.searchsorted(z, z - reach, "right"), np.searchsorted(z, z + reach, "left")
