@@ -8,8 +8,8 @@ from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit import fit_roof
 from hiproof.fit.union import fit_building
-from hiproof.fit.union.clamp import CLAMP_M, MISSED_SPACINGS
-from hiproof.model import Roof
+from hiproof.fit.union.clamp import CLAMP_M, LEAST_M2, MISSED_SPACINGS, clamped
+from hiproof.model import Part, Piece, Roof
 from hiproof.settings import Settings
 from points_of_roofs import sampled
 
@@ -70,8 +70,20 @@ def test_pieces_cover_the_outline_and_stay_near_the_points(name, points_wanted):
     heights = height_of(fit, corners)
     heights = heights[np.isfinite(heights)]
     slope = max(np.hypot(*piece.planes[:, :2].T).max() for part in fit.roof_parts for piece in part.pieces)
-    beyond = CLAMP_M + MISSED_SPACINGS * slope * np.sqrt(outline.area / len(points)) + 0.1
+    tip = slope * np.sqrt(2.0 * LEAST_M2)
+    beyond = CLAMP_M + MISSED_SPACINGS * slope * np.sqrt(outline.area / len(points)) + tip + 0.1
     assert inside.min() - beyond <= heights.min() and heights.max() <= inside.max() + beyond
+
+
+@pytest.mark.parametrize(("below_m", "parts"), [(0.2, 1), (1.0, 2)])
+def test_what_lies_beyond_the_points_is_a_part_unless_it_is_the_tip_of_a_corner(below_m, parts):
+    # Delft's 503100000018519 had a part of 0.02 m2
+    plane = np.array([[1.0, 1.0, 5.0]])
+    slope = Part("monopitch", (Piece(shapely.box(0, 0, 8, 8), plane),))
+    found = clamped([slope], 5.0 + CLAMP_M + below_m, 30.0, 0.0)
+    assert [part.type for part in found] == ["monopitch", "flat"][:parts]
+    areas = [piece.outline.area for part in found for piece in part.pieces]
+    assert sum(areas) == pytest.approx(64.0) and min(areas) > LEAST_M2
 
 
 def test_fewer_than_four_points_give_a_flat_roof_at_their_median():

@@ -12,6 +12,7 @@ from ...rings import GRID_M
 from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
+LEAST_M2 = 0.1  # of a piece beyond; less is the tip of a corner and no part
 MISSED_SPACINGS = (
     0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner
 )
@@ -43,8 +44,12 @@ def clamped_part(part: Part, low: float, high: float) -> list[Part]:
         if z.max(axis=0).min() > high:
             above_high = [half_plane(plane - [0.0, 0.0, high], piece.outline) for plane in piece.planes]
             risen = shapely.intersection_all(above_high)
-        beneath += polygons_of(shapely.intersection(piece.outline, sunken, grid_size=GRID_M))
-        above += polygons_of(shapely.intersection(piece.outline, risen, grid_size=GRID_M))
+        sunken, risen = (shapely.intersection(piece.outline, beyond, grid_size=GRID_M) for beyond in (sunken, risen))
+        if sunken.area + risen.area < LEAST_M2:
+            kept.append(piece)
+            continue
+        beneath += polygons_of(sunken)
+        above += polygons_of(risen)
         rest = shapely.difference(piece.outline, shapely.union(sunken, risen), grid_size=GRID_M)
         kept += [Piece(polygon, piece.planes) for polygon in polygons_of(rest)]
     found = [dataclasses.replace(part, pieces=tuple(kept))] if kept else []
