@@ -1,6 +1,7 @@
 """Laws of what becomes of volumes: sides on lines of the outline, regions without gaps, larger shapes put together."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -168,6 +169,20 @@ def test_monopitches_that_face_each_other_or_differ_stay_apart():
     steeper = teeth(2, 0.0, slope=0.9)[1]
     for second in (turned, steeper):
         assert sorted(part.type for part in put_together([one, second])) == ["monopitch", "monopitch"]
+
+
+@pytest.mark.parametrize("higher", [0.22, -0.22])
+def test_two_all_but_level_roofs_at_two_heights_are_no_saw_tooth(higher):
+    """Their planes tell nothing of how wide teeth are; where no wall did either and they told of less than nothing, the fit failed."""
+    first, second = sorted(teeth(2, 1.6, slope=0.033, width=3.7, length=2.8), key=lambda part: part.translation[0])
+    second = replace(
+        second,
+        pieces=tuple(replace(piece, planes=piece.planes + [0.0, 0.0, higher]) for piece in second.pieces),
+        translation=second.translation + [0.0, 0.0, higher],
+    )
+    shape = get("flat")
+    around = shape.part(shape.to_theta({"width": 30.0, "length": 30.0}, 1.6, np.array([36.0, -7.0, 3.0])))
+    assert sorted(part.type for part in put_together([first, second, around])) == ["flat", "monopitch", "monopitch"]
 
 
 def test_larger_shapes_only_where_they_are_allowed():

@@ -175,7 +175,8 @@ def ground_of(row: list[Part], others: list[Part]) -> Ground:
 
 
 def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
-    """The other parts and one shed of the row; None where some of its teeth are wider than others.
+    """The other parts and one shed of the row; None where some of its teeth are wider than others, or their planes tell of others than
+    were seen.
 
     What a tooth reaches further than it was seen it takes from the others, and leaves them what it reaches less.
     """
@@ -186,7 +187,9 @@ def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
     heights = np.array([part.translation[2] + 0.5 * part.parameters["height"] for part in row])
     breaks = laid_out(centres[:, 1] - heights / slopes.mean(), ground)
     heights = heights + slopes * (0.5 * (breaks[:-1] + breaks[1:]) - centres[:, 1])
-    if np.ptp(heights) > UNEVEN_M:
+    seen_wide = float(np.mean([part.parameters["width"] for part in row]))
+    told_wide = float(breaks[-1] - breaks[0]) / len(row)  # nothing like it, or less than none, where they hardly slope
+    if np.ptp(heights) > UNEVEN_M or abs(told_wide - seen_wide) > SIZE_ALIKE * seen_wide:
         return None
     length, width = float(np.mean([part.parameters["length"] for part in row])), float(breaks[-1] - breaks[0])
     rise = float(slopes.mean() * width / len(row))
