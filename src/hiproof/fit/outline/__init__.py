@@ -37,8 +37,10 @@ BLUR_M, STRAY = 0.15, math.exp(-4.0)
 PRICES = (3.0, 3.0, 1.0, 6.0)
 # m from the border of the points' shape within which a wall is an outer one: the scanner's noise, doubled
 OUTER_M = 0.25
-# points a square metre; of more only every second, third, ... bears on what is drawn: no finer for them
-MOST_DENSE = 8.0
+# points a square metre up to which chance makes borders ragged; beyond, plants, gutters and what hangs out do, all points alike: prices
+# grow with these powers of the density
+CHANCE_DENSE, GROWTH = 8.0, (0.5, 0.5, 0.5, 1.0)
+MOST_DENSE = 40.0  # points a square metre; of more only every second, third, ... bears on what is drawn: it takes time
 SAME_DIRECTION_RAD = math.radians(1.5)  # rad; within it the direction of slopes and that of the outline are one
 AROUND_M = 2.0  # m around a court's first drawing in which its corners lie; points of twice that bear on it
 MOSTLY_INSIDE = 0.8  # of a court's area
@@ -116,9 +118,11 @@ def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
     step = math.ceil(cloud.density / MOST_DENSE)
     order = np.argsort(xy[::step, 1], kind="stable") * step
     x, y = np.ascontiguousarray(xy[order].T)
-    prices = (cloud.dearness * price for price in PRICES)
+    density = cloud.density / step
+    dense = max(density / CHANCE_DENSE, 1.0)
+    prices = (cloud.dearness * price * dense**growth for price, growth in zip(PRICES, GROWTH, strict=True))
     box = low[0], high[0], low[1], high[1]
-    return Border(x, y, wall[order], cloud.density / step, court, box, BLUR_M, STRAY, *prices)
+    return Border(x, y, wall[order], density, court, box, BLUR_M, STRAY, *prices)
 
 
 def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shapely.Polygon:
