@@ -96,7 +96,8 @@ def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
 def ring_of(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> shapely.Polygon:
     """One ring: the cheapest of the drawings from its `starts` on, each along one of the `ways` (rad)."""
     drawings = []
-    for corners, angle in zip(starts, ways, strict=True):
+    for corners, way in zip(starts, ways, strict=True):
+        angle = along_y(corners, way)
         border = border_of(cloud, corners, angle)
         found = drawn(lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing)
         drawings.append((found.cost, found.lines + [angle, 0.0]))
@@ -105,6 +106,12 @@ def ring_of(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> 
     corners = np.empty_like(lines)
     find_corners(lines, corners)
     return shapely.Polygon(corners)
+
+
+def along_y(corners: np.ndarray, way: float) -> float:
+    """The `way` (rad), or that across it, such that `corners` (n, 2) turned by it reach further in y: fewer sides are as high as a point."""
+    x, y = np.ptp(turned_back(corners, way), axis=0)
+    return way if y >= x else way + 0.5 * math.pi
 
 
 def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
