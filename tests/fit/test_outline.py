@@ -88,6 +88,19 @@ def test_points_on_the_walls_do_not_push_the_sides_out():
     assert corner_count(outline) == 6
 
 
+@pytest.mark.parametrize("overhang", [0.5, 0.7])
+def test_walls_seen_below_wide_eaves_do_not_pull_the_outline_in(overhang):
+    rng = np.random.default_rng(4)
+    truth = shapely.box(0, 0, 14, 8)
+    roof, _ = points_in(truth, 40.0, angle=0.0)
+    line = truth.buffer(-overhang, join_style="mitre").exterior
+    walls = shapely.get_coordinates(line.interpolate(rng.uniform(0, line.length, int(60 * line.length))))
+    z = np.concatenate([np.full(len(roof), 6.0), rng.uniform(0.5, 5.5, len(walls))])
+    points = np.column_stack([np.concatenate([roof, walls]), z]) + rng.normal(0, 0.02, (len(z), 3))
+    outline = estimate_outline(points)
+    assert shapely.hausdorff_distance(outline.exterior, truth.exterior) < 0.15
+
+
 def test_an_oblique_wall_is_drawn_as_one():
     xy, truth = points_in(shapely.Polygon([(0, 0), (16, 0), (11, 9), (0, 9)]), 6.0)
     outline = estimate_outline(xy)

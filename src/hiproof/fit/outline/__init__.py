@@ -102,7 +102,7 @@ def ring_of(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> 
         found = drawn(lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing)
         drawings.append((found.cost, found.lines + [angle, 0.0]))
     _, lines = min(drawings, key=itemgetter(0))
-    lines = settled(lines, cloud.xy, cloud.density)
+    lines = settled(lines, cloud.xy[cloud.telling], cloud.density)  # walls well inside stand below eaves that reach out
     corners = np.empty_like(lines)
     find_corners(lines, corners)
     return shapely.Polygon(corners)
