@@ -155,6 +155,7 @@ def test_a_building_with_too_many_points_is_thinned_and_says_so(town_files, tmp_
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints), settings=settings))
     row = by_id(tmp_path / "out")["house-0"]
     assert row["points"] == 1000
+    assert row["density"] == pytest.approx(20.0, rel=0.2)  # the cloud's, not that of what is left
     if row["status"] == "modelled":
         assert "fitted to 1000 of its" in row["detail"]
 

@@ -169,8 +169,8 @@ def solve_one(
         used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
         known = used, job.footprint, surroundings.terrain_of(job), plan.settings
         building = reconstruct(*known, id=job.id) if override is None else overridden(override, *known, id=job.id)
-        if len(used) < len(points) and building.status is Status.MODELLED:
-            building = remarked(building, f"fitted to {len(used)} of its {len(points)} points")
+        if len(used) < len(points):
+            building = told_of_thinning(building, len(used), len(points))
         building = remarked(remarked(building, found.remark), surroundings.doubt_of_terrain(job))
         building = remarked(surroundings.looked_at(building, job, points), doubt_of_ground(building))
         return fragments(building, plan.names_of(job), plan.head)
@@ -179,6 +179,13 @@ def solve_one(
     except Exception as error:
         place = traceback.extract_tb(error.__traceback__)[-1]
         return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+
+
+def told_of_thinning(building: Building, used: int, count: int) -> Building:
+    """The building with the density of all its `count` points, not of those `used`; a model says that it is fitted to these."""
+    quality = dataclasses.replace(building.quality, density=building.quality.density * count / used)
+    remark = f"fitted to {used} of its {count} points" if building.status is Status.MODELLED else ""
+    return remarked(dataclasses.replace(building, quality=quality), remark)
 
 
 def doubt_of_ground(building: Building) -> str:
