@@ -18,7 +18,13 @@ from ...rings import GRID_M
 from .regions import besides, polygons_of
 from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, with_saw_teeth
 
-ON_TOP_M = 0.3  # a gable whose eave is so near another's top stands on it
+NEAR_M = 0.3  # what is drawn so near a gambrel at its corners is one
+SKEWED = 1e-6  # rise over run along the ridge; numerically none
+LEAST_BREAK, MOST_BREAK, STEEPER = (
+    0.1,
+    0.95,
+    0.1,
+)  # of a gambrel's width between its breaks; rise over run by which lower slopes are steeper
 
 
 def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]:
@@ -32,24 +38,47 @@ def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]
 
 def with_gambrels(parts: list[Part]) -> list[Part]:
     """`parts` with every gable on a truncated gable's top, or between two steeper slopes, united with these."""
-    gables = [part for part in parts if part.type == "gable" and tuple(part.parameters) == get("gable").parameters]
-    for upper in gables:
-        below = [part for part in parts if part is not upper]
+    for upper in (part for part in parts if part.type in ("gable", "asymmetric_gable")):
+        top, below = top_of(upper), [part for part in parts if part is not upper]
         for lower in [(part,) for part in below] + list(combinations(below, 2)):
-            found = gambrel_of(upper, slopes_below(upper, lower))
+            found = None if top is None else gambrel_of(upper, top, lower)
             if found is not None:
                 return with_gambrels([*besides(below, lower), found])
     return parts
 
 
 @dataclass(frozen=True)
+class Top:
+    """The upper slopes of a gambrel: how far their ridge lies across it from the gable's middle (m), its height, their slope."""
+
+    at: float
+    ridge: float
+    slope: float
+
+
+def top_of(upper: Part) -> Top | None:
+    """The slopes of the gable `upper`; None where they are not alike."""
+    along = np.array([math.cos(upper.kappa), math.sin(upper.kappa)])
+    planes = upper.pieces[0].planes
+    rises = planes[:, :2] @ np.array([-along[1], along[0]])
+    if len(planes) != 2 or np.abs(planes[:, :2] @ along).max() > SKEWED:
+        return None
+    front, back = int(rises.argmax()), int(rises.argmin())
+    slope = 0.5 * float(rises[front] - rises[back])
+    if abs(rises[front] + rises[back]) > SIZE_ALIKE * slope:
+        return None
+    heights = planes @ np.array([*upper.translation[:2], 1.0])
+    at = float(heights[back] - heights[front]) / (2.0 * slope)
+    return Top(at, float(heights[front] + rises[front] * at), slope)
+
+
+@dataclass(frozen=True)
 class Slope:
-    """One lower side of a gambrel: the line of its eave across the ridge (m, from the upper gable's), its height, its slope."""
+    """One lower side of a gambrel: how far the line of its eave lies across it from the upper gable's middle (m), its height, its slope."""
 
     at: float
     eave: float
     slope: float
-    outlines: tuple[shapely.Polygon, ...]
 
 
 def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
@@ -59,54 +88,55 @@ def slopes_below(upper: Part, lower: tuple[Part, ...]) -> list[Slope]:
     for part in lower:
         turn = math.remainder(part.kappa - upper.kappa, 2.0 * math.pi)
         step, p = float(across @ (part.translation - upper.translation)[:2]), part.parameters
-        outlines = tuple(piece.outline for piece in part.pieces)
         if part.type == "monopitch" and len(lower) == 2 and "height" in p:
             side = -1.0 if abs(turn) < TURN_ALIKE_RAD else 1.0
             if side > 0.0 and abs(abs(turn) - math.pi) > TURN_ALIKE_RAD:
                 return []
-            found.append(Slope(step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"], outlines))
+            found.append(Slope(step + side * 0.5 * p["width"], part.translation[2], p["height"] / p["width"]))
         elif part.type == "truncated_gable" and len(lower) == 1 and abs(math.remainder(turn, math.pi)) < TURN_ALIKE_RAD:
             member = member_of(part.type, p, part.kappa, part.translation)
             for sign, side in ((-1.0, FRONT), (1.0, BACK)):
                 at = step + sign * 0.5 * p["width"]
-                found.append(Slope(at, member.eaves[side], member.slopes[side], outlines))
+                found.append(Slope(at, member.eaves[side], member.slopes[side]))
         else:
             return []
     return sorted(found, key=lambda slope: slope.at)
 
 
-def gambrel_of(upper: Part, below: list[Slope]) -> Part | None:
+def gambrel_of(upper: Part, top: Top, lower: tuple[Part, ...]) -> Part | None:
     """The gable `upper` and the slopes on its two sides as one gambrel, None where they are none."""
-    top = upper.parameters
+    below = slopes_below(upper, lower)
     if len(below) != 2:
         return None
     front, back = below
-    slope, upper_slope = 0.5 * (front.slope + back.slope), 2.0 * top["height"] / top["width"]
-    width, eave = back.at - front.at, 0.5 * (front.eave + back.eave)
-    rise = upper.translation[2] + top["height"] - eave
-    half_break = (0.5 * slope * width - rise) / (slope - upper_slope) if slope > upper_slope + 0.1 else 0.0
-    reach = [one.eave + one.slope * (0.5 * (width - top["width"])) for one in below]
-    fits = (
-        abs(front.at + back.at) < 2.0 * ON_TOP_M
-        and abs(front.eave - back.eave) < 2.0 * ON_TOP_M
-        and abs(front.slope - back.slope) < SIZE_ALIKE * slope
-        and all(abs(height - upper.translation[2]) < 2.0 * ON_TOP_M for height in reach)
-        and 0.1 < 2.0 * half_break / max(width, 1e-6) < 0.95
-    )
-    if not fits:
+    slope, width = 0.5 * (front.slope + back.slope), back.at - front.at
+    if abs(front.slope - back.slope) > SIZE_ALIKE * slope or slope < top.slope + STEEPER:
+        return None
+    eave = 0.5 * (front.eave + back.eave)
+    rise = top.ridge - eave
+    half_break = (0.5 * slope * width - rise) / (slope - top.slope)
+    if not LEAST_BREAK < 2.0 * half_break / max(width, 1e-6) < MOST_BREAK:
         return None
     parameters = {
         "width": width,
-        "length": top["length"],
+        "length": upper.parameters["length"],
         "height": rise,
         "break_width": 2.0 * half_break,
-        "break_height": rise - upper_slope * half_break,
+        "break_height": rise - top.slope * half_break,
     }
     across = np.array([-math.sin(upper.kappa), math.cos(upper.kappa)])
     centre = upper.translation[:2] + 0.5 * (front.at + back.at) * across
-    translation = np.array([*centre, eave])
     shape = get("gambrel")
-    planes = shape.part(shape.to_theta(parameters, upper.kappa, translation)).pieces[0].planes
-    outlines = [piece.outline for piece in upper.pieces] + [o for one in below for o in one.outlines]
-    covered = polygons_of(shapely.union_all(outlines, grid_size=GRID_M))
-    return Part("gambrel", tuple(Piece(polygon, planes) for polygon in covered), parameters, upper.kappa, translation)
+    planes = shape.planes_at(shape.to_theta(parameters, upper.kappa, np.array([*centre, eave])))
+    pieces = [piece for part in (upper, *lower) for piece in part.pieces]
+    if not all(is_near(piece, planes) for piece in pieces):
+        return None
+    covered = polygons_of(shapely.union_all([piece.outline for piece in pieces], grid_size=GRID_M))
+    own = tuple(Piece(polygon, planes) for polygon in covered)
+    return Part("gambrel", own, parameters, upper.kappa, np.array([*centre, eave]))
+
+
+def is_near(piece: Piece, planes: np.ndarray) -> bool:
+    """Whether the lowest of `planes` (k, 3) is all but as high as the piece at its corners."""
+    corners = shapely.get_coordinates(piece.outline)
+    return bool(np.abs(Piece(piece.outline, planes).height_at(corners) - piece.height_at(corners)).max() < NEAR_M)
