@@ -236,6 +236,27 @@ def test_a_gable_on_a_truncated_gable_is_a_gambrel(seed, kappa):
     assert height_of([found], xy) == pytest.approx(height_of(parts, xy), abs=1e-6)
 
 
+@pytest.mark.parametrize("kappa", KAPPAS)
+@pytest.mark.parametrize(("further", "steeper"), [(1.0, 0.0), (0.0, 0.01)])
+def test_a_gable_whose_ridge_lies_off_its_middle_is_a_gambrels_top(further, steeper, kappa):
+    """Where a rectangle ends under other parts, and a hundredth of slope, say nothing of what is seen."""
+    (lower, upper), sizes = gambrel_in_parts(np.random.default_rng(1), kappa)
+    half_break, slope = 0.5 * sizes[3], upper.parameters["height"] / (0.5 * sizes[3])
+    eave = float(upper.translation[2])
+    off = Member(
+        kappa,
+        upper.translation[:2] + 0.5 * further * np.array([-math.sin(kappa), math.cos(kappa)]),
+        np.array([0.5 * sizes[1], half_break + 0.5 * further]),
+        np.array([np.inf, np.inf, eave, eave - slope * further]),
+        np.array([0.0, 0.0, slope + steeper, slope]),
+    )
+    top = off.part([piece.outline for piece in upper.pieces])
+    assert top.type == ("asymmetric_gable" if steeper else "gable") and "ridge_offset" in top.parameters
+    (found,) = put_together([lower, top])
+    assert found.type == "gambrel"
+    assert found.parameters["break_width"] == pytest.approx(sizes[3], abs=0.2)
+
+
 def test_a_gable_beside_a_truncated_gable_is_no_gambrel():
     (lower, upper), _ = gambrel_in_parts(np.random.default_rng(0), 0.0)
     aside = Part(

@@ -18,7 +18,8 @@ from ...rings import GRID_M
 from .regions import besides, polygons_of
 from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, with_saw_teeth
 
-NEAR_M = 0.3  # what is drawn so near a gambrel at its corners is one
+# m within which a gambrel must be as high as what it stands for, at what share of places so close
+NEAR_M, NEARLY, GRID_STEP_M = 0.3, 0.9, 0.4
 SKEWED = 1e-6  # rise over run along the ridge; numerically none
 LEAST_BREAK, MOST_BREAK, STEEPER = (
     0.1,
@@ -128,15 +129,19 @@ def gambrel_of(upper: Part, top: Top, lower: tuple[Part, ...]) -> Part | None:
     centre = upper.translation[:2] + 0.5 * (front.at + back.at) * across
     shape = get("gambrel")
     planes = shape.planes_at(shape.to_theta(parameters, upper.kappa, np.array([*centre, eave])))
-    pieces = [piece for part in (upper, *lower) for piece in part.pieces]
-    if not all(is_near(piece, planes) for piece in pieces):
+    if not stands_for(planes, (upper, *lower)):
         return None
-    covered = polygons_of(shapely.union_all([piece.outline for piece in pieces], grid_size=GRID_M))
+    outlines = [piece.outline for part in (upper, *lower) for piece in part.pieces]
+    covered = polygons_of(shapely.union_all(outlines, grid_size=GRID_M))
     own = tuple(Piece(polygon, planes) for polygon in covered)
     return Part("gambrel", own, parameters, upper.kappa, np.array([*centre, eave]))
 
 
-def is_near(piece: Piece, planes: np.ndarray) -> bool:
-    """Whether the lowest of `planes` (k, 3) is all but as high as the piece at its corners."""
-    corners = shapely.get_coordinates(piece.outline)
-    return bool(np.abs(Piece(piece.outline, planes).height_at(corners) - piece.height_at(corners)).max() < NEAR_M)
+def stands_for(planes: np.ndarray, parts: tuple[Part, ...]) -> bool:
+    """Whether the lowest of `planes` (k, 3) is all but as high as the highest of `parts` nearly everywhere on these."""
+    x0, y0, x1, y1 = shapely.union_all([piece.outline for part in parts for piece in part.pieces]).bounds
+    xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+    z = np.max([part.height_at(xy) for part in parts], axis=0)
+    there = np.isfinite(z)
+    own = (np.column_stack([xy[there], np.ones(there.sum())]) @ planes.T).min(axis=1)
+    return bool((np.abs(own - z[there]) < NEAR_M).sum() > NEARLY * there.sum())
