@@ -8,13 +8,14 @@ import pytest
 import shapely
 
 from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.apart import told_apart
 from hiproof.fit.union.finish import cost_of, finished, inverse_of, least_squares, weighted_moments
 from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
 from hiproof.fit.union.scene import scene_of
 from hiproof.fit.union.sides import Side, corners_of, lines_of, sides_of
-from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, U0, V1, base_only, roof_heights
+from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, SLOPE, U0, V0, V1, base_only, roof_heights
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member
@@ -118,6 +119,23 @@ def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
     assert 0.0 < side.sigma < 0.2  # the gap between the points on either side
 
 
+def tooth(low, high, offset):
+    """A volume of one plane that rises towards higher v, from v = `low` to `high`."""
+    row = base_only(0.0)[0]
+    row[U0 : V1 + 1] = -11.0, 11.0, low, high
+    row[OFFSET + LEVEL], row[OFFSET + 2], row[SLOPE + 2] = np.inf, offset, 0.26
+    return row
+
+
+def test_a_strip_by_which_what_is_hidden_ran_too_far_is_no_part():
+    """A tooth that runs on under the next one, and shows beyond it where the roof is all but as high."""
+    outline = shapely.box(-10.0, -7.0, 10.0, 7.0)
+    base, hiding = base_only(-1.6)[0], tooth(-4.8, -0.3, 0.93)
+    _, scene = laid_out(np.random.default_rng(0), outline, np.array([base, tooth(-0.3, 4.0, -0.23), hiding]))
+    found = told_apart(np.array([base, tooth(-5.2, 4.0, -0.23), hiding]), scene)
+    assert found[:, V0].tolist() == pytest.approx([base[V0], -0.3, -4.8])
+
+
 # --- larger shapes ---------------------------------------------------------------------------------------------------
 
 KAPPAS = [0.0, 0.7, -2.5]
@@ -158,6 +176,22 @@ def test_equal_monopitches_in_a_row_are_one_saw_tooth(count, kappa):
     (shed,) = put_together(parts)
     assert shed.type == "shed" and shed.parameters["teeth"] == count
     assert shed.parameters["width"] == pytest.approx(5.0 * count)
+    xy = strewn_over(parts)
+    assert np.mean(np.abs(height_of([shed], xy) - height_of(parts, xy)) < 1e-6) > 0.99
+
+
+@pytest.mark.parametrize("kappa", KAPPAS)
+def test_a_tooth_whose_lower_end_is_hidden_is_a_tooth_of_its_row(kappa):
+    """The middle one of three, which reaches under its neighbour: neither of the others follows the other."""
+    parts = sorted(
+        teeth(3, kappa), key=lambda part: np.array([-math.sin(kappa), math.cos(kappa)]) @ part.translation[:2]
+    )
+    shape, back = get("monopitch"), np.array([math.sin(kappa), -math.cos(kappa), 0.0])
+    middle = parts[1]
+    longer = {"width": 8.0, "length": 12.0, "height": 4.0}  # 3 m of it under the first tooth
+    under = shape.part(shape.to_theta(longer, kappa, middle.translation + 1.5 * back + [0.0, 0.0, -1.5]))
+    (shed,) = put_together([parts[0], under, parts[2]])
+    assert shed.type == "shed" and shed.parameters["teeth"] == 3
     xy = strewn_over(parts)
     assert np.mean(np.abs(height_of([shed], xy) - height_of(parts, xy)) < 1e-6) > 0.99
 

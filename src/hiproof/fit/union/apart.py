@@ -8,12 +8,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from .moves import without
+from .objective import objective
 from .scene import Scene, nodes
 from .trim import COVER_M, runs_of
-from .volumes import DIRECTION, LEVEL, OFFSET, U0, roof_heights
+from .volumes import DIRECTION, LEVEL, OFFSET, U0, U1, V0, V1, roof_heights
 
 LEAST_M2 = 1.0  # of each of the places in which a volume shows
 IN_LINE_M = 0.5  # what stands in a row is as deep as its neighbours
+STRIP_M = 0.8  # narrower than dormers are
 # m within which an edge of another volume is taken for that at which one ends; m inside the outline at which it must show
 NEAR_EDGE_M, INSIDE_M = 0.5, 0.4
 
@@ -28,8 +31,21 @@ def told_apart(volumes: np.ndarray, scene: Scene) -> np.ndarray:
             if len(pieces) > 1:
                 trial = np.concatenate([volumes[:k], pieces, volumes[k + 1 :]])
                 if np.array_equal(roof_heights(trial, U, V)[0], heights):
-                    volumes = trial
+                    volumes = without_strips(trial, k, len(pieces), scene)
+                    heights, top = roof_heights(volumes, U, V)
                     break
+    return volumes
+
+
+def without_strips(volumes: np.ndarray, first: int, count: int, scene: Scene) -> np.ndarray:
+    """The volumes without those of the `count` from `first` on that are strips, and do not pay: one ran too far beyond what hides it."""
+    value = objective(volumes, scene, np.inf)
+    for k in range(first + count - 1, first - 1, -1):
+        wide = volumes[k, [U1, V1]] - volumes[k, [U0, V0]]
+        trial = without(volumes, k)
+        found = objective(trial, scene, value) if wide.min() < STRIP_M else np.inf
+        if found < np.inf:
+            volumes, value = trial, found
     return volumes
 
 

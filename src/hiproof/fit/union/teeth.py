@@ -50,8 +50,9 @@ def rows_of(parts: list[Part]) -> Iterator[tuple[list[Part], list[Part]]]:
             if neighbour is not None:
                 teeth = besides(teeth, [neighbour])
                 row = [*row, neighbour] if follows(row[-1], neighbour) else [neighbour, *row]
+        row, others = carried_on(row, besides(parts, row))
         if len(row) >= min(TEETH):
-            yield carried_on(row, besides(parts, row))
+            yield row, others
 
 
 def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:
@@ -85,23 +86,24 @@ def next_tooth(row: list[Part], last: Part, step: float) -> Part:
 
 def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
     """Whether what shows of a part under `others` is the `tooth`: there as high nearly everywhere, and nowhere else."""
-    if len(part.pieces) != 1 or not shapely.intersects(part.pieces[0].outline, tooth.pieces[0].outline):
+    covered = area_of([part])
+    if not shapely.intersects(covered, tooth.pieces[0].outline):
         return False
-    x0, y0, x1, y1 = part.pieces[0].outline.bounds
+    x0, y0, x1, y1 = covered.bounds
     xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
     z, wanted = part.height_at(xy), tooth.height_at(xy)
     beneath = np.max([other.height_at(xy) for other in others], axis=0)
     shows = z > beneath + 1e-6
     alike = np.abs(z[shows] - wanted[shows]) < HEIGHT_ALIKE_M
-    covered = alike.sum() * GRID_STEP_M**2 > NEARLY * tooth.area
-    return bool(covered and alike.sum() > NEARLY * shows.sum())
+    whole = alike.sum() * GRID_STEP_M**2 > NEARLY * tooth.area
+    return bool(whole and alike.sum() > NEARLY * shows.sum())
 
 
 def as_high(tooth: Part, part: Part) -> Part:
     """The `tooth` over what a part covers of it and near it, as high there as that part."""
     (piece,) = tooth.pieces
     around = shapely.buffer(piece.outline, SIZE_ALIKE * tooth.parameters["width"], join_style="mitre")
-    outline = shapely.intersection(part.pieces[0].outline, around)
+    outline = shapely.intersection(area_of([part]), around)
     middle = shapely.get_coordinates(shapely.point_on_surface(shapely.intersection(outline, piece.outline)))
     rise = np.array([0.0, 0.0, float((part.height_at(middle) - piece.height_at(middle))[0])])
     pieces = tuple(Piece(polygon, piece.planes + rise) for polygon in polygons_of(outline))
