@@ -88,17 +88,28 @@ def test_points_on_the_walls_do_not_push_the_sides_out():
     assert corner_count(outline) == 6
 
 
-@pytest.mark.parametrize("overhang", [0.5, 0.7])
-def test_walls_seen_below_wide_eaves_do_not_pull_the_outline_in(overhang):
+def seen_by_a_drone(overhang, roof_density, walls_a_metre):
+    """Points (n, 3) of a level roof and of the walls below, `overhang` metres behind its eaves; and the eaves."""
     rng = np.random.default_rng(4)
     truth = shapely.box(0, 0, 14, 8)
-    roof, _ = points_in(truth, 40.0, angle=0.0)
+    roof, _ = points_in(truth, roof_density, angle=0.0)
     line = truth.buffer(-overhang, join_style="mitre").exterior
-    walls = shapely.get_coordinates(line.interpolate(rng.uniform(0, line.length, int(60 * line.length))))
+    walls = shapely.get_coordinates(line.interpolate(rng.uniform(0, line.length, int(walls_a_metre * line.length))))
     z = np.concatenate([np.full(len(roof), 6.0), rng.uniform(0.5, 5.5, len(walls))])
-    points = np.column_stack([np.concatenate([roof, walls]), z]) + rng.normal(0, 0.02, (len(z), 3))
+    return np.column_stack([np.concatenate([roof, walls]), z]) + rng.normal(0, 0.02, (len(z), 3)), truth
+
+
+@pytest.mark.parametrize("overhang", [0.5, 0.7])
+def test_walls_seen_below_wide_eaves_do_not_pull_the_outline_in(overhang):
+    points, truth = seen_by_a_drone(overhang, roof_density=40.0, walls_a_metre=60)
+    assert shapely.hausdorff_distance(estimate_outline(points).exterior, truth.exterior) < 0.15
+
+
+def test_outlines_are_drawn_straight_where_most_points_are_of_walls():
+    points, truth = seen_by_a_drone(0.6, roof_density=25.0, walls_a_metre=200)
     outline = estimate_outline(points)
-    assert shapely.hausdorff_distance(outline.exterior, truth.exterior) < 0.15
+    assert corner_count(outline) == 4
+    assert shapely.hausdorff_distance(outline.exterior, truth.exterior) < 0.2
 
 
 def test_an_oblique_wall_is_drawn_as_one():

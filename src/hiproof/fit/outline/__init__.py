@@ -61,7 +61,7 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
     (4, True)
     """
     points = np.ascontiguousarray(points, float)
-    rough = rough_outline(points[:, :2])
+    rough = rough_outline(points)
     own = main_direction(shapely.Polygon(rough.rings[0][0]))
     kappa = own if kappa is None else kappa
     other = own if abs(quarter_gap(kappa - own)) > SAME_DIRECTION_RAD else kappa

@@ -10,9 +10,13 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ..alpha_shape import alpha_shape, default_radius
+from ..alpha_shape import SPACINGS, alpha_shape, default_radius
+from ..walls import on_walls
 from .lines import BACK, SHARPEST, find_corners, lines_through
 
+# points for each of the roof, beyond which walls below wide eaves, as drones see them, would make the spacing half the roof's; airborne
+# scans have fewer, and all that is told in spacings was chosen by those
+MOST_A_ROOF_POINT = 1.5
 NARROWER = 0.8  # of the usual radius of alpha shapes: bays of two spacings stay open
 # spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points
 CLOSING_SPACINGS, PUSH_SPACINGS = 1.0, 0.5
@@ -34,10 +38,12 @@ class Rough(NamedTuple):
     shape: shapely.Polygon
 
 
-def rough_outline(xy: np.ndarray) -> Rough:
-    """What points `xy` (m, 2) are drawn from. Raises FitError for points that span no area."""
-    shape = with_large_holes(alpha_shape(xy, NARROWER * default_radius(xy), holes=True))
-    spacing = math.sqrt(shape.area / len(xy))
+def rough_outline(points: np.ndarray) -> Rough:
+    """What `points` (m, 2 or 3) are drawn from. Raises FitError for points that span no area."""
+    xy = points[:, :2]
+    thinner = math.sqrt(len(xy) / telling_count(points))
+    shape = with_large_holes(alpha_shape(xy, NARROWER * thinner * default_radius(xy), holes=True))
+    spacing = thinner * math.sqrt(shape.area / len(xy))
     closed = shapely.buffer(shape, CLOSING_SPACINGS * spacing, join_style="mitre")
     pushed = shapely.buffer(closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre")
     pushed = with_large_holes(largest(pushed))
@@ -45,6 +51,14 @@ def rough_outline(xy: np.ndarray) -> Rough:
     unit = max(spacing, LEAST_SPACING_M)
     rings = [[corners_of(ring, spacings * unit) for spacings in SIMPLIFY_SPACINGS] for ring in filled]
     return Rough(rings[:1] + [[corners[::-1] for corners in court] for court in rings[1:]], spacing, shape)
+
+
+def telling_count(points: np.ndarray) -> int:
+    """How many of `points` (m, 2 or 3) tell how far apart they are: all, or where many stand one over another on walls the roof's."""
+    if points.shape[1] < 3 or len(points) < 3:
+        return max(len(points), 1)
+    roof = int((~on_walls(points, points, default_radius(points[:, :2]) / SPACINGS)).sum())
+    return roof if 0 < MOST_A_ROOF_POINT * roof < len(points) else len(points)
 
 
 def with_large_holes(polygon: shapely.Polygon) -> shapely.Polygon:
