@@ -124,6 +124,18 @@ def test_houses_beside_a_higher_one_are_told_apart():
     assert lengths == pytest.approx([6.0, 6.0, 6.0], abs=0.2)
 
 
+def test_gables_at_both_walls_below_a_ridge_are_two():
+    """One under the roof from wall to wall would explain them as well; it does not stand out of the roof as a wing does."""
+    outline = shapely.box(0, 0, 14, 10)
+    xy = scene_points(outline, 8.0)
+    roof = 4.0 + 1.0 * (5.0 - np.abs(xy[:, 1] - 5.0))
+    gable = 6.5 - 0.6 * np.abs(xy[:, 0] - 7.0)
+    z = np.where(np.abs(xy[:, 0] - 7.0) < 2.0, np.maximum(roof, gable), roof)
+    fit = fit_building(np.column_stack([xy, z]), outline)
+    assert [part.type for part in fit.roof_parts] == ["gable"] * 3
+    assert sorted(part.area for part in fit.roof_parts)[1] < 15.0
+
+
 @pytest.mark.parametrize("wide", [5.0, 6.0, 7.0])
 def test_a_level_roof_ends_where_a_gable_begins_whose_eaves_are_lower(wide):
     """Along the eaves nothing but the points tells that the level roof does not run on over them."""

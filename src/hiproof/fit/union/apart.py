@@ -1,7 +1,7 @@
 """Volumes that show in several places told apart: houses of one height on both sides of another, dormers on both slopes.
 
-One long volume under what stands between explains them as well, and more cheaply; a person sees two. A wing that crosses the
-main roof stays one: it stands out of it on both sides.
+One long volume under what stands between explains them as well, and more cheaply; a person sees two, where each pays by itself. A wing
+that crosses the main roof stays one: it stands out of it on both sides.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def told_apart(volumes: np.ndarray, scene: Scene) -> np.ndarray:
         for axis in (0, 1):
             pieces = pieces_of(volumes, k, axis, U, V, top, scene)
             if len(pieces) > 1:
-                trial = np.concatenate([volumes[:k], pieces, volumes[k + 1 :]])
+                trial = cut_apart(volumes, k, pieces)
                 if np.array_equal(roof_heights(trial, U, V)[0], heights):
                     volumes = without_strips(trial, k, len(pieces), scene)
                     heights, top = roof_heights(volumes, U, V)
@@ -65,9 +65,8 @@ def pieces_of(
         return volumes[:0]
     between = within & np.any([(x > a) & (x < b) for a, b in zip(ends[:-1], starts[1:], strict=True)], axis=0)
     covers = volumes[np.unique(top[between])]
-    if counts.min() * scene.pitch**2 < LEAST_M2 or not (
-        in_a_row(own, covers, cross, y) or inside(own, low, cross, scene)
-    ):
+    told = in_a_row(own, covers, cross, y) or inside(own, low, cross, scene)
+    if counts.min() * scene.pitch**2 < LEAST_M2 or not (told or under_one_roof(own, covers, low)):
         return volumes[:0]
     pieces = np.repeat(own[None], len(starts), axis=0)
     for n, (a, b) in enumerate(zip(starts, ends, strict=True)):
@@ -75,7 +74,18 @@ def pieces_of(
             pieces[n, low] = max(own[low], edge_near(covers, own, low, a, -COVER_M))
         if n < len(starts) - 1:
             pieces[n, low + 1] = min(own[low + 1], edge_near(covers, own, low, b, COVER_M))
-    return pieces
+    return pieces if told or all_pay(cut_apart(volumes, k, pieces), k, len(pieces), scene) else volumes[:0]
+
+
+def cut_apart(volumes: np.ndarray, k: int, pieces: np.ndarray) -> np.ndarray:
+    """The volumes with `pieces` (m, COLUMNS) in place of volume k."""
+    return np.concatenate([volumes[:k], pieces, volumes[k + 1 :]])
+
+
+def all_pay(volumes: np.ndarray, first: int, count: int, scene: Scene) -> bool:
+    """Whether each of the `count` volumes from `first` on pays as one of its own."""
+    value = objective(volumes, scene, np.inf)
+    return all(objective(without(volumes, first + n), scene, value) == np.inf for n in range(count))
 
 
 def in_a_row(own: np.ndarray, covers: np.ndarray, cross: int, y: np.ndarray) -> bool:
@@ -98,6 +108,12 @@ def inside(own: np.ndarray, low: int, cross: int, scene: Scene) -> bool:
         if not on or scene.depth[i, j] < INSIDE_M:
             return False
     return True
+
+
+def under_one_roof(own: np.ndarray, covers: np.ndarray, low: int) -> bool:
+    """Whether one roof hides the middle of a volume along an axis and reaches as far: a wing that crosses it would stand out."""
+    reaches = (covers[:, low] < own[low] + IN_LINE_M) & (covers[:, low + 1] > own[low + 1] - IN_LINE_M)
+    return len(covers) == 1 and bool(covers[0, DIRECTION] == own[DIRECTION] and covers[0, low] > -1e3 and reaches[0])
 
 
 def edge_near(covers: np.ndarray, own: np.ndarray, low: int, seen_to: float, beyond: float) -> float:
