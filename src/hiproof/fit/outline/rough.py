@@ -21,9 +21,8 @@ NARROWER = 0.8  # of the usual radius of alpha shapes: bays of two spacings stay
 # spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points
 CLOSING_SPACINGS, PUSH_SPACINGS = 1.0, 0.5
 SIMPLIFY_SPACINGS = (0.7, 0.4, 0.2)  # spacings of points within which corners are dropped: few are left, more, and many
-LEAST_SPACING_M = (
-    0.35  # closer points drop corners like those: of twice as many no drawing gets better, all take longer
-)
+# m; closer points drop corners like those: of twice as many no drawing gets better, all take longer
+LEAST_SPACING_M = 0.35
 COARSER, TRIES = 1.3, 12  # factor between tries at few corners, and how many tries
 LEAST_COURT_M2 = 4.0  # m2; as of buildings
 MOST_CORNERS = 90  # to begin with; the time grows with the square of them

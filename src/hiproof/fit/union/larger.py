@@ -21,11 +21,8 @@ from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, with_saw_teeth
 # m within which a gambrel must be as high as what it stands for, at what share of places so close
 NEAR_M, NEARLY, GRID_STEP_M = 0.3, 0.9, 0.4
 SKEWED = 1e-6  # rise over run along the ridge; numerically none
-LEAST_BREAK, MOST_BREAK, STEEPER = (
-    0.1,
-    0.95,
-    0.1,
-)  # of a gambrel's width between its breaks; rise over run by which lower slopes are steeper
+LEAST_BREAK, MOST_BREAK = 0.1, 0.95  # of a gambrel's width, what lies between its breaks
+STEEPER = 0.1  # rise over run by which its lower slopes are steeper than the upper ones
 
 
 def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]:

@@ -86,10 +86,10 @@ def next_tooth(row: list[Part], last: Part, step: float) -> Part:
 
 def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
     """Whether what shows of a part under `others` is the `tooth`: there as high nearly everywhere, and nowhere else."""
-    covered = area_of([part])
-    if not shapely.intersects(covered, tooth.pieces[0].outline):
+    middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
+    if np.abs(part.height_at(middle) - tooth.height_at(middle))[0] > HEIGHT_ALIKE_M:
         return False
-    x0, y0, x1, y1 = covered.bounds
+    x0, y0, x1, y1 = area_of([part]).bounds
     xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
     z, wanted = part.height_at(xy), tooth.height_at(xy)
     beneath = np.max([other.height_at(xy) for other in others], axis=0)
