@@ -90,10 +90,14 @@ def all_pay(volumes: np.ndarray, first: int, count: int, scene: Scene) -> bool:
 
 def in_a_row(own: np.ndarray, covers: np.ndarray, cross: int, y: np.ndarray) -> bool:
     """Whether what hides a volume lies along its direction and is no deeper where the outline is: at places `y` (n,) across it."""
-    along = (covers[:, DIRECTION] == own[DIRECTION]) & (covers[:, cross] > -1e3)
     (low, high), ends = own[cross : cross + 2], np.clip(covers[:, cross : cross + 2], y.min(), y.max())
     deeper = (ends[:, 0] < low - IN_LINE_M) | (ends[:, 1] > high + IN_LINE_M)
-    return bool((along & ~deeper).all())
+    return bool((lie_along(own, covers) & ~deeper).all())
+
+
+def lie_along(own: np.ndarray, covers: np.ndarray) -> np.ndarray:
+    """Which of `covers` (n,) have the volume's direction; the base has none."""
+    return (covers[:, DIRECTION] == own[DIRECTION]) & (covers[:, U0] > -1e3)
 
 
 def inside(own: np.ndarray, low: int, cross: int, scene: Scene) -> bool:
@@ -112,8 +116,8 @@ def inside(own: np.ndarray, low: int, cross: int, scene: Scene) -> bool:
 
 def under_one_roof(own: np.ndarray, covers: np.ndarray, low: int) -> bool:
     """Whether one roof hides the middle of a volume along an axis and reaches as far: a wing that crosses it would stand out."""
-    reaches = (covers[:, low] < own[low] + IN_LINE_M) & (covers[:, low + 1] > own[low + 1] - IN_LINE_M)
-    return len(covers) == 1 and bool(covers[0, DIRECTION] == own[DIRECTION] and covers[0, low] > -1e3 and reaches[0])
+    reach = (covers[:, low] < own[low] + IN_LINE_M) & (covers[:, low + 1] > own[low + 1] - IN_LINE_M)
+    return len(covers) == 1 and bool((lie_along(own, covers) & reach).all())
 
 
 def edge_near(covers: np.ndarray, own: np.ndarray, low: int, seen_to: float, beyond: float) -> float:

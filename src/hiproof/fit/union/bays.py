@@ -78,9 +78,8 @@ def level_over(bay: np.ndarray, volumes: np.ndarray, seen: Seen, scene: Scene, u
     roof, top = roof_heights(volumes, *where)
     now = misfits(z, roof, scene)
     narrow = min(bay[2] - bay[1], bay[4] - bay[3])
-    if narrow < 2.0 * THICK_M or not base_shows(
-        volumes, scene
-    ):  # what little there is of the base is drawn as the roof beside
+    if narrow < 2.0 * THICK_M or not base_shows(volumes, scene):
+        # what little there is of the base is drawn as the roof beside
         beside, _ = roof_heights(continued(volumes, narrow), *where)
         now = np.where(top > 0, now, misfits(z, beside, scene))
     reach = scene.dead + scene.width

@@ -8,18 +8,15 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-import shapely
 
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.contract import BACK, FRONT
 from ...primitives.family import member_of
-from ...rings import GRID_M
-from .regions import besides, polygons_of
-from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, with_saw_teeth
+from .regions import area_of, besides, polygons_of
+from .teeth import SIZE_ALIKE, TURN_ALIKE_RAD, places_around, with_saw_teeth
 
-# m within which a gambrel must be as high as what it stands for, at what share of places so close
-NEAR_M, NEARLY, GRID_STEP_M = 0.3, 0.9, 0.4
+NEAR_M, NEARLY = 0.3, 0.9  # m within which a gambrel must be as high as what it stands for, at what share of places
 SKEWED = 1e-6  # rise over run along the ridge; numerically none
 LEAST_BREAK, MOST_BREAK = 0.1, 0.95  # of a gambrel's width, what lies between its breaks
 STEEPER = 0.1  # rise over run by which its lower slopes are steeper than the upper ones
@@ -36,10 +33,13 @@ def put_together(parts: list[Part], allowed: tuple[str, ...] = ()) -> list[Part]
 
 def with_gambrels(parts: list[Part]) -> list[Part]:
     """`parts` with every gable on a truncated gable's top, or between two steeper slopes, united with these."""
-    for upper in (part for part in parts if part.type in ("gable", "asymmetric_gable")):
-        top, below = top_of(upper), [part for part in parts if part is not upper]
+    for upper in parts:
+        top = top_of(upper)
+        if top is None:
+            continue
+        below = [part for part in parts if part is not upper]
         for lower in [(part,) for part in below] + list(combinations(below, 2)):
-            found = None if top is None else gambrel_of(upper, top, lower)
+            found = gambrel_of(upper, top, lower)
             if found is not None:
                 return with_gambrels([*besides(below, lower), found])
     return parts
@@ -55,7 +55,9 @@ class Top:
 
 
 def top_of(upper: Part) -> Top | None:
-    """The slopes of the gable `upper`; None where they are not alike."""
+    """The slopes of a gable; None where they are not alike, and of other parts."""
+    if upper.type not in ("gable", "asymmetric_gable"):
+        return None
     along = np.array([math.cos(upper.kappa), math.sin(upper.kappa)])
     planes = upper.pieces[0].planes
     rises = planes[:, :2] @ np.array([-along[1], along[0]])
@@ -128,16 +130,13 @@ def gambrel_of(upper: Part, top: Top, lower: tuple[Part, ...]) -> Part | None:
     planes = shape.planes_at(shape.to_theta(parameters, upper.kappa, np.array([*centre, eave])))
     if not stands_for(planes, (upper, *lower)):
         return None
-    outlines = [piece.outline for part in (upper, *lower) for piece in part.pieces]
-    covered = polygons_of(shapely.union_all(outlines, grid_size=GRID_M))
-    own = tuple(Piece(polygon, planes) for polygon in covered)
+    own = tuple(Piece(polygon, planes) for polygon in polygons_of(area_of((upper, *lower))))
     return Part("gambrel", own, parameters, upper.kappa, np.array([*centre, eave]))
 
 
 def stands_for(planes: np.ndarray, parts: tuple[Part, ...]) -> bool:
     """Whether the lowest of `planes` (k, 3) is all but as high as the highest of `parts` nearly everywhere on these."""
-    x0, y0, x1, y1 = shapely.union_all([piece.outline for part in parts for piece in part.pieces]).bounds
-    xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+    xy = places_around(parts)
     z = np.max([part.height_at(xy) for part in parts], axis=0)
     there = np.isfinite(z)
     own = (np.column_stack([xy[there], np.ones(there.sum())]) @ planes.T).min(axis=1)

@@ -7,7 +7,7 @@ slope so far apart have teeth so wide.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -72,8 +72,7 @@ def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Pa
 
 def next_tooth(row: list[Part], last: Part, step: float) -> Part:
     """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
-    width = float(np.mean([part.parameters["width"] for part in row]))
-    across = step * width * np.array([-math.sin(last.kappa), math.cos(last.kappa)])
+    across = step * mean_of(row, "width") * np.array([-math.sin(last.kappa), math.cos(last.kappa)])
     piece = last.pieces[0]
     planes = piece.planes.copy()
     planes[:, 2] -= planes[:, :2] @ across
@@ -89,14 +88,24 @@ def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
     middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
     if np.abs(part.height_at(middle) - tooth.height_at(middle))[0] > HEIGHT_ALIKE_M:
         return False
-    x0, y0, x1, y1 = area_of([part]).bounds
-    xy = np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+    xy = places_around([part])
     z, wanted = part.height_at(xy), tooth.height_at(xy)
     beneath = np.max([other.height_at(xy) for other in others], axis=0)
     shows = z > beneath + 1e-6
     alike = np.abs(z[shows] - wanted[shows]) < HEIGHT_ALIKE_M
     whole = alike.sum() * GRID_STEP_M**2 > NEARLY * tooth.area
     return bool(whole and alike.sum() > NEARLY * shows.sum())
+
+
+def places_around(parts: Iterable[Part]) -> np.ndarray:
+    """Places (n, 2) on a grid over the box around all that parts cover."""
+    x0, y0, x1, y1 = area_of(parts).bounds
+    return np.stack(np.meshgrid(np.arange(x0, x1, GRID_STEP_M), np.arange(y0, y1, GRID_STEP_M)), axis=-1).reshape(-1, 2)
+
+
+def mean_of(row: list[Part], name: str) -> float:
+    """The mean of a parameter of a row's teeth."""
+    return float(np.mean([part.parameters[name] for part in row]))
 
 
 def as_high(tooth: Part, part: Part) -> Part:
@@ -189,11 +198,10 @@ def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
     heights = np.array([part.translation[2] + 0.5 * part.parameters["height"] for part in row])
     breaks = laid_out(centres[:, 1] - heights / slopes.mean(), ground)
     heights = heights + slopes * (0.5 * (breaks[:-1] + breaks[1:]) - centres[:, 1])
-    seen_wide = float(np.mean([part.parameters["width"] for part in row]))
-    told_wide = float(breaks[-1] - breaks[0]) / len(row)  # nothing like it, or less than none, where they hardly slope
-    if np.ptp(heights) > UNEVEN_M or abs(told_wide - seen_wide) > SIZE_ALIKE * seen_wide:
+    length, width, seen_wide = mean_of(row, "length"), float(breaks[-1] - breaks[0]), mean_of(row, "width")
+    # planes that hardly slope tell of teeth of another width than was seen, or of less than none
+    if np.ptp(heights) > UNEVEN_M or abs(width / len(row) - seen_wide) > SIZE_ALIKE * seen_wide:
         return None
-    length, width = float(np.mean([part.parameters["length"] for part in row])), float(breaks[-1] - breaks[0])
     rise = float(slopes.mean() * width / len(row))
     parameters = {"width": width, "length": length, "height": rise, "teeth": float(len(row))}
     centre = np.array([centres[:, 0].mean(), breaks[0] + 0.5 * width]) @ ground.axes + ground.origin
