@@ -12,6 +12,7 @@ from hiproof.city.found import found_roof
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.errors import InputError, InputWarning
 from hiproof.settings import Settings
+from hiproof.simulate import SOURCES, Defects, ScanSettings, random_compound, scan
 from leafy_scenes import drone, forest, house_under_a_tree
 from tiny_town import make_town, write_cloud, write_footprints
 
@@ -100,6 +101,17 @@ def test_a_roof_that_was_cut_out_is_one_building(tmp_path):
     with pytest.warns(InputWarning, match="taken for the points of one roof"):
         rows = run(tmp_path, roof, np.zeros(len(roof)))
     assert [row["status"] for row in rows.values()] == ["modelled"]
+
+
+def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path):
+    rng = np.random.default_rng(4)
+    building = random_compound(rng, "two_level", (85000.0, 446000.0, 2.0))
+    cloud = scan(building, rng, ScanSettings(density=8.0, defects=Defects.none()))
+    roof = cloud.points[cloud.source == SOURCES.index("roof")]
+    with pytest.warns(InputWarning, match="no building class"):
+        rows = run(tmp_path, roof, np.ones(len(roof)), {"house": building.footprint})
+    off = roof[:, 2] - height_of(rows["house"], roof[:, :2])
+    assert np.mean(np.abs(off) < 0.2) > 0.97
 
 
 def test_a_footprint_in_a_forest_holds_no_roof_and_says_so(tmp_path):

@@ -37,10 +37,10 @@ def iou(a, b):
 
 
 def street(density=8.0):
-    """Five houses, the second and third sharing a wall, on ground of class 2."""
+    """Five houses, the second and third sharing a wall, with ground of class 2 around them."""
     houses = [turned(shapely.box(x, 0, x + w, 9), 20) for x, w in ((0, 8), (11, 8), (19, 8), (30, 8), (41, 8))]
     roofs = [points_in(house, density, seed, 8.0 + seed) for seed, house in enumerate(houses)]
-    ground = points_in(turned(shapely.box(-5, -15, 55, -2), 20), 4, 9, 1.0)
+    ground = points_in(turned(shapely.box(-5, -15, 55, 20), 20) - shapely.union_all(houses), 4, 9, 1.0)
     xyz = np.concatenate([*roofs, ground])
     return PointCloud(xyz, np.repeat([6, 2], [len(xyz) - len(ground), len(ground)]).astype(np.uint8)), houses
 
@@ -90,7 +90,7 @@ def test_a_small_cloud_without_classes_is_one_building(classes):
     points = points_in(turned(L_SHAPE, 30), 5)
     classification = None if classes is None else np.full(len(points), classes, np.uint8)
     (building,) = split_buildings(PointCloud(points, classification))
-    assert building.is_alone and len(building.index) == len(points) and building.area.area > 200
+    assert building.is_cut_out and len(building.index) == len(points) and building.area.area > 200
 
 
 def test_noise_is_no_part_of_the_one_building():

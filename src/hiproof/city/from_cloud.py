@@ -7,6 +7,7 @@ import warnings
 import shapely
 
 from ..errors import InputError, InputWarning
+from ..log import counted
 from ..model import PointCloud
 from ..settings import Settings
 from .classes import with_read
@@ -14,13 +15,14 @@ from .plan import Job
 
 
 def jobs_from_cloud(clouds: tuple[str, ...], settings: Settings) -> tuple[tuple[Job, ...], Settings]:
-    """A job a building found, and the settings by which its points are chosen: all of them in a cloud of one roof alone."""
+    """A job a building found, and the settings by which its points are chosen: all of them in a cloud of roofs alone."""
     from ..classify.split import split_buildings
 
     cloud = readable_points(clouds, settings)
     found = split_buildings(cloud, settings)
-    if settings.read.roofs == "shape" and found[0].is_alone:
-        said = f"{', '.join(cloud.sources)}: taken for the points of one roof, as nothing in it looks like ground"
+    if settings.read.roofs == "shape" and found and found[0].is_cut_out:
+        roofs = counted(len(found), "roof") if len(found) > 1 else "one roof"
+        said = f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks like ground"
         warnings.warn(said, InputWarning)
         settings = with_read(settings, roofs="class")
     areas = [(building.id, shapely.make_valid(building.area)) for building in found]

@@ -36,6 +36,8 @@ from .sort import load_points
 
 NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
 
+BESIDE_ALL_M = 10.0  # m around a building that show whether there is ground between roofs; yards are as wide
+
 # m between a terrain model and ground points: other heights (a geoid's are 10 to 100 m) or another date
 FAR_GROUND_M = 2.0
 
@@ -56,10 +58,21 @@ class Surroundings:
         """
         if self.plan.settings.read.roofs != "shape" or job.area.is_empty:
             return FoundRoof(self.roof[self.grid.within(job.area, self.plan.around_m)])
-        low, high = neighbourhood(job, 0.0).reshape(2, 2)
+        near = self.points_near(job, 0.0)
+        return found_roof(near, job.area, near[:, 2] - self.ground_to_leave_out(job).height_at(near))
+
+    def points_near(self, job: Job, reach_m: float) -> np.ndarray:
+        """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the building, each once."""
+        low, high = neighbourhood(job, reach_m).reshape(2, 2)
         near = self.roof[self.grid.candidates((*low, *high))]
-        near = without_repeats(near[((near[:, :2] >= low) & (near[:, :2] <= high)).all(axis=1)])
-        return found_roof(near, job.area, near[:, 2] - TerrainChain(self.grounds_of(job)).height_at(near))
+        return without_repeats(near[((near[:, :2] >= low) & (near[:, :2] <= high)).all(axis=1)])
+
+    def ground_to_leave_out(self, job: Job) -> TerrainChain:
+        """The ground around the building; the terrain model's alone among roofs cut out beforehand, whose lowest are no ground."""
+        from ..classify.cut_out import is_cut_out
+
+        around = self.points_near(job, BESIDE_ALL_M)
+        return TerrainChain([self.model] if len(around) and is_cut_out(around) else self.grounds_of(job))
 
     def grounds_of(self, job: Job) -> list[Terrain | None]:
         """The terrain model, the ground points in the whole-metre box around the building, and the ground found there."""

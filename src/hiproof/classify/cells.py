@@ -25,6 +25,12 @@ class SquareCells:
         """Table of how many of the points `chosen` (n,) each cell holds."""
         return np.bincount(self.index[chosen], minlength=self.shape[0] * self.shape[1]).reshape(self.shape)
 
+    def top(self, values: np.ndarray) -> np.ndarray:
+        """Table of the largest of the `values` (n,) of all points in each cell, minus infinity where there is none."""
+        table = np.full(self.shape[0] * self.shape[1], -np.inf)
+        np.maximum.at(table, self.index, values)
+        return table.reshape(self.shape)
+
     def highest(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Table of the largest of the `values` (n,) of points `chosen` (n,) in each cell and those around it."""
         table = np.full(self.shape[0] * self.shape[1], -np.inf)

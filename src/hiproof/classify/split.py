@@ -15,6 +15,7 @@ from ..log import counted
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
 from .cells import plan_density
+from .cut_out import is_cut_out
 from .houses import told_apart
 from .scene import roofs_by_shape
 
@@ -22,6 +23,7 @@ GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of 
 SPACINGS_PER_GAP = 2.5  # a gap is no gap between houses where points lie sparser than this many to it
 # m, points and share of one connected group: what may be one roof cut out beforehand, the paper's case
 SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 20_000, 0.9
+BLOCK_EXTENT_M = 250.0  # of a block of houses cut out beforehand; a plane lies under it
 NEVER_CLASSIFIED = (0, 1)  # of ASPRS: created, unclassified
 NOISE = (7, 18)  # of ASPRS: low and high noise
 MIN_AREA_M2 = 4.0  # m2; smaller is a shed or a car's roof, and too little to model
@@ -33,37 +35,41 @@ class FoundBuilding:
     """A group of points taken for one building: ascending `index` (n,) into the cloud.
 
     `area` is the union of the cells that hold the group's points, in world metres, less what lies beyond a wall between
-    touching houses: all of them lie in it, and none of another group. The roof's outline is the fit's business. `is_alone`:
-    all points but noise are one roof, cut out beforehand.
+    touching houses: all of them lie in it, and none of another group. The roof's outline is the fit's business.
+    `is_cut_out`: the cloud holds roofs alone, cut out beforehand, so that all its points but noise count.
     """
 
     id: str
     index: np.ndarray
     area: shapely.Geometry
-    is_alone: bool = False
+    is_cut_out: bool = False
 
 
 def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
     """The buildings of `cloud`, from the points of its building class, or where it has none from roofs found by shape.
 
-    A small file that holds one roof alone is one building. Houses that touch are told apart where their roofs say so
-    (`settings.read.split_houses`), else they stay together. Groups with fewer than `settings.read.split_min_points` points or
-    less than 4 m2 are left out with an InputWarning. Ids name the metre that holds the group's middle, not its number, so
-    that they do not depend on what else was read. Raises InputError where no point may be a building's.
+    A small file that holds one roof alone is one building; one of several roofs cut out beforehand is as if their class were
+    known. Houses that touch are told apart where their roofs say so (`settings.read.split_houses`), else they stay together. Groups
+    with fewer than `settings.read.split_min_points` points or less than 4 m2 are left out with an InputWarning. Ids name the metre that
+    holds the group's middle, not its number, so that they do not depend on what else was read. Raises InputError where no point may be a
+    building's.
     """
     read = (settings or Settings()).read
-    roof, is_alone = roof_points_of(cloud, read)
-    if is_alone:
-        return [
-            dataclasses.replace(one, is_alone=True) for one in named([roof], cloud.xyz, adapted_gap(cloud.xyz[roof]))
-        ]
+    roof, is_cut_out = roof_points_of(cloud, read)
     xy = cloud.xyz[roof, :2]
-    gap_m = read.split_gap_m or adapted_gap(xy)
-    groups = [roof[group] for group in connected_groups(xy, gap_m)]
+    if is_cut_out and is_single(xy):
+        found = named([roof], cloud.xyz, adapted_gap(xy))
+    else:
+        gap_m = read.split_gap_m or adapted_gap(xy)
+        groups = [roof[group] for group in connected_groups(xy, gap_m)]
+        found = named(large_enough(groups, cloud.xyz, read), cloud.xyz, gap_m, read.split_houses)
+    return [dataclasses.replace(one, is_cut_out=is_cut_out) for one in found]
+
+
+def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) -> list[np.ndarray]:
+    """Those of the groups that are large enough for a building; an InputWarning counts the others."""
     large = [
-        group
-        for group in groups
-        if len(group) >= read.split_min_points and hull_area(cloud.xyz[group, :2]) >= MIN_AREA_M2
+        group for group in groups if len(group) >= read.split_min_points and hull_area(xyz[group, :2]) >= MIN_AREA_M2
     ]
     left_out = len(groups) - len(large)
     if left_out:
@@ -72,24 +78,26 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
             f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
             InputWarning,
         )
-    return named(large, cloud.xyz, gap_m, read.split_houses)
+    return large
 
 
 def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool]:
-    """Ascending indices of the points that may be roofs, and whether they are one roof cut out beforehand."""
+    """Ascending indices of the points that may be roofs, and whether they are roofs alone, cut out beforehand."""
     index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
     if index is not None:
         return index, False
-    alone, is_chosen = single_building(cloud), read.building_classes != ReadSettings().building_classes
+    unclassified, is_chosen = never_classified(cloud), read.building_classes != ReadSettings().building_classes
     if read.roofs == "class" or (read.roofs == "auto" and is_chosen):
-        if alone is None:
+        if unclassified is None or not is_single(cloud.xyz[unclassified, :2]):
             raise InputError(without_building_class(cloud, read.building_classes))
-        return alone, True
-    roofs, is_alone = roofs_by_shape(cloud, read.ground_classes, alone is not None)
-    if read.roofs == "auto" and not is_alone:
+        return unclassified, True
+    if unclassified is not None and holds_roofs_alone(cloud.xyz[unclassified]):
+        return unclassified, True
+    roofs = roofs_by_shape(cloud, read.ground_classes)
+    if read.roofs == "auto":
         said = f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs were found by shape"
         warnings.warn(said, InputWarning)
-    return roofs, is_alone
+    return roofs, False
 
 
 def classes_text(classes: tuple[int, ...]) -> str:
@@ -104,22 +112,39 @@ def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray |
     return index if len(index) else None
 
 
-def single_building(cloud: PointCloud) -> np.ndarray | None:
-    """All points that are no noise, where an unclassified cloud is small enough to be one building; else None.
-
-    Small is at most 60 m wide and 20,000 points, nine tenths of them connected. This is the paper's case.
-    """
+def never_classified(cloud: PointCloud) -> np.ndarray | None:
+    """Ascending indices of all points that are no noise, None where there are none, or any has a class."""
     classes = np.zeros(len(cloud), np.uint8) if cloud.classification is None else cloud.classification
-    if not np.isin(classes, NEVER_CLASSIFIED + NOISE).all():
-        return None
     index = np.flatnonzero(~np.isin(classes, NOISE))
-    if not 0 < len(index) <= SINGLE_POINTS:
-        return None
-    xy = cloud.xyz[index, :2]
-    if np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
-        return None
-    largest = max(map(len, connected_groups(xy, 2 * adapted_gap(xy))))
-    return index if largest >= SINGLE_SHARE * len(index) else None
+    return index if len(index) and np.isin(classes, NEVER_CLASSIFIED + NOISE).all() else None
+
+
+def is_single(xy: np.ndarray) -> bool:
+    """Whether points (n, 2) are few and close enough for one building, the paper's case.
+
+    They are at most 60 m wide and 20,000, nine tenths of them connected.
+    """
+    if len(xy) > SINGLE_POINTS or np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
+        return False
+    return max(map(len, connected_groups(xy, 2 * adapted_gap(xy)))) >= SINGLE_SHARE * len(xy)
+
+
+def holds_roofs_alone(xyz: np.ndarray) -> bool:
+    """Whether the points (n, 3) are one roof or several, each a group by itself, that were cut out beforehand.
+
+    Of several most are known for roofs, and hardly any is none; what has nothing high on it may be either.
+    """
+    if is_single(xyz[:, :2]):
+        return is_cut_out(xyz) is not False
+    roofs = others = 0
+    for group in connected_groups(xyz[:, :2], 2 * adapted_gap(xyz[:, :2])):
+        wide = np.ptp(xyz[group, :2], axis=0).max() > BLOCK_EXTENT_M
+        found = False if wide else is_cut_out(xyz[group])
+        roofs += len(group) if found else 0
+        others += len(group) if found is False else 0
+        if others > (1.0 - SINGLE_SHARE) * len(xyz):
+            return False
+    return roofs > 0.5 * len(xyz)
 
 
 def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:

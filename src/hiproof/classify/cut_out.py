@@ -1,0 +1,56 @@
+"""Roofs cut out beforehand, told from a scene with its ground: by where what is high ends.
+
+A scene's houses end in walls, down to the ground around them. What somebody cut out along its outline ends where the cloud does,
+or in a roof's own slopes.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .buildings import HIGH_M, roof_points
+from .cells import SquareCells, plan_density
+from .ground import lowest_in_cells, plane_through
+
+CELL_M, SPACINGS_A_CELL = 1.0, 2.0  # side of the cells, at least so many spacings of points
+REACH_CELLS = 2  # that no beam may have hit between a roof and the ground
+WALL_M = 2.0  # from a cell down to the next: no house's wall is lower, no roof's slope falls so far over a cell
+# of the border of what is high, without a wall down to something lower. Roofs cut out of three simulated towns, at 2 to 19 points/m2, with
+# walls and without, have 0.85 to 1 in nine of ten, Delft's along footprints 0.83 to 1; with ground around 0 to 0.09, Delft's boxes 0.34 to 0.56
+OPEN_SHARE = 0.7
+SMOOTH_SHARE = 0.6  # of the points of roofs; woods have less
+
+
+def is_cut_out(xyz: np.ndarray) -> bool | None:
+    """Whether points (n, 3), n > 0, are roofs alone and not a scene with its ground; None where nothing on their surface is high.
+
+    >>> x, y = (axis.ravel() for axis in np.mgrid[0:20, 0:20] / 2)
+    >>> gable, house = 8 - abs(x - 5), (abs(x - 5) < 3) & (abs(y - 5) < 3)
+    >>> is_cut_out(np.column_stack([x, y, gable])), is_cut_out(np.column_stack([x, y, np.where(house, gable, 0)]))
+    (True, False)
+    """
+    cell_m = max(CELL_M, SPACINGS_A_CELL / math.sqrt(plan_density(xyz)))
+    _, lowest = lowest_in_cells(xyz, cell_m)
+    height = SquareCells(xyz, cell_m).top(xyz[:, 2]) - plane_through(lowest, cell_m)
+    ends = walls = 0
+    for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
+        beyond = next_seen(height, axis, way)
+        border = (height > HIGH_M) & (beyond <= HIGH_M)
+        is_wall = np.isfinite(beyond[border]) & (height[border] - beyond[border] > WALL_M)
+        walls += int(is_wall.sum())
+        ends += int((~is_wall).sum())
+    if ends < OPEN_SHARE * (ends + walls) or roof_points(xyz).mean() <= SMOOTH_SHARE:
+        return False
+    return True if (height > HIGH_M).any() else None
+
+
+def next_seen(height: np.ndarray, axis: int, way: int) -> np.ndarray:
+    """Of each cell (c, r) the height of the next one with points within REACH_CELLS on one side; minus infinity where there is none."""
+    wide = np.pad(height, REACH_CELLS, constant_values=-np.inf)
+    found = np.full(wide.shape, -np.inf)
+    for step in range(REACH_CELLS, 0, -1):
+        near = np.roll(wide, way * step, axis)
+        found = np.where(np.isfinite(near), near, found)
+    return found[REACH_CELLS:-REACH_CELLS, REACH_CELLS:-REACH_CELLS]
