@@ -1,6 +1,7 @@
 """Runs of clouds without a building class: roofs and ground are found, and what hides a roof is said."""
 
 import json
+import warnings
 
 import laspy
 import numpy as np
@@ -24,6 +25,10 @@ def run(folder, xyz, classes, footprints=None, settings=None):
     request = Request((str(cloud),), folder / "out", outlines, settings=settings or Settings())
     reconstruct_area(request)
     return {row["id"]: row for row in read_parameters(folder / "out" / "parameters.jsonl")}
+
+
+def asked(roofs):
+    return Settings.from_dict({"read": {"roofs": roofs}})
 
 
 def height_of(row, xy_world):
@@ -54,7 +59,7 @@ def test_nothing_but_points_is_enough(tmp_path):
 def test_shape_can_be_asked_for_although_there_is_a_class(tmp_path):
     town = make_town()
     wrong = np.where(np.arange(len(town.xyz)) % 2, town.classification, 1)
-    rows = run(tmp_path, town.xyz, wrong, settings=Settings.from_dict({"read": {"roofs": "shape"}}))
+    rows = run(tmp_path, town.xyz, wrong, settings=asked("shape"))
     assert [row["status"] for row in rows.values()] == ["modelled"] * 4
 
 
@@ -101,6 +106,19 @@ def test_a_roof_that_was_cut_out_is_one_building(tmp_path):
     with pytest.warns(InputWarning, match="taken for the points of one roof"):
         rows = run(tmp_path, roof, np.zeros(len(roof)))
     assert [row["status"] for row in rows.values()] == ["modelled"]
+
+
+@pytest.mark.parametrize("roofs", ["auto", "alone"])
+def test_a_tree_beside_a_roof_that_was_cut_out_is_no_part_of_it(tmp_path, roofs):
+    cloud, building = house_under_a_tree(np.random.default_rng(2), 0.4)
+    points = cloud.points + (85000, 446000, 0)
+    outline = shapely.transform(building.footprint, lambda xy: xy + (85000, 446000))
+    cut = shapely.contains_xy(outline.buffer(1.5), *points[:, :2].T) & (cloud.source != SOURCES.index("ground"))
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)  # auto says what it takes the cloud for
+        (row,) = run(tmp_path, points[cut], np.ones(cut.sum()), settings=asked(roofs)).values()
+    found = shapely.transform(shapely.Polygon(row["outline"][0]), lambda xy: xy + row["origin"][:2])
+    assert found.intersection(outline).area / found.union(outline).area > 0.9
 
 
 def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path):

@@ -46,8 +46,9 @@ class ReadSettings:
     roofs: str = setting(
         "auto",
         "class: roofs are the points of the building classes; shape: they are looked for among all others that may be roofs; "
-        "auto: by shape where no point has the building class",
-        choices=("auto", "class", "shape"),
+        "alone: all of these are, but leaves, of clouds that hold roofs alone, cut out beforehand; auto: by shape where no point has "
+        "the building class, or alone where nothing looks like ground",
+        choices=("auto", "class", "shape", "alone"),
         option="--roofs",
     )
     crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say', option="--crs")

@@ -18,7 +18,7 @@ PEEK_POINTS = 100_000  # points of a file looked at to learn its classes; a thin
 
 
 def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
-    """`settings`, or where roofs are to be found by shape those with that said, and the classes that may hold roofs.
+    """`settings`, or where roofs are to be found by shape or stand alone those with that said, and the classes that may hold roofs.
 
     Classes other than the default that were asked for are taken as they are. Otherwise all classes but ground, water, noise,
     low vegetation and bridges may hold roofs where no point has the building class, and one line says so. Raises InputError
@@ -47,7 +47,7 @@ def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
             f"for among the points of class {', '.join(map(str, others))}; say otherwise with --building-class",
             InputWarning,
         )
-    return with_read(settings, roofs="shape", building_classes=others)
+    return with_read(settings, roofs="shape" if read.roofs == "auto" else read.roofs, building_classes=others)
 
 
 def with_read(settings: Settings, **changes: Any) -> Settings:

@@ -46,3 +46,9 @@ def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray) -> 
         remark = f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, the rest {what}"
         return FoundRoof(near[inside & is_roof], remark)
     return FoundRoof(near[inside & is_roof])
+
+
+def found_alone(near: np.ndarray, area: shapely.Geometry) -> FoundRoof:
+    """The roof within `area` of points (n, 3) that are roofs' or leaves': without these, unless hardly anything would be left."""
+    found = found_roof(near, area, np.full(len(near), np.nan))
+    return found if found.is_seen else FoundRoof(found.points)

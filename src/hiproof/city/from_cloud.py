@@ -24,7 +24,7 @@ def jobs_from_cloud(clouds: tuple[str, ...], settings: Settings) -> tuple[tuple[
         roofs = counted(len(found), "roof") if len(found) > 1 else "one roof"
         said = f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks like ground"
         warnings.warn(said, InputWarning)
-        settings = with_read(settings, roofs="class")
+        settings = with_read(settings, roofs="alone")
     areas = [(building.id, shapely.make_valid(building.area)) for building in found]
     return tuple(Job(i, id, area, None) for i, (id, area) in enumerate(areas)), settings
 

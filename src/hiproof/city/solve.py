@@ -25,7 +25,7 @@ from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
-from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_roof
+from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_alone, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
@@ -54,11 +54,14 @@ class Surroundings:
     def roof_of(self, job: Job) -> FoundRoof:
         """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be moved onto them.
 
-        A point that stands in two files comes twice. Roofs found by shape are those inside the area.
+        A point that stands in two files comes twice. Roofs found by shape, or alone, are those inside the area.
         """
-        if self.plan.settings.read.roofs != "shape" or job.area.is_empty:
+        how = self.plan.settings.read.roofs
+        if how not in ("shape", "alone") or job.area.is_empty:
             return FoundRoof(self.roof[self.grid.within(job.area, self.plan.around_m)])
         near = self.points_near(job, 0.0)
+        if how == "alone":
+            return found_alone(near, job.area)
         return found_roof(near, job.area, near[:, 2] - self.ground_to_leave_out(job).height_at(near))
 
     def points_near(self, job: Job, reach_m: float) -> np.ndarray:
@@ -109,7 +112,7 @@ class Surroundings:
 
     def looked_at(self, building: Building, job: Job, roof: np.ndarray) -> Building:
         """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
-        if self.plan.settings.read.roofs == "shape" or job.area.is_empty:
+        if self.plan.settings.read.roofs in ("shape", "alone") or job.area.is_empty:
             return building
         box = neighbourhood(job, 0.0)
         terrain = TerrainChain(self.grounds_of(job))

@@ -14,14 +14,27 @@ NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noi
 
 def roofs_by_shape(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
     """Ascending indices of the roofs' points. Raises InputError where there are none."""
-    classes = np.zeros(len(cloud), np.uint8) if cloud.classification is None else cloud.classification
-    asked = np.flatnonzero(~np.isin(classes, tuple(NO_ROOFS)))
-    found = classify(cloud.xyz[asked])
-    roofs = asked[(found == BUILDING) & ~np.isin(classes[asked], ground_classes)]
+    asked = np.flatnonzero(~np.isin(classes_of(cloud), tuple(NO_ROOFS)))
+    roofs = asked[(classify(cloud.xyz[asked]) == BUILDING) & ~np.isin(classes_of(cloud)[asked], ground_classes)]
+    return some(roofs, cloud, "none of which lies on a smooth surface above the ground")
+
+
+def points_that_may_be_roofs(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
+    """Ascending indices of all points but those of classes that hold no roofs. Raises InputError where there are none."""
+    asked = np.flatnonzero(~np.isin(classes_of(cloud), (*NO_ROOFS, *ground_classes)))
+    return some(asked, cloud, "all of them ground, water, noise, low vegetation or bridges")
+
+
+def classes_of(cloud: PointCloud) -> np.ndarray:
+    return np.zeros(len(cloud), np.uint8) if cloud.classification is None else cloud.classification
+
+
+def some(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndarray:
+    """The `roofs`, or InputError where there are none."""
     if len(roofs):
         return roofs
     where = ", ".join(cloud.sources) or "the cloud"
     raise InputError(
-        f"expected buildings in {where}, got {counted(len(cloud), 'point')} none of which lies on a smooth surface "
-        "above the ground; give --footprints, or name the class that holds roofs with --building-class"
+        f"expected buildings in {where}, got {counted(len(cloud), 'point')} {why_not}; give --footprints, or name the class that "
+        "holds roofs with --building-class"
     )

@@ -17,7 +17,7 @@ from ..settings import ReadSettings, Settings
 from .cells import plan_density
 from .cut_out import is_cut_out
 from .houses import told_apart
-from .scene import roofs_by_shape
+from .scene import points_that_may_be_roofs, roofs_by_shape
 
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
 SPACINGS_PER_GAP = 2.5  # a gap is no gap between houses where points lie sparser than this many to it
@@ -83,6 +83,8 @@ def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) 
 
 def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool]:
     """Ascending indices of the points that may be roofs, and whether they are roofs alone, cut out beforehand."""
+    if read.roofs == "alone":
+        return points_that_may_be_roofs(cloud, read.ground_classes), True
     index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
     if index is not None:
         return index, False
