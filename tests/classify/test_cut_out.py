@@ -8,7 +8,7 @@ from hiproof.classify.split import split_buildings
 from hiproof.errors import InputError
 from hiproof.model import PointCloud
 from hiproof.simulate import SOURCES, Defects, ScanSettings, random_building, random_compound, scan
-from leafy_scenes import forest
+from leafy_scenes import drone, forest
 
 ROOF, GROUND = SOURCES.index("roof"), SOURCES.index("ground")
 KINDS = ["gable", "hip", "pyramid", "mansard", "monopitch", "L", "T", "U", "row", "two_level", "dormered"]
@@ -30,6 +30,15 @@ def test_a_roof_with_its_walls_or_without_is_cut_out_and_one_on_its_ground_is_no
 
 
 @pytest.mark.parametrize("kind", KINDS[:5])
+@pytest.mark.parametrize("type", ["gable", "flat"])
+def test_a_house_from_a_drone_is_told_from_its_lawn_and_is_one_building_without(type):
+    cloud, _ = drone(np.random.default_rng(1), type)
+    cut = cloud.points[cloud.source != GROUND]
+    assert is_cut_out(cloud.points) is False and len(cut) > 50_000
+    (building,) = split_buildings(PointCloud(cut))
+    assert building.is_cut_out and len(building.index) == len(cut)
+
+
 def test_the_answer_is_that_of_the_points_turned_moved_and_in_another_order(kind):
     cloud = scanned(kind, 5.0)
     for points, wanted in ((cloud.points, False), (cloud.points[cloud.source == ROOF], True)):

@@ -103,7 +103,7 @@ def test_noise_is_no_part_of_the_one_building():
 @pytest.mark.parametrize("what", ["two houses", "wide", "many", "without classes"])
 def test_larger_clouds_without_building_class_are_refused(what):
     box = shapely.box(0, 0, 90, 20) if what == "wide" else shapely.box(0, 0, 14, 9)
-    points = points_in(box, 200 if what == "many" else 6)
+    points = points_in(box, 2000 if what == "many" else 6)
     if what == "two houses":
         points = np.concatenate([points, points + [30, 0, 0]])
     classification = None if what == "without classes" else np.ones(len(points), np.uint8)

@@ -22,7 +22,7 @@ from .scene import points_that_may_be_roofs, roofs_by_shape
 GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
 SPACINGS_PER_GAP = 2.5  # a gap is no gap between houses where points lie sparser than this many to it
 # m, points and share of one connected group: what may be one roof cut out beforehand, the paper's case
-SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 20_000, 0.9
+SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 200_000, 0.9
 BLOCK_EXTENT_M = 250.0  # of a block of houses cut out beforehand; a plane lies under it
 NEVER_CLASSIFIED = (0, 1)  # of ASPRS: created, unclassified
 NOISE = (7, 18)  # of ASPRS: low and high noise
@@ -124,7 +124,7 @@ def never_classified(cloud: PointCloud) -> np.ndarray | None:
 def is_single(xy: np.ndarray) -> bool:
     """Whether points (n, 2) are few and close enough for one building, the paper's case.
 
-    They are at most 60 m wide and 20,000, nine tenths of them connected.
+    They are at most 60 m wide and 200,000, a drone's of a large house, nine tenths of them connected.
     """
     if len(xy) > SINGLE_POINTS or np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
         return False
