@@ -84,6 +84,20 @@ def test_without_terrain_the_assumption_is_named():
     assert "assumed" in hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).ground_source
 
 
+@pytest.mark.parametrize(("seen_m", "wanted"), [(4.0, 4.0), (2.0, 3.0), (0.0, 3.0)])
+def test_without_terrain_the_ground_is_at_the_foot_of_walls_that_are_seen(seen_m, wanted):
+    roof = gable_points()
+    eave = roof[:, 2].min()
+    down = np.linspace(0.0, seen_m, 30)
+    x = np.full(30, roof[:, 0].min())
+    wall = np.column_stack([x, np.linspace(roof[:, 1].min(), roof[:, 1].max(), 30), eave - down])
+    noise = [[roof[:, 0].mean(), roof[:, 1].mean(), eave - 30.0]]
+    for points in (np.concatenate([roof, wall]), np.concatenate([roof, wall, noise])):
+        building = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
+        assert building.ground_source.startswith("assumed")
+        assert building.solid.vertices[:, 2].min() == pytest.approx(eave - wanted, abs=0.3)
+
+
 def test_terrain_that_does_not_cover_the_building_is_an_assumption_too():
     far = shapely.affinity.translate(FOOTPRINT, 100, 0)
     building = hiproof.reconstruct(gable_points() + (100, 0, 0), far, Slope(), PLAIN)

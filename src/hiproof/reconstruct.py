@@ -30,7 +30,7 @@ def reconstruct(
     points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; non-finite and repeated
     ones are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
     beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
-    `hiproof.Terrain`; without one the ground is assumed below the lowest point.
+    `hiproof.Terrain`; without one the ground is assumed below the lowest point, or at the foot of walls that are seen.
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError
     for points of another shape, and for a footprint, a terrain or settings of another kind.
 
@@ -54,8 +54,8 @@ def reconstruct(
     fitted = stages.fit(points, outline, recognised, settings)
     if not fitted.parts:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
-    ground = stages.find_ground(fitted.outline, points, frame, terrain)
     roof = Roof(fitted.parts, fitted.outline, frame)
+    ground = stages.find_ground(fitted.outline, points, frame, terrain, roof)
     roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, ground, settings)
     building = stages.cautioned(building, points)

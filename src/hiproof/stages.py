@@ -36,6 +36,9 @@ SUNK_M = 0.2
 ASSUMED_WALL_M = 3.0
 """Height of the lowest wall where nothing is known of the terrain."""
 
+WALLS_SEEN_M = 1.5
+"""Of the lowest point below all of the roof, from which on walls are seen; a gutter or a bay hangs less far down."""
+
 
 @dataclass(frozen=True)
 class Recognised:
@@ -281,12 +284,16 @@ def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: s
     return Fitted((part,), outline, status=status, detail=detail or status.value)
 
 
-def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Terrain | None) -> Ground:
-    """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them."""
+def find_ground(
+    outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Terrain | None, roof: Roof | None = None
+) -> Ground:
+    """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them.
+
+    Where no terrain is known it is assumed as low as a low wall's foot, or as the lowest points of the walls that are seen below `roof`.
+    """
     from .compose import terrain_intersection
     from .compose.settle import PLAN_DIGITS, settled
 
-    lowest_roof = float(points[:, 2].min())
     if terrain is not None:
         corners = np.concatenate([np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)])
         heights, source = asked(terrain, frame.to_world(corners))
@@ -296,8 +303,32 @@ def find_ground(outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame,
                 outline, lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2], z - frame.origin[2]
             )
             return Ground(z, source, tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines))
-    assumed = settled(lowest_roof - ASSUMED_WALL_M + frame.origin[2], PLAN_DIGITS)
-    return Ground(assumed, f"assumed {ASSUMED_WALL_M:g} m below the lowest point")
+    assumed, source = assumed_ground(points, roof)
+    return Ground(settled(assumed + frame.origin[2], PLAN_DIGITS), source)
+
+
+def assumed_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
+    """Height in the frame of the points (n, 3) where nothing tells it but them, and what it goes by."""
+    lowest, usual = float(points[:, 2].min()), f"assumed {ASSUMED_WALL_M:g} m below"
+    eave = math.inf if roof is None else lowest_over(points, roof)
+    if not math.isfinite(eave) or lowest >= eave - WALLS_SEEN_M:
+        return lowest - ASSUMED_WALL_M, f"{usual} the lowest point"
+    foot = lowest_but_one(points)
+    return (
+        (foot, "assumed at the foot of its walls")
+        if foot < eave - ASSUMED_WALL_M
+        else (eave - ASSUMED_WALL_M, f"{usual} its roof")
+    )
+
+
+def lowest_over(points: np.ndarray, roof: Roof) -> float:
+    """The lowest height of the roof over the points (n, 3), in its frame."""
+    return float(np.nanmin(roof.height_at(points[:, :2]), initial=math.inf))
+
+
+def lowest_but_one(points: np.ndarray) -> float:
+    """Height of the lowest of the points (n, 3) but one: a single one may be noise."""
+    return float(np.partition(points[:, 2], 1)[1]) if len(points) > 1 else float(points[0, 2])
 
 
 def asked(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
