@@ -132,6 +132,20 @@ def test_the_low_part_of_a_roof_cut_out_is_no_ground_under_the_high_one(tmp_path
     assert np.mean(np.abs(off) < 0.2) > 0.97
 
 
+def test_sparse_points_of_a_shed_are_its_roof_where_a_footprint_is_and_none_is_lost_by_that():
+    area, more = shapely.box(0, 0, 3.0, 2.7), 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        points = rng.uniform((0, 0, 2.2), (3.0, 2.7, 2.6), (26, 3))
+        points[:10, 1], points[:10, 2] = rng.normal(2.6, 0.1, 10), rng.uniform(0.5, 4.2, 10)
+        unknown = np.full(len(points), np.nan)
+        found, asked_for = (found_roof(points, area, unknown, is_asked_for) for is_asked_for in (False, True))
+        assert asked_for.is_seen
+        assert not found.is_seen or len(found.points) <= len(asked_for.points)
+        more += not found.is_seen
+    assert more > 0
+
+
 def test_a_footprint_in_a_forest_holds_no_roof_and_says_so(tmp_path):
     points = forest(np.random.default_rng(0), 40.0, 5.0).points + (85000, 446000, 0)
     with pytest.warns(InputWarning):

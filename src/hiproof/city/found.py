@@ -11,6 +11,8 @@ CLEAR_M = 0.5  # of a roof above the ground
 BESIDE_M = 1.0  # m from the outline beyond which points lie beside the building
 FEWEST_BESIDE = 10  # cells beside a building, without which nothing is known of the ground
 MOSTLY, HARDLY = 0.5, 0.15  # shares of the outline's points
+# log odds of a roof where a footprint says that there is a building: sparse points of small roofs tell little by themselves
+FOOTPRINT_ODDS = 0.7
 
 
 @dataclass(frozen=True)
@@ -22,10 +24,11 @@ class FoundRoof:
     is_seen: bool = True
 
 
-def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray) -> FoundRoof:
+def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False) -> FoundRoof:
     """The roof within `area`, from the points `near` (n, 3) it and their `height` (n,) above ground, NaN where unknown.
 
-    Shares are of points thinned to one a voxel, so that a wall or a crown hit often does not count as more.
+    `is_asked_for`: the area is a footprint, not one that was found by these points. Shares are of points thinned to one a voxel, so
+    that a wall or a crown hit often does not count as more.
     """
     from ..classify import roof_points
     from ..classify.surfaces import one_a_voxel
@@ -36,7 +39,7 @@ def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray) -> 
     shapely.prepare(area)
     is_high = ~(height < CLEAR_M)
     is_roof = np.zeros(len(near), bool)
-    is_roof[is_high] = roof_points(near[is_high])
+    is_roof[is_high] = roof_points(near[is_high], FOOTPRINT_ODDS if is_asked_for else 0.0)
     chosen, _ = one_a_voxel(near[inside])
     roof, high = is_roof[inside][chosen].mean(), is_high[inside][chosen].mean()
     what = "leaves" if high > 0.5 * (1 + roof) else "ground"

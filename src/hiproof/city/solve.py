@@ -62,7 +62,8 @@ class Surroundings:
         near = self.points_near(job, 0.0)
         if how == "alone":
             return found_alone(near, job.area)
-        return found_roof(near, job.area, near[:, 2] - self.ground_to_leave_out(job).height_at(near))
+        height = near[:, 2] - self.ground_to_leave_out(job).height_at(near)
+        return found_roof(near, job.area, height, job.footprint is not None)
 
     def points_near(self, job: Job, reach_m: float) -> np.ndarray:
         """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the building, each once."""

@@ -65,12 +65,15 @@ def classes_of_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     return classes
 
 
-def roof_points(xyz: np.ndarray) -> np.ndarray:
-    """Which (n,) of points (n, 3) within one building's outline lie on a surface, and not among leaves."""
+def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
+    """Which (n,) of points (n, 3) within one building's outline lie on a surface, and not among leaves.
+
+    `more_odds` are the log odds of a roof there by what is known besides.
+    """
     if len(xyz) < 4:
         return np.ones(len(xyz), bool)
     surfaces = surfaces_of(xyz)
-    return smoothed(surfaces, log_odds(surfaces))[surfaces.voxel] > 0
+    return smoothed(surfaces, log_odds(surfaces) + more_odds)[surfaces.voxel] > 0
 
 
 def log_odds(surfaces: Surfaces) -> np.ndarray:
