@@ -5,7 +5,7 @@ usage: python -m benchmarks.cut_out [--every K]
 Buildings of three towns scanned by simulation at 2, 5 and 19 points/m2, as `benchmarks.towns` does: their points with walls, their
 roofs alone, and with 3 m of ground around them. Then the points of Delft's footprints of 25 m2 or more, all of them and a tenth:
 inside, half a metre around, and in boxes 3 m and 8 m around, in which rows of houses are cut off. Printed is how many of each are
-taken for roofs cut out: all of the first three kinds should be, none of the scenes. `--every` takes each k-th building.
+taken for roofs cut out: all but those with 3 m of ground or more should be. `--every` takes each k-th building.
 """
 
 from __future__ import annotations
