@@ -19,6 +19,7 @@ import shapely
 from hiproof.classify.cut_out import is_cut_out
 from hiproof.classify.split import is_single
 from hiproof.read import read_footprints, read_points
+from hiproof.read.assign import PointGrid
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 
 from .judging import SHARED
@@ -70,16 +71,10 @@ def main() -> None:
     footprints = [f.polygon for f in read_footprints(str(folder / "footprints.gpkg")) if f.polygon.area >= LEAST_M2]
     for kept in 1.0, 0.1:
         some = xyz[np.random.default_rng(0).random(len(xyz)) < kept]
+        grid = PointGrid(some)
         for kind, around in AROUND.items():
             areas = [around(footprint) for footprint in footprints[::every]]
-            print(f"delft, {kept:g} of the points, {kind}: {told([points_in(area, some) for area in areas])}")
-
-
-def points_in(area: shapely.Polygon, xyz: np.ndarray) -> np.ndarray:
-    """The points (n, 3) inside an area."""
-    low, high = np.array(area.bounds).reshape(2, 2)
-    near = xyz[((xyz[:, :2] >= low) & (xyz[:, :2] <= high)).all(axis=1)]
-    return near[shapely.contains_xy(area, near[:, 0], near[:, 1])]
+            print(f"delft, {kept:g} of the points, {kind}: {told([some[grid.inside(area)] for area in areas])}")
 
 
 if __name__ == "__main__":

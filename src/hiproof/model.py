@@ -39,6 +39,11 @@ class PointCloud:
     def __len__(self) -> int:
         return len(self.xyz)
 
+    @property
+    def classes(self) -> np.ndarray:
+        """The classification (n,), 0 ("created, never classified") where the files have none."""
+        return np.zeros(len(self), np.uint8) if self.classification is None else self.classification
+
 
 def as_xyz(points: Any) -> np.ndarray:
     """Points as float64 (n, 3), none as (0, 3). Raises InputError for another shape: columns taken for rows make a roof of anything."""

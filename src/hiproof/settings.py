@@ -70,6 +70,11 @@ class ReadSettings:
     )
     split_min_points: int = setting(30, "without footprints: groups of fewer points are no building", "", 3, 100000)
 
+    @property
+    def by_class(self) -> bool:
+        """Whether roofs are the points of the building classes, of whole clouds or, with "auto", where there are such."""
+        return self.roofs in ("auto", "class")
+
 
 @dataclass(frozen=True)
 class FitSettings:

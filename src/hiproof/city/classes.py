@@ -60,8 +60,7 @@ def count_classes(clouds: tuple[str, ...], enough: tuple[int, ...]) -> Counter[i
     for name in clouds:
         try:
             for chunk in iter_points(name, PEEK_POINTS):
-                classes = np.zeros(len(chunk), np.uint8) if chunk.classification is None else chunk.classification
-                counts.update({c: int(n) for c, n in enumerate(np.bincount(classes)) if n})
+                counts.update({c: int(n) for c, n in enumerate(np.bincount(chunk.classes)) if n})
                 if any(counts[c] for c in enough):
                     return counts
         except MemoryError:

@@ -66,7 +66,7 @@ class WorkPlan:
     @functools.cached_property
     def around_m(self) -> float:
         """How far beyond its area a building sees roof points: as far as its footprint may have to be moved."""
-        moved = self.settings.reconstruct.align != "off" and self.settings.read.roofs not in ("shape", "alone")
+        moved = self.settings.reconstruct.align != "off" and self.settings.read.by_class
         moved = moved and any(job.footprint is not None for job in self.jobs)
         return AROUND_M if moved else 0.0
 

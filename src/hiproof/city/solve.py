@@ -56,11 +56,11 @@ class Surroundings:
 
         A point that stands in two files comes twice. Roofs found by shape, or alone, are those inside the area.
         """
-        how = self.plan.settings.read.roofs
-        if how not in ("shape", "alone") or job.area.is_empty:
+        read = self.plan.settings.read
+        if read.by_class or job.area.is_empty:
             return FoundRoof(self.roof[self.grid.within(job.area, self.plan.around_m)])
         near = self.points_near(job, 0.0)
-        if how == "alone":
+        if read.roofs == "alone":
             return found_alone(near, job.area)
         height = near[:, 2] - self.ground_to_leave_out(job).height_at(near)
         return found_roof(near, job.area, height, job.footprint is not None)
@@ -113,7 +113,7 @@ class Surroundings:
 
     def looked_at(self, building: Building, job: Job, roof: np.ndarray) -> Building:
         """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
-        if self.plan.settings.read.roofs in ("shape", "alone") or job.area.is_empty:
+        if not self.plan.settings.read.by_class or job.area.is_empty:
             return building
         box = neighbourhood(job, 0.0)
         terrain = TerrainChain(self.grounds_of(job))

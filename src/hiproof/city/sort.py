@@ -126,7 +126,7 @@ class Gatherer:
     def add(self, cloud: PointCloud) -> None:
         """Take from a chunk what any tile needs."""
         self.points += len(cloud)
-        classes = cloud.classification if cloud.classification is not None else np.zeros(len(cloud), np.uint8)
+        classes = cloud.classes
         self.classes.update({int(c): int(n) for c, n in enumerate(np.bincount(classes)) if n})
         kinds = self.kind_of_class()[classes]
         grid = PointGrid(cloud.xyz, SQUARE_M)

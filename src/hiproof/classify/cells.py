@@ -33,9 +33,7 @@ class SquareCells:
 
     def highest(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
         """Table of the largest of the `values` (n,) of points `chosen` (n,) in each cell and those around it."""
-        table = np.full(self.shape[0] * self.shape[1], -np.inf)
-        np.maximum.at(table, self.index[chosen], values[chosen])
-        return ndimage.maximum_filter(table.reshape(self.shape), 3)
+        return ndimage.maximum_filter(self.top(np.where(chosen, values, -np.inf)), 3)
 
     def share_around(self, chosen: np.ndarray, width_m: float) -> np.ndarray:
         """Share, flat by cells, of the points in a window of `width_m` about each cell that are `chosen` (n,)."""

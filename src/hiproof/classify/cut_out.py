@@ -12,7 +12,7 @@ import numpy as np
 
 from .buildings import HIGH_M, roof_points
 from .cells import SquareCells, plan_density
-from .ground import lowest_in_cells, plane_through
+from .ground import plane_through
 
 CELL_M, SPACINGS_A_CELL = 1.0, 2.0  # side of the cells, at least so many spacings of points
 REACH_CELLS = 2  # that no beam may have hit between a roof and the ground
@@ -32,8 +32,8 @@ def is_cut_out(xyz: np.ndarray) -> bool | None:
     (True, False)
     """
     cell_m = max(CELL_M, SPACINGS_A_CELL / math.sqrt(plan_density(xyz)))
-    _, lowest = lowest_in_cells(xyz, cell_m)
-    height = SquareCells(xyz, cell_m).top(xyz[:, 2]) - plane_through(lowest, cell_m)
+    cells = SquareCells(xyz, cell_m)
+    height = cells.top(xyz[:, 2]) - plane_through(-cells.top(-xyz[:, 2]), cell_m)
     ends = walls = 0
     for axis, way in ((0, 1), (0, -1), (1, 1), (1, -1)):
         beyond = next_seen(height, axis, way)

@@ -14,19 +14,15 @@ NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noi
 
 def roofs_by_shape(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
     """Ascending indices of the roofs' points. Raises InputError where there are none."""
-    asked = np.flatnonzero(~np.isin(classes_of(cloud), tuple(NO_ROOFS)))
-    roofs = asked[(classify(cloud.xyz[asked]) == BUILDING) & ~np.isin(classes_of(cloud)[asked], ground_classes)]
+    asked = np.flatnonzero(~np.isin(cloud.classes, tuple(NO_ROOFS)))
+    roofs = asked[(classify(cloud.xyz[asked]) == BUILDING) & ~np.isin(cloud.classes[asked], ground_classes)]
     return some(roofs, cloud, "none of which lies on a smooth surface above the ground")
 
 
 def points_that_may_be_roofs(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
     """Ascending indices of all points but those of classes that hold no roofs. Raises InputError where there are none."""
-    asked = np.flatnonzero(~np.isin(classes_of(cloud), (*NO_ROOFS, *ground_classes)))
+    asked = np.flatnonzero(~np.isin(cloud.classes, (*NO_ROOFS, *ground_classes)))
     return some(asked, cloud, "all of them ground, water, noise, low vegetation or bridges")
-
-
-def classes_of(cloud: PointCloud) -> np.ndarray:
-    return np.zeros(len(cloud), np.uint8) if cloud.classification is None else cloud.classification
 
 
 def some(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndarray:

@@ -116,9 +116,8 @@ def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray |
 
 def never_classified(cloud: PointCloud) -> np.ndarray | None:
     """Ascending indices of all points that are no noise, None where there are none, or any has a class."""
-    classes = np.zeros(len(cloud), np.uint8) if cloud.classification is None else cloud.classification
-    index = np.flatnonzero(~np.isin(classes, NOISE))
-    return index if len(index) and np.isin(classes, NEVER_CLASSIFIED + NOISE).all() else None
+    index = np.flatnonzero(~np.isin(cloud.classes, NOISE))
+    return index if len(index) and np.isin(cloud.classes, NEVER_CLASSIFIED + NOISE).all() else None
 
 
 def is_single(xy: np.ndarray) -> bool:
@@ -128,7 +127,7 @@ def is_single(xy: np.ndarray) -> bool:
     """
     if len(xy) > SINGLE_POINTS or np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
         return False
-    return max(map(len, connected_groups(xy, 2 * adapted_gap(xy)))) >= SINGLE_SHARE * len(xy)
+    return max(map(len, roughly_connected(xy))) >= SINGLE_SHARE * len(xy)
 
 
 def holds_roofs_alone(xyz: np.ndarray) -> bool:
@@ -139,7 +138,7 @@ def holds_roofs_alone(xyz: np.ndarray) -> bool:
     if is_single(xyz[:, :2]):
         return is_cut_out(xyz) is not False
     roofs = others = 0
-    for group in connected_groups(xyz[:, :2], 2 * adapted_gap(xyz[:, :2])):
+    for group in roughly_connected(xyz[:, :2]):
         wide = np.ptp(xyz[group, :2], axis=0).max() > BLOCK_EXTENT_M
         found = False if wide else is_cut_out(xyz[group])
         roofs += len(group) if found else 0
@@ -165,6 +164,11 @@ def adapted_gap(xy: np.ndarray) -> float:
     """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points are sparse."""
     needed = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
     return next((gap for gap in GAPS_M if gap >= needed), GAPS_M[-1])
+
+
+def roughly_connected(xy: np.ndarray) -> list[np.ndarray]:
+    """The groups of `xy` (n, 2) that are connected across twice the gap between buildings: a roof may have holes."""
+    return connected_groups(xy, 2 * adapted_gap(xy))
 
 
 def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:

@@ -352,9 +352,7 @@ def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
     """Classes of all clouds one after the other; 0 (never classified) where a file has none; None where no file has."""
     if all(cloud.classification is None for cloud in clouds):
         return None
-    return np.concatenate(
-        [np.zeros(len(c), np.uint8) if c.classification is None else c.classification for c in clouds]
-    )
+    return np.concatenate([cloud.classes for cloud in clouds])
 
 
 def chosen(xyz: np.ndarray, classes: np.ndarray | None, keep: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
