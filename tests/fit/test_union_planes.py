@@ -10,6 +10,7 @@ from hiproof.fit.union.planes import (
     best_rectangle,
     distinct,
     gain_by_point,
+    median_of_few,
     neighbours_of,
     reach_of_rows,
     truncated,
@@ -55,11 +56,17 @@ def test_neighbours_are_those_of_sorting_all_distances(n):
     u, v = np.random.default_rng(n).uniform(0.0, 8.0, (2, n))
     cell = np.zeros(n, np.int64)
     near, nearest = np.empty(n, np.int64), np.empty(17, np.int64)
-    count, kept = neighbours_of(Cloud(u, v, u, cell, cell), n // 2, near, np.empty(17), nearest)
+    count, kept = neighbours_of(Cloud(u, v, u, cell, cell), n // 2, np.empty(n), near, np.empty(17), nearest)
     distance = np.hypot(u - u[n // 2], v - v[n // 2])
     assert near[:count].tolist() == np.nonzero(distance < NEIGHBOUR_RADIUS_M)[0].tolist()
     assert kept == min(count, 17)
     assert nearest[:kept].tolist() == np.argsort(distance)[:kept].tolist()
+
+
+@pytest.mark.parametrize("count", range(1, 18))
+def test_the_median_of_few_is_the_median(count):
+    values = np.random.default_rng(count).normal(0.0, 1.0, count).round(1)
+    assert median_of_few(values.copy()) == pytest.approx(np.median(values))
 
 
 @pytest.mark.parametrize("count", [1, 2, 4])

@@ -17,10 +17,11 @@ from pathlib import Path
 from typing import Any
 
 
-def compiled(function: Callable | None = None, **options: Any) -> Any:
+def compiled(function: Callable | None = None, *, allocates: bool = True, **options: Any) -> Any:
     """`numba.njit` with its options, as a decorator with or without them, for functions at the top of a module.
 
-    A division by zero gives infinity or NaN, as in NumPy.
+    A division by zero gives infinity or NaN, as in NumPy. A function that makes no array and is called a million times
+    says `allocates=False`: then it counts no references to those it reads, which cost a tenth of its time.
 
     >>> @compiled(fastmath=True)
     ... def half(x):
@@ -29,10 +30,12 @@ def compiled(function: Callable | None = None, **options: Any) -> Any:
     1.5
     """
     if function is None:
-        return functools.partial(compiled, **options)
+        return functools.partial(compiled, allocates=allocates, **options)
     import numba  # not before it is needed: the command line shows its help without
 
     options = {"error_model": "numpy", "no_cfunc_wrapper": True} | options  # both only for what is compiled sooner
+    if not allocates:
+        options["_nrt"] = False
     file = Path(function.__code__.co_filename)
     if numba.config.DISABLE_JIT or not file.is_file():
         return numba.njit(**options)(function)
