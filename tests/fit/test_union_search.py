@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.union.candidates import best_rectangles, gains_enough
+from hiproof.fit.union.candidates import best_rectangles, gains_at_places
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
 from hiproof.fit.union.improve import improve, simplify, surroundings
 from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
-from hiproof.fit.union.moves import refit_each, settled
+from hiproof.fit.union.moves import best_plane, refit_each, settled
 from hiproof.fit.union.objective import BASE_SHARE, costs, edges_cost, objective
-from hiproof.fit.union.refit import refit
+from hiproof.fit.union.refit import refit, where_it_may_show
 from hiproof.fit.union.scene import nodes
 from hiproof.fit.union.steps import (
     AT_CORNER_M,
@@ -48,6 +48,7 @@ from hiproof.fit.union.volumes import (
     coefficients,
     equalise_slopes,
     is_allowed,
+    lowest,
     lowest_plane,
     roof_heights,
     volume_cost,
@@ -487,9 +488,25 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
 
 
 def gains_in(scene, candidates, m, cells, cost_now, z_now, replacing, gain):
-    """All that candidate m gains, by cell, never given up."""
-    places, nothing_left = tuple(cell[int(candidates[m, DIRECTION])] for cell in cells), np.zeros(len(z_now) + 1)
-    assert gains_enough(scene, candidates, m, places, cost_now, nothing_left, z_now, replacing, -np.inf, gain)
+    """All that candidate m gains, by cell."""
+    by_place = np.empty(len(z_now))
+    above = np.full(len(z_now), -np.inf) if replacing else z_now + 1e-9
+    total = gains_at_places(scene, candidates, m, cost_now, above, by_place)
+    assert total == pytest.approx(by_place[by_place > 0.0].sum())
+    np.add.at(gain, tuple(cell[int(candidates[m, DIRECTION])] for cell in cells), by_place)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_volume_may_show_where_it_is_the_top_of_the_roof(seed):
+    """`where_it_may_show` says of the heights of a volume what `roof_heights` makes of them."""
+    _, volumes, scene = drawn(seed)
+    n = scene.n
+    _, top = roof_heights(volumes, scene.U, scene.V)
+    for k in range(len(volumes)):
+        above, not_below = where_it_may_show(volumes, scene.U, scene.V, n, k)
+        direction, c = int(volumes[k, DIRECTION]), coefficients(volumes, k)
+        h = np.array([lowest(c, u, v) for u, v in zip(scene.U[direction, :n], scene.V[direction, :n], strict=True)])
+        assert ((h > above) & (h >= not_below)).tolist() == (top[:n] == k).tolist()
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -506,6 +523,28 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
     cost = costs(h, scene)
     cost[: scene.n][cost[: scene.n] >= 1.0] += 0.02  # what covers a point without explaining it
     assert gain[0, 0] == pytest.approx((cost_now - cost)[h > z_now + 1e-9].sum())
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_further_plane_gains_what_the_points_then_cost_less(seed):
+    rng, _, scene = drawn(seed)
+    volumes = random_volumes(rng)
+    volumes[1:, REPLACES] = 0.0
+    z_now, _ = roof_heights(volumes, scene.U, scene.V)
+    for k in range(1, len(volumes)):
+        everywhere, beneath = with_and_without(volumes, scene.U, scene.V, k)
+        for plane in np.nonzero(volumes[k, OFFSET : OFFSET + PLANES] == np.inf)[0]:
+            slopes = SLOPES if plane < LEVEL else np.zeros(1)
+            gain, slope, offset = best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath, 0.0)
+            assert gain > 0.0 or (slope, offset) == (0.0, 0.0)
+            trial = volumes.copy()
+            if gain > 0.0:
+                trial[k, OFFSET + plane] = offset
+            if plane < LEVEL:
+                trial[k, SLOPE + plane] = slope
+            z_then, _ = roof_heights(trial, scene.U, scene.V)
+            less = costs(z_now, scene)[: scene.n].sum() - costs(z_then, scene)[: scene.n].sum()
+            assert gain == pytest.approx(less, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(6))

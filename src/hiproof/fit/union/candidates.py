@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...compiled import compiled
-from .objective import place_cost
+from .objective import ghost_cost, point_cost
 from .plan import cells_of
 from .planes import (
     Cloud,
@@ -46,6 +46,7 @@ RIDGE_INSIDE_M = 0.4  # m that a ridge lies inside the rectangle; nearer to an e
 MOST_TOPS, MOST_PAIRS = 2, 3  # level tops and pairs of slopes, strongest first, that make hips and mansards
 SAME_SLOPE = 1e-6  # rise over run; numerically equal
 WRONG_COVER = 0.02  # of a point: what covering one without explaining it costs
+LEAST_ABOVE_M = 1e-9  # m by which a volume has to be the higher one: numerically none
 NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 
 
@@ -171,24 +172,22 @@ def best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, r
     cannot come near the best found are left out (minus infinity).
     """
     gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
-    threshold, left = 0.0, np.zeros(len(cost_now) + 1)  # what is left to gain at each point and those after it
-    for i in range(len(cost_now) - 1, -1, -1):
-        left[i] = left[i + 1] + cost_now[i]
+    above, gain = np.full(len(z_now), -np.inf) if replacing else z_now + LEAST_ABOVE_M, np.empty(len(z_now))
+    threshold, most = 0.0, cost_now.sum()
     for m in range(len(candidates)):
         direction = int(candidates[m, DIRECTION])
-        nu, nv = shape[direction]
-        cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
         price = scene.evidence * (volume_cost(candidates[m]) + NEW_EDGES)
         least = price + threshold
-        if left[0] <= least:
+        if most <= least or gains_at_places(scene, candidates, m, cost_now, above, gain) <= least:
             continue
-        places = cell_u[direction], cell_v[direction]
-        if not gains_enough(scene, candidates, m, places, cost_now, left, z_now, replacing, least, cells):
-            continue
+        nu, nv = shape[direction]
+        cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
+        for i in range(len(gain)):
+            cells[cell_u[direction, i], cell_v[direction, i]] += gain[i]
         reach_of_rows(cells, reach)
-        if reach[0] <= price + threshold:
+        if reach[0] <= least:
             continue
-        score, i0, i1, j0, j1 = best_rectangle(cells, max(price + threshold, 1e-6), reach, column)
+        score, i0, i1, j0, j1 = best_rectangle(cells, max(least, 1e-6), reach, column)
         if i1 > i0:
             gains[m] = score - price
             rectangles[m] = (i0, i1, j0, j1)
@@ -197,23 +196,31 @@ def best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, r
 
 
 @compiled
-def gains_enough(scene, candidates, m, places, cost_now, left, z_now, replacing, least, cells):
-    """Whether the gains of candidate m at points and ghosts sum up to more than `least`; then `cells` holds them by cell.
+def gains_at_places(scene, candidates, m, cost_now, above, gain):
+    """Fill `gain` (n + g,) with what candidate m saves at points and ghosts where it is higher than `above` (n + g,); returns the sum
+    over those that gain.
 
-    It is given up as soon as what is `left` to gain cannot do.
+    Loops without branches over arrays of their own: a processor does several places at once.
     """
-    direction = int(candidates[m, DIRECTION])
-    c = coefficients(candidates, m)
-    u, v, (i_of, j_of) = scene.U[direction], scene.V[direction], places
-    gained = 0.0
-    for i in range(len(z_now)):
-        if gained + left[i] <= least:
-            return False
+    direction, n, c = int(candidates[m, DIRECTION]), scene.n, coefficients(candidates, m)
+    u, v, z = scene.U[direction], scene.V[direction], scene.z
+    dead, width = scene.dead, scene.width
+    for i in range(n):
         h = lowest(c, u[i], v[i])
-        if h <= z_now[i] + 1e-9 and not replacing:
-            continue
-        cost = place_cost(scene, i, h)
-        gain = cost_now[i] - (cost + WRONG_COVER if i < scene.n and cost >= 1.0 else cost)
-        cells[i_of[i], j_of[i]] += gain
-        gained += max(gain, 0.0)
-    return gained > least
+        cost = point_cost(z[i], h, dead, width)
+        gain[i] = cost_now[i] - (cost if cost < 1.0 else 1.0 + WRONG_COVER) if h > above[i] else 0.0
+    u, v, weight, shade = u[n:], v[n:], scene.weight[n:], scene.shade[n:]
+    low, high = scene.low, scene.high
+    before, above, saved = cost_now[n:], above[n:], gain[n:]
+    for i in range(len(u)):
+        h = lowest(c, u[i], v[i])
+        saved[i] = before[i] - ghost_cost(h, weight[i], shade[i], low, high) if h > above[i] else 0.0
+    return sum_of_gains(gain)
+
+
+@compiled(fastmath=True)
+def sum_of_gains(gain):
+    total = 0.0
+    for x in gain:
+        total += max(x, 0.0)
+    return total

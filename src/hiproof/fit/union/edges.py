@@ -41,16 +41,19 @@ EVERYWHERE = 60.0  # m: no edge is further from where it may go
 def move_edges(volumes, scene, k, value, reach):
     """Move each edge of volume k (in place) by at most `reach` to the place of the lowest objective; returns that."""
     everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
-    before = costs(without, scene)
-    gain = np.where(everywhere != without, costs(everywhere, scene) - before, 0.0)
-    base = volumes[0, OFFSET + LEVEL]
-    bare = np.where((without == base) & (everywhere != base), scene.weight, 0.0)
-    bare[: scene.n] = 0.0
-    always_bare = scene.weight[scene.n :][without[scene.n :] == base].sum()
+    before, gain, bare = costs(without, scene), costs(everywhere, scene), np.zeros(len(without))
+    base, always_bare = volumes[0, OFFSET + LEVEL], 0.0
+    for i in range(len(gain)):
+        gain[i] = gain[i] - before[i] if everywhere[i] != without[i] else 0.0
+    for i in range(scene.n, len(bare)):
+        if without[i] == base:
+            always_bare += scene.weight[i]
+            bare[i] = scene.weight[i] if everywhere[i] != base else 0.0
     fixed = before.sum()
     for j in range(1, len(volumes)):
         fixed += scene.evidence * volume_cost(volumes[j])
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
+    touched = np.zeros((len(volumes), 4), np.bool_)
     walls, is_charged = walls_of(scene), False
     for edge in range(4):
         places, m = places_of(volumes, scene, k, edge)
@@ -61,17 +64,18 @@ def move_edges(volumes, scene, k, value, reach):
         best, chosen = value - LEAST_GAIN, start
         for q in range(m + 1):
             t = places[q]
-            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M or is_repeated(places, q):
+            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
                 continue
             p = np.searchsorted(distance, sign * t, side="right")
             trial = fixed + (gains[p - 1] if p > 0 else 0.0)
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
                 trial += scene.evidence * BASE_COST
-            if trial >= best:
+            if trial >= best or is_repeated(places, q):
                 continue
             if not is_charged:
-                charge, is_charged = charge_all(volumes, walls, int(volumes[k, DIRECTION]), boxes), True
-            trial = charged(volumes, walls, k, edge, t, trial, best, charge, boxes)
+                is_charged = True
+                charge_all(volumes, walls, int(volumes[k, DIRECTION]), charge, boxes)
+            trial = charged(volumes, walls, k, edge, t, trial, best, charge, boxes, touched)
             if trial < best:
                 best, chosen = trial, t
         if chosen != start:
@@ -90,11 +94,18 @@ def sums_outward(volumes, scene, k, edge, gain, bare):
     low, high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     sign, opposite, count = (-1.0 if edge % 2 == 0 else 1.0), volumes[k, U0 + (edge ^ 1)], len(order)
     distance, gains, covered = np.empty(count), np.empty(count), np.empty(count)
+    first, last = 0, count  # of the order, where the way begins: found by halving
+    while first < last:
+        q = (first + last) // 2
+        if sign * (x[order[q if edge % 2 == 1 else count - 1 - q]] - opposite) >= 0.0:
+            last = q
+        else:
+            first = q + 1
     gained = bared = 0.0
     m = 0
-    for q in range(count):
-        i = order[q] if edge % 2 == 1 else order[count - 1 - q]
-        if low <= across[i] <= high and sign * (x[i] - opposite) >= 0.0:
+    for q in range(first, count):
+        i = order[q if edge % 2 == 1 else count - 1 - q]
+        if low <= across[i] <= high:
             gained += gain[i]
             bared += bare[i]
             distance[m], gains[m], covered[m] = sign * x[i], gained, bared
@@ -157,12 +168,12 @@ def is_repeated(places, q):
     return False
 
 
-@compiled
-def charge_all(volumes, walls, direction, boxes):
-    """The cost of every edge (k, 4); its bounds in the axes of `direction`, none where it lies outside the outline, go to `boxes`
-    (k, 4, 4)."""
-    c, s = walls.turn[direction]
-    charge = np.zeros((len(volumes), 4))
+@compiled(allocates=False)
+def charge_all(volumes, walls, direction, charge, boxes):
+    """Fill `charge` (k, 4) with the cost of every edge, and `boxes` (k, 4, 4) with its bounds in the axes of `direction`, none where it
+    lies outside the outline."""
+    c, s = walls.turn[direction, 0], walls.turn[direction, 1]
+    charge[:] = 0.0
     for j in range(1, len(volumes)):
         other = int(volumes[j, DIRECTION])
         cosine = walls.turn[other, 0] * c + walls.turn[other, 1] * s
@@ -179,25 +190,26 @@ def charge_all(volumes, walls, direction, boxes):
                 x, y = cosine * a - sine * b, sine * a + cosine * b
                 boxes[j, e, 0], boxes[j, e, 1] = min(boxes[j, e, 0], x), max(boxes[j, e, 1], x)
                 boxes[j, e, 2], boxes[j, e, 3] = min(boxes[j, e, 2], y), max(boxes[j, e, 3], y)
-    return charge
 
 
-@compiled
-def charged(volumes, walls, k, edge, t, trial, best, charge, boxes):
-    """`trial` and all edges' costs were edge `edge` of volume k at `t`; given up as soon as it is not below `best`."""
+@compiled(allocates=False)
+def charged(volumes, walls, k, edge, t, trial, best, charge, boxes, touched):
+    """`trial` and all edges' costs were edge `edge` of volume k at `t`; given up as soon as it is not below `best`.
+
+    Which edges (k, 4) the move touches goes to `touched`.
+    """
     start = volumes[k, U0 + edge]
     low, high = min(start, t) - TOUCH_M, max(start, t) + TOUCH_M
     cross_low, cross_high = (volumes[k, V0], volumes[k, V1]) if edge < 2 else (volumes[k, U0], volumes[k, U1])
     along, cross = (0, 2) if edge < 2 else (2, 0)
-    touched = np.zeros((len(volumes), 4), np.bool_)
     for j in range(1, len(volumes)):
         for e in range(4):
             if j == k:
                 touched[j, e] = e == edge or (e != edge ^ 1 and boxes[j, e, 0] < np.inf)
             else:
-                box = boxes[j, e]
-                meets = box[along] <= high and box[along + 1] >= low
-                touched[j, e] = meets and box[cross] <= cross_high + TOUCH_M and box[cross + 1] >= cross_low - TOUCH_M
+                meets = boxes[j, e, along] <= high and boxes[j, e, along + 1] >= low
+                beside = boxes[j, e, cross] <= cross_high + TOUCH_M and boxes[j, e, cross + 1] >= cross_low - TOUCH_M
+                touched[j, e] = meets and beside
             if not touched[j, e]:
                 trial += walls.evidence * charge[j, e]
     volumes[k, U0 + edge] = t

@@ -28,8 +28,8 @@ from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0
 
 AROUND_M = 0.5  # volumes nearer than this take part in each other's surroundings
 DIGEST_STEP = 0.02  # of metres and of slopes: changes smaller than this are none
-# of a digest: primes whose product float64 holds, and m above which all heights are one
-DIGEST_FACTOR, DIGEST_PRIME, HIGH_ABOVE = 1_000_003.0, 2_147_483_647.0, 1e5
+# of a digest: an odd number that spreads bits well, the bits that a float64 holds, and m above which all heights are one
+DIGEST_FACTOR, DIGEST_BITS, HIGH_ABOVE = 6_364_136_223_846_793_005, (1 << 52) - 1, 1e5
 
 
 @compiled
@@ -104,12 +104,13 @@ def surroundings(volumes, k):
             or volumes[j, V1] < volumes[k, V0] - AROUND_M
         ):
             continue
-        term = 1.0
+        term = 1
         for q in range(SETTLED):
-            x = volumes[j, q]
-            term = (term * DIGEST_FACTOR + math.floor(min(x, HIGH_ABOVE) / DIGEST_STEP + 0.5)) % DIGEST_PRIME
+            x = min(volumes[j, q], HIGH_ABOVE) / DIGEST_STEP
+            term = (term + math.floor(x + 0.5)) * DIGEST_FACTOR
+            term ^= term >> 29
         total += term
-    return total + 1.0
+    return float(total & DIGEST_BITS) + 1.0
 
 
 @compiled

@@ -19,34 +19,27 @@ from .volumes import BASE_COST, is_allowed, roof_heights, volume_cost
 BASE_SHARE = 0.01  # of the outline's area: the base costs nothing where less of it shows
 
 
-@compiled
+@compiled(inline="always")
 def point_cost(z_point, z_roof, dead, width):
     r = max(abs(z_point - z_roof) - dead, 0.0) / width
     r *= r
     return r if r < 1.0 else 1.0
 
 
-@compiled
+@compiled(inline="always")
 def ghost_cost(z_roof, weight, shade, low, high):
-    if z_roof < low or z_roof > high:
-        return weight
-    return shade * (z_roof - low) / (high - low)
-
-
-@compiled
-def place_cost(scene, i, z_roof):
-    """Cost of point or ghost i under a roof `z_roof` high there."""
-    if i < scene.n:
-        return point_cost(scene.z[i], z_roof, scene.dead, scene.width)
-    return ghost_cost(z_roof, scene.weight[i], scene.shade[i], scene.low, scene.high)
+    return weight if (z_roof < low) | (z_roof > high) else shade * (z_roof - low) / (high - low)
 
 
 @compiled
 def costs(z, scene):
     """Cost (n + g,) of every point and ghost under roof heights `z` (n + g,)."""
-    cost = np.empty(len(z))
-    for i in range(len(z)):
-        cost[i] = place_cost(scene, i, z[i])
+    cost, n = np.empty(len(z)), scene.n
+    for i in range(n):
+        cost[i] = point_cost(scene.z[i], z[i], scene.dead, scene.width)
+    over, weight, shade, of_ghosts = z[n:], scene.weight[n:], scene.shade[n:], cost[n:]
+    for i in range(len(over)):
+        of_ghosts[i] = ghost_cost(over[i], weight[i], shade[i], scene.low, scene.high)
     return cost
 
 

@@ -36,57 +36,63 @@ LEAST_WEIGHT, LEAST_SLOPE_WEIGHT, LEAST_SPREAD_M2 = 1.0, 2.0, 0.02
 @compiled
 def refit(volumes, scene, k):
     """Two rounds of biweighted least squares for volume k (in place) on the points where it is the one that shows."""
-    direction = int(volumes[k, DIRECTION])
-    u, v, z_points = scene.U[direction], scene.V[direction], scene.z
-    members, above, not_below = where_it_may_show(volumes, scene.U, scene.V, scene.n, k)
+    direction, n = int(volumes[k, DIRECTION]), scene.n
+    u, v, z = scene.U[direction, :n], scene.V[direction, :n], scene.z[:n]
+    above, not_below = where_it_may_show(volumes, scene.U, scene.V, n, k)
+    weights = np.empty(n)
     for turn in range(ROUNDS):
         scale = (scene.dead + scene.width) * (2.0 if turn == 0 else 1.5)
-        sums = np.zeros((5, PLANES))  # w, w x, w z, w x x, w x z of each plane
         c = coefficients(volumes, k)
-        for m in range(len(members)):
-            i = members[m]
+        for i in range(n):  # no branches: a processor does several points at once
             h = lowest(c, u[i], v[i])
-            if not (h > above[m] and h >= not_below[m] and abs(z_points[i] - h) < scale):
-                continue
+            w = 1.0 - ((z[i] - h) / scale) ** 2
+            weights[i] = w * w if (h > above[i]) & (h >= not_below[i]) & (abs(z[i] - h) < scale) else 0.0
+        solve_planes(volumes[k], sums_by_plane(volumes, k, c, u, v, z, weights))
+
+
+@compiled
+def sums_by_plane(volumes, k, c, u, v, z, weights):
+    """Sums (5, PLANES) of w, w x, w z, w x x, w x z over the points that each plane of volume k is the lowest at."""
+    sums = np.zeros((5, PLANES))
+    for i in range(len(u)):
+        w = weights[i]
+        if w > 0.0:
             _, plane = lowest_plane(c, u[i], v[i])
-            w = (1.0 - ((z_points[i] - h) / scale) ** 2) ** 2
             x = distance_up(volumes[k], plane, u[i], v[i]) if plane < LEVEL else 0.0
             sums[0, plane] += w
             sums[1, plane] += w * x
-            sums[2, plane] += w * z_points[i]
+            sums[2, plane] += w * z[i]
             sums[3, plane] += w * x * x
-            sums[4, plane] += w * x * z_points[i]
-        solve_planes(volumes[k], sums)
+            sums[4, plane] += w * x * z[i]
+    return sums
 
 
 @compiled
 def where_it_may_show(volumes, U, V, n, k):
-    """Which of the first n points at U, V lie in the rectangle of volume k with none over them that replaces it, and how high it has
-    to be to show there: above one height (m,) and not below another (m,)."""
-    own = int(volumes[k, DIRECTION])
-    members, above, not_below = np.empty(n, np.int64), np.empty(n), np.empty(n)
-    m = 0
+    """How high volume k has to be at the first n points of U, V to show there: above one height (n,) and not below another (n,), which is
+    infinite outside its rectangle and where another replaces it."""
+    above, not_below = np.full(n, -np.inf), np.empty(n)
+    u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
+    u0, u1, v0, v1 = volumes[k, U0], volumes[k, U1], volumes[k, V0], volumes[k, V1]
     for i in range(n):
-        if volumes[k, U0] <= U[own, i] <= volumes[k, U1] and volumes[k, V0] <= V[own, i] <= volumes[k, V1]:
-            members[m], above[m], not_below[m] = i, -np.inf, -np.inf
-            m += 1
-    for j in range(len(volumes)):
+        not_below[i] = -np.inf if (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1) else np.inf
+    for j in range(0 if volumes[k, REPLACES] == 0.0 else k, len(volumes)):
         if j == k:
-            if volumes[k, REPLACES] > 0.0:
-                above[:m] = -np.inf
             continue
-        direction, replaces, c = int(volumes[j, DIRECTION]), volumes[j, REPLACES] > 0.0, coefficients(volumes, j)
-        u, v = U[direction], V[direction]
+        u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
         u0, u1, v0, v1 = volumes[j, U0], volumes[j, U1], volumes[j, V0], volumes[j, V1]
-        for q in range(m):
-            i = members[q]
-            if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
-                if j > k:
-                    not_below[q] = np.inf if replaces else max(not_below[q], lowest(c, u[i], v[i]))
-                else:
-                    h = lowest(c, u[i], v[i])
-                    above[q] = h if replaces else max(above[q], h)
-    return members[:m], above[:m], not_below[:m]
+        replaces, c = volumes[j, REPLACES] > 0.0, coefficients(volumes, j)
+        if j < k:
+            for i in range(n):
+                h = lowest(c, u[i], v[i])
+                there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1)
+                above[i] = h if there & (replaces | (h > above[i])) else above[i]
+            continue
+        for i in range(n):
+            h = np.inf if replaces else lowest(c, u[i], v[i])
+            there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1)
+            not_below[i] = h if there & (h > not_below[i]) else not_below[i]
+    return above, not_below
 
 
 @compiled

@@ -24,34 +24,46 @@ SAMPLE_M, MOST_SAMPLES = 0.5, 40
 TOUCH_M = 0.03  # m; a volume that reaches so near covers the place
 
 
-# Of a scene what the cost of edges depends on, and room (3, MOST_SAMPLES) to work in; fewer arrays are fewer to count references
-# of, a million times.
-Walls = namedtuple("Walls", "turn depth corner_u corner_v pitch vertices corners room prices evidence")
+# Of a scene what the cost of edges depends on, and room (MOST_SAMPLES,) to work in: where the samples of an edge are, and the heights on
+# either side of it. Fewer arrays are fewer to count references of, a million times.
+Walls = namedtuple("Walls", "turn depth corner_u corner_v pitch vertices corners places inside outside prices evidence")
 
 
 @compiled
 def walls_of(scene):
     where = scene.corner_u, scene.corner_v, scene.pitch
     corners, prices = (scene.vertices, scene.corners), scene.edge_prices
-    return Walls(scene.turn, scene.depth, *where, *corners, np.empty((3, MOST_SAMPLES)), prices, scene.evidence)
+    room = np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES)
+    return Walls(scene.turn, scene.depth, *where, *corners, *room, prices, scene.evidence)
 
 
-@compiled
+@compiled(allocates=False)
 def edge_cost(volumes, walls, k, edge):
     """Units of complexity for what shows of one edge (0 u low, 1 u high, 2 v low, 3 v high) of volume k."""
     direction, axis, at = int(volumes[k, DIRECTION]), edge // 2, volumes[k, U0 + edge]
     inside, in_line = among_vertices(walls, direction, axis, at)
     if not inside:
         return 0.0
+    m, step = samples_inside(volumes, walls, k, edge)
+    if m == 0:
+        return 0.0
+    heights_beside(volumes, walls, k, edge, m)
     any_step, a_metre, low_a_metre, low_step, loose, at_corner = walls.prices
-    first, last, shown, low = what_shows(volumes, walls, k, edge, low_step)
+    shown = low = 0.0
+    for q in range(m):
+        gap = abs(walls.inside[q] - walls.outside[q])
+        if gap > STEP_M:
+            shown += step
+            if gap < low_step:
+                low += step
     if shown == 0.0:
         return 0.0
+    first, last = walls.places[0], walls.places[m - 1]
     once = any_step + (-at_corner * ends_at_corners(walls, direction, axis, at, first, last) if in_line else loose)
     return once * min(shown / WHOLE_STEP_M, 1.0) + a_metre * shown + low_a_metre * low
 
 
-@compiled
+@compiled(inline="always")
 def among_vertices(walls, direction, axis, at):
     """Whether a line of one axis of a direction comes far enough inside the outline for a step to show there, and whether it is in line
     with one of the outline's vertices."""
@@ -67,54 +79,40 @@ def among_vertices(walls, direction, axis, at):
     return min(at - low, high - at) + off_a_node >= INSIDE_M, in_line
 
 
-@compiled
-def what_shows(volumes, walls, k, edge, low_step):
-    """Of an edge of volume k where its samples inside the outline begin and end, for how many metres it shows there, and for how
-    many with a step of less than `low_step`."""
-    across = U0 + 2 - 2 * (edge // 2)
+@compiled(inline="always")
+def samples_inside(volumes, walls, k, edge):
+    """How many of an edge's samples are inside the outline, and m from one to the next; where along the edge they are goes to
+    walls.places."""
+    own, at, across = int(volumes[k, DIRECTION]), volumes[k, U0 + edge], U0 + 2 - 2 * (edge // 2)
     start, length = volumes[k, across], volumes[k, across + 1] - volumes[k, across]
     count = min(MOST_SAMPLES, max(2, int(length / SAMPLE_M) + 1))
     step = length / count
-    places = walls.room[0]
-    m = samples_inside(volumes, walls, k, edge, start, step, count)
-    if m == 0:
-        return 0.0, 0.0, 0.0, 0.0
-    heights_beside(volumes, walls.turn, k, edge, places[:m], walls.room[1], walls.room[2])
-    shown = low = 0.0
-    for q in range(m):
-        gap = abs(walls.room[1, q] - walls.room[2, q])
-        if gap > STEP_M:
-            shown += step
-            if gap < low_step:
-                low += step
-    return places[0], places[m - 1], shown, low
-
-
-@compiled
-def samples_inside(volumes, walls, k, edge, start, step, count):
-    """How many of an edge's `count` samples are inside the outline; where along the edge they are goes to walls.room[0]."""
-    own, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
     c, s = walls.turn[own, 0], walls.turn[own, 1]
-    m = 0
+    rows, columns, m = walls.inside, walls.outside, 0  # of the raster; the heights come later
     for q in range(count):
         t = start + (q + 0.5) * step
         a, b = (at, t) if edge < 2 else (t, at)
-        i = math.floor((c * a - s * b - walls.corner_u) / walls.pitch + 0.5)
-        j = math.floor((s * a + c * b - walls.corner_v) / walls.pitch + 0.5)
+        rows[q] = math.floor((c * a - s * b - walls.corner_u) / walls.pitch + 0.5)
+        columns[q] = math.floor((s * a + c * b - walls.corner_v) / walls.pitch + 0.5)
+    for q in range(count):
+        i, j = int(rows[q]), int(columns[q])
         if 0 <= i < walls.depth.shape[0] and 0 <= j < walls.depth.shape[1] and walls.depth[i, j] >= INSIDE_M:
-            walls.room[0, m] = t
+            walls.places[m] = start + (q + 0.5) * step
             m += 1
-    return m
+    return m, step
 
 
-@compiled
-def heights_beside(volumes, turn, k, edge, places, inside, outside):
-    """Fill `inside` and `outside` with the heights just inside and just outside of volume k at `places` (m,) along its edge.
+@compiled(inline="always")
+def heights_beside(volumes, walls, k, edge, m):
+    """Fill walls.inside and walls.outside with the heights just inside and just outside of volume k at the first `m` of walls.places.
 
     All places in one volume after another, so that a processor does several at once.
     """
-    own, at, m = int(volumes[k, DIRECTION]), volumes[k, U0 + edge], len(places)
-    inside[:m] = outside[:m] = -np.inf
+    own, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
+    places, inside, outside, turn = walls.places, walls.inside, walls.outside, walls.turn
+    first, last = places[0], places[m - 1]
+    for q in range(m):
+        inside[q] = outside[q] = -np.inf
     for j in range(len(volumes)):
         other, cosine, sine = int(volumes[j, DIRECTION]), 1.0, 0.0
         if other != own:
@@ -124,7 +122,7 @@ def heights_beside(volumes, turn, k, edge, places, inside, outside):
         a0, a, b0, b = (cosine * at, sine, -sine * at, cosine) if edge < 2 else (sine * at, cosine, cosine * at, -sine)
         u0, u1 = volumes[j, U0] - TOUCH_M, volumes[j, U1] + TOUCH_M
         v0, v1 = volumes[j, V0] - TOUCH_M, volumes[j, V1] + TOUCH_M
-        ends_u, ends_v = (a0 + a * places[0], a0 + a * places[-1]), (b0 + b * places[0], b0 + b * places[-1])
+        ends_u, ends_v = (a0 + a * first, a0 + a * last), (b0 + b * first, b0 + b * last)
         if j != k and (max(ends_u) < u0 or min(ends_u) > u1 or max(ends_v) < v0 or min(ends_v) > v1):
             continue
         c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
@@ -141,7 +139,7 @@ def heights_beside(volumes, turn, k, edge, places, inside, outside):
             outside[q] = h if there & (replaces | (h > outside[q])) else outside[q]
 
 
-@compiled
+@compiled(allocates=False)
 def ends_at_corners(walls, direction, axis, at, first, last):
     """How many of the two ends of what lies of the line `at` inside the outline are at corners of it."""
     low = high = 0

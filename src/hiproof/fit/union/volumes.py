@@ -66,12 +66,13 @@ def lowest(c, u, v):
 @compiled
 def lowest_plane(c, u, v):
     """Height at u, v and which of the planes is the lowest there."""
+    z0, z1 = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
+    z2, z3 = c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u
     best, plane = c[4], LEVEL
-    along = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
-    across = c[2] + c[7] * v + c[11] * u, c[3] - c[8] * v + c[12] * u
-    for k, z in enumerate((along[0], along[1], across[0], across[1])):
-        if z < best:
-            best, plane = z, k
+    best, plane = (z0, 0) if z0 < best else (best, plane)
+    best, plane = (z1, 1) if z1 < best else (best, plane)
+    best, plane = (z2, 2) if z2 < best else (best, plane)
+    best, plane = (z3, 3) if z3 < best else (best, plane)
     return best, plane
 
 
@@ -97,11 +98,10 @@ def roof_heights(volumes, U, V):
         u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
         u0, u1, v0, v1 = volumes[k, U0], volumes[k, U1], volumes[k, V0], volumes[k, V1]
         c, replaces = coefficients(volumes, k), volumes[k, REPLACES] > 0.0
-        for i in range(n):
-            if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
-                h = lowest(c, u[i], v[i])
-                if h > z[i] or replaces:
-                    z[i], top[i] = h, k
+        for i in range(n):  # no branches: a processor does several points at once
+            h = lowest(c, u[i], v[i])
+            there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1) & (replaces | (h > z[i]))
+            z[i], top[i] = h if there else z[i], k if there else top[i]
     return z, top
 
 
@@ -117,13 +117,13 @@ def with_and_without(volumes, U, V, k):
         if j == k:
             for i in range(n):
                 h = lowest(c, u[i], v[i])
-                everywhere[i] = h if replaces else max(h, without[i])
+                everywhere[i] = h if replaces | (h > without[i]) else without[i]
             continue
         for i in range(n):
-            if u0 <= u[i] <= u1 and v0 <= v[i] <= v1:
-                h = lowest(c, u[i], v[i])
-                without[i] = h if replaces else max(h, without[i])
-                everywhere[i] = h if replaces else max(h, everywhere[i])
+            h = lowest(c, u[i], v[i])
+            there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1)
+            without[i] = h if there & (replaces | (h > without[i])) else without[i]
+            everywhere[i] = h if there & (replaces | (h > everywhere[i])) else everywhere[i]
     return everywhere, without
 
 
