@@ -8,7 +8,7 @@ the eaves on the outline are at one height. Everything is linear in c and s, so 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -35,7 +35,7 @@ ROUNDS = 3  # of fitting and re-weighting
 FEWEST_POINTS = 6  # points; with fewer a volume's planes stay as the search found them
 FACING_GAIN = 0.1  # units: planes face other than along the axes only where that explains so much more
 LEVEL_SLACK = 0.004  # of the points: what level eaves, or what volumes agree in, may leave unexplained besides the parameters saved
-SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+SIGN = (1.0, -1.0, 1.0, -1.0)
 FLATTEST = 0.02  # rise over run; a flatter plane does not tell which way it faces
 SQUARE = 1e-3  # a side that leans less is square to the others
 
@@ -76,11 +76,10 @@ def shown_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
 
 def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members: np.ndarray) -> Planes:
     """One volume's planes from the points `members` (m,) over which it shows."""
-    start = planes_as_found(volume)
-    there = np.isfinite(volume[OFFSET : OFFSET + LEVEL + 1])
+    there = np.flatnonzero(volume[OFFSET : OFFSET + LEVEL + 1] < np.inf).tolist()
     direction = int(volume[DIRECTION])
-    points = np.stack([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
-    start = replace(start, cost=cost_of(start.rows, points, scene.dead, scene.width))
+    points = np.array([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
+    start = planes_as_found(volume, there, points, scene)
     if len(members) < FEWEST_POINTS:
         return start
     base = scene.evidence * PARAMETER_COST
@@ -92,16 +91,16 @@ def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members
             found = fitted(start, design_of(volume, sides, leans, there, level=()), points, scene)
             if found.cost + FACING_GAIN * base < best.cost - 1e-9:
                 best, facing = found, leans
-    anchored = tuple(k for k in range(SIDES) if there[k] and sides[k].anchored)
+    anchored = tuple(k for k in there if k < LEVEL and sides[k].anchored)
     if len(anchored) > 1:
         square = own_leans(sides, anchored, facing)
         found = fitted(best, design_of(volume, sides, square, there, anchored), points, scene)
         if found.cost <= best.cost + base * (len(anchored) - 1) + LEVEL_SLACK * len(members):
             best = found
-    if there[:SIDES].all() and not there[LEVEL]:
+    if there == [*range(SIDES)]:
         leans = own_leans(sides, (0, 1, 2, 3), facing)
         found = fitted(best, one_apex(sides, leans), points, scene)
-        saved = max(len(set(slope_groups(volume, there))) - 1, 0)
+        saved = max(len(set(slope_groups(volume))) - 1, 0)
         if found.cost <= best.cost + base * saved + LEVEL_SLACK * len(members):
             best = found
     return best
@@ -119,26 +118,25 @@ def one_apex(sides: list[Side], leans: tuple[float, ...]) -> np.ndarray:
     return design
 
 
-def planes_as_found(volume: np.ndarray) -> Planes:
-    """The planes that the search left, along the axes."""
-    rows = np.full((5, 3), np.nan)
-    for k in range(SIDES + 1):
-        if volume[OFFSET + k] < np.inf:
-            rows[k] = (0.0, 0.0, volume[OFFSET + k])
-            if k < LEVEL:
-                rows[k, k // 2] = SIGN[k] * volume[SLOPE + k]
-                rows[k, 1 - k // 2] = volume[SLOPE + k] * volume[LEAN + k]
-    return Planes(rows, np.inf, np.zeros((SIDES + 1, 3, 0)), np.zeros((0, 0)))
+def planes_as_found(volume: np.ndarray, there: list[int], points: np.ndarray, scene: Scene) -> Planes:
+    """The planes that the search left, along the axes, over their `points` (3, m)."""
+    rows = np.full((SIDES + 1, 3), np.nan)
+    for k in there:
+        rows[k] = (0.0, 0.0, volume[OFFSET + k])
+        if k < LEVEL:
+            rows[k, k // 2] = SIGN[k] * volume[SLOPE + k]
+            rows[k, 1 - k // 2] = volume[SLOPE + k] * volume[LEAN + k]
+    cost = cost_of(rows, points, scene.dead, scene.width)
+    return Planes(rows, cost, np.zeros((SIDES + 1, 3, 0)), np.zeros((0, 0)))
 
 
-def facings(found: np.ndarray, sides: list[Side], there: np.ndarray, pair: int) -> list[tuple[float, float]]:
+def facings(found: np.ndarray, sides: list[Side], there: list[int], pair: int) -> list[tuple[float, float]]:
     """Ways (2 leans each) for planes `pair` and the next to face other than along the axis: as `found` (4,), square to their
-    sides or both to one of them."""
+    sides or both to one of them. A plane that is not `there` has no lean."""
     one, other = (0.0 if abs(side.lean) < SQUARE else side.lean for side in sides[pair : pair + 2])
-    ways = [(float(found[pair]), float(found[pair + 1]))]
-    if there[pair] or there[pair + 1]:
-        ways += [(-one, other), (-one, one), (-other, other)]
-    return [way for way in dict.fromkeys(ways) if any(way)]
+    ways = [(float(found[pair]), float(found[pair + 1])), (-one, other), (-one, one), (-other, other)]
+    low, high = pair in there, pair + 1 in there
+    return [way for way in dict.fromkeys((low * a, high * b) for a, b in ways) if any(way)]
 
 
 def own_leans(sides: list[Side], anchored: tuple[int, ...], facing: tuple[float, ...]) -> tuple[float, ...]:
@@ -151,21 +149,18 @@ def own_leans(sides: list[Side], anchored: tuple[int, ...], facing: tuple[float,
 
 
 def design_of(
-    volume: np.ndarray, sides: list[Side], leans: tuple[float, ...], there: np.ndarray, level: tuple[int, ...]
+    volume: np.ndarray, sides: list[Side], leans: tuple[float, ...], there: list[int], level: tuple[int, ...]
 ) -> np.ndarray:
     """The planes (5, 3, p) as linear in p unknowns: an offset each, one for all sides that are `level`; slopes as tied."""
-    groups = slope_groups(volume, there)
-    columns = {place: k for k, place in enumerate(p for p in np.nonzero(there)[0] if p not in level)}
-    eave = len(columns)
-    width = eave + (1 if level else 0)
-    slope_column = {
-        group: width + k for k, group in enumerate(dict.fromkeys(groups[k] for k in range(SIDES) if there[k]))
-    }
-    design = np.zeros((5, 3, width + len(slope_column)))
-    for place in np.nonzero(there)[0]:
-        design[place, 2, eave if place in level else columns[place]] = 1.0
+    groups = slope_groups(volume)
+    offsets = [place for place in there if place not in level]
+    slopes = list(dict.fromkeys(groups[place] for place in there if place < LEVEL))
+    eave, width = len(offsets), len(offsets) + bool(level)
+    design = np.zeros((SIDES + 1, 3, width + len(slopes)))
+    for place in there:
+        design[place, 2, eave if place in level else offsets.index(place)] = 1.0
         if place < LEVEL:
-            column = slope_column[groups[place]]
+            column = width + slopes.index(groups[place])
             design[place, place // 2, column] = SIGN[place]
             design[place, 1 - place // 2, column] = leans[place]
             if place in level:
@@ -173,7 +168,7 @@ def design_of(
     return design
 
 
-def slope_groups(volume: np.ndarray, there: np.ndarray) -> list[int]:
+def slope_groups(volume: np.ndarray) -> list[int]:
     """Which slopes are one under the volume's tie."""
     if volume[TIE] == ALL:
         return [0, 0, 0, 0]
