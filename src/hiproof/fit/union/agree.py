@@ -44,8 +44,8 @@ class Member:
     """A volume as one of several.
 
     `rows` (5, 3) are its planes in its own axes, by all p unknowns `own` (5, 3, p) there and `common` (5, 3, p) in the first
-    direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's, `plane`
-    (n,) that on which each lies, `shown` (5,) whether any does on each.
+    direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
+    the numbers of its planes on which any lie, with the numbers of those.
     """
 
     rows: np.ndarray
@@ -53,8 +53,7 @@ class Member:
     common: np.ndarray
     points: np.ndarray
     places: np.ndarray
-    plane: np.ndarray
-    shown: np.ndarray
+    seen: dict[int, np.ndarray]
     sides: list[Side]
 
 
@@ -69,7 +68,7 @@ class Fit:
 
 def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> list[Planes]:
     """The planes of all volumes fitted together, equal in what they have in common."""
-    members = members_of(volumes, sides, planes, scene)
+    members = members_of(volumes, sides, planes, scene) if len(volumes) > 1 else {}
     if len(members) < 2:
         return planes
     known = list(members.values())
@@ -77,16 +76,20 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
     nearly = sorted(likely(known, start), key=lambda one: one[0])
     if not nearly:
         return planes
-    held = np.zeros((0, len(start)))
-    best = free = fitted(known, held, start, scene)
+    held, basis = np.zeros((0, len(start))), np.eye(len(start))
+    best = free = fitted(known, basis, start, scene)
     for gap, two, equation in nearly:
-        saved = int(np.linalg.matrix_rank(equation @ null_space(held), tol=HELD))
-        if saved == 0 or (gap > LEVELLED_M and not may_hold(equation, start, free.covariance)):
+        if gap > LEVELLED_M and not may_hold(equation, start, free.covariance):
             continue
-        found = fitted(known, np.vstack([held, equation]), start, scene)
+        saved = int(np.linalg.matrix_rank(equation @ basis, tol=HELD))
+        if saved == 0:
+            continue
+        with_it = np.vstack([held, equation])
+        left = null_space(with_it)
+        found = fitted(known, left, start, scene)
         spared = scene.evidence * PARAMETER_COST * saved + LEVEL_SLACK * sum(known[k].points.shape[1] for k in two)
         if found.cost <= best.cost + spared:
-            held, best = np.vstack([held, equation]), found
+            held, basis, best = with_it, left, found
     if len(held) == 0:
         return planes
     agreed_planes = list(planes)
@@ -97,7 +100,7 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
 
 def may_hold(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray) -> bool:
     """Whether `equation` (m, p) is no further from holding than the points leave open."""
-    sigma = np.sqrt(np.clip(np.einsum("ij,jk,ik->i", equation, covariance, equation), 0.0, None))
+    sigma = np.sqrt(np.maximum(((equation @ covariance) * equation).sum(axis=1), 0.0))
     return bool((np.abs(equation @ unknowns) < SIGMAS * sigma).all())
 
 
@@ -114,13 +117,19 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         c, s = scene.turn[direction]
         common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
         one = np.ones(len(shown[k]))
-        points = np.stack([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
-        z = rows @ np.stack([points[0], points[1], one])
-        plane = np.argmin(np.where(np.isfinite(z), z, np.inf), axis=0)
-        places = np.stack([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
-        on_each = np.bincount(plane, minlength=LEVEL + 1) > 0
-        found[k] = Member(rows, own, common, points, places, plane, on_each, sides[k])
+        points = np.array([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
+        places = np.array([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
+        found[k] = Member(rows, own, common, points, places, lowest_planes(rows, points), sides[k])
     return found
+
+
+def lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.ndarray]:
+    """The planes (5, 3) that are the lowest at any of `points` (3, n), by their numbers: at which, by theirs."""
+    there = np.flatnonzero(np.isfinite(rows[:, 2])).tolist()
+    z = rows[there] @ np.array([points[0], points[1], np.ones(points.shape[1])])
+    lowest = z.argmin(axis=0)
+    on = {number: np.flatnonzero(lowest == k) for k, number in enumerate(there)}
+    return {number: own for number, own in on.items() if len(own)}
 
 
 def unknowns_of(members: list[Member]) -> np.ndarray:
@@ -171,8 +180,8 @@ def likely(members: list[Member], start: np.ndarray) -> Iterator[tuple[float, tu
 
 
 def seen_planes(member: Member, start: np.ndarray) -> list[Seen]:
-    numbers = np.flatnonzero(member.shown).tolist()
-    return [Seen(p, member.common[p] @ start, member.common[p], member.places[:, member.plane == p]) for p in numbers]
+    common, places = member.common @ start, member.places
+    return [Seen(p, common[p], member.common[p], places[:, on]) for p, on in member.seen.items()]
 
 
 def gap_of_planes(one: Seen, other: Seen) -> float:
@@ -194,9 +203,9 @@ def one_plane(one: Seen, other: Seen) -> np.ndarray:
 
 def slopes(member: Member, start: np.ndarray) -> Iterator[Measure]:
     """The slopes of a member's inclined planes; half of how far their points reach along the fall makes them heights."""
-    for p in range(SIDES):
-        if member.shown[p]:
-            along = member.points[p // 2, member.plane == p]
+    for p, on in member.seen.items():
+        if p < SIDES:
+            along = member.points[p // 2, on]
             equation = SIGN[p] * member.own[p, p // 2]
             yield Measure(float(equation @ start), equation, 0.5 * float(along.max() - along.min()))
 
@@ -204,11 +213,12 @@ def slopes(member: Member, start: np.ndarray) -> Iterator[Measure]:
 def ridges(member: Member, start: np.ndarray) -> Iterator[Measure]:
     """The heights of a member's ridges, as they change from `start`."""
     for p, q in ((0, 1), (2, 3)):
-        if member.shown[p] and member.shown[q]:
+        if p in member.seen and q in member.seen:
             axis, rows = p // 2, member.own[[p, q]] @ start
             rise, fall = rows[0, axis], -rows[1, axis]
             at = np.ones(3)
-            at[1 - axis] = float(np.median(member.points[1 - axis]))
+            along = np.sort(member.points[1 - axis])
+            at[1 - axis] = 0.5 * (along[(len(along) - 1) // 2] + along[len(along) // 2])
             at[axis] = (rows[1] - rows[0])[[1 - axis, 2]] @ (at[1 - axis], 1.0) / (rise + fall)
             equation = at @ (fall * member.own[p] + rise * member.own[q]) / (rise + fall)
             yield Measure(float(equation @ start), equation, 1.0)
@@ -216,33 +226,35 @@ def ridges(member: Member, start: np.ndarray) -> Iterator[Measure]:
 
 def eaves(member: Member, start: np.ndarray) -> Iterator[Measure]:
     """The heights of a member's eaves on the outline."""
-    for p in range(SIDES):
-        if member.sides[p].anchored and member.shown[p]:
+    for p in member.seen:
+        if p < SIDES and member.sides[p].anchored:
             equation = member.own[p, 2] + member.sides[p].at * member.own[p, p // 2]
             yield Measure(float(equation @ start), equation, 1.0)
 
 
 def null_space(equations: np.ndarray) -> np.ndarray:
     """An orthonormal basis (p, q) of all unknowns of which `equations` (m, p) are zero."""
-    if len(equations) == 0:
-        return np.eye(equations.shape[1])
     _, values, rows = np.linalg.svd(equations)
     return rows[int((values > HELD).sum()) :].T
 
 
-def fitted(members: list[Member], equations: np.ndarray, start: np.ndarray, scene: Scene) -> Fit:
-    """All planes by biweighted least squares on their points, `equations` (m, p) times the unknowns being zero."""
-    basis, rows, scale = null_space(equations), [member.rows for member in members], scene.dead + scene.width
+def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: Scene) -> Fit:
+    """All planes by biweighted least squares on their points, over unknowns (p,) that are `basis` (p, q) times any."""
+    own, rows = np.concatenate([member.own for member in members]), [member.rows for member in members]
+    absent, scale = np.isnan(np.concatenate(rows)), scene.dead + scene.width
     for turn in range(ROUNDS):
         normal, right, total, misfit = np.zeros((len(start), len(start))), np.zeros(len(start)), 0.0, 0.0
-        for member, own in zip(members, rows, strict=True):
-            moments, products, weight, left = weighted_moments(own, member.points, scale * (2.0 if turn == 0 else 1.5))
-            matrix, vector = normal_equations(member.own, moments, products, np.isfinite(own[:, 2]))
+        for member, planes in zip(members, rows, strict=True):
+            reach = scale * (2.0 if turn == 0 else 1.5)
+            moments, products, weight, left = weighted_moments(planes, member.points, reach)
+            matrix, vector = normal_equations(member.own, moments, products, np.isfinite(planes[:, 2]))
             normal, right, total, misfit = normal + matrix, right + vector, total + weight, misfit + left
         ridge = RIDGE * max(np.trace(normal) / len(start), 1e-6)
         inverse = basis @ np.linalg.inv(basis.T @ normal @ basis + ridge * np.eye(basis.shape[1])) @ basis.T
         unknowns = inverse @ (right + ridge * start)
-        rows = [np.where(np.isfinite(member.rows), member.own @ unknowns, np.nan) for member in members]
+        every = own @ unknowns
+        every[absent] = np.nan
+        rows = list(every.reshape(len(members), LEVEL + 1, 3))
     cost = sum(cost_of(own, member.points, scene.dead, scene.width) for member, own in zip(members, rows, strict=True))
     if not all(proper(own) for own in rows):
         cost = np.inf
