@@ -111,7 +111,8 @@ class Part:
         z = np.full(len(xy_local), -np.inf)
         for piece in self.pieces:
             inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
-            z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
+            if inside.any():
+                z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
         return z
 
 

@@ -12,7 +12,7 @@ import math
 import numpy as np
 import shapely
 
-from ..fit.union.shown import heights_of
+from ..fit.union.shown import highest_of
 from ..model import Roof
 from .metrics import FACADE_M, NEAR_M
 
@@ -72,7 +72,7 @@ def two_surfaces(points: np.ndarray, roof: Roof) -> tuple[float, float]:
     """
     inner = shapely.buffer(roof.outline, -FACADE_M)
     points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
-    dz = points[:, 2] - heights_of(roof.parts, points[:, :2]).max(axis=0)
+    dz = points[:, 2] - highest_of(roof.parts, points[:, :2])[0]
     points, dz = points[np.isfinite(dz)], dz[np.isfinite(dz)]
     if len(points) < FEWEST_POINTS:
         return 0.0, 0.0

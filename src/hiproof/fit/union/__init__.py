@@ -56,7 +56,7 @@ from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
 from .regions import besides, places_of, polygons_of, regions_of
 from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
-from .shown import heights_of, that_show
+from .shown import highest_of, that_show
 from .slivers import without_slivers, without_specks
 from .unite import united
 
@@ -113,7 +113,7 @@ def fit_building(
 def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
     """The share of the plan's points further than `tolerance_m` from the max of the parts."""
     xy = plan.frame.xy_local(np.column_stack([plan.cloud.u, plan.cloud.v]))
-    z = heights_of(parts, xy).max(axis=0)
+    z, _ = highest_of(parts, xy)
     return float(np.mean(np.abs(z - plan.frame.origin[2] - plan.cloud.z) > tolerance_m))
 
 

@@ -12,6 +12,7 @@ from ...rings import GRID_M
 from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
+NOWHERE = shapely.Polygon()
 LEAST_M2 = 0.1  # of a piece beyond; less is the tip of a corner and no part
 MISSED_SPACINGS = (
     0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner
@@ -29,22 +30,10 @@ def clamped(parts: list[Part], low: float, high: float, spacing: float) -> list[
 
 
 def clamped_part(part: Part, low: float, high: float) -> list[Part]:
-    """The part where it is between `low` and `high`, and a level part where it is below or above."""
-    if all(is_within(piece, low, high) for piece in part.pieces):
-        return [part]
+    """The part where it is between `low` and `high`, and a level part where it is below or above; itself where it is neither."""
     kept, beneath, above = [], [], []
     for piece in part.pieces:
-        if is_within(piece, low, high):
-            kept.append(piece)
-            continue
-        z, sunken, risen = corner_heights(piece), shapely.Polygon(), shapely.Polygon()
-        if z.min() < low:
-            beneath_low = [half_plane([0.0, 0.0, low] - plane, piece.outline) for plane in piece.planes]
-            sunken = shapely.union_all(beneath_low, grid_size=GRID_M)
-        if z.max(axis=0).min() > high:
-            above_high = [half_plane(plane - [0.0, 0.0, high], piece.outline) for plane in piece.planes]
-            risen = shapely.intersection_all(above_high)
-        sunken, risen = (shapely.intersection(piece.outline, beyond, grid_size=GRID_M) for beyond in (sunken, risen))
+        sunken, risen = beyond(piece, low, high)
         if sunken.area + risen.area < LEAST_M2:
             kept.append(piece)
             continue
@@ -52,14 +41,26 @@ def clamped_part(part: Part, low: float, high: float) -> list[Part]:
         above += polygons_of(risen)
         rest = shapely.difference(piece.outline, shapely.union(sunken, risen), grid_size=GRID_M)
         kept += [Piece(polygon, piece.planes) for polygon in polygons_of(rest)]
+    if not beneath and not above:
+        return [part]
     found = [dataclasses.replace(part, pieces=tuple(kept))] if kept else []
     return found + [level_part(polygons, z) for polygons, z in ((beneath, low), (above, high)) if polygons]
 
 
-def is_within(piece: Piece, low: float, high: float) -> bool:
-    """Whether a piece is nowhere below `low`, and one of its planes nowhere above `high`."""
-    z = corner_heights(piece)
-    return bool(z.min() >= low and z.max(axis=0).min() <= high)
+def beyond(piece: Piece, low: float, high: float) -> tuple[shapely.Geometry, shapely.Geometry]:
+    """Where a piece is below `low`, which one of its planes is there, and where above `high`, as all of them are."""
+    z, sunken, risen = corner_heights(piece), NOWHERE, NOWHERE
+    if z.min() < low:
+        rings = [ring_above(box_around(piece.outline), *line) for line in ([0.0, 0.0, low] - piece.planes).tolist()]
+        below = shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=GRID_M)
+        sunken = shapely.intersection(piece.outline, below, grid_size=GRID_M)
+    if z.max(axis=0).min() > high:
+        ring = box_around(piece.outline)
+        for line in (piece.planes - [0.0, 0.0, high]).tolist():
+            ring = ring_above(ring, *line)
+        if ring:
+            risen = shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=GRID_M)
+    return sunken, risen
 
 
 def corner_heights(piece: Piece) -> np.ndarray:
@@ -77,15 +78,14 @@ def level_part(polygons: list[shapely.Polygon], z: float) -> Part:
     )
 
 
-def half_plane(line: np.ndarray, polygon: shapely.Polygon) -> shapely.Polygon:
-    """Where a x + b y + c >= 0 of `line` (3,) within the bounds of `polygon`."""
-    x0, y0, x1, y1 = shapely.bounds(polygon)
-    box = [(x0 - 1.0, y0 - 1.0), (x1 + 1.0, y0 - 1.0), (x1 + 1.0, y1 + 1.0), (x0 - 1.0, y1 + 1.0)]
-    return shapely.Polygon(ring_above(box, *line))
+def box_around(polygon: shapely.Polygon) -> list[tuple[float, float]]:
+    """The corners of a box that `polygon` lies in the midst of."""
+    x0, y0, x1, y1 = polygon.bounds
+    return [(x0 - 1.0, y0 - 1.0), (x1 + 1.0, y0 - 1.0), (x1 + 1.0, y1 + 1.0), (x0 - 1.0, y1 + 1.0)]
 
 
 def ring_above(ring: list[tuple[float, float]], a: float, b: float, c: float) -> list[tuple[float, float]]:
-    """The part of a convex ring where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
+    """The part of a convex ring, or of none, where a x + b y + c >= 0 (Sutherland and Hodgman 1974)."""
     signed = [a * x + b * y + c for x, y in ring]
     kept = []
     for k, (vertex, z) in enumerate(zip(ring, signed, strict=True)):

@@ -27,27 +27,29 @@ def that_show(parts: list[Part], plan: Plan, scene: Scene, widest_m2: float = ma
         return parts
     u, v = nodes(scene, BORDER_M)
     xy = plan.frame.xy_local(np.column_stack([u[0], v[0]]))
-    top = set(np.argmax(heights_of(parts, xy), axis=0).tolist())
-    shown, hidden = ([part for k, part in enumerate(parts) if (k in top) == seen] for seen in (True, False))
+    places = np.bincount(highest_of(parts, xy)[1], minlength=len(parts)).tolist()  # at which each part is the highest
+    shown = [part for part, count in zip(parts, places, strict=True) if count]
+    hidden = [part for part, count in zip(parts, places, strict=True) if not count]
     for part in hidden:
         taken = shown and with_slivers(shown, part, widest_m2)
         shown = taken or [*shown, part]
     return shown
 
 
-def heights_of(parts: Sequence[Part], xy: np.ndarray) -> np.ndarray:
-    """Heights (parts, n) at `xy` (n, 2), minus infinity beside a part: `Part.height_at` for many points. On a border that two
-    pieces share it is one of them that holds a point."""
-    heights, (x, y) = np.full((len(parts), len(xy)), -np.inf), np.ascontiguousarray(xy.T)
-    for part, z in zip(parts, heights, strict=True):
+def highest_of(parts: Sequence[Part], xy: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Height (n,) of the roof of `parts` at `xy` (n, 2), minus infinity beside it, and the part (n,) it is of, the first of several,
+    by its number: `Part.height_at` for many points. On a border that two pieces share it is one of them that holds a point."""
+    z, top, (x, y) = np.full(len(xy), -np.inf), np.zeros(len(xy), np.int64), np.ascontiguousarray(xy.T)
+    for k, part in enumerate(parts):
         for piece in part.pieces:
-            raise_over(z, x, y, *ring_edges(piece.outline), np.ascontiguousarray(piece.planes))
-    return heights
+            raise_over(z, top, k, x, y, *ring_edges(piece.outline), np.ascontiguousarray(piece.planes))
+    return z, top
 
 
 @compiled
-def raise_over(z, x, y, starts, ends, planes):
-    """Raise heights z (n,) at x, y to the lowest of `planes` (k, 3) inside the edges `starts`, `ends` (m, 2)."""
+def raise_over(z, top, number, x, y, starts, ends, planes):
+    """Raise heights z (n,) at x, y to the lowest of `planes` (k, 3) inside the edges `starts`, `ends` (m, 2), `top` (n,) there
+    becomes `number`."""
     inside = np.zeros(len(x), np.bool_)
     for e in range(len(starts)):
         for i in range(len(x)):
@@ -56,7 +58,8 @@ def raise_over(z, x, y, starts, ends, planes):
         lowest = np.inf
         for a, b, c in planes:
             lowest = min(lowest, a * x[k] + b * y[k] + c)
-        z[k] = max(z[k], lowest)
+        if lowest > z[k]:
+            z[k], top[k] = lowest, number
 
 
 def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part] | None:

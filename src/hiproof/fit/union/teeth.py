@@ -61,7 +61,7 @@ def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Pa
     for step in 1.0, -1.0:
         while len(row) < max(TEETH):
             place = next_tooth(row, row[-1] if step > 0.0 else row[0], step)
-            part = next((p for p in others if shows_as(p, place, besides(parts, [p]))), None)
+            part = next((p for p in as_high_amid(others, place) if shows_as(p, place, besides(parts, [p]))), None)
             if part is None:
                 break
             tooth = as_high(place, part)
@@ -72,22 +72,19 @@ def carried_on(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Pa
 
 def next_tooth(row: list[Part], last: Part, step: float) -> Part:
     """The tooth that would follow the `last` of a row, before it with a `step` of -1."""
-    across = step * mean_of(row, "width") * np.array([-math.sin(last.kappa), math.cos(last.kappa)])
-    piece = last.pieces[0]
-    planes = piece.planes.copy()
-    planes[:, 2] -= planes[:, :2] @ across
-    return replace(
-        last,
-        pieces=(Piece(shapely.affinity.translate(piece.outline, *across), planes),),
-        translation=last.translation + np.array([*across, 0.0]),
-    )
+    across = step * mean_of(row, "width") * np.array([-math.sin(last.kappa), math.cos(last.kappa), 0.0])
+    return replace(last, pieces=(last.pieces[0].moved(across),), translation=last.translation + across)
+
+
+def as_high_amid(parts: list[Part], tooth: Part) -> Iterator[Part]:
+    """The parts that are about as high as a `tooth` in the midst of it."""
+    middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
+    wanted = tooth.height_at(middle)[0]
+    return (part for part in parts if abs(part.height_at(middle)[0] - wanted) <= HEIGHT_ALIKE_M)
 
 
 def shows_as(part: Part, tooth: Part, others: list[Part]) -> bool:
     """Whether what shows of a part under `others` is the `tooth`: there as high nearly everywhere, and nowhere else."""
-    middle = shapely.get_coordinates(shapely.point_on_surface(tooth.pieces[0].outline))
-    if np.abs(part.height_at(middle) - tooth.height_at(middle))[0] > HEIGHT_ALIKE_M:
-        return False
     xy = places_around([part])
     z, wanted = part.height_at(xy), tooth.height_at(xy)
     beneath = np.max([other.height_at(xy) for other in others], axis=0)
