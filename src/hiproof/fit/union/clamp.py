@@ -12,7 +12,7 @@ from ...rings import GRID_M
 from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
-NOWHERE = shapely.Polygon()
+NOWHERE = shapely.Polygon()  # what no place of a piece is beyond
 LEAST_M2 = 0.1  # of a piece beyond; less is the tip of a corner and no part
 MISSED_SPACINGS = (
     0.7  # of the points: half the diagonal between four, by which none need be nearer to a tip or a corner

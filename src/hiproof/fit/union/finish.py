@@ -35,7 +35,7 @@ ROUNDS = 3  # of fitting and re-weighting
 FEWEST_POINTS = 6  # points; with fewer a volume's planes stay as the search found them
 FACING_GAIN = 0.1  # units: planes face other than along the axes only where that explains so much more
 LEVEL_SLACK = 0.004  # of the points: what level eaves, or what volumes agree in, may leave unexplained besides the parameters saved
-SIGN = (1.0, -1.0, 1.0, -1.0)
+SIGN = (1.0, -1.0, 1.0, -1.0)  # the plane from the left rises to +u, from the right to -u, ...
 FLATTEST = 0.02  # rise over run; a flatter plane does not tell which way it faces
 SQUARE = 1e-3  # a side that leans less is square to the others
 
