@@ -9,7 +9,7 @@ import shapely
 
 from hiproof.errors import FitError
 from hiproof.primitives import CATALOGUE, get
-from hiproof.primitives.family import KIN, SHAPES, member_of, name_among, planes_of
+from hiproof.primitives.family import KIN, SHAPES, Member, member_of, name_among, planes_of
 from union_scenes import lowest_of, member_of_shape, rectangle_of
 
 SHAPE_NAMES = [name for name, _ in SHAPES.values()]
@@ -49,7 +49,7 @@ def test_planes_follow_from_the_description(shape):
 def test_planes_follow_from_the_description_side_by_side(shape):
     for member in members(shape):
         parameters, kappa, translation = member.describe(as_catalogue=False)
-        if member.has.any():  # a flat roof has no side to be described by
+        if any(member.has):  # a flat roof has no side to be described by
             planes = planes_of(member.name, parameters, kappa, translation)
             assert in_one_order(planes) == pytest.approx(in_one_order(member.planes()), abs=1e-9)
 
@@ -86,7 +86,7 @@ def test_however_its_axes_were_turned_a_member_is_described_alike(shape):
         described = member.describe()
         assert described[0] == pytest.approx(member.turned().describe()[0], abs=1e-9)
         once = member.canonical()
-        assert np.array_equal(once.has, once.canonical().has) and once.kappa == once.canonical().kappa
+        assert once.has == once.canonical().has and once.kappa == once.canonical().kappa
 
 
 @each_shape
@@ -102,7 +102,7 @@ def test_a_member_over_its_whole_plan_is_the_lowest_of_its_planes(shape):
 @each_shape
 def test_eaves_lie_where_the_parameters_say(shape):
     """In the middle of a side its own plane is as high above T_L as its eave, and as steep as its pitch."""
-    side_by_side = [member for member in members(shape) if member.has.any()]
+    side_by_side = [member for member in members(shape) if any(member.has)]
     for member in side_by_side:
         parameters, kappa, translation = member.describe(as_catalogue=False)
         c, s = math.cos(kappa), math.sin(kappa)
@@ -162,11 +162,36 @@ def test_a_member_like_a_shape_is_described_in_its_words(shape):
 def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes_alone(lower):
     """Which eave is the lower decides from where it is described; a change of a millimetre must not."""
     member = planted_gable(eaves=(3.0, 3.0 + 1e-4 * (1 - 2 * lower)))
-    changes = [
-        replace(member, eaves=member.eaves + change) for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])
-    ]
+    changes = several(
+        [replace(member, eaves=member.eaves + change) for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])]
+    )
     sigma = member.part([shapely.Polygon(rectangle_of(member))], None, changes).sigma
     assert 0.0 < max(sigma.values()) < 0.01
+
+
+@pytest.mark.parametrize("regular", [False, True])
+@each_shape
+def test_several_members_are_measured_as_each_of_them(shape, regular):
+    member = member_of_shape(np.random.default_rng(3), shape, regular=regular).canonical()
+    kind = get(shape) if regular else None
+    each = [
+        replace(member, half=member.half + change, eaves=member.eaves + change, slopes=member.slopes * (1.0 + change))
+        for change in (0.0, 1e-3, 0.02)
+    ]
+    looks_alike = member.turned(2).has == member.has  # else it is seen from one side alone
+    for kappa in [member.turned(quarters).kappa for quarters in (range(4) if looks_alike else (0,))]:
+        together, alone = several(each).measures_of(kind, kappa), [own.measures_of(kind, kappa) for own in each]
+        assert np.array([np.broadcast_to(of, 3) for of in together]) == pytest.approx(np.array(alone).T, abs=1e-12)
+
+
+def several(members):
+    """Members of one direction as one that is several."""
+    arrays = (
+        np.stack([getattr(member, of) for member in members], axis=1)
+        for of in ("centre", "half", "eaves", "slopes", "leans")
+    )
+    centre, half, eaves, slopes, leans = arrays
+    return Member(members[0].kappa, centre, half, eaves, slopes, np.array([own.top for own in members]), leans)
 
 
 def planted_gable(eaves):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -30,14 +31,15 @@ class Formula:
         """Value at the six shape parameters."""
         return self.at((V, U, q0, q1, q2, q3))
 
-    def at(self, shape: Sequence[float] | np.ndarray) -> float:
-        """Value at `shape` (6,): V, U, q0, q1, q2, q3."""
-        total = 0.0
+    def at(self, shape: Sequence[Any] | np.ndarray) -> Any:
+        """Value at `shape` (6,): V, U, q0, q1, q2, q3; values (m,) where these are arrays (m,)."""
+        total: Any = 0.0
         for factor, powers in self.sparse:
+            value: Any = factor
             for k, power in powers:
-                factor *= shape[k] if power == 1 else shape[k] ** power
-            total += factor
-        return float(total)
+                value = value * (shape[k] if power == 1 else shape[k] ** power)
+            total = total + value
+        return total
 
     @cached_property
     def sparse(self) -> tuple[tuple[float, tuple[tuple[int, int], ...]], ...]:

@@ -17,7 +17,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import shapely
@@ -208,9 +208,13 @@ class Primitive:
 
     def from_theta(self, theta: np.ndarray) -> tuple[dict[str, float], float, np.ndarray]:
         """(theta_p by name, kappa, T_L (3,)) of `theta` (9,)."""
-        shape = np.asarray(theta, float)[HALF_WIDTH:].tolist()
-        theta_p = {name: measure.at(shape) for name, measure in self.measures.items()}
-        return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], self.eave.at(shape)])
+        *measures, eave = self.measures_at(np.asarray(theta, float)[HALF_WIDTH:].tolist())
+        theta_p = dict(zip(self.measures, measures, strict=True))
+        return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], eave])
+
+    def measures_at(self, shape: Sequence[Any]) -> list[Any]:
+        """theta_p in order and the lowest eave's height at a `shape` (V, U, q0..q3), or at several: arrays (m,)."""
+        return [measure.at(shape) for measure in (*self.measures.values(), self.eave)]
 
     def is_proper(self, theta: np.ndarray) -> bool:
         """Whether every length is positive: no ridge or top of negative length."""
@@ -249,8 +253,7 @@ class Primitive:
     def planes_at(self, theta: np.ndarray) -> np.ndarray:
         """Planes (k, 3) over x, y in theta's own frame, in the order of `faces`."""
         c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
-        a, b, z = self.plane_values(theta).T
-        planes = np.stack([a * c - b * s, a * s + b * c, z], axis=1)
+        planes = np.array([(a * c - b * s, a * s + b * c, z) for a, b, z in self.plane_values(theta).tolist()])
         planes[:, 2] -= planes[:, :2] @ theta[[CX, CY]]
         return planes
 

@@ -20,6 +20,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import shapely
@@ -27,7 +28,7 @@ import shapely
 from ..errors import FitError
 from ..model import Part, Piece
 from .catalogue import CATALOGUE, get
-from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, RIGHT, Primitive
+from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, Q0, RIGHT, Primitive
 
 SIDES = ("left", "right", "front", "back")
 AXIS = np.array([0, 0, 1, 1])
@@ -38,6 +39,7 @@ LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])
 TURNS = {1: (QUARTER_TURN, LEANS_TURN), 2: (HALF_TURN, -np.ones(4)), 3: (OTHER_TURN, -LEANS_TURN)}
 SAME = 1e-9  # m; numerically equal
 ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
+NEGLIGIBLE = 1e-18  # m2 or square degrees; numerically no variance
 HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
 
 
@@ -70,7 +72,8 @@ COMPONENTS = {
 class Member:
     """A shape of the family: `kappa` (rad), `centre` (2,) and `half` (2,) extents along u and v, heights of the eaves (4,) at
     their own sides, infinite where a side has no plane, `slopes` (4,), and the height of the level `top`, infinite without one.
-    `leans` (4,) are what the planes rise along their sides, as shares of their slopes.
+    `leans` (4,) are what the planes rise along their sides, as shares of their slopes. Several of one `kappa` that have planes on the
+    same sides may be one `Member`: its arrays then have a further axis, and its `top` is an array, of one place for each.
 
     >>> gable = Member(0.0, np.zeros(2), np.array([6.0, 4.0]), np.array([np.inf, np.inf, 5.0, 5.0]), np.array([0, 0, 0.5, 0.5]))
     >>> gable.name, gable.describe()[0]
@@ -82,46 +85,65 @@ class Member:
     half: np.ndarray
     eaves: np.ndarray
     slopes: np.ndarray
-    top: float = math.inf
+    top: Any = math.inf
     leans: np.ndarray = field(default_factory=lambda: np.zeros(4))
 
     @cached_property
-    def has(self) -> np.ndarray:
-        """Which sides (4,) have a plane."""
-        return np.isfinite(self.eaves)
+    def has(self) -> tuple[bool, ...]:
+        """Which sides have a plane."""
+        eaves = self.eaves if self.eaves.ndim == 1 else self.eaves[:, 0]
+        return tuple(map(math.isfinite, eaves.tolist()))
+
+    @cached_property
+    def sides(self) -> tuple[int, ...]:
+        """The sides that have a plane."""
+        return tuple(side for side in range(4) if self.has[side])
+
+    @cached_property
+    def has_top(self) -> bool:
+        """Whether there is a level top."""
+        return math.isfinite(self.top if self.eaves.ndim == 1 else self.top[0])
 
     @property
-    def base(self) -> float:
-        """Height of the lowest eave, of the top where there is none: z of T_L."""
-        return float(min(self.eaves.min(), self.top)) if not self.has.any() else float(self.eaves.min())
+    def general_shape(self) -> tuple[str, tuple[int, ...]]:
+        """Of SHAPES the one with planes on as many sides."""
+        along, across = sorted((sum(self.has[:2]), sum(self.has[2:])))
+        return SHAPES[self.has_top, along, across]
 
-    def own_planes(self) -> np.ndarray:
-        """Planes (k, 3) over u, v about the centre: those of the sides in order, then the top."""
+    @property
+    def base(self) -> Any:
+        """Height of the lowest eave, of the top where there is none: z of T_L."""
+        return self.eaves.min(axis=0) if any(self.has) else self.top
+
+    def those(self, which: int | list[int]) -> Member:
+        """One or some of several."""
+        centre, half, eaves, slopes = (of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes))
+        return Member(self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which])
+
+    def own_planes(self) -> list[tuple[float, float, float]]:
+        """Planes a, b, c over u, v about the centre: those of the sides in order, then the top."""
         planes = []
-        for side in np.nonzero(self.has)[0]:
-            plane = np.zeros(3)
-            plane[AXIS[side]] = SIGN[side] * self.slopes[side]
-            plane[1 - AXIS[side]] = self.leans[side] * self.slopes[side]
-            plane[2] = self.eaves[side] + self.slopes[side] * self.half[AXIS[side]]
-            planes.append(plane)
-        if math.isfinite(self.top):
-            planes.append(np.array([0.0, 0.0, self.top]))
-        return np.array(planes)
+        for side in self.sides:
+            rise, along = SIGN[side] * self.slopes[side], self.leans[side] * self.slopes[side]
+            middle = self.eaves[side] + self.slopes[side] * self.half[side // 2]
+            planes.append((rise, along, middle) if side < FRONT else (along, rise, middle))
+        return [*planes, (0.0, 0.0, self.top)] if self.has_top else planes
 
     def planes(self) -> np.ndarray:
         """Planes (k, 3) over x, y of the frame that `kappa` and `centre` are given in."""
         c, s = math.cos(self.kappa), math.sin(self.kappa)
-        planes = self.own_planes() @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        planes = np.array(self.own_planes()) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         planes[:, 2] -= planes[:, :2] @ self.centre
         return planes
 
-    def apex(self, axis: int) -> float:
+    def apex(self, axis: int) -> Any:
         """Height at which the planes of the two sides across `axis` meet, infinite where one is missing."""
-        (low, high), (one, other) = self.eaves[2 * axis : 2 * axis + 2], self.slopes[2 * axis : 2 * axis + 2]
-        if not (math.isfinite(low) and math.isfinite(high)):
+        side = 2 * axis
+        if not (self.has[side] and self.has[side + 1]):
             return math.inf
+        low, high, one, other = self.eaves[side], self.eaves[side + 1], self.slopes[side], self.slopes[side + 1]
         run = (high - low + 2.0 * self.half[axis] * other) / (one + other)  # from the low side's eave to the ridge
-        return float(low + one * run)
+        return low + one * run
 
     def over(self, half: np.ndarray) -> Member:
         """The member with its eaves and slopes over a rectangle of other half extents (2,)."""
@@ -134,7 +156,7 @@ class Member:
         kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
         sides, leans_turn = TURNS[quarters]
         half = self.half[::-1].copy() if quarters % 2 else self.half
-        eaves, slopes, leans = self.eaves[sides], self.slopes[sides], self.leans[sides] * leans_turn
+        eaves, slopes, leans = self.eaves[sides], self.slopes[sides], (self.leans[sides].T * leans_turn).T
         return Member(kappa, self.centre, half, eaves, slopes, self.top, leans)
 
     def canonical(self) -> Member:
@@ -144,12 +166,11 @@ class Member:
     @cached_property
     def quarter_turns(self) -> int:
         """How many turns lead to the canonical direction."""
-        has = self.has.tolist()
-        along, across = sorted((sum(has[:2]), sum(has[2:])))
-        _, sides = SHAPES[math.isfinite(self.top), along, across]
+        _, sides = self.general_shape
         wanted, named, places = [side in sides for side in range(4)], [], [LEFT, RIGHT, FRONT, BACK]
+        lies = self.lies_along(0), self.lies_along(1)
         for turns in range(4):
-            if [has[place] for place in places] == wanted and self.lies_along(turns % 2):
+            if lies[turns % 2] and [self.has[place] for place in places] == wanted:
                 named.append((self.order(turns, places), turns))
             places = [places[place] for place in QUARTER_TURN]
         return min(named, default=((), 0))[1]
@@ -173,14 +194,15 @@ class Member:
         low, high = self.apex(1 - axis), self.apex(axis)
         if math.isfinite(low) and math.isfinite(high) and abs(low - high) > SAME:
             return low < high
-        square_like = self.has.all() or not self.has.any()
+        square_like = all(self.has) or not any(self.has)
         return not square_like or bool(self.half[axis] >= self.half[1 - axis] - SAME)
 
     @cached_property
     def name(self) -> str:
         """The roof type: a name of the catalogue or of the family."""
-        along, across = sorted((int(self.has[:2].sum()), int(self.has[2:].sum())))
-        name, _ = SHAPES[math.isfinite(self.top), along, across]
+        name, _ = self.general_shape
+        if name not in ("gable", "hip", "side_hip"):
+            return name
         member = self.canonical()
         if name == "gable":
             return "gable" if abs(member.slopes[FRONT] - member.slopes[BACK]) < SAME else "asymmetric_gable"
@@ -195,31 +217,29 @@ class Member:
         return name
 
     @cached_property
-    def in_catalogue(self) -> Primitive | None:
-        """The catalogue's shape that is the same surface, of a member in its canonical direction."""
+    def in_catalogue(self) -> tuple[Primitive, np.ndarray] | None:
+        """The catalogue's shape that is the same surface, and its canonical theta (9,), of a member in its canonical direction."""
         if self.leans.any():
             return None
+        own = self.own_planes()
         for shape in get(self.name).variants:
             theta = self.theta(shape)
-            planes = shape.plane_values(theta)[np.argsort(shape.sides)]
-            if np.abs(planes - self.own_planes()).max() < SAME * 10.0 and shape.is_proper(theta):
-                return shape
+            planes = [plane for _, plane in sorted(zip(shape.sides, shape.plane_values(theta).tolist(), strict=True))]
+            apart = (
+                abs(x - y) for one, other in zip(planes, own, strict=True) for x, y in zip(one, other, strict=True)
+            )
+            if max(apart) < SAME * 10.0 and shape.is_proper(theta):
+                return shape, shape.canonical_theta(theta)
         return None
 
     def theta(self, shape: Primitive) -> np.ndarray:
-        """theta (9,) of the catalogue's `shape`, by the front and the right side where the others are as these."""
-        q = shape.from_member(self)
-        return np.array([*self.centre, self.kappa, self.half[1], self.half[0], *q, *[0.0] * (4 - len(q))])
-
-    def in_words_of(self, shape: Primitive, kappa: float | None = None) -> tuple[dict[str, float], float, np.ndarray]:
-        """(parameters by name, kappa, T_L (3,)) of the catalogue's `shape` that this member is; seen from `kappa` or its opposite if
-        that is told, so that a small change does not turn it round."""
-        if kappa is not None:
-            opposite = math.cos(self.kappa - kappa) < 0.0
-            theta = (self.turned(2) if opposite else self).theta(shape)
-            if math.cos(theta[KAPPA] - kappa) > ALONG:
-                return shape.from_theta(theta)
-        return shape.from_theta(shape.canonical_theta(self.theta(shape)))
+        """theta (9,) of the catalogue's `shape`, by the front and the right side where the others are as these; (9, m) of several."""
+        theta = np.zeros((9, *self.eaves.shape[1:]))
+        theta[:KAPPA], theta[KAPPA] = self.centre, self.kappa
+        theta[HALF_WIDTH], theta[HALF_LENGTH] = self.half[1], self.half[0]
+        for k, q in enumerate(shape.from_member(self)):
+            theta[Q0 + k] = q
+        return theta
 
     def describe(self, as_catalogue: bool = True) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member in its canonical direction."""
@@ -227,49 +247,77 @@ class Member:
 
     def in_words(self, as_catalogue: bool) -> tuple[dict[str, float], float, np.ndarray]:
         """`describe` of a member in its canonical direction."""
-        shape = self.in_catalogue if as_catalogue else None
-        return self.side_by_side() if shape is None else self.in_words_of(shape)
+        if not as_catalogue or self.in_catalogue is None:
+            return self.side_by_side()
+        shape, theta = self.in_catalogue
+        return shape.from_theta(theta)
 
     def side_by_side(self) -> tuple[dict[str, float], float, np.ndarray]:
         """(parameters by name, kappa, T_L (3,)) of this member, each side's own."""
-        parameters = {"width": 2.0 * self.half[1], "length": 2.0 * self.half[0]}
-        if math.isfinite(self.top):
-            parameters["height"] = self.top - self.base
-        for side in np.nonzero(self.has)[0]:
-            parameters[f"pitch_{SIDES[side]}"] = math.degrees(math.atan(self.slopes[side]))
-            parameters[f"eave_{SIDES[side]}"] = self.eaves[side] - self.base
-            if self.leans[side]:
-                parameters[f"skew_{SIDES[side]}"] = math.degrees(math.atan(self.leans[side]))
-        parameters = {name: float(value) for name, value in parameters.items()}
+        parameters = {name: float(value) for name, value in self.own_measures().items()}
         return parameters, self.kappa, np.array([*self.centre, self.base])
 
-    def sigma(self, changes: list[Member], as_catalogue: bool = True) -> dict[str, float]:
-        """Standard deviations by parameter (and t_z) where `changes` are this member after independent changes of one each."""
-        shape = self.in_catalogue if as_catalogue else None
-        kappa = None if shape is None else shape.canonical_theta(self.theta(shape))[KAPPA]
+    def own_measures(self) -> dict[str, Any]:
+        """Parameters by name, each side's own."""
+        parameters, base = {"width": 2.0 * self.half[1], "length": 2.0 * self.half[0]}, self.base
+        if self.has_top:
+            parameters["height"] = self.top - base
+        for side in self.sides:
+            parameters[f"pitch_{SIDES[side]}"] = degrees(self.slopes[side])
+            parameters[f"eave_{SIDES[side]}"] = self.eaves[side] - base
+            if self.leans[side].any():
+                parameters[f"skew_{SIDES[side]}"] = degrees(self.leans[side])
+        return parameters
 
-        def values(member: Member) -> dict[str, float]:
-            parameters, _, translation = member.side_by_side() if shape is None else member.in_words_of(shape, kappa)
-            return {**parameters, "t_z": float(translation[2])}
-
-        own = values(self)
-        moved = np.array([list(values(member).values()) for member in changes]).reshape(-1, len(own))
-        variance = ((moved - list(own.values())) ** 2).sum(axis=0)
-        return {name: math.sqrt(v) for name, v in zip(own, variance.tolist(), strict=True) if v > 1e-18}
+    def measures_of(self, shape: Primitive | None, kappa: float) -> list[Any]:
+        """The parameters and t_z that this member, or each of several, has as `shape`, side by side without one; seen from `kappa` or its
+        opposite, so that a small change does not turn it round."""
+        if shape is None:
+            return [*self.own_measures().values(), self.base]
+        seen = self.turned(2) if math.cos(self.kappa - kappa) < 0.0 else self
+        theta = seen.theta(shape)
+        if math.cos(seen.kappa - kappa) <= ALONG:
+            theta = np.apply_along_axis(shape.canonical_theta, 0, theta)
+        return shape.measures_at(list(theta[HALF_WIDTH:]))
 
     def part(
-        self, outlines: list[shapely.Polygon], name: str | None = None, changes: list[Member] | None = None
+        self,
+        outlines: list[shapely.Polygon],
+        name: str | None = None,
+        changes: Member | None = None,
+        untold: int = 0,
     ) -> Part:
         """A part of this shape that roofs `outlines`, in the frame of `kappa` and `centre`; called `name` if that is its kin.
 
-        `changes` are as in `sigma`, in the same direction as this member, which must be its canonical one.
+        This member must be its canonical one; `changes` are, in the same direction, several: this one after independent changes of one
+        standard deviation each. The last of them, `untold`, are changes that nothing tells: parameters that these change have no deviation.
         """
         as_catalogue = name in (None, self.name)
-        parameters, kappa, translation = self.in_words(as_catalogue)
+        words = self.in_words(as_catalogue)
+        sigma = {} if changes is None else self.sigma(changes, untold, as_catalogue, words)
         name = name or self.name
-        planes = planes_of(name, parameters, kappa, translation)
-        sigma = self.sigma(changes or [], as_catalogue)
-        return Part(name, tuple(Piece(o, planes) for o in outlines), parameters, kappa, translation, sigma)
+        planes = planes_of(name, *words)
+        return Part(name, tuple(Piece(o, planes) for o in outlines), *words, sigma)
+
+    def sigma(
+        self, changes: Member, untold: int, as_catalogue: bool, words: tuple[dict[str, float], float, np.ndarray]
+    ) -> dict[str, float]:
+        """Standard deviations by parameter (and t_z) of `part`, which describes this member in these `words`."""
+        parameters, kappa, translation = words
+        shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
+        own = {**parameters, "t_z": float(translation[2])}
+        squares = np.zeros((len(own), changes.eaves.shape[1]))
+        for k, (value, changed) in enumerate(zip(own.values(), changes.measures_of(shape, kappa), strict=True)):
+            squares[k] = (changed - value) ** 2
+        told = squares.shape[1] - untold
+        known, unknown = squares[:, :told].sum(axis=1).tolist(), squares[:, told:].sum(axis=1).tolist()
+        each = zip(own, known, unknown, strict=True)
+        return {name: math.sqrt(v) for name, v, free in each if v > NEGLIGIBLE and not free > NEGLIGIBLE}
+
+
+def degrees(rise: Any) -> Any:
+    """The angle under a `rise` over run, of one or of several (m,)."""
+    return np.degrees(np.arctan(rise)) if np.ndim(rise) else math.degrees(math.atan(rise))
 
 
 def name_among(name: str, allowed: tuple[str, ...]) -> str | None:

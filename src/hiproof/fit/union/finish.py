@@ -54,9 +54,9 @@ class Planes:
 
     @property
     def modes(self) -> np.ndarray:
-        """Independent changes (p, 5, 3) of the rows, of one standard deviation each."""
+        """Independent changes (5, 3, p) of the rows, of one standard deviation each."""
         variances, axes = np.linalg.eigh(self.covariance)
-        return np.moveaxis(self.design @ (axes * np.sqrt(np.clip(variances, 0.0, None))), 2, 0)
+        return self.design @ (axes * np.sqrt(np.maximum(variances, 0.0)))
 
 
 def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene) -> list[Planes]:

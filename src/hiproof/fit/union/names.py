@@ -23,6 +23,7 @@ STRAIGHT = 1e-9  # rad; numerically the same direction
 GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
 # standard deviations of a swath's place and height, which no point of a building tells: roofs lie beside their outline by the former
 REGISTERED_PLAN_M, REGISTERED_M = 0.03, 0.01
+RAISED = np.tile([[0.0], [0.0], [REGISTERED_M]], (SIDES + 1, 1, 1))  # planes (5, 3, 1) changed by the latter
 PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it
 
 
@@ -38,44 +39,45 @@ def part_of(
     """The volume over its `regions` (local coordinates) as a part of the family, called as `allowed` has it where that can be."""
     c, s = scene.turn[int(volume[DIRECTION])]
     axes = np.array([[c, s], [-s, c]]) @ plan.frame.rotation
-    corners = np.concatenate([shapely.get_coordinates(region) for region in regions]) - plan.frame.origin[:2]
-    uv = corners @ axes.T
-    rows = np.where(showing(planes.rows, uv)[:, None], planes.rows, np.nan)
-    registrations = registered(planes, rows, uv)
+    corners = shapely.get_coordinates(regions) - plan.frame.origin[:2]
+    at = np.column_stack([corners @ axes.T, np.ones(len(corners))])
+    rows = np.where(showing(planes.rows, at)[:, None], planes.rows, np.nan)
+    registrations = registered(planes, rows, at)
     turn = common_lean(rows)
     axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]]) @ axes
     rows = turned(rows, turn) + [0.0, 0.0, plan.frame.origin[2]]
     sides = [moved(side, k, turn) for k, side in enumerate(sides)]
-    low, high = rectangle_of(sides, corners @ axes.T)
-    kappa = math.atan2(axes[0, 1], axes[0, 0])
-    modes = np.concatenate([turned(planes.modes, turn), np.tile((0.0, 0.0, REGISTERED_M), (1, SIDES + 1, 1))])
-    known, unknown = (ends_moved(sides, low, high, known) for known in (True, False))
-    ends = np.array([(low, high), (low, high), (low, high), *known, *unknown])
-    every = np.tile(rows, (len(ends), 1, 1))
-    every[1:3] += turned(registrations, turn)
-    member, *others = regular(every, ends, kappa)
-    told, turns = len(registrations) + len(known), member.quarter_turns
-    changes = [own.turned(turns) for own in changed(member, modes) + others[:told]]
-    member = replace(member.canonical(), centre=member.centre @ axes + plan.frame.origin[:2])
-    part = member.part(regions, name_among(member.name, allowed), changes)
-    untold = member.sigma([own.turned(turns) for own in others[told:]], part.type == member.name)
-    return replace(part, sigma={name: value for name, value in part.sigma.items() if name not in untold})
+    ends = rectangle_of(sides, corners @ axes.T)
+    known, unknown = ends_moved(sides, ends)
+    tried = np.array([ends, ends, ends, *known, *unknown]).T
+    every = np.repeat(rows[:, :, None], tried.shape[1], axis=2)
+    every[:, :, 1:3] += turned(registrations, turn)
+    members = regular(every, tried, math.atan2(axes[0, 1], axes[0, 0]))
+    member = members.those(0)
+    turns = member.quarter_turns
+    modes = np.concatenate([turned(planes.modes, turn), RAISED], axis=2)
+    changes = changed(members, modes).turned(turns)
+    member = replace(member.turned(turns), centre=member.centre @ axes + plan.frame.origin[:2])
+    return member.part(regions, name_among(member.name, allowed), changes, len(unknown))
 
 
-def registered(planes: Planes, rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """By how much (2, 5, 3) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
-    that show (`rows`) can over `corners` (n, 2), tied to sides of the outline as they are."""
-    there, at = np.isfinite(rows[:, 2]), np.column_stack([corners, np.ones(len(corners))])
-    design = (at @ planes.design[there]).reshape(there.sum() * len(at), planes.design.shape[2])
-    shifted = -REGISTERED_PLAN_M * rows[there, :2].repeat(len(corners), axis=0)
-    unknowns = np.linalg.lstsq(design, shifted, rcond=None)[0]
-    return np.moveaxis(planes.design @ unknowns, 2, 0)
-
-
-def showing(rows: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Which planes (5,) are not everywhere above some single other one over the regions' `corners` (n, 2)."""
+def registered(planes: Planes, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """By how much (5, 3, 2) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
+    that show (`rows`) can over the corners `at` (n, 3), u, v, 1, tied to sides of the outline as they are."""
     there = np.isfinite(rows[:, 2])
-    z = rows @ np.column_stack([corners, np.ones(len(corners))]).T
+    if not rows[there, :2].any():  # level ones stay as high
+        return np.zeros((SIDES + 1, 3, 2))
+    design = (at @ planes.design[there]).reshape(there.sum() * len(at), planes.design.shape[2])
+    shifted = -REGISTERED_PLAN_M * rows[there, :2].repeat(len(at), axis=0)
+    return planes.design @ np.linalg.lstsq(design, shifted, rcond=None)[0]
+
+
+def showing(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Which planes (5,) are not everywhere above some single other one over the regions' corners `at` (n, 3), u, v, 1."""
+    there = np.isfinite(rows[:, 2])
+    if there.sum() < 2:
+        return there
+    z = rows @ at.T
     above = (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()  # [k][j]: plane k nowhere below plane j
     for k in np.nonzero(there)[0].tolist():
         there[k] = not any(above[k][j] for j in np.nonzero(there)[0].tolist() if j != k)
@@ -95,13 +97,13 @@ def common_lean(rows: np.ndarray) -> float:
 
 
 def turned(rows: np.ndarray, angle: float) -> np.ndarray:
-    """Planes (..., 5, 3) over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
+    """Planes (5, 3), or several (5, 3, m), over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
     if angle == 0.0:
         return rows
     c, s = math.cos(angle), math.sin(angle)
-    rows = rows @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    along = rows[..., EACH, 1 - AXIS]
-    rows[..., EACH, 1 - AXIS] = np.where(np.abs(along) < 1e-8, 0.0, along)
+    rows = (rows.swapaxes(1, -1) @ np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])).swapaxes(1, -1)
+    along = rows[EACH, 1 - AXIS]
+    rows[EACH, 1 - AXIS] = np.where(np.abs(along) < 1e-8, 0.0, along)
     return rows
 
 
@@ -114,81 +116,86 @@ def moved(side: Side, edge: int, angle: float) -> Side:
     return replace(side, at=side.at * scale, lean=math.tan(slope))
 
 
-def rectangle_of(sides: list[Side], corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest u, v (2,) of the sides in their middle, no further out than the regions' `corners` (n, 2) are."""
-    least, most = corners.min(axis=0), corners.max(axis=0)
-    middle = 0.5 * (least + most)
-    at = [side.at + side.lean * middle[1 - AXIS[k]] for k, side in enumerate(sides)]
-    low = np.array([at[k] if sides[k].anchored else max(at[k], least[AXIS[k]]) for k in (0, 2)])
-    high = np.array([at[k] if sides[k].anchored else min(at[k], most[AXIS[k]]) for k in (1, 3)])
-    narrow = high - low < 1e-3
-    return np.where(narrow, least, low), np.where(narrow, most, high)
+def rectangle_of(sides: list[Side], corners: np.ndarray) -> list[float]:
+    """Lowest and highest u, lowest and highest v of the sides in their middle, no further out than the regions' `corners` (n, 2) are."""
+    least, most = corners.min(axis=0).tolist(), corners.max(axis=0).tolist()
+    ends = []
+    for axis in (0, 1):
+        low, high = sides[2 * axis], sides[2 * axis + 1]
+        middle = 0.5 * (least[1 - axis] + most[1 - axis])
+        start, end = low.at + low.lean * middle, high.at + high.lean * middle
+        start = start if low.anchored else max(start, least[axis])
+        end = end if high.anchored else min(end, most[axis])
+        ends += [least[axis], most[axis]] if end - start < 1e-3 else [start, end]
+    return ends
 
 
-def ends_moved(sides: list[Side], low: np.ndarray, high: np.ndarray, known: bool) -> list[np.ndarray]:
-    """The lowest and highest u, v (2, 2) of the rectangle from `low` to `high` (2,) after each of its sides moved by its standard deviation, if that is `known`; or else
-    a little, of those that stand where no points tell."""
-    middle, found = 0.5 * (low + high), []
+def ends_moved(sides: list[Side], ends: list[float]) -> tuple[list[list[float]], list[list[float]]]:
+    """The `ends` (lowest and highest u, v) of a rectangle after each of its sides moved by its standard deviation; and after each of
+    those that stand where no points tell moved a little."""
+    middle, known, unknown = (0.5 * (ends[0] + ends[1]), 0.5 * (ends[2] + ends[3])), [], []
     for k, side in enumerate(sides):
-        ends = np.array([low, high])
-        given = side.anchored or abs(ends[k % 2, AXIS[k]] - side.at - side.lean * middle[1 - AXIS[k]]) > GIVEN_M
-        if side.sigma == math.inf and not known:
-            ends[k % 2, AXIS[k]] += PROBE_M
-            found.append(ends)
-        elif known and not given and 0.0 < side.sigma < math.inf:
-            ends[k % 2, AXIS[k]] += side.sigma
-            found.append(ends)
-    return found
+        given = side.anchored or abs(ends[k] - side.at - side.lean * middle[1 - k // 2]) > GIVEN_M
+        if side.sigma == math.inf:
+            unknown.append([*ends[:k], ends[k] + PROBE_M, *ends[k + 1 :]])
+        elif not given and side.sigma > 0.0:
+            known.append([*ends[:k], ends[k] + side.sigma, *ends[k + 1 :]])
+    return known, unknown
 
 
-def regular(rows: np.ndarray, ends: np.ndarray, kappa: float) -> list[Member]:
-    """Members over m rectangles, lowest and highest u, v `ends` (m, 2, 2), with planes `rows` (m, 5, 3), which all have the same sides,
+def regular(rows: np.ndarray, ends: np.ndarray, kappa: float) -> Member:
+    """Members over m rectangles, lowest and highest u, v `ends` (4, m), with planes `rows` (5, 3, m), which all have the same sides,
     in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are."""
-    centre, half = 0.5 * (ends[:, 0] + ends[:, 1]), 0.5 * (ends[:, 1] - ends[:, 0])
-    sides, has = rows[:, :SIDES], np.isfinite(rows[:, :SIDES, 2])
-    slopes = np.where(has, SIGN * sides[:, EACH, AXIS], 0.0)
-    leans = np.divide(sides[:, EACH, 1 - AXIS], slopes, out=np.zeros_like(slopes), where=has)
-    middles = (sides[:, :, :2] * centre[:, None]).sum(axis=2)
-    eaves = np.where(has, middles + sides[:, :, 2] - slopes * half[:, AXIS], np.inf)
-    centre, half, eaves = level(centre, half, eaves, slopes, leans)
-    tops = np.where(np.isfinite(rows[:, LEVEL, 2]), rows[:, LEVEL, 2], np.inf).tolist()
-    members = zip(centre, half, eaves, slopes, tops, leans, strict=True)
-    return [with_one_apex(Member(kappa, *member)) for member in members]
-
-
-def changed(member: Member, changes: np.ndarray) -> list[Member]:
-    """The member with its planes changed by each of `changes` (m, 5, 3), its sides where they are."""
-    slopes = member.slopes + np.where(member.has, SIGN * changes[:, EACH, AXIS], 0.0)
-    middles = np.tile(member.centre, (SIDES, 1))  # of the sides
-    middles[EACH, AXIS] -= SIGN * member.half[AXIS]
-    eaves = member.eaves + (changes[:, :SIDES, :2] * middles).sum(axis=2) + changes[:, :SIDES, 2]
-    tops = member.top + changes[:, LEVEL, 2]
-    kappa, centre, half, leans = member.kappa, member.centre, member.half, member.leans
-    return [Member(kappa, centre, half, *own, leans) for own in zip(eaves, slopes, tops.tolist(), strict=True)]
+    centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
+    there = np.flatnonzero(np.isfinite(rows[:, 2, 0])).tolist()
+    sides, count = [k for k in there if k < SIDES], rows.shape[2]
+    eaves, slopes, leans = np.full((SIDES, count), np.inf), np.zeros((SIDES, count)), np.zeros((SIDES, count))
+    for k in sides:
+        axis = k // 2
+        slopes[k] = SIGN[k] * rows[k, axis]
+        leans[k] = rows[k, 1 - axis] / slopes[k]
+        eaves[k] = rows[k, 0] * centre[0] + rows[k, 1] * centre[1] + rows[k, 2] - slopes[k] * half[axis]
+    top = rows[LEVEL, 2] if LEVEL in there else np.full(count, np.inf)
+    if sides:
+        centre, half, eaves = level(centre, half, eaves, slopes, leans, sides)
+    return with_one_apex(Member(kappa, centre, half, eaves, slopes, top, leans))
 
 
 def level(
-    centre: np.ndarray, half: np.ndarray, eaves: np.ndarray, slopes: np.ndarray, leans: np.ndarray
+    centre: np.ndarray, half: np.ndarray, eaves: np.ndarray, slopes: np.ndarray, leans: np.ndarray, sides: list[int]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres and halves (m, 2) and eaves (m, 4) of members with sides moved out to the lowest eave's height where that is near."""
-    has, lowest = np.isfinite(eaves), eaves.min(axis=1, keepdims=True)
-    if not has.any():
-        return centre, half, eaves
-    further = np.divide(eaves - lowest, slopes, out=np.full_like(eaves, np.inf), where=has)
-    outwards = np.where(further < LEVEL_EAVE_M, further, 0.0)
-    low, high = outwards[:, [0, 2]], outwards[:, [1, 3]]
+    """Centres and halves (2, m) and eaves (4, m) of members with `sides` moved out to the lowest eave's height where that is near."""
+    lowest, outwards, eaves = eaves.min(axis=0), np.zeros_like(eaves), eaves.copy()
+    for k in sides:
+        further = (eaves[k] - lowest) / slopes[k]
+        outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
+    low, high = outwards[::2], outwards[1::2]
     shift = 0.5 * (high - low)
-    lower = eaves + slopes * (leans * shift[:, 1 - AXIS] - outwards)
-    near = has & (np.abs(lower - lowest) < 1e-6)
-    return centre + shift, half + 0.5 * (high + low), np.where(near, lowest, lower)
+    for k in sides:
+        lower = eaves[k] + slopes[k] * (leans[k] * shift[1 - k // 2] - outwards[k])
+        eaves[k] = np.where(np.abs(lower - lowest) < 1e-6, lowest, lower)
+    return centre + shift, half + 0.5 * (high + low), eaves
 
 
-def with_one_apex(member: Member) -> Member:
-    """A hip whose two pairs of sides meet at nearly the same height with all four meeting in one point, eaves where they are."""
-    if not member.has.all() or math.isfinite(member.top) or member.leans.any():
-        return member
-    one, other = member.apex(0), member.apex(1)
-    if abs(one - other) > APEX_M:
-        return member
-    runs = (np.array([one, one, other, other]) - member.eaves) / member.slopes  # from each eave to the point in plan
-    return replace(member, slopes=(0.5 * (one + other) - member.eaves) / runs)
+def changed(members: Member, changes: np.ndarray) -> Member:
+    """The first of several with its planes changed by each of `changes` (5, 3, p), its sides where they are; and the others."""
+    count = changes.shape[2]
+    found = members.those([0] * count + list(range(1, members.eaves.shape[1])))
+    for k in members.sides:
+        axis = k // 2
+        middle = members.centre[:, 0].copy()  # of the side
+        middle[axis] -= SIGN[k] * members.half[axis, 0]
+        found.slopes[k, :count] += SIGN[k] * changes[k, axis]
+        found.eaves[k, :count] += changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
+    found.top[:count] += changes[LEVEL, 2]
+    return found
+
+
+def with_one_apex(members: Member) -> Member:
+    """Hips whose two pairs of sides meet at nearly the same height with all four meeting in one point, eaves where they are."""
+    if not all(members.has) or members.has_top:
+        return members
+    one, other = members.apex(0), members.apex(1)
+    near = (np.abs(one - other) <= APEX_M) & ~members.leans.any(axis=0)
+    runs = (np.stack([one, one, other, other]) - members.eaves) / members.slopes  # from each eave to the point in plan
+    return replace(members, slopes=np.where(near, (0.5 * (one + other) - members.eaves) / runs, members.slopes))
