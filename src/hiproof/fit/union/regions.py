@@ -42,12 +42,9 @@ def regions_of(
     for k in range(1, len(volumes)):
         own = shapely.intersection(quads[k], outline, grid_size=GRID_M)
         if volumes[k, REPLACES]:
-            regions = [
-                [q for p in before for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
-                for before in regions
-            ]
+            regions = [cut_out(before, quads[k]) for before in regions]
         elif regions[0] and not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, plan, scene):
-            regions[0] = [q for p in regions[0] for q in polygons_of(shapely.difference(p, quads[k], grid_size=GRID_M))]
+            regions[0] = cut_out(regions[0], quads[k])
         regions.append(polygons_of(own))
     return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, quads, outline, plan, scene)
 
@@ -136,6 +133,11 @@ def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     return [part for part in parts if part.geom_type == "Polygon" and part.area > 1e-9]
 
 
+def cut_out(polygons: list[shapely.Polygon], hole: shapely.Polygon) -> list[shapely.Polygon]:
+    """What is left of the polygons without the `hole`."""
+    return [q for p in polygons for q in polygons_of(shapely.difference(p, hole, grid_size=GRID_M))]
+
+
 def area_of(parts: Iterable[Part]) -> shapely.Geometry:
     """What parts cover together."""
     return shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M)
@@ -158,8 +160,8 @@ def gaps_filled(
     """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
     rest = shapely.difference(outline, shapely.union_all(quads[1:], grid_size=GRID_M), grid_size=GRID_M)
     for gap in polygons_of(rest):
-        near, shared, k, q = shares_most(gap, [[], *regions[1:]])
-        if shared > 0.0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], plan, scene)):
+        near, k, q = shares_most(gap, [[], *regions[1:]])
+        if k > 0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], plan, scene)):
             merged = polygons_of(
                 shapely.intersection(
                     shapely.union_all([regions[k][q], near], grid_size=GRID_M), outline, grid_size=GRID_M
@@ -167,24 +169,28 @@ def gaps_filled(
             )
             if len(merged) == 1:
                 regions[k][q] = merged[0]
-                regions[0] = [
-                    p for own in regions[0] for p in polygons_of(shapely.difference(own, near, grid_size=GRID_M))
-                ]
+                regions[0] = cut_out(regions[0], near)
                 continue
-        if not regions[0] or not shapely.covers(shapely.union_all(regions[0], grid_size=GRID_M).buffer(1e-3), gap):
+        if not is_covered(gap, regions[0]):
             regions[0].append(gap)
     return regions
 
 
-def shares_most(gap: shapely.Polygon, polygons: list[list[shapely.Polygon]]) -> tuple[shapely.Polygon, float, int, int]:
-    """The `gap` a millimetre wider, the area of it that one of the `polygons` shares at most, and that one's two indices."""
+def shares_most(gap: shapely.Polygon, polygons: list[list[shapely.Polygon]]) -> tuple[shapely.Polygon, int, int]:
+    """The `gap` a millimetre wider, and the two indices of that one of the `polygons` that shares most of it; zeros where none does."""
     near = shapely.buffer(gap, 1e-3, quad_segs=1)
-    beside = [
-        (shapely.intersection(near, polygon, grid_size=GRID_M).area, k, q)
-        for k, own in enumerate(polygons)
-        for q, polygon in enumerate(own)
-    ]
-    return near, *max(beside, default=(0.0, 0, 0))
+    beside = [(k, q) for k, own in enumerate(polygons) for q, p in enumerate(own) if shapely.intersects(near, p)]
+    if len(beside) > 1:
+        areas = [shapely.intersection(near, polygons[k][q], grid_size=GRID_M).area for k, q in beside]
+        beside = [max(zip(areas, beside, strict=True))[1]]
+    return near, *(beside[0] if beside else (0, 0))
+
+
+def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
+    """Whether the polygons cover a gap together, but for a millimetre."""
+    if any(shapely.covers(polygon, gap) for polygon in polygons):
+        return True
+    return bool(shapely.covers(shapely.union_all(polygons, grid_size=GRID_M).buffer(1e-3), gap))
 
 
 def is_base(

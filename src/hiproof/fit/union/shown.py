@@ -70,7 +70,7 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
     for sliver in bare:
-        near, _, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
+        near, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
         outline = pieces[k][q].outline
         seam = polygons_of(shapely.intersection(near, own, grid_size=GRID_M))
         beside = shapely.snap(sliver, outline, SEAM_M)
