@@ -54,7 +54,7 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     volumes = level_volumes(rng, 1 + seed % 4)
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, lines_of(outline, plan, scene), scene)
-    regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, base)
+    regions = regions_of(volumes, finished(volumes, sides, scene, {}), sides, plan, outline, scene, base)
     assert len(regions) == len(volumes)
     polygons = [polygon for own in regions for polygon in own]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
@@ -71,7 +71,7 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     volumes[-1, REPLACES] = 1.0
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, lines_of(outline, plan, scene), scene)
-    regions = regions_of(volumes, finished(volumes, sides, scene), sides, plan, outline, scene, True)
+    regions = regions_of(volumes, finished(volumes, sides, scene, {}), sides, plan, outline, scene, True)
     recess = shapely.union_all(regions[-1])
     assert recess.area > 1.0
     assert all(polygon.intersection(recess).area < 1e-3 for own in regions[:-1] for polygon in own)

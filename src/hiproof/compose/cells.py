@@ -66,7 +66,8 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
     soup = np.concatenate((xy[:-1], xy[1:]), axis=1)
     kept = (ring[:-1] == ring[1:]) & ((soup[:, 0] != soup[:, 2]) | (soup[:, 1] != soup[:, 3]))
     owner = polygon_of_part[part_of_ring[ring[:-1][kept]]]
-    return np.split(soup[kept], np.searchsorted(owner, np.arange(1, len(polygons))))
+    soup, ends = soup[kept], np.searchsorted(owner, np.arange(len(polygons) + 1)).tolist()
+    return [soup[low:high] for low, high in itertools.pairwise(ends)]
 
 
 def plan_problem(roof: Roof) -> PlanProblem:
@@ -102,7 +103,7 @@ def equal_planes(planes: np.ndarray) -> np.ndarray:
 
 def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """One array of edges and the start of each polygon in it."""
-    start = np.concatenate(([0], np.cumsum([len(soup) for soup in soups]))).astype(np.int64)
+    start = np.array([0, *itertools.accumulate(map(len, soups))])
     edges = np.concatenate(soups) if soups else np.zeros((0, 4))
     return np.ascontiguousarray(edges, float), start
 

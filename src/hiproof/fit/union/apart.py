@@ -58,11 +58,11 @@ def pieces_of(
     if np.isfinite(own[[OFFSET + LEVEL, OFFSET + 2 * axis, OFFSET + 2 * axis + 1]]).all():
         return volumes[:0]  # what stands on a top between two slopes is the upper part of a gambrel
     x, y = (U, V)[axis][int(own[DIRECTION])], (U, V)[1 - axis][int(own[DIRECTION])]
-    within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])
-    seen = x[within & (top == k)]
+    seen = x[top == k]
     starts, ends, counts = runs_of(seen, scene.pitch) if len(seen) else (seen, seen, seen)
     if len(starts) < 2:
         return volumes[:0]
+    within = (x >= own[low]) & (x <= own[low + 1]) & (y >= own[cross]) & (y <= own[cross + 1])
     between = within & np.any([(x > a) & (x < b) for a, b in zip(ends[:-1], starts[1:], strict=True)], axis=0)
     covers = volumes[np.unique(top[between])]
     told = in_a_row(own, covers, cross, y) or inside(own, low, cross, scene)

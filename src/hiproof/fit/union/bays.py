@@ -6,6 +6,7 @@ no volume. But its corners are drawn in any case. So each is asked by itself, by
 
 from __future__ import annotations
 
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -55,14 +56,15 @@ def with_bays(roof: Drawn, outline: shapely.Polygon, plan: Plan, scene: Scene, u
             break
         volumes = np.vstack([volumes, levels[best]])
         del left[best]
-    return roof if volumes is roof.volumes else drawn(volumes, lines_of(outline, plan, scene), scene)
+    return roof if volumes is roof.volumes else drawn(volumes, lines_of(outline, plan, scene), scene, {})
 
 
 def all_points(plan: Plan, scene: Scene) -> Seen:
     (u, v, z), c, s = plan.border, scene.turn[:, :1], scene.turn[:, 1:]
-    every = np.r_[scene.z[: scene.n], z]
+    every = np.concatenate([scene.z[: scene.n], z])
     order = np.argsort(every, kind="stable")
-    U, V = np.c_[scene.U[:, : scene.n], c * u + s * v], np.c_[scene.V[:, : scene.n], c * v - s * u]
+    U = np.concatenate([scene.U[:, : scene.n], c * u + s * v], axis=1)
+    V = np.concatenate([scene.V[:, : scene.n], c * v - s * u], axis=1)
     return Seen(U[:, order], V[:, order], every[order])
 
 
@@ -85,9 +87,9 @@ def level_over(bay: np.ndarray, volumes: np.ndarray, seen: Seen, scene: Scene, u
     reach = scene.dead + scene.width
     first, last = np.searchsorted(z, z - reach, "right"), np.searchsorted(z, z + reach, "left")
     near = slice(*max(zip(first, last, strict=True), key=lambda ends: ends[1] - ends[0]))
-    height = float(np.median(z[near]))
+    height = median(z[near].tolist())
     row[OFFSET : OFFSET + PLANES] = np.inf
-    row[OFFSET + LEVEL], row[DIRECTION], row[REPLACES] = height, direction, height < np.median(roof)
+    row[OFFSET + LEVEL], row[DIRECTION], row[REPLACES] = height, direction, height < median(roof.tolist())
     row[U0 : V1 + 1] = bay[1:]
     if (now[near] > UNEXPLAINED).sum() < FEWEST or not is_allowed(row, scene.allowed):
         return -np.inf, row
@@ -114,7 +116,7 @@ def rectangles_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[np
 
 def rectangle_around(ring: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene) -> np.ndarray | None:
     """Around a piece's ring (m, 2) in the direction in which it holds least of the outline besides; None where that is too much."""
-    own, area = (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T, shapely.Polygon(ring).area
+    own, area = (ring - plan.frame.origin[:2]) @ plan.frame.rotation.T, 0.5 * float(cross(ring, following(ring)).sum())
     best, least = None, FILLED * area
     for direction, (c, s) in enumerate(scene.turn):
         turned = own @ np.array([[c, -s], [s, c]])
@@ -133,8 +135,8 @@ def pieces_of(outline: shapely.Polygon) -> list[np.ndarray]:
     """Rings (m, 2), counterclockwise, of what is small of the pieces that walls cut off, drawn on from corners that point inwards."""
     exterior = outline.exterior if outline.exterior.is_ccw else outline.exterior.reverse()
     ring = shapely.get_coordinates(exterior)[:-1]
-    after = np.roll(ring, -1, axis=0) - ring
-    before = np.roll(after, 1, axis=0)
+    after = following(ring) - ring
+    before = np.concatenate([after[-1:], after[:-1]])
     inwards = np.nonzero(cross(before, after) < 0.0)[0]
     if not len(inwards):
         return []
@@ -164,6 +166,11 @@ def areas_of(ring: np.ndarray, firsts: np.ndarray, lasts: np.ndarray, places: np
     return 0.5 * (sums[lasts] - sums[firsts] + cross(twice[lasts], places) + cross(places, twice[firsts]))
 
 
+def following(ring: np.ndarray) -> np.ndarray:
+    """The corner after each of a ring's (n, 2)."""
+    return np.concatenate([ring[1:], ring[:1]])
+
+
 def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
 
@@ -171,7 +178,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 def first_crossings(ring: np.ndarray, corners: np.ndarray, ways: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The edges (k,) of a ring (n, 2), by their numbers, at which lines from its `corners` (k,) along `ways` (k, 2) leave it first, and
     the places (k, 2); without any it is the corner itself."""
-    edges, off = np.roll(ring, -1, axis=0) - ring, ring - ring[corners, None]
+    edges, off = following(ring) - ring, ring - ring[corners, None]
     turn = cross(ways[:, None], edges)
     with np.errstate(divide="ignore", invalid="ignore"):
         along, across = cross(off, edges) / turn, cross(off, ways[:, None]) / turn

@@ -59,12 +59,19 @@ class Planes:
         return self.design @ (axes * np.sqrt(np.maximum(variances, 0.0)))
 
 
-def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene) -> list[Planes]:
-    """The planes of every volume, in its direction's axes."""
-    return [
-        finished_volume(volume, own, scene, members)
-        for volume, own, members in zip(volumes, sides, shown_points(volumes, scene), strict=True)
-    ]
+# planes by all that they depend on in one scene: their volume, its sides, and the points over which it shows
+Known = dict[tuple[bytes, tuple[Side, ...], bytes], Planes]
+
+
+def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene, known: Known) -> list[Planes]:
+    """The planes of every volume, in its direction's axes; those `known` are not fitted again, those found become known."""
+    planes = []
+    for volume, own, members in zip(volumes, sides, shown_points(volumes, scene), strict=True):
+        key = volume.tobytes(), tuple(own), members.tobytes()
+        if key not in known:
+            known[key] = finished_volume(volume, own, scene, members)
+        planes.append(known[key])
+    return planes
 
 
 def shown_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:

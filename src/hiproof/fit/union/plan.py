@@ -60,17 +60,20 @@ def signed_depth(x, y, starts, ends):
 
 def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
     """Starts and ends (m, 2) of all edges of the outline, holes included."""
+    if not outline.interiors:
+        ring = shapely.get_coordinates(outline)
+        return ring[:-1], ring[1:]
     rings = [shapely.get_coordinates(ring) for ring in (outline.exterior, *outline.interiors)]
     return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
 
 
 def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> np.ndarray:
     """Lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`."""
-    kept = [float(low), float(high)]
+    kept, end = [float(low)], float(high)
     for x in sorted(vertices.tolist()):
-        if min(abs(x - y) for y in kept) > MERGE_LINES_M:
+        if abs(x - kept[-1]) > MERGE_LINES_M and abs(x - end) > MERGE_LINES_M:
             kept.append(x)
-    kept.sort()
+    kept.append(end)
     while len(kept) > MAX_CELLS:  # an outline of hundreds of vertices: give up the line closest to its neighbours
         crowded = min(range(1, len(kept) - 1), key=lambda k: kept[k + 1] - kept[k - 1])
         del kept[crowded]
@@ -85,8 +88,8 @@ def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> np
 
 
 def cells_of(lines: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Which of the cells between neighbouring `lines`, few and ascending, each of x (n,) lies in; the first or last where beyond all."""
-    return (lines[1:-1, None] <= x).sum(axis=0)
+    """Which of the cells between neighbouring `lines`, ascending, each of x (n,) lies in; the first or last where beyond all."""
+    return np.searchsorted(lines[1:-1], x, side="right")
 
 
 def lay_out_plan(points_local: np.ndarray, outline: shapely.Polygon) -> Plan:
@@ -128,13 +131,12 @@ def off_facades(points: np.ndarray, depth: np.ndarray, area_m2: float) -> np.nda
     return ~near
 
 
-def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
+def emptiness(cloud: Cloud, expected: np.ndarray) -> np.ndarray:
     """How empty (nu, nv) cells and those beside them are of the points `expected` (nu, nv): 1 quite, 0 from half of them on."""
-    count = np.zeros(expected.shape)
-    np.add.at(count, (cloud.i, cloud.j), 1.0)
     rows, columns = expected.shape
     padded = np.zeros((2, rows + 2, columns + 2))
-    padded[:, 1:-1, 1:-1] = count, expected
+    padded[0, 1:-1, 1:-1] = np.bincount(cloud.i * columns + cloud.j, minlength=expected.size).reshape(rows, columns)
+    padded[1, 1:-1, 1:-1] = expected
     windows = [padded[:, a : a + rows, b : b + columns] for a in range(3) for b in range(3)]
     around = np.sum(windows, axis=0)
     return np.clip(1.0 - around[0] / np.maximum(0.5 * around[1], 1e-9), 0.0, 1.0)
@@ -143,12 +145,11 @@ def emptiness(grid: Grid, cloud: Cloud, expected: np.ndarray) -> np.ndarray:
 def lay_ghosts(frame: PlanFrame, grid: Grid, cloud: Cloud, outline: shapely.Polygon) -> Ghosts:
     """A ghost at the centre of every cell inside the outline, weighing as many points as its area usually holds."""
     centre_u, centre_v = (0.5 * (lines[:-1] + lines[1:]) for lines in (grid.u, grid.v))
-    i, j = (index.ravel() for index in np.indices((len(centre_u), len(centre_v))))
-    u, v = centre_u[i], centre_v[j]
+    u, v = np.repeat(centre_u, len(centre_v)), np.tile(centre_v, len(centre_u))
     xy = frame.xy_local(np.column_stack([u, v]))
     inside = signed_depth(xy[:, 0].copy(), xy[:, 1].copy(), *ring_edges(outline)) > 0.0
-    weight = (np.diff(grid.u)[i] * np.diff(grid.v)[j]) * len(cloud.u) / outline.area
-    shade = SHADE * weight * emptiness(grid, cloud, weight.reshape(len(centre_u), -1)).ravel()
+    weight = np.outer(np.diff(grid.u), np.diff(grid.v)) * len(cloud.u) / outline.area
+    shade = SHADE * weight * emptiness(cloud, weight)
     low, high = (cloud.z.min(), cloud.z.max()) if len(cloud.z) else (0.0, 0.0)
-    u, v, weight, shade = (np.ascontiguousarray(column[inside]) for column in (u, v, weight, shade))
+    u, v, weight, shade = (np.ascontiguousarray(column[inside]) for column in (u, v, weight.ravel(), shade.ravel()))
     return Ghosts(u, v, weight, shade, low - GHOST_MARGIN_M, high + GHOST_MARGIN_M)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections import namedtuple
 from collections.abc import Sequence
+from statistics import median
 
 import numpy as np
 import shapely
@@ -77,7 +78,8 @@ def scene_of(
     turn = np.array([[math.cos(a), math.sin(a)] for a in angles])
     depth, corner, pitch = depth_raster(plan, outline)
     ring = (shapely.get_coordinates(outline.exterior)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
-    lines, vertices = lines_of(plan, ring, turn)
+    corners = np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in turn])
+    lines, vertices = lines_of(plan, corners)
     U, V = np.array([c * u + s * v for c, s in turn]), np.array([c * v - s * u for c, s in turn])
     return Scene(
         U,
@@ -96,8 +98,8 @@ def scene_of(
         pitch,
         lines,
         vertices,
-        np.array([ring @ np.array([[c, -s], [s, c]]) for c, s in turn]),
-        padded([leans_along(ring @ np.array([[c, -s], [s, c]]), axis) for c, s in turn for axis in (0, 1)]),
+        corners,
+        padded([leans_along(own, axis) for own in corners for axis in (0, 1)]),
         evidence,
         DEAD_M,
         max(tolerance_m - DEAD_M, LEAST_WIDTH_M),
@@ -108,6 +110,8 @@ def scene_of(
 
 def seen_through(scene: Scene, kept: np.ndarray, evidence: float) -> Scene:
     """The scene with only the points `kept` (m,), ghosts weighing as many of them; what the outline gives is shared."""
+    if len(kept) == scene.n:
+        return scene._replace(evidence=evidence)
     columns = np.r_[kept, scene.n : len(scene.z)]
     weight, shade = scene.weight[columns], scene.shade[columns]
     weight[len(kept) :] *= len(kept) / scene.n
@@ -153,30 +157,23 @@ def nodes(scene: Scene, least_depth: float = 0.0) -> tuple[np.ndarray, np.ndarra
     return c * u + s * v, c * v - s * u
 
 
-def lines_of(plan: Plan, ring: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Grid lines and vertex lines (directions, 2, m), ascending, padded with infinity."""
-    cell = float(np.median(np.diff(plan.grid.u)))
-    lines, vertices = [], []
-    for number, (c, s) in enumerate(turn):
-        own = ring @ np.array([[c, -s], [s, c]])
-        for axis in range(2):
-            x = own[:, axis]
-            first = number == 0
-            lines.append((plan.grid.u, plan.grid.v)[axis] if first else grid_lines(x.min(), x.max(), x, cell))
-            vertices.append(np.unique(np.round(x, 3)))
-    return padded(lines), padded(vertices)
+def lines_of(plan: Plan, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Grid lines and vertex lines (directions, 2, m) of an outline's `corners` (directions, c, 2), ascending, padded with infinity."""
+    cell = median(np.diff(plan.grid.u).tolist())
+    lines = [plan.grid.u, plan.grid.v]
+    lines += [grid_lines(x.min(), x.max(), x, cell) for own in corners[1:] for x in own.T]
+    return padded(lines), padded([sorted(set(x)) for own in np.round(corners, 3) for x in own.T.tolist()])
 
 
 def leans_along(ring: np.ndarray, axis: int) -> list[float]:
     """Leans of those of a ring's (n, 2) edges that are nearly but not quite along an axis' lines, the longest first."""
-    step = np.diff(np.vstack([ring, ring[:1]]), axis=0)
-    length, along = np.hypot(*step.T), np.abs(step[:, 1 - axis])
-    walls = (np.abs(step[:, axis]) < MOST_LEAN * along) & (length > WALL_M)
-    lean = step[walls, axis] / step[walls, 1 - axis]
+    step = np.concatenate([ring[1:], ring[:1]]) - ring
+    length, across, along = np.hypot(step[:, 0], step[:, 1]), step[:, axis], step[:, 1 - axis]
+    walls = np.nonzero((np.abs(across) < MOST_LEAN * np.abs(along)) & (length > WALL_M))[0]
     found: list[float] = []
-    for k in np.argsort(-length[walls], kind="stable"):
-        if len(found) < MOST_LEANS and min(abs(lean[k] - x) for x in (0.0, *found)) > LEANS_APART:
-            found.append(float(lean[k]))
+    for lean in (across[walls] / along[walls])[np.argsort(-length[walls], kind="stable")].tolist():
+        if len(found) < MOST_LEANS and min(abs(lean - x) for x in (0.0, *found)) > LEANS_APART:
+            found.append(lean)
     return found
 
 

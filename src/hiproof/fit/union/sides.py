@@ -8,7 +8,6 @@ it, up to the price of a loose edge.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +26,6 @@ CHORD_END_M, MOST_CORNERS = 0.6, 40  # how far beyond a side the ends of a line 
 SHARED_M = 0.3  # m within which a side takes its neighbour's line
 # units of evidence: for a side along no line, for one with no wall below, and for each metre off
 LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 1.2, 0.3, 0.1
-FACING = 1e-9  # m; numerically along the axis
 SHOWN_M = 0.5  # m next to a side in which points need its volume, or else it lies hidden
 MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
 NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
@@ -67,7 +65,8 @@ class Side:
 def lines_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[list[Lines]]:
     """The lines that sides across u and across v may take, by direction."""
     edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
-    return [[lines_across(edges, chords, turn, axis) for axis in (0, 1)] for turn in scene.turn]
+    ends = np.concatenate([edges, chords], axis=1)
+    return [lines_along(ends, edges.shape[1], turn) for turn in scene.turn]
 
 
 def sides_of(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> list[list[Side]]:
@@ -93,31 +92,32 @@ def plan_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
 
 def plan_chords(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     """Starts and ends (2, m, 2) of the straight lines inside the outline between two of its corners; none of too many."""
-    corners = sorted(set(map(tuple, shapely.get_coordinates(outline).tolist())))
+    corners = np.array(sorted(set(map(tuple, shapely.get_coordinates(outline).tolist()))))
     if len(corners) > MOST_CORNERS:
         return np.zeros((2, 0, 2))
-    ends, wider = np.array(list(combinations(corners, 2))), shapely.buffer(outline, ALONG_M)
+    number, wider = np.arange(len(corners)), shapely.buffer(outline, ALONG_M)
+    ends = corners[np.array(np.nonzero(number[:, None] < number))]
     shapely.prepare(wider)
-    within = shapely.covers(wider, shapely.linestrings(ends))
-    return (np.moveaxis(ends[within], 1, 0) - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    within = shapely.contains_properly(wider, shapely.linestrings(ends.swapaxes(0, 1)))
+    return (ends[:, within] - plan.frame.origin[:2]) @ plan.frame.rotation.T
 
 
-def lines_across(edges: np.ndarray, chords: np.ndarray, turn: np.ndarray, axis: int) -> Lines:
-    """Those of the edges and chords (2, m, 2), in the first direction, that are nearly square to an axis of another."""
+def lines_along(ends: np.ndarray, edges: int, turn: np.ndarray) -> list[Lines]:
+    """Lines across u and across v of the direction `turn`, of the `ends` (2, m, 2) of edges, so many of them, and of chords after these."""
     c, s = turn
-    edges, chords = (ends @ np.array([[c, -s], [s, c]]) for ends in (edges, chords))
-    ends = np.concatenate([edges, chords], axis=1)
-    is_edge = np.arange(ends.shape[1]) < edges.shape[1]
-    step = ends[1] - ends[0]
-    steep = np.abs(step[:, 1 - axis]) < FACING
-    lean = np.where(steep, 1e9, step[:, axis] / np.where(steep, 1.0, step[:, 1 - axis]))
-    kept = (np.abs(lean) < LEAN) & (np.hypot(*step.T) > SHORTEST_M)
-    ends, lean = ends[:, kept], lean[kept]
-    start = ends[0, :, axis] - lean * ends[0, :, 1 - axis]
-    y, x_edges, y_edges = (
-        np.ascontiguousarray(x) for x in (ends[:, :, 1 - axis], edges[:, :, axis], edges[:, :, 1 - axis])
-    )
-    return Lines(start, lean, y, is_edge[kept], x_edges, y_edges)
+    u, v = np.moveaxis(ends @ np.array([[c, -s], [s, c]]), 2, 0)
+    long = np.hypot(u[1] - u[0], v[1] - v[0]) > SHORTEST_M
+    return [lines_across(x, y, long, edges) for x, y in ((u, v), (v, u))]
+
+
+def lines_across(x: np.ndarray, y: np.ndarray, long: np.ndarray, edges: int) -> Lines:
+    """Those `long` (m,) of the lines from one to the other of x, y (2, m) that are nearly square to the axis x."""
+    across, along = x[1] - x[0], y[1] - y[0]
+    kept = np.nonzero(long & (np.abs(across) < LEAN * np.abs(along)))[0]
+    lean = across[kept] / along[kept]
+    start = x[0, kept] - lean * y[0, kept]
+    x_edges, y_edges = np.ascontiguousarray(x[:, :edges]), np.ascontiguousarray(y[:, :edges])
+    return Lines(start, lean, np.ascontiguousarray(y[:, kept]), kept < edges, x_edges, y_edges)
 
 
 @compiled

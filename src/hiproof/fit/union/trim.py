@@ -10,7 +10,7 @@ import numpy as np
 from .moves import without
 from .objective import objective
 from .scene import Scene, nodes
-from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
+from .volumes import DIRECTION, U0, V0, V1, roof_heights
 
 HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
 # m from what shows within which an edge or a corner is the place to draw a side in to
@@ -18,6 +18,7 @@ NEAR_EDGE_M, NEAR_VERTEX_M = 0.5, 0.3
 # m, and of the raster's steps, which are long on large roofs, for which a volume is hidden that shows in several places
 GAP_M, GAP_NODES = 0.8, 2.5
 CUT_UNITS = 10.0  # units that a volume cut short may cost before its neighbours are drawn out
+OUTWARDS = np.array([-1.0, 1.0])  # of the low and the high edge along an axis
 SLACK_UNITS = 0.02  # units of evidence that drawing in may cost; what is hidden explains nothing
 
 
@@ -53,23 +54,22 @@ def runs_of(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.nda
     many places each has."""
     x = np.sort(x)
     gaps = np.flatnonzero(x[1:] - x[:-1] > max(GAP_M, GAP_NODES * pitch))
-    first, last = np.append(0, gaps + 1), np.append(gaps, len(x) - 1)
+    first, last = np.concatenate(([0], gaps + 1)), np.concatenate((gaps, [len(x) - 1]))
     return x[first], x[last], last - first + 1
 
 
 def drawn_out(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
     """The volumes with every edge at the line of corners that is next to it on its outer side, where that costs next to nothing."""
-    for k in range(1, len(volumes)):
-        for edge in (U0, U1, V0, V1):
-            outwards = -1.0 if edge in (U0, V0) else 1.0
-            beyond = outwards * (scene.vertices[int(volumes[k, DIRECTION]), (edge - U0) // 2] - volumes[k, edge])
-            near = beyond[(beyond > 0.0) & (beyond < NEAR_VERTEX_M)]
-            if len(near):
-                trial = volumes.copy()
-                trial[k, edge] += outwards * near.min()
-                found = objective(trial, scene, value + SLACK_UNITS * scene.evidence)
-                if np.isfinite(found):
-                    volumes, value = trial, found
+    edges, lines = volumes[:, U0 : V1 + 1].reshape(-1, 2, 2, 1), scene.vertices[volumes[:, DIRECTION].astype(int)]
+    beyond = OUTWARDS[:, None] * (lines[:, :, None] - edges)
+    nearest = np.where(beyond > 0.0, beyond, np.inf).min(axis=3).reshape(-1, 4)
+    for k, edge in np.argwhere(nearest < NEAR_VERTEX_M):
+        if k > 0:
+            trial = volumes.copy()
+            trial[k, U0 + edge] += OUTWARDS[edge % 2] * nearest[k, edge]
+            found = objective(trial, scene, value + SLACK_UNITS * scene.evidence)
+            if np.isfinite(found):
+                volumes, value = trial, found
     return volumes, value
 
 
@@ -121,9 +121,10 @@ def cut_short(
 
 def lines_near(volumes: np.ndarray, scene: Scene, k: int, edge: int, seen_to: float) -> list[float]:
     """The nearest line to `seen_to` that another volume's edge or a corner of the outline has; none if none is near."""
-    axis = (edge - U0) // 2
-    others = [j for j in range(1, len(volumes)) if j != k and volumes[j, DIRECTION] == volumes[k, DIRECTION]]
-    edges = volumes[others][:, [U0 + 2 * axis, U1 + 2 * axis]].ravel()
-    vertices = scene.vertices[int(volumes[k, DIRECTION]), axis]
-    near = np.r_[edges[np.abs(edges - seen_to) < NEAR_EDGE_M], vertices[np.abs(vertices - seen_to) < NEAR_VERTEX_M]]
-    return [float(near[np.argmin(np.abs(near - seen_to))])] if len(near) else []
+    axis, direction = (edge - U0) // 2, int(volumes[k, DIRECTION])
+    low = U0 + 2 * axis
+    others = [row for j, row in enumerate(volumes[1:, [low, low + 1, DIRECTION]].tolist(), start=1) if j != k]
+    edges = [x for *ends, along in others if along == direction for x in ends]
+    near = [x for x in edges if abs(x - seen_to) < NEAR_EDGE_M]
+    near += [x for x in scene.vertices[direction, axis].tolist() if abs(x - seen_to) < NEAR_VERTEX_M]
+    return [min(near, key=lambda x: abs(x - seen_to))] if near else []

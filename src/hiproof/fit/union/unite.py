@@ -13,13 +13,13 @@ from itertools import combinations
 import numpy as np
 import shapely
 
-from .finish import SQUARE, Planes, finished
+from .finish import SQUARE, Known, Planes, finished
 from .moves import refit_each, without
 from .objective import base_shows, edges_cost, objective
 from .plan import Plan
 from .scene import Scene
 from .sides import Lines, Side, lines_of, sides_of
-from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, distances_up, volume_cost
+from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, V1, distances_up, volume_cost
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
@@ -40,7 +40,8 @@ class Drawn:
 def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
     """The volumes along their sides, without those that do not pay once planes face as these do."""
     lines, value = lines_of(outline, plan, scene), objective(volumes, scene, np.inf)
-    best = drawn(volumes, lines, scene)
+    known: Known = {}
+    best = drawn(volumes, lines, scene, known)
     tried = True
     while tried:
         tried = False
@@ -50,7 +51,7 @@ def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Sce
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
             if found > value + HOPELESS_UNITS * scene.evidence:
                 continue
-            roof = drawn(trial, lines, scene)
+            roof = drawn(trial, lines, scene, known)
             if roof.cost < best.cost:
                 best, value, tried = roof, found, True
                 break
@@ -69,10 +70,10 @@ def fewer(roof: Drawn) -> Iterator[np.ndarray]:
             yield without(roof.volumes, k)
 
 
-def drawn(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> Drawn:
+def drawn(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene, known: Known) -> Drawn:
     """The volumes with the sides, on the outline's `lines` where these are near, and the planes that suit them."""
     sides = sides_of(volumes, lines, scene)
-    planes = finished(volumes, sides, scene)
+    planes = finished(volumes, sides, scene, known)
     structure = scene.evidence * sum(volume_cost(volume) for volume in volumes[1:]) + edges_cost(volumes, scene, np.inf)
     return Drawn(volumes, sides, planes, sum(own.cost for own in planes) + structure)
 
@@ -81,11 +82,9 @@ def alike(one: np.ndarray, other: np.ndarray) -> bool:
     """Whether two volumes lie beside each other in one line, with all but the same planes."""
     if one[DIRECTION] != other[DIRECTION] or one[REPLACES] or other[REPLACES]:
         return False
-    rectangles = np.array([one[U0 : V0 + 2], other[U0 : V0 + 2]]).reshape(2, 2, 2)  # volume, axis, end
-    gap = rectangles[:, :, 0].max(axis=0) - rectangles[:, :, 1].min(axis=0)
-    apart = np.abs(rectangles[0] - rectangles[1]).max(axis=1)
-    if not any(gap[axis] < BESIDE_M and apart[1 - axis] < IN_LINE_M for axis in (0, 1)):
+    if not in_line(one[U0 : V1 + 1].tolist(), other[U0 : V1 + 1].tolist()):
         return False
+    rectangles = np.array([one[U0 : V1 + 1], other[U0 : V1 + 1]]).reshape(2, 2, 2)  # volume, axis, end
     there = np.isfinite(one[OFFSET : OFFSET + PLANES]), np.isfinite(other[OFFSET : OFFSET + PLANES])
     both = there[0] & there[1]
     if both.sum() < min(there[0].sum(), there[1].sum()) or both.sum() == 0:
@@ -96,6 +95,16 @@ def alike(one: np.ndarray, other: np.ndarray) -> bool:
     heights = np.array([one[OFFSET : OFFSET + PLANES], other[OFFSET : OFFSET + PLANES]]) + slopes * x
     near = np.abs(heights[0, both] - heights[1, both]) < HEIGHTS_ALIKE_M
     return bool(near.all() and (np.abs(slopes[0] - slopes[1])[both] < SLOPES_ALIKE).all())
+
+
+def in_line(one: list[float], other: list[float]) -> bool:
+    """Whether two rectangles (u0, u1, v0, v1) lie beside each other in one line."""
+    for low, across in ((0, 2), (2, 0)):
+        gap = max(one[low], other[low]) - min(one[low + 1], other[low + 1])
+        apart = max(abs(one[across] - other[across]), abs(one[across + 1] - other[across + 1]))
+        if gap < BESIDE_M and apart < IN_LINE_M:
+            return True
+    return False
 
 
 def over_both(one: np.ndarray, other: np.ndarray) -> np.ndarray:
