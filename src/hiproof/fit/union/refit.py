@@ -39,25 +39,24 @@ def refit(volumes, scene, k):
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v, z = scene.U[direction, :n], scene.V[direction, :n], scene.z[:n]
     above, not_below = where_it_may_show(volumes, scene.U, scene.V, n, k)
-    weights = np.empty(n)
+    weights, planes = np.empty(n), np.empty(n, np.int64)
     for turn in range(ROUNDS):
         scale = (scene.dead + scene.width) * (2.0 if turn == 0 else 1.5)
         c = coefficients(volumes, k)
         for i in range(n):  # no branches: a processor does several points at once
-            h = lowest(c, u[i], v[i])
+            h, planes[i] = lowest_plane(c, u[i], v[i])
             w = 1.0 - ((z[i] - h) / scale) ** 2
             weights[i] = w * w if (h > above[i]) & (h >= not_below[i]) & (abs(z[i] - h) < scale) else 0.0
-        solve_planes(volumes[k], sums_by_plane(volumes, k, c, u, v, z, weights))
+        solve_planes(volumes[k], sums_by_plane(volumes, k, u, v, z, weights, planes))
 
 
 @compiled
-def sums_by_plane(volumes, k, c, u, v, z, weights):
+def sums_by_plane(volumes, k, u, v, z, weights, planes):
     """Sums (5, PLANES) of w, w x, w z, w x x, w x z over the points that each plane of volume k is the lowest at."""
     sums = np.zeros((5, PLANES))
     for i in range(len(u)):
-        w = weights[i]
+        w, plane = weights[i], planes[i]
         if w > 0.0:
-            _, plane = lowest_plane(c, u[i], v[i])
             x = distance_up(volumes[k], plane, u[i], v[i]) if plane < LEVEL else 0.0
             sums[0, plane] += w
             sums[1, plane] += w * x

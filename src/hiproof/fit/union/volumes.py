@@ -63,7 +63,7 @@ def lowest(c, u, v):
     return min(min(along, across), c[4])
 
 
-@compiled
+@compiled(inline="always")
 def lowest_plane(c, u, v):
     """Height at u, v and which of the planes is the lowest there."""
     z0, z1 = c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v
