@@ -50,7 +50,7 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
         return 0.0
     some = points[np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2]
     places = places_in(outline)
-    gap = ((places[:, None] - some) ** 2).sum(axis=2).min(axis=1)
+    gap = ((places[:, :1] - some[:, 0]) ** 2 + (places[:, 1:] - some[:, 1]) ** 2).min(axis=1)
     share = np.mean(gap > REACH**2 * outline.area / len(some)) if len(places) else 0.0
     return float(share) if share > LEAST_GAP else 0.0
 
