@@ -3,12 +3,15 @@
 import numpy as np
 import pytest
 
-from hiproof.fit.union.candidates import best_rectangles, gains_at_places
+from hiproof.fit.union.add import COME_BACK, ENOUGH, add_volumes, best_addition
+from hiproof.fit.union.candidates import best_rectangles, candidates_of, gains_at_places
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
+from hiproof.fit.union.grow import MOST_PLANES, ground_of
 from hiproof.fit.union.improve import improve, simplify, surroundings
 from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
 from hiproof.fit.union.moves import best_plane, refit_each, settled
 from hiproof.fit.union.objective import BASE_SHARE, costs, edges_cost, objective
+from hiproof.fit.union.planes import Grid
 from hiproof.fit.union.refit import refit, where_it_may_show
 from hiproof.fit.union.scene import nodes
 from hiproof.fit.union.steps import (
@@ -470,10 +473,10 @@ def test_the_best_candidate_has_the_best_of_all_rectangles(seed, replacing):
     rng, volumes, scene = drawn(seed)
     candidates = np.array([random_volume(rng, 0.0) for _ in range(6)])
     cell_u, cell_v = rng.integers(0, 6, (2, *scene.U.shape))
-    shape = np.full((2, 2), 6)
+    scene = scene._replace(lines=np.tile(np.arange(7.0), (2, 2, 1)))
     z_now, _ = roof_heights(volumes, scene.U, scene.V)
     cost_now = costs(z_now, scene)
-    gains, cells = best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, replacing)
+    gains, cells = best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, replacing)
     brute, found = np.empty(6), np.empty(6)
     for m, (i0, i1, j0, j1) in enumerate(cells):
         gain = np.zeros((6, 6))
@@ -523,6 +526,44 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
     cost = costs(h, scene)
     cost[: scene.n][cost[: scene.n] >= 1.0] += 0.02  # what covers a point without explaining it
     assert gain[0, 0] == pytest.approx((cost_now - cost)[h > z_now + 1e-9].sum())
+
+
+def ground_beneath(scene):
+    grids = [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
+    candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
+    return ground_of(scene, grids, candidates), candidates
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_addition_is_one_volume_more_for_less(seed):
+    _, volumes, scene = drawn(seed)
+    ground, candidates = ground_beneath(scene)
+    for start in (base_only(float(scene.z.min())), volumes):
+        value = objective(start, scene, np.inf)
+        more, found = best_addition(start, value, ground, candidates)
+        if found == np.inf:
+            continue
+        assert len(more) == len(start) + 1
+        assert found < value
+        assert is_true(more, scene, found)
+        end = add_volumes(start, value, ground, candidates, 1, 0, 0.0)
+        assert end[1] <= found + 1e-9
+        assert end[2:] == (ENOUGH, 0)
+    assert best_addition(volumes, value, ground, candidates[:0])[1] == np.inf
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_adding_ends_where_a_known_roof_comes_back(seed):
+    _, _, scene = drawn(seed)
+    ground, candidates = ground_beneath(scene)
+    base = base_only(float(scene.z.min()))
+    value = objective(base, scene, np.inf)
+    volumes, found, end, left = add_volumes(base, value, ground, candidates, 1, 0, 0.0)
+    again = add_volumes(base, value, ground, candidates, 5, len(volumes), found)
+    assert len(volumes) > 1
+    assert (end, left) == (ENOUGH, 0)
+    assert again[2] == COME_BACK
+    assert len(again[0]) == len(volumes)
 
 
 @pytest.mark.parametrize("seed", SEEDS)

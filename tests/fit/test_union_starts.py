@@ -53,7 +53,7 @@ def test_growing_anew_never_costs(seed):
     value = objective(volumes, scene, np.inf)
     grids = [Grid(np.arange(-8.0, 8.5, 0.5), np.arange(-8.0, 8.5, 0.5))] * len(scene.turn)
     candidates = candidates_of(scene, np.arange(scene.n), grids, 12)
-    found, lower = regrown(volumes, value, ground_of(scene, grids, candidates), candidates)
+    found, lower = regrown(volumes, value, ground_of(scene, grids, candidates), grids, candidates)
     assert lower <= value
     assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
 

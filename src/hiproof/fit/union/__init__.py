@@ -12,7 +12,7 @@ steps       compiled: what an edge of a volume costs that shows
 objective   compiled: what a roof costs: misfit, volumes, edges that show
 edges, refit  compiled: a volume's edges moved, its planes refitted
 moves, facings, joins, improve  compiled: structure that comes and goes: of one volume, the ways planes face, of several, all in turn
-grow        volumes added one by one from a level base, all improved after each
+add, grow   volumes added one by one from a level base, all improved after each; the first of them grown anew
 trim        hidden edges drawn in
 search      these in order, and the simplification that a draughtsman would make
 slivers     planes of which a narrow strip shows

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from .grow import UNEXPLAINED
+from .add import UNEXPLAINED
 from .objective import base_shows
 from .plan import Plan
 from .regions import THICK_M, misfits

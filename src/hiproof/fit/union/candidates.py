@@ -164,23 +164,22 @@ def tie_of(volume):
 
 
 @compiled
-def best_rectangles(scene, candidates, cell_u, cell_v, shape, cost_now, z_now, replacing):
+def best_rectangles(scene, candidates, cell_u, cell_v, cost_now, z_now, replacing):
     """For each candidate the rectangle of cells (m, 4) in which it gains most, and that gain (m,) less its price.
 
-    `cell_u`, `cell_v` (directions, n + g) are the cells of points and ghosts, `shape` (directions, 2) their numbers. Joining
-    the max a candidate only counts where it is above the roof `z_now`; `replacing` it counts everywhere. Candidates that
+    `cell_u`, `cell_v` (directions, n + g) are the cells of points and ghosts between the scene's lines. Joining the max a candidate only counts where it is above the roof `z_now`; `replacing` it counts everywhere. Candidates that
     cannot come near the best found are left out (minus infinity).
     """
     gains, rectangles = np.full(len(candidates), -np.inf), np.zeros((len(candidates), 4), np.int64)
     above, gain = np.full(len(z_now), -np.inf) if replacing else z_now + LEAST_ABOVE_M, np.empty(len(z_now))
-    threshold, most = 0.0, cost_now.sum()
+    threshold, most, cell_counts = 0.0, cost_now.sum(), (scene.lines < np.inf).sum(axis=2) - 1
     for m in range(len(candidates)):
         direction = int(candidates[m, DIRECTION])
         price = scene.evidence * (volume_cost(candidates[m]) + NEW_EDGES)
         least = price + threshold
         if most <= least or gains_at_places(scene, candidates, m, cost_now, above, gain) <= least:
             continue
-        nu, nv = shape[direction]
+        nu, nv = cell_counts[direction]
         cells, reach, column = np.zeros((nu, nv)), np.empty(nu + 1), np.empty(nv)
         for i in range(len(gain)):
             cells[cell_u[direction, i], cell_v[direction, i]] += gain[i]
