@@ -11,7 +11,6 @@ from hiproof.fit.union.improve import improve, simplify, surroundings
 from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
 from hiproof.fit.union.moves import best_plane, refit_each, settled
 from hiproof.fit.union.objective import BASE_SHARE, costs, edges_cost, objective
-from hiproof.fit.union.planes import Grid
 from hiproof.fit.union.refit import refit, where_it_may_show
 from hiproof.fit.union.scene import nodes
 from hiproof.fit.union.steps import (
@@ -529,9 +528,8 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
 
 
 def ground_beneath(scene):
-    grids = [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
-    candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
-    return ground_of(scene, grids, candidates), candidates
+    candidates = candidates_of(scene, np.arange(scene.n), MOST_PLANES)
+    return ground_of(scene, candidates), candidates
 
 
 @pytest.mark.parametrize("seed", range(8))

@@ -13,7 +13,7 @@ from hiproof.fit.union.candidates import candidates_of
 from hiproof.fit.union.grow import ground_of, regrown
 from hiproof.fit.union.objective import objective
 from hiproof.fit.union.plan import emptiness, lay_out_plan
-from hiproof.fit.union.planes import Cloud, Grid
+from hiproof.fit.union.planes import Cloud
 from hiproof.fit.union.scene import directions_of, scene_of
 from hiproof.fit.union.volumes import U0, V0, V1, base_only
 from hiproof.model import Roof
@@ -51,9 +51,8 @@ def test_growing_anew_never_costs(seed):
     rng = np.random.default_rng(seed)
     volumes, scene = random_volumes(rng, replacing=0.0), random_scene(rng)
     value = objective(volumes, scene, np.inf)
-    grids = [Grid(np.arange(-8.0, 8.5, 0.5), np.arange(-8.0, 8.5, 0.5))] * len(scene.turn)
-    candidates = candidates_of(scene, np.arange(scene.n), grids, 12)
-    found, lower = regrown(volumes, value, ground_of(scene, grids, candidates), grids, candidates)
+    candidates = candidates_of(scene, np.arange(scene.n), 12)
+    found, lower = regrown(volumes, value, ground_of(scene, candidates), candidates)
     assert lower <= value
     assert objective(found, scene, np.inf) == pytest.approx(lower, rel=1e-9)
 

@@ -47,10 +47,10 @@ def moves() -> None:
 def planes() -> None:
     """The planes and gables that the search begins with."""
     from ..fit.union.candidates import candidates_of
-    from ..fit.union.grow import MOST_PLANES, grids_of
+    from ..fit.union.grow import MOST_PLANES
 
-    plan, scene = scene_of_house()
-    candidates_of(scene, np.arange(scene.n), grids_of(plan, scene), MOST_PLANES)
+    _, scene = scene_of_house()
+    candidates_of(scene, np.arange(scene.n), MOST_PLANES)
 
 
 def scene_of_house() -> tuple:

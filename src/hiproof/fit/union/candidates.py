@@ -50,14 +50,19 @@ LEAST_ABOVE_M = 1e-9  # m by which a volume has to be the higher one: numericall
 NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 
 
-def candidates_of(scene: Scene, members: np.ndarray, grids: list[Grid], most_planes: int) -> np.ndarray:
+def candidates_of(scene: Scene, members: np.ndarray, most_planes: int) -> np.ndarray:
     """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
     found = [
         volume_of(direction, np.array(planes), scene.allowed)
-        for direction, grid in enumerate(grids)
+        for direction, grid in enumerate(grids_of(scene))
         for planes in candidates_in(scene, members, direction, grid, most_planes)
     ]
     return np.array([volume for volume, allowed in found if allowed]).reshape(-1, COLUMNS)
+
+
+def grids_of(scene: Scene) -> list[Grid]:
+    """The cells between the scene's lines, for each direction."""
+    return [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
 
 
 def candidates_in(

@@ -13,12 +13,11 @@ from .add import (
     add_volumes,
     unexplained,
 )
-from .candidates import candidates_of
+from .candidates import candidates_of, grids_of
 from .improve import improve
 from .moves import without
 from .objective import objective
-from .plan import MIN_STRUCTURE_POINTS, Plan, cells_of
-from .planes import Grid
+from .plan import MIN_STRUCTURE_POINTS, cells_of
 from .scene import Scene
 from .volumes import OFFSET, SIDES, SLOPE, base_only
 
@@ -34,26 +33,25 @@ STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = (
 MOST_REGROWN = 3  # volumes, those that grew first: of 40 that were better anew none had grown later
 
 
-def grow(scene: Scene, grids: list[Grid]) -> tuple[np.ndarray, float]:
+def grow(scene: Scene) -> tuple[np.ndarray, float]:
     """Volumes (k, COLUMNS) and their objective: grown from the base, then each taken out in turn and its place grown anew."""
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
     base = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
-    candidates = candidates_of(scene, np.arange(scene.n), grids, MOST_PLANES)
-    ground = ground_of(scene, grids, candidates)
-    volumes, value = grown(base, objective(base, scene, np.inf), ground, grids, candidates)
-    return regrown(volumes, value, ground, grids, candidates)
+    candidates = candidates_of(scene, np.arange(scene.n), MOST_PLANES)
+    ground = ground_of(scene, candidates)
+    volumes, value = grown(base, objective(base, scene, np.inf), ground, candidates)
+    return regrown(volumes, value, ground, candidates)
 
 
-def ground_of(scene: Scene, grids: list[Grid], candidates: np.ndarray) -> Ground:
+def ground_of(scene: Scene, candidates: np.ndarray) -> Ground:
     """The ground that a scene and the first candidates give."""
+    grids = grids_of(scene)
     cell_u = np.array([cells_of(grid.u, u) for grid, u in zip(grids, scene.U, strict=True)])
     cell_v = np.array([cells_of(grid.v, v) for grid, v in zip(grids, scene.V, strict=True)])
     return Ground(scene, cell_u, cell_v, typical_slopes(candidates))
 
 
-def regrown(
-    volumes: np.ndarray, value: float, ground: Ground, grids: list[Grid], candidates: np.ndarray
-) -> tuple[np.ndarray, float]:
+def regrown(volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray) -> tuple[np.ndarray, float]:
     """The volumes with each of the first in turn taken out and what is missing grown anew, where that is clearly better.
 
     The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
@@ -63,7 +61,7 @@ def regrown(
     while k > 0 and len(volumes) > 2:
         trial = without(volumes, k)
         trial, found = improve(trial, scene, objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS)
-        trial, found = grown(trial, found, ground, grids, candidates, (len(volumes), value))
+        trial, found = grown(trial, found, ground, candidates, (len(volumes), value))
         if found < value - REGROWN_UNITS * scene.evidence:
             volumes, value = trial, found
         k = min(k, len(volumes)) - 1
@@ -74,7 +72,6 @@ def grown(
     volumes: np.ndarray,
     value: float,
     ground: Ground,
-    grids: list[Grid],
     candidates: np.ndarray,
     known: tuple[int, float] = (0, 0.0),
 ) -> tuple[np.ndarray, float]:
@@ -92,7 +89,7 @@ def grown(
         far = unexplained(volumes, scene)
         if len(far) < FEWEST_UNEXPLAINED:
             break
-        candidates, fresh = candidates_of(scene, far, grids, MOST_NEW_PLANES), True
+        candidates, fresh = candidates_of(scene, far, MOST_NEW_PLANES), True
     return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)
 
 
@@ -105,12 +102,3 @@ def typical_slopes(candidates: np.ndarray) -> np.ndarray:
         if len(slopes) > MOST_SLOPES
         else slopes
     )
-
-
-def grids_of(plan: Plan, scene: Scene) -> list[Grid]:
-    """A grid of cells for each direction."""
-    grids = [plan.grid]
-    for lines in scene.lines[1:]:
-        u, v = (axis[np.isfinite(axis)] for axis in lines)
-        grids.append(Grid(u, v))
-    return grids

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from .allowed import allowed_shapes
-from .grow import grids_of, grow
+from .grow import grow
 from .improve import simplify
 from .moves import move_all_edges, refit_each
 from .objective import objective
@@ -45,7 +45,7 @@ def find_volumes(
     angles = directions_of(outline, plan)
     every = scene_of(plan, outline, angles, evidence[1], settings.tolerance_m, allowed_shapes(types))
     scene = seen_through(every, few, evidence[0])
-    volumes, _ = grow(scene, grids_of(plan, scene))
+    volumes, _ = grow(scene)
     volumes, value = settled_on_all(volumes, every)
     lenient = lenient_scene(scene, outline.area)
     volumes, _ = simplify(volumes, lenient, objective(volumes, lenient, np.inf), LENIENT_SLOPE)
