@@ -3,10 +3,12 @@
 import numpy as np
 import pytest
 
+from hiproof.fit.union.candidates import facings, groups_of
 from hiproof.fit.union.plan import grid_lines, signed_depth
 from hiproof.fit.union.planes import (
     NEIGHBOUR_RADIUS_M,
     Cloud,
+    Grid,
     best_rectangle,
     distinct,
     gain_by_point,
@@ -104,3 +106,27 @@ def test_grid_lines_are_few_whatever_the_outline(vertices):
     lines = grid_lines(0.0, 30.0, at, 0.5)
     assert len(lines) <= 29
     assert (np.diff(lines) > 0).all() and lines[0] == 0.0 and lines[-1] == 30.0
+
+
+def test_groups_of_planes_are_all_pairs_with_a_ridge_and_few_larger_ones():
+    """Two slopes that face each other, two across them and a top: each, three pairs, a hip, and all of these with the top."""
+    grid = Grid(np.arange(0.0, 12.5, 0.5), np.arange(0.0, 8.5, 0.5))
+    slopes = [(0.7, 0.0, 3.0), (-0.7, 0.0, 11.4), (0.0, 0.7, 3.0), (0.0, -0.7, 8.6)]
+    planes = np.array([*slopes, (0.0, 0.0, 5.0)])
+    groups, sizes = groups_of(planes, np.zeros((0, 5, 3)), np.zeros(0, np.int64), grid)
+    found = {frozenset(map(tuple, group[:size].tolist())) for group, size in zip(groups, sizes, strict=True)}
+    along, across, top = set(slopes[:2]), set(slopes[2:]), {(0.0, 0.0, 5.0)}
+    larger = [along, across, along | across]
+    expected = [{p} for p in (*slopes, *top)] + larger + [group | top for group in larger]
+    assert found == {frozenset(group) for group in expected}
+    assert len(groups) == len(expected)
+
+
+def test_a_plane_faces_the_walls_that_it_very_nearly_faces():
+    pool = np.array([(0.7, 0.02, 3.0), (0.0, 0.0, 5.0), (0.5, 0.3, 4.0)])
+    leans, middle = np.array([(-0.06, np.inf), (np.inf, np.inf)]), np.array([5.0, 4.0])
+    found = facings(pool, middle, leans)
+    at_middle = found[:, :2] @ middle + found[:, 2]
+    assert found[:, 1].tolist() == pytest.approx([0.0, 0.042, 0.0, 0.3])
+    assert found[:, 0].tolist() == [0.7, 0.7, 0.0, 0.5]
+    assert at_middle == pytest.approx((pool[:, :2] @ middle + pool[:, 2])[[0, 0, 1, 2]])

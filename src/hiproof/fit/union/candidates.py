@@ -52,12 +52,8 @@ NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 
 def candidates_of(scene: Scene, members: np.ndarray, most_planes: int) -> np.ndarray:
     """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
-    found = [
-        volume_of(direction, np.array(planes), scene.allowed)
-        for direction, grid in enumerate(grids_of(scene))
-        for planes in candidates_in(scene, members, direction, grid, most_planes)
-    ]
-    return np.array([volume for volume, allowed in found if allowed]).reshape(-1, COLUMNS)
+    grids = enumerate(grids_of(scene))
+    return np.concatenate([candidates_in(scene, members, direction, grid, most_planes) for direction, grid in grids])
 
 
 def grids_of(scene: Scene) -> list[Grid]:
@@ -65,50 +61,105 @@ def grids_of(scene: Scene) -> list[Grid]:
     return [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
 
 
-def candidates_in(
-    scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int
-) -> list[list[np.ndarray]]:
-    """The planes of each in one direction: every plane of the pool, along an axis if need be, the gables, all pairs that form a ridge."""
+def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int) -> np.ndarray:
+    """Those (m, COLUMNS) in one direction: of every plane of the pool, along an axis if need be, the gables, all pairs that form a
+    ridge, and larger groups of these."""
     every = members[np.arange(min(len(members), POOL_POINTS)) * len(members) // min(len(members), POOL_POINTS)]
     u, v, z = (np.ascontiguousarray(x[every]) for x in (scene.U[direction], scene.V[direction], scene.z))
     few = Cloud(u, v, z, cells_of(grid.u, u), cells_of(grid.v, v))
     evidence, tolerance = scene.evidence * len(every) / len(members), scene.dead + scene.width
     pool = plane_pool(few, grid, hypotheses(few, SEEDS, PAIRS), tolerance, evidence, most_planes)
     if len(pool) == 0:
-        return []
+        return np.empty((0, COLUMNS))
     gables, counts = gable_pool(few, grid, pool, tolerance, evidence, MOST_GABLES)
     middle = np.array([np.sort(u)[len(u) // 2], np.sort(v)[len(v) // 2]])
-    along = [facing for plane in pool for facing in facings(plane, middle, scene.leans[direction])]
-    pairs = [list(g[:c]) for g, c in zip(gables, counts, strict=True)]
-    pairs += [[p, q] for i, p in enumerate(along) for q in along[:i] if has_ridge(p, q, grid.u, grid.v)]
-    return [[plane] for plane in along] + pairs + larger_groups(along, pairs)
+    along = facings(pool, middle, scene.leans[direction])
+    groups, sizes = groups_of(along, gables, counts, grid)
+    return volumes_of(direction, groups, sizes, scene.allowed)
 
 
-def larger_groups(planes: list[np.ndarray], pairs: list[list[np.ndarray]]) -> list[list[np.ndarray]]:
-    """Hips of two pairs across each other, and pairs and hips with a level top: those of the strongest few."""
-    flats = [plane for plane in planes if axis_of(plane) < 0][:MOST_TOPS]
-    across = [[pair for pair in pairs if len(pair) == 2 and axis_of(pair[0]) == axis][:MOST_PAIRS] for axis in (0, 1)]
-    hips = [one + other for one in across[0] for other in across[1]]
-    return hips + [group + [flat] for flat in flats for group in (*across[0], *across[1], *hips)]
-
-
-def facings(plane: np.ndarray, middle: np.ndarray, leans: np.ndarray) -> list[np.ndarray]:
-    """The plane facing along an axis, and square to the walls that lean by `leans` (2, m), where it very nearly does; as it is where it
-    does neither.
+@compiled
+def facings(pool, middle, leans):
+    """Each plane of the pool (m, 3) facing along an axis, and square to the walls that lean by `leans` (2, n), where it very nearly does;
+    as it is where it does neither.
 
     It is turned about the points' `middle`.
     """
-    axis = axis_of(plane)
-    if axis < 0:
-        return [plane]
-    found = []
-    for lean in (0.0, *leans[axis][np.isfinite(leans[axis])]):
-        turned = plane.copy()
-        turned[1 - axis] = -lean * plane[axis]
-        if abs(turned[1 - axis] - plane[1 - axis]) < ALONG_AXIS * abs(plane[axis]):
-            turned[2] += (plane - turned)[:2] @ middle
-            found.append(turned)
-    return found or [plane]
+    found, m = np.empty((len(pool) * (1 + leans.shape[1]), 3)), 0
+    for plane in pool:
+        axis, first = axis_of(plane), m
+        for q in range(-1, leans.shape[1]):
+            lean = 0.0 if q < 0 else leans[axis, q]
+            if axis < 0 or lean == np.inf:
+                break
+            turn = plane[1 - axis] + lean * plane[axis]
+            if abs(turn) < ALONG_AXIS * abs(plane[axis]):
+                found[m] = plane
+                found[m, 1 - axis] = -lean * plane[axis]
+                found[m, 2] += turn * middle[1 - axis]
+                m += 1
+        if m == first:
+            found[m] = plane
+            m += 1
+    return found[:m]
+
+
+@compiled
+def groups_of(planes, gables, counts, grid):
+    """Groups of planes (g, PLANES, 3) that may be volumes, and their sizes (g,): each plane, the `gables` of `counts` planes, all pairs
+    that form a ridge; hips of two pairs across each other, and pairs and hips with a level top, of the strongest few."""
+    n = len(planes)
+    most = n + len(gables) + n * (n - 1) // 2 + MOST_PAIRS**2 + MOST_TOPS * (2 * MOST_PAIRS + MOST_PAIRS**2)
+    groups, sizes = np.empty((most, PLANES, 3)), np.empty(most, np.int64)
+    groups[:n, 0], sizes[:n] = planes, 1
+    groups[n : n + len(gables)], sizes[n : n + len(gables)] = gables, counts
+    m = n + len(gables)
+    for i in range(n):
+        for j in range(i):
+            if has_ridge(planes[i], planes[j], grid.u, grid.v):
+                groups[m, 0], groups[m, 1], sizes[m] = planes[i], planes[j], 2
+                m += 1
+    pairs = m
+    for one in strongest(groups, sizes, n, pairs, 0):
+        for other in strongest(groups, sizes, n, pairs, 1):
+            groups[m, :2], groups[m, 2:4], sizes[m] = groups[one, :2], groups[other, :2], 4
+            m += 1
+    last, tops = m, 0
+    for i in range(n):
+        if axis_of(planes[i]) >= 0 or tops == MOST_TOPS:
+            continue
+        tops += 1
+        for axis in range(2):
+            for pair in strongest(groups, sizes, n, pairs, axis):
+                groups[m, :2], groups[m, 2], sizes[m] = groups[pair, :2], planes[i], 3
+                m += 1
+        for hip in range(pairs, last):
+            groups[m, :4], groups[m, 4], sizes[m] = groups[hip, :4], planes[i], 5
+            m += 1
+    return groups[:m], sizes[:m]
+
+
+@compiled
+def strongest(groups, sizes, first, last, axis):
+    """The first MOST_PAIRS of the groups from `first` to `last` that are two planes facing along an axis."""
+    found, m = np.empty(MOST_PAIRS, np.int64), 0
+    for q in range(first, last):
+        if m < MOST_PAIRS and sizes[q] == 2 and axis_of(groups[q, 0]) == axis:
+            found[m] = q
+            m += 1
+    return found[:m]
+
+
+@compiled
+def volumes_of(direction, groups, sizes, allowed):
+    """Volumes (m, COLUMNS) of those groups of planes that are `allowed` shapes."""
+    found, m = np.empty((len(groups), COLUMNS)), 0
+    for q in range(len(groups)):
+        volume, is_one = volume_of(direction, groups[q, : sizes[q]], allowed)
+        if is_one:
+            found[m] = volume
+            m += 1
+    return found[:m]
 
 
 @compiled
