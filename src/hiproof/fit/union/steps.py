@@ -21,6 +21,7 @@ WHOLE_STEP_M = 0.55
 AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
 # m between the places at which a step between volumes is judged, and how many at most of an edge
 SAMPLE_M, MOST_SAMPLES = 0.5, 40
+AT_ONCE = 8  # samples that a processor looks at together: so many more are looked at that none is left to be looked at by itself
 TOUCH_M = 0.03  # m; a volume that reaches so near covers the place
 
 
@@ -33,7 +34,7 @@ Walls = namedtuple("Walls", "turn depth corner_u corner_v pitch vertices corners
 def walls_of(scene):
     where = scene.corner_u, scene.corner_v, scene.pitch
     corners, prices = (scene.vertices, scene.corners), scene.edge_prices
-    room = np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES)
+    room = np.zeros(MOST_SAMPLES), np.empty(MOST_SAMPLES), np.empty(MOST_SAMPLES)
     return Walls(scene.turn, scene.depth, *where, *corners, *room, prices, scene.evidence)
 
 
@@ -89,7 +90,7 @@ def samples_inside(volumes, walls, k, edge):
     step = length / count
     c, s = walls.turn[own, 0], walls.turn[own, 1]
     rows, columns, m = walls.inside, walls.outside, 0  # of the raster; the heights come later
-    for q in range(count):
+    for q in range(whole(count)):
         t = start + (q + 0.5) * step
         a, b = (at, t) if edge < 2 else (t, at)
         rows[q] = math.floor((c * a - s * b - walls.corner_u) / walls.pitch + 0.5)
@@ -103,6 +104,12 @@ def samples_inside(volumes, walls, k, edge):
 
 
 @compiled(inline="always")
+def whole(count):
+    """The next multiple of AT_ONCE."""
+    return (count + AT_ONCE - 1) // AT_ONCE * AT_ONCE
+
+
+@compiled(inline="always")
 def heights_beside(volumes, walls, k, edge, m):
     """Fill walls.inside and walls.outside with the heights just inside and just outside of volume k at the first `m` of walls.places.
 
@@ -111,7 +118,8 @@ def heights_beside(volumes, walls, k, edge, m):
     own, at = int(volumes[k, DIRECTION]), volumes[k, U0 + edge]
     places, inside, outside, turn = walls.places, walls.inside, walls.outside, walls.turn
     first, last = places[0], places[m - 1]
-    for q in range(m):
+    there = whole(m)
+    for q in range(there):
         inside[q] = outside[q] = -np.inf
     for j in range(len(volumes)):
         other, cosine, sine = int(volumes[j, DIRECTION]), 1.0, 0.0
@@ -127,16 +135,16 @@ def heights_beside(volumes, walls, k, edge, m):
             continue
         c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
         if j == k:
-            for q in range(m):
+            for q in range(there):
                 h = lowest(c, a0 + a * places[q], b0 + b * places[q])
-                inside[q] = h if replaces or h > inside[q] else inside[q]
+                inside[q] = h if replaces | (h > inside[q]) else inside[q]
             continue
-        for q in range(m):
+        for q in range(there):
             u, v = a0 + a * places[q], b0 + b * places[q]
             h = lowest(c, u, v)
-            there = (u0 <= u) & (u <= u1) & (v0 <= v) & (v <= v1)
-            inside[q] = h if there & (replaces | (h > inside[q])) else inside[q]
-            outside[q] = h if there & (replaces | (h > outside[q])) else outside[q]
+            within = (u0 <= u) & (u <= u1) & (v0 <= v) & (v <= v1)
+            inside[q] = h if within & (replaces | (h > inside[q])) else inside[q]
+            outside[q] = h if within & (replaces | (h > outside[q])) else outside[q]
 
 
 @compiled(allocates=False)
