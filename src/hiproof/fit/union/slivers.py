@@ -7,10 +7,23 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...compiled import compiled
 from .moves import refit_each, without
 from .objective import objective
 from .scene import Scene, nodes
-from .volumes import DIRECTION, LEAN, OFFSET, PLANES, SIDES, SLOPE, distances_up, roof_heights
+from .volumes import (
+    DIRECTION,
+    LEAN,
+    LEVEL,
+    OFFSET,
+    PLANES,
+    SIDES,
+    SLOPE,
+    coefficients,
+    distance_up,
+    lowest_plane,
+    roof_heights,
+)
 
 FEWEST_SEEN = 3  # points over which a volume of several is the highest: two on a wall at one height are chance
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
@@ -35,8 +48,7 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     U, V = nodes(scene)
     _, top = roof_heights(volumes, U, V)
     for k in range(1, len(volumes)):
-        direction, seen = int(volumes[k, DIRECTION]), top == k
-        for plane in narrow_planes(volumes[k], U[direction, seen], V[direction, seen]):
+        for plane in narrow_planes(volumes, k, U, V, top):
             if np.isfinite(volumes[k, OFFSET : OFFSET + PLANES]).sum() < 2:
                 break
             trial = volumes.copy()
@@ -49,16 +61,23 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
     return volumes
 
 
-def narrow_planes(volume: np.ndarray, u: np.ndarray, v: np.ndarray) -> list[int]:
-    """Inclined planes of a volume that show nowhere, or over a strip narrower than NARROW_M; it shows at `u`, `v` (n,)."""
-    there = [p for p in range(SIDES) if volume[OFFSET + p] < np.inf]
-    if len(u) == 0 or not there:
+def narrow_planes(volumes: np.ndarray, k: int, U: np.ndarray, V: np.ndarray, top: np.ndarray) -> list[int]:
+    """Inclined planes of volume k that show nowhere, or over a strip narrower than NARROW_M; `top` (n,) is what shows at U, V."""
+    if not (top == k).any():
         return []
-    slopes = np.append(volume[SLOPE : SLOPE + SIDES], 0.0)
-    falls = np.stack([*distances_up(volume, u, v), np.zeros_like(u)])
-    lowest = np.argmin(volume[OFFSET : OFFSET + PLANES, None] + slopes[:, None] * falls, axis=0)
-    return [p for p in there if width_of(falls[p, lowest == p]) < NARROW_M]
+    widths = widths_of_planes(volumes, k, U, V, top)
+    return [p for p in range(SIDES) if volumes[k, OFFSET + p] < np.inf and widths[p] < NARROW_M]
 
 
-def width_of(x: np.ndarray) -> float:
-    return float(np.ptp(x)) if len(x) else 0.0
+@compiled
+def widths_of_planes(volumes, k, U, V, top):
+    """How wide, along its own fall, each inclined plane (4,) of volume k shows at those of U, V (directions, n) where it is the `top`."""
+    u, v, c = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])], coefficients(volumes, k)
+    low, high = np.full(SIDES, np.inf), np.full(SIDES, -np.inf)
+    for i in range(len(top)):
+        if top[i] == k:
+            _, plane = lowest_plane(c, u[i], v[i])
+            if plane < LEVEL:
+                x = distance_up(volumes[k], plane, u[i], v[i])
+                low[plane], high[plane] = min(low[plane], x), max(high[plane], x)
+    return np.maximum(high - low, 0.0)

@@ -52,8 +52,13 @@ def trim(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, f
 def runs_of(x: np.ndarray, pitch: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Where the runs of places x (n,) begin and end (m,) that follow each other by no more than a few steps of the raster, and how
     many places each has."""
+    gap, low, high = max(GAP_M, GAP_NODES * pitch), x.min(), x.max()
+    if np.bincount(
+        ((x - low) * (2.0 / gap)).astype(int)
+    ).all():  # some in every half of a gap: one run, found without sorting
+        return np.array([low]), np.array([high]), np.array([len(x)])
     x = np.sort(x)
-    gaps = np.flatnonzero(x[1:] - x[:-1] > max(GAP_M, GAP_NODES * pitch))
+    gaps = np.flatnonzero(x[1:] - x[:-1] > gap)
     first, last = np.concatenate(([0], gaps + 1)), np.concatenate((gaps, [len(x) - 1]))
     return x[first], x[last], last - first + 1
 
