@@ -12,7 +12,6 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from typing import Any
 
-import numpy as np
 import shapely
 
 from ..model import Building, Part
@@ -115,7 +114,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "shift": [float(value) for value in building.shift],
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
-        "terrain_line": [[numbers(xyz) for xyz in line] for line in building.terrain_intersection],
+        "terrain_line": [[numbers(xyz) for xyz in line.tolist()] for line in building.terrain_intersection],
         "attributes": {plain_text(name): plain(value) for name, value in building.attributes.items()},
         "points": int(quality.points),
         "residuals": {
@@ -164,4 +163,4 @@ def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
 
 
 def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float | None]:
-    return [round(v, digits) + 0.0 if math.isfinite(v) else None for v in np.asarray(values, float).tolist()]
+    return [number(value, digits) for value in values]
