@@ -25,6 +25,7 @@ from .citygml_geometry import (
     lod2_surfaces,
     multi_surface,
     positions,
+    rings_of_faces,
     surface_ids,
     terrain_element,
 )
@@ -156,9 +157,12 @@ def building_element(sheet: Sheet) -> str:
         )
         text.append(level_surfaces(sheet))
         text.append(lod1_solid(sheet.shapes.lod13 or sheet.shapes.lod12, sheet.head.units.gml))
-    text.append(with_terrain(sheet))
-    if figures is not None and (solid := own_solid(sheet)) is not None:
-        text += boundary_surfaces(solid, figures, surface_ids(solid.faces, name), sheet.head.units.gml)
+    if figures is None or (solid := own_solid(sheet)) is None:
+        text.append(with_terrain(sheet, "", []))
+    else:
+        ids, rings = surface_ids(solid.faces, name), rings_of_faces(solid.faces, in_file(sheet, solid))
+        text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
+        text += boundary_surfaces(solid, figures, ids, rings)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
     return "".join([*text, "</bldg:Building>"])
 
@@ -175,8 +179,9 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
     if "2.2" in sheet.head.write.lods:
         ids = surface_ids(part.solid.faces, sheet.gml_name, f"{number}.")
         text.append(lod2_solid(ids, f"shell-{name}"))
-        text += [lod2_surfaces(part.solid, sheet.head.units.gml)] if sheet.head.write.gml_surfaces else []
-        text += boundary_surfaces(part.solid, part.figures, ids, sheet.head.units.gml)
+        rings = rings_of_faces(part.solid.faces, in_file(sheet, part.solid))
+        text += [lod2_surfaces(rings)] if sheet.head.write.gml_surfaces else []
+        text += boundary_surfaces(part.solid, part.figures, ids, rings)
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
 
 
@@ -195,13 +200,14 @@ def level_surfaces(sheet: Sheet) -> str:
         return ""
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
     unmoved = solid.vertices - np.array([*sheet.building.shift, 0.0])
-    low = multi_surface((upward,), positions(sheet.head.units.gml.from_metres(unmoved)))
-    edge = multi_surface((upward,), positions(sheet.head.units.gml.from_metres(shapes.edge_vertices(solid))))
+    low = multi_surface(rings_of_faces((upward,), sheet.head.units.gml.from_metres(unmoved)))
+    edge = multi_surface(rings_of_faces((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid))))
     return f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint><bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
 
 
-def with_terrain(sheet: Sheet) -> str:
-    """The building's own solid of LoD2, its surfaces and the line along which it meets the terrain, as far as asked for.
+def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
+    """The building's own solid of LoD2, `shell`, its surfaces, of these `rings`, and the line along which it meets the terrain, as far
+    as asked for.
 
     GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line, which is the same at all levels,
     stands before them as LoD1's; without LoD2 it would be the last, and is left out.
@@ -210,10 +216,7 @@ def with_terrain(sheet: Sheet) -> str:
     has_lod2 = "2.2" in sheet.head.write.lods
     first = terrain_element(lines, 1) if lines and not is_last and has_lod2 else ""
     last = terrain_element(lines, 2 if has_lod2 else 1) if lines and is_last else ""
-    if (solid := own_solid(sheet)) is None:
-        return first + last
-    shell = lod2_solid(surface_ids(solid.faces, sheet.gml_name), f"solid-{sheet.gml_name}")
-    surfaces = lod2_surfaces(solid, sheet.head.units.gml) if sheet.head.write.gml_surfaces else ""
+    surfaces = lod2_surfaces(rings) if shell and sheet.head.write.gml_surfaces else ""
     return f"{first}{shell}{surfaces}{last}"
 
 
@@ -223,6 +226,11 @@ def terrain_lines(sheet: Sheet) -> list[np.ndarray]:
         return []
     lines = (line for line in sheet.building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
     return [sheet.head.units.gml.from_metres(line) for line in lines]
+
+
+def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
+    """The vertices (n, 3) of a solid in the file's unit."""
+    return sheet.head.units.gml.from_metres(solid.vertices)
 
 
 def own_solid(sheet: Sheet) -> Solid | None:

@@ -1,4 +1,6 @@
-"""The geometry of one building in CityGML, each function one property or surface; `place` is each vertex' coordinates as text."""
+"""The geometry of one building in CityGML, each function one property or surface.
+
+`place` is each vertex' coordinates as text, `rings` each face's rings: they are made once, though a solid is told more than once."""
 
 from __future__ import annotations
 
@@ -31,7 +33,7 @@ def lod1_solid(solid: Solid | None, units: Units) -> str:
     """A block; nothing for None."""
     if solid is None:
         return ""
-    members = surface_members(solid.faces, positions(units.from_metres(solid.vertices)))
+    members = surface_members(rings_of_faces(solid.faces, units.from_metres(solid.vertices)))
     return (
         f"<bldg:lod1Solid><gml:Solid><gml:exterior><gml:CompositeSurface>{members}</gml:CompositeSurface></gml:exterior>"
         "</gml:Solid></bldg:lod1Solid>"
@@ -47,20 +49,18 @@ def lod2_solid(polygon_ids: list[str], id: str) -> str:
     )
 
 
-def lod2_surfaces(solid: Solid, units: Units) -> str:
+def lod2_surfaces(rings: list[str]) -> str:
     """The solid's surfaces by value, for readers that follow no links."""
-    surfaces = multi_surface(solid.faces, positions(units.from_metres(solid.vertices)))
-    return f"<bldg:lod2MultiSurface>{surfaces}</bldg:lod2MultiSurface>"
+    return f"<bldg:lod2MultiSurface>{multi_surface(rings)}</bldg:lod2MultiSurface>"
 
 
-def multi_surface(faces: Iterable[Face], place: list[str]) -> str:
-    return f"<gml:MultiSurface>{surface_members(faces, place)}</gml:MultiSurface>"
+def multi_surface(rings: list[str]) -> str:
+    return f"<gml:MultiSurface>{surface_members(rings)}</gml:MultiSurface>"
 
 
-def surface_members(faces: Iterable[Face], place: list[str]) -> str:
+def surface_members(rings: list[str]) -> str:
     return "".join(
-        f"<gml:surfaceMember><gml:Polygon>{polygon_rings(face, place)}</gml:Polygon></gml:surfaceMember>"
-        for face in faces
+        [f"<gml:surfaceMember><gml:Polygon>{of_face}</gml:Polygon></gml:surfaceMember>" for of_face in rings]
     )
 
 
@@ -74,16 +74,15 @@ def terrain_element(lines: list[np.ndarray], level: int) -> str:
     return f"<{tag}><gml:MultiCurve>{members}</gml:MultiCurve></{tag}>"
 
 
-def boundary_surfaces(solid: Solid, figures: RoofFigures, polygon_ids: list[str], units: Units) -> list[str]:
+def boundary_surfaces(solid: Solid, figures: RoofFigures, polygon_ids: list[str], rings: list[str]) -> list[str]:
     """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth in degrees."""
-    place = positions(units.from_metres(solid.vertices))
     surfaces = []
-    for index, (face, polygon_id) in enumerate(zip(solid.faces, polygon_ids, strict=True)):
+    for index, (face, polygon_id, of_face) in enumerate(zip(solid.faces, polygon_ids, rings, strict=True)):
         tag = f"bldg:{face.kind}"
         angles = angle_attributes(figures, index) if face.kind == ROOF else ""
         surfaces.append(
             f'<bldg:boundedBy><{tag} gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
-            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{polygon_rings(face, place)}</gml:Polygon>'
+            f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{of_face}</gml:Polygon>'
             f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
         )
     return surfaces
@@ -93,6 +92,12 @@ def angle_attributes(figures: RoofFigures, index: int) -> str:
     """Slope and azimuth of roof face `index`, as far as they are known."""
     angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
     return "".join(generic_attribute(key, rounded(angle, 3)) for key, angle in angles.items() if math.isfinite(angle))
+
+
+def rings_of_faces(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:
+    """The rings of each of the faces over the vertices `xyz` (n, 3)."""
+    place = positions(xyz)
+    return [polygon_rings(face, place) for face in faces]
 
 
 def polygon_rings(face: Face, place: list[str]) -> str:
