@@ -89,14 +89,16 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
     if len(xy) < LEAST_POINTS or len(ring) < 3:
         return Shift()
     xy, lines = np.ascontiguousarray(xy), lines_through(ring)
-    shift = by_sides(xy, ring, lines, np.zeros(2))
+    density = len(xy) / max(shapely.Polygon(ring).area, 1.0)
+    shift = by_sides(xy, ring, lines, np.zeros(2), density)
     if shift is not None and shift.is_none:
         return shift
+    shapely.prepare(footprint)
     if np.mean(~shapely.contains_xy(footprint, xy[:, 0], xy[:, 1])) < LEAST_OUTSIDE:
         return Shift()  # points cut off at the footprint look like a roof that ends there
     shift = Shift(most_points(xy, footprint))
     for _ in range(ROUNDS):
-        found = by_sides(xy, ring, lines, shift.xy)
+        found = by_sides(xy, ring, lines, shift.xy, density)
         if found is None:
             return Shift()
         settled = np.abs(found.xy - shift.xy).max() < 0.02
@@ -110,8 +112,8 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     """The shift (2,) at which the footprint holds most of `xy`, the least of those that hold as many: coarse, then fine."""
     low = np.array(footprint.bounds[:2]) - STRAY_FROM_M
     count = np.ceil((np.array(footprint.bounds[2:]) + STRAY_FROM_M - low) / (2 * PITCH_M)).astype(int)
-    nodes = low + 2 * PITCH_M * np.moveaxis(np.indices(tuple(count)), 0, -1).reshape(-1, 2)
-    depth = signed_depth(nodes[:, 0].copy(), nodes[:, 1].copy(), *ring_edges(footprint))
+    x, y = (start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(low, count, strict=True))
+    depth = signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
     costs = costs_at(depth / BLUR_M).reshape(count)
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
@@ -137,17 +139,23 @@ def costs_at(depth):
 def slid_costs(xy, costs, low, pitch, moves):
     """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first node lies at `low`."""
     found, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
-    for m in range(len(moves)):
-        for k in range(len(xy)):
-            i = int((xy[k, 0] - moves[m, 0] - low[0]) * nodes_a_metre + 0.5)
-            j = int((xy[k, 1] - moves[m, 1] - low[1]) * nodes_a_metre + 0.5)
-            found[m] += costs[min(max(i, 0), costs.shape[0] - 1), min(max(j, 0), costs.shape[1] - 1)]
+    (rows, columns), flat = costs.shape, costs.ravel()
+    east, north, place = moves[:, 0].copy(), moves[:, 1].copy(), np.empty(len(moves), np.int64)
+    for k in range(len(xy)):  # all moves of a point at once: four times as fast as all points of a move
+        x, y = xy[k]
+        for m in range(len(moves)):
+            i = int((x - east[m] - low[0]) * nodes_a_metre + 0.5)
+            j = int((y - north[m] - low[1]) * nodes_a_metre + 0.5)
+            place[m] = min(max(i, 0), rows - 1) * columns + min(max(j, 0), columns - 1)
+        for m in range(len(moves)):
+            found[m] += flat[place[m]]
     return found
 
 
-def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray) -> Shift | None:
+def by_sides(
+    xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray, density: float
+) -> Shift | None:
     """The shift and the reach beyond that all free sides of the footprint, slid by `start`, agree on best; None of too few."""
-    density = len(xy) / max(shapely.Polygon(ring).area, 1.0)
     ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
