@@ -50,7 +50,8 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
         return 0.0
     some = points[np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2]
     places = places_in(outline)
-    gap = ((places[:, :1] - some[:, 0]) ** 2 + (places[:, 1:] - some[:, 1]) ** 2).min(axis=1)
+    x, y = some.T.copy()  # side by side they are told from the places in a third of the time
+    gap = ((places[:, :1] - x) ** 2 + (places[:, 1:] - y) ** 2).min(axis=1)
     share = np.mean(gap > REACH**2 * outline.area / len(some)) if len(places) else 0.0
     return float(share) if share > LEAST_GAP else 0.0
 
@@ -71,6 +72,7 @@ def two_surfaces(points: np.ndarray, roof: Roof) -> tuple[float, float]:
     Points less than 0.3 m inside the outline, where walls answer, do not count. The distance is the median of the cells'.
     """
     inner = shapely.buffer(roof.outline, -FACADE_M)
+    shapely.prepare(inner)
     points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
     dz = points[:, 2] - highest_of(roof.parts, points[:, :2])[0]
     points, dz = points[np.isfinite(dz)], dz[np.isfinite(dz)]
@@ -103,7 +105,9 @@ def split_cells(
     lower = np.arange(len(order)) - start[cell] + 1
     higher = counts[cell] - lower
     between = np.where(higher > 0, sums**2 / (lower * np.maximum(higher, 1)), 0.0)
-    best = np.lexsort((between, cell))[start + counts - 1]
+    highest = np.flatnonzero(between == np.maximum.reduceat(between, start)[cell])
+    best = np.empty(len(start), np.int64)
+    best[cell[highest]] = highest  # the last of several
     variance = np.add.reduceat(values**2, start) / counts
     apart = np.sqrt(between[best]) * counts / np.sqrt(lower[best] * np.maximum(higher[best], 1))
     within = 1.0 - np.divide(between[best], variance, out=np.zeros(len(start)), where=variance > 0)
