@@ -61,12 +61,18 @@ def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
 def roof_of_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
     """A remark where, over much of a building, only points of other classes lie high: in cells without `roof` points (n, 3)
     and without ground. Empty otherwise."""
-    high = np.setdiff1d(cells_of(points.high), cells_of(np.concatenate([roof, points.ground])))
-    share = points.share(high)
-    if share <= HALF_CLASSIFIED or len(high) < FEWEST_CELLS:
+    if not is_much(points.high, points):  # a point a cell: most buildings need no further look
         return ""
-    lie = f"over {100 * share:.0f} % of its outline, without points of its class, {Doubt.POINTS_OF_OTHER_CLASSES.value}"
+    high = np.setdiff1d(cells_of(points.high), cells_of(np.concatenate([roof, points.ground])))
+    if not is_much(high, points):
+        return ""
+    lie = f"over {100 * points.share(high):.0f} % of its outline, without points of its class, {Doubt.POINTS_OF_OTHER_CLASSES.value}"
     return f"{lie}: leaves, or a roof that --roofs shape finds"
+
+
+def is_much(cells: np.ndarray, points: OtherPoints) -> bool:
+    """Whether so many cells (n, ...) are more than chance, and more than a small share of the area."""
+    return len(cells) >= FEWEST_CELLS and points.share(cells) > HALF_CLASSIFIED
 
 
 def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
