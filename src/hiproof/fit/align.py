@@ -152,9 +152,7 @@ def slid_costs(xy, costs, low, pitch, moves):
     return found
 
 
-def by_sides(
-    xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray, density: float
-) -> Shift | None:
+def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray, density: float) -> Shift | None:
     """The shift and the reach beyond that all free sides of the footprint, slid by `start`, agree on best; None of too few."""
     ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)

@@ -5,6 +5,9 @@ A surface that several parts have in common, for they lie in one plane, names on
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate, chain
+
 import numpy as np
 import shapely
 
@@ -30,15 +33,16 @@ def shown_areas(building: Building) -> list[shapely.Geometry]:
     if building.built is None:
         return []
     roof, solid = building.roof, building.solid.moved(-building.roof.frame.origin)
-    planes = planes_of(roof)
     shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
-    for face in solid.of_kind(ROOF):
+    faces = solid.of_kind(ROOF)
+    for face, others in zip(faces, parts_in_plane(faces, solid.vertices, planes_of(roof)), strict=True):
         left = solid.plan_of(face)
-        for other in parts_in_plane(face, solid.vertices, planes):
+        for other in others:
             left, others_own = shared_out(left, drawn(roof.parts[face.part]), drawn(roof.parts[other]))
             shown[other].append(others_own)
         shown[face.part].append(left)
-    return [shapely.transform(shapely.union_all(areas, grid_size=GRID_M), roof.frame.to_world) for areas in shown]
+    united = np.array([shapely.union_all(areas, grid_size=GRID_M) for areas in shown], object)
+    return shapely.transform(united, roof.frame.to_world).tolist()
 
 
 def planes_of(roof: Roof) -> np.ndarray:
@@ -47,11 +51,15 @@ def planes_of(roof: Roof) -> np.ndarray:
     return np.array([(number, *plane) for number, part in parts for piece in part.pieces for plane in piece.planes])
 
 
-def parts_in_plane(face: Face, vertices: np.ndarray, planes: np.ndarray) -> list[int]:
-    """The parts, other than its own, that have a plane in which the face over `vertices` (n, 3) lies."""
-    corners = vertices[[vertex for ring in face.rings for vertex in ring]]
-    off = np.abs(corners[:, :2] @ planes[:, 1:3].T + planes[:, 3] - corners[:, 2:]).max(axis=0)
-    return sorted({int(number) for number in planes[off < SAME_PLANE_M, 0]} - {face.part})
+def parts_in_plane(faces: Sequence[Face], vertices: np.ndarray, planes: np.ndarray) -> list[list[int]]:
+    """Of each of the faces over `vertices` (n, 3) the parts, other than its own, that have a plane in which it lies."""
+    if not faces or len(set(planes[:, 0].tolist())) < 2:
+        return [[] for _ in faces]
+    of_faces = [[vertex for ring in face.rings for vertex in ring] for face in faces]
+    corners = vertices[list(chain.from_iterable(of_faces))]
+    off = np.abs(corners[:, :2] @ planes[:, 1:3].T + planes[:, 3] - corners[:, 2:])
+    lies_in = np.maximum.reduceat(off, [0, *accumulate(map(len, of_faces[:-1]))]) < SAME_PLANE_M
+    return [sorted(set(planes[own, 0].astype(int).tolist()) - {f.part}) for f, own in zip(faces, lies_in, strict=True)]
 
 
 def shared_out(
