@@ -80,9 +80,12 @@ def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
 
     One flight sees no ground through a roof, but two do where a house was built or pulled down between them.
     """
+    fewest = UNDER_ROOF * FEWEST_CELLS
+    if len(points.ground) < fewest:
+        return ""
     inner = shapely.buffer(points.area, -BESIDE_WALL_M)
     ground = points.ground[within(inner, points.ground)]
-    if len(ground) < UNDER_ROOF * FEWEST_CELLS:
+    if len(ground) < fewest:
         return ""
     seen = cells_of(roof[within(inner, roof)])
     share = np.isin(seen, cells_of(ground)).sum() / max(len(seen), 1)
