@@ -4,15 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .add import (
-    COME_BACK,
-    ENOUGH,
-    FEWEST_UNEXPLAINED,
-    REGROWN_UNITS,
-    Ground,
-    add_volumes,
-    unexplained,
-)
+from .add import COME_BACK, ENOUGH, FEWEST_UNEXPLAINED, REGROWN_UNITS, Ground, add_volumes, unexplained
 from .candidates import candidates_of, grids_of
 from .improve import improve
 from .moves import without
@@ -25,11 +17,8 @@ MOST_ADDITIONS = 20  # tried for one building: a bound on time
 MOST_PLANES, MOST_NEW_PLANES = 16, 10  # candidate planes from all points at first, from unexplained ones later
 BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs but not below a stray point
 MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
-STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = (
-    2,
-    2,
-    3,
-)  # of all moves: before a place is grown anew, where no candidate helps, at the end
+# of all moves: before a place is grown anew, where no candidate helps, at the end
+STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = 2, 2, 3
 MOST_REGROWN = 3  # volumes, those that grew first: of 40 that were better anew none had grown later
 
 

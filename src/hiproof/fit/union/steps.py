@@ -21,7 +21,8 @@ WHOLE_STEP_M = 0.55
 AT_CORNER_M, END_AT_CORNER_M = 0.25, 0.7
 # m between the places at which a step between volumes is judged, and how many at most of an edge
 SAMPLE_M, MOST_SAMPLES = 0.5, 40
-AT_ONCE = 8  # samples that a processor looks at together: so many more are looked at that none is left to be looked at by itself
+# samples that a processor looks at together, of which MOST_SAMPLES is a multiple: so many more are looked at that none is left over
+AT_ONCE = 8
 TOUCH_M = 0.03  # m; a volume that reaches so near covers the place
 
 
