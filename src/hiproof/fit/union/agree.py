@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
+from statistics import median
 from typing import NamedTuple
 
 import numpy as np
@@ -217,8 +218,7 @@ def ridges(member: Member, start: np.ndarray) -> Iterator[Measure]:
             axis, rows = p // 2, member.own[[p, q]] @ start
             rise, fall = rows[0, axis], -rows[1, axis]
             at = np.ones(3)
-            along = np.sort(member.points[1 - axis])
-            at[1 - axis] = 0.5 * (along[(len(along) - 1) // 2] + along[len(along) // 2])
+            at[1 - axis] = median(member.points[1 - axis].tolist())
             at[axis] = (rows[1] - rows[0])[[1 - axis, 2]] @ (at[1 - axis], 1.0) / (rise + fall)
             equation = at @ (fall * member.own[p] + rise * member.own[q]) / (rise + fall)
             yield Measure(float(equation @ start), equation, 1.0)

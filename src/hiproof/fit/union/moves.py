@@ -17,7 +17,7 @@ import numpy as np
 
 from ...compiled import compiled
 from .edges import BEYOND_M, EVERYWHERE, LEAST_GAIN, move_edges
-from .objective import objective
+from .objective import objective, point_cost
 from .refit import refit
 from .volumes import (
     DIRECTION,
@@ -37,8 +37,10 @@ from .volumes import (
     coefficients,
     distance_up,
     equalise_slopes,
+    is_within,
     lowest,
     plane_count,
+    rectangle,
     roof_heights,
     slope_count,
     with_and_without,
@@ -252,14 +254,14 @@ def best_plane(volumes, scene, k, plane, slopes, z_now, everywhere, beneath, lea
     """
     direction, n = int(volumes[k, DIRECTION]), scene.n
     u, v = scene.U[direction], scene.V[direction]
-    c, replaces = coefficients(volumes, k), volumes[k, REPLACES] > 0.0
+    c, ends, replaces = coefficients(volumes, k), rectangle(volumes, k), volumes[k, REPLACES] > 0.0
     dead, width, z_points = scene.dead, scene.width, scene.z
     z, x, own, under = np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     seeds = np.empty(n, np.int64)
     m = count = 0
     unchanged = 0.0
     for i in range(n):
-        inside = volumes[k, U0] <= u[i] <= volumes[k, U1] and volumes[k, V0] <= v[i] <= volumes[k, V1]
+        inside = is_within(ends, u[i], v[i])
         h = lowest(c, u[i], v[i])
         if not inside or everywhere[i] != h:  # or something else shows there
             continue
@@ -294,6 +296,5 @@ def misfit_of(slope, offset, z, x, own, under, dead, width):
     total = 0.0
     for p in range(min(AT_ONCE, len(z))):
         h = max(min(own[p], offset + slope * x[p]), under[p])
-        r = max(abs(z[p] - h) - dead, 0.0) / width
-        total += min(r * r, 1.0)
+        total += point_cost(z[p], h, dead, width)
     return total

@@ -18,14 +18,12 @@ from .volumes import (
     SLOPE_HIGH,
     SLOPE_LOW,
     TIE,
-    U0,
-    U1,
-    V0,
-    V1,
     coefficients,
     distance_up,
+    is_within,
     lowest,
     lowest_plane,
+    rectangle,
 )
 
 ROUNDS = 2  # of fitting and re-weighting
@@ -72,24 +70,24 @@ def where_it_may_show(volumes, U, V, n, k):
     infinite outside its rectangle and where another replaces it."""
     above, not_below = np.full(n, -np.inf), np.empty(n)
     u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
-    u0, u1, v0, v1 = volumes[k, U0], volumes[k, U1], volumes[k, V0], volumes[k, V1]
+    ends = rectangle(volumes, k)
     for i in range(n):
-        not_below[i] = -np.inf if (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1) else np.inf
+        not_below[i] = -np.inf if is_within(ends, u[i], v[i]) else np.inf
     for j in range(0 if volumes[k, REPLACES] == 0.0 else k, len(volumes)):
         if j == k:
             continue
         u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
-        u0, u1, v0, v1 = volumes[j, U0], volumes[j, U1], volumes[j, V0], volumes[j, V1]
+        ends = rectangle(volumes, j)
         replaces, c = volumes[j, REPLACES] > 0.0, coefficients(volumes, j)
         if j < k:
             for i in range(n):
                 h = lowest(c, u[i], v[i])
-                there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1)
+                there = is_within(ends, u[i], v[i])
                 above[i] = h if there & (replaces | (h > above[i])) else above[i]
             continue
         for i in range(n):
             h = np.inf if replaces else lowest(c, u[i], v[i])
-            there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1)
+            there = is_within(ends, u[i], v[i])
             not_below[i] = h if there & (h > not_below[i]) else not_below[i]
     return above, not_below
 

@@ -12,7 +12,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from .volumes import DIRECTION, REPLACES, U0, U1, V0, V1, coefficients, lowest
+from .volumes import DIRECTION, REPLACES, U0, U1, V0, V1, coefficients, is_within, lowest
 
 STEP_M, INSIDE_M = 0.05, 0.2  # a gap that is a step; how far inside the outline it shows
 # m from which on an edge costs the whole of its fixed sum; were shorter ones free, a flight of small steps would cost less than one straight edge
@@ -143,7 +143,7 @@ def heights_beside(volumes, walls, k, edge, m):
         for q in range(there):
             u, v = a0 + a * places[q], b0 + b * places[q]
             h = lowest(c, u, v)
-            within = (u0 <= u) & (u <= u1) & (v0 <= v) & (v <= v1)
+            within = is_within((u0, u1, v0, v1), u, v)
             inside[q] = h if within & (replaces | (h > inside[q])) else inside[q]
             outside[q] = h if within & (replaces | (h > outside[q])) else outside[q]
 

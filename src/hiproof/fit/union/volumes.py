@@ -56,6 +56,18 @@ def coefficients(volumes, k):
 
 
 @compiled(inline="always")
+def rectangle(volumes, k):
+    """Where volume k begins and ends along u and along v."""
+    return volumes[k, 1], volumes[k, 2], volumes[k, 3], volumes[k, 4]
+
+
+@compiled(inline="always")
+def is_within(ends, u, v):
+    """Whether u, v lies in a rectangle, whose `ends` these are; without branches, so that a processor asks for several at once."""
+    return (ends[0] <= u) & (u <= ends[1]) & (ends[2] <= v) & (v <= ends[3])
+
+
+@compiled(inline="always")
 def lowest(c, u, v):
     """Height at u, v of the volume whose `coefficients` are c, its rectangle not asked."""
     along = min(c[0] + c[5] * u + c[9] * v, c[1] - c[6] * u + c[10] * v)
@@ -96,11 +108,11 @@ def roof_heights(volumes, U, V):
     z, top = np.full(n, -np.inf), np.zeros(n, np.int64)
     for k in range(len(volumes)):
         u, v = U[int(volumes[k, DIRECTION])], V[int(volumes[k, DIRECTION])]
-        u0, u1, v0, v1 = volumes[k, U0], volumes[k, U1], volumes[k, V0], volumes[k, V1]
+        ends = rectangle(volumes, k)
         c, replaces = coefficients(volumes, k), volumes[k, REPLACES] > 0.0
         for i in range(n):  # no branches: a processor does several points at once
             h = lowest(c, u[i], v[i])
-            there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1) & (replaces | (h > z[i]))
+            there = is_within(ends, u[i], v[i]) & (replaces | (h > z[i]))
             z[i], top[i] = h if there else z[i], k if there else top[i]
     return z, top
 
@@ -112,7 +124,7 @@ def with_and_without(volumes, U, V, k):
     everywhere, without = np.full(n, -np.inf), np.full(n, -np.inf)
     for j in range(len(volumes)):
         u, v = U[int(volumes[j, DIRECTION])], V[int(volumes[j, DIRECTION])]
-        u0, u1, v0, v1 = volumes[j, U0], volumes[j, U1], volumes[j, V0], volumes[j, V1]
+        ends = rectangle(volumes, j)
         c, replaces = coefficients(volumes, j), volumes[j, REPLACES] > 0.0
         if j == k:
             for i in range(n):
@@ -121,7 +133,7 @@ def with_and_without(volumes, U, V, k):
             continue
         for i in range(n):
             h = lowest(c, u[i], v[i])
-            there = (u0 <= u[i]) & (u[i] <= u1) & (v0 <= v[i]) & (v[i] <= v1)
+            there = is_within(ends, u[i], v[i])
             without[i] = h if there & (replaces | (h > without[i])) else without[i]
             everywhere[i] = h if there & (replaces | (h > everywhere[i])) else everywhere[i]
     return everywhere, without
