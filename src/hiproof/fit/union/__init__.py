@@ -14,6 +14,7 @@ edges, refit  compiled: a volume's edges moved, its planes refitted
 moves, facings, joins, improve  compiled: structure that comes and goes: of one volume, the ways planes face, of several, all in turn
 add, grow   volumes added one by one from a level base, all improved after each; the first of them grown anew
 trim        hidden edges drawn in
+run_on      ends that stand out of a neighbour by little drawn on until they lie hidden in it
 search      these in order, and the simplification that a draughtsman would make
 slivers     planes of which a narrow strip shows
 apart       volumes that show in several places
@@ -21,7 +22,10 @@ sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
 unite       volumes that only skewed walls keep apart, made one
 bays        level volumes over small pieces that walls cut off the outline
+members     the volumes whose planes points tell, by the unknowns of all
 agree       planes, slopes, ridges and eaves that volumes have in common
+corners     hips and valleys that end beside a corner of the outline end in it
+hips        steps below hips, where a hip's plane comes down to its neighbours' eaves
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
 teeth       rows of equal monopitches as saw-teeth
@@ -48,6 +52,7 @@ from .apart import told_apart
 from .bays import with_bays
 from .clamp import clamped
 from .fit import BuildingFit
+from .hips import with_steps_at_hips
 from .larger import put_together
 from .names import part_of
 from .objective import base_shows
@@ -94,6 +99,7 @@ def fit_building(
     roof = with_bays(united(volumes, plan, outline, scene), outline, plan, scene, unit)
     volumes, sides = roof.volumes, roof.sides
     planes = agreed(volumes, sides, roof.planes, scene)
+    sides = with_steps_at_hips(volumes, planes, sides, scene)
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
         part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)

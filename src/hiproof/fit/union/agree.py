@@ -16,21 +16,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .finish import (
-    FEWEST_POINTS,
-    LEVEL_SLACK,
-    ROUNDS,
-    SIGN,
-    Planes,
-    cost_of,
-    normal_equations,
-    proper,
-    shown_points,
-    weighted_moments,
-)
+from .corners import SPARED_UNITS, creases_at_corners
+from .finish import LEVEL_SLACK, ROUNDS, SIGN, Planes, cost_of, normal_equations, proper, weighted_moments
+from .members import Member, members_of, unknowns_of
 from .scene import Scene
 from .sides import Side
-from .volumes import DIRECTION, LEVEL, PARAMETER_COST, SIDES
+from .volumes import LEVEL, PARAMETER_COST, SIDES
 
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
@@ -41,104 +32,82 @@ HELD = 1e-6  # an equation that the others leave so little of holds by them
 
 
 @dataclass(frozen=True)
-class Member:
-    """A volume as one of several.
-
-    `rows` (5, 3) are its planes in its own axes, by all p unknowns `own` (5, 3, p) there and `common` (5, 3, p) in the first
-    direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
-    the numbers of its planes on which any lie, with the numbers of those.
-    """
-
-    rows: np.ndarray
-    own: np.ndarray
-    common: np.ndarray
-    points: np.ndarray
-    places: np.ndarray
-    seen: dict[int, np.ndarray]
-    sides: list[Side]
-
-
-@dataclass(frozen=True)
 class Fit:
-    """The unknowns' covariance (p, p), every member's rows (5, 3) and what the points cost."""
+    """The unknowns (p,) and their covariance (p, p), every member's rows (5, 3) and what the points cost."""
 
+    unknowns: np.ndarray
     covariance: np.ndarray
     rows: list[np.ndarray]
     cost: float
 
 
+class Asked(NamedTuple):
+    """An equation (m, p) that nearly holds: how far in height (m) from it, between which two members, how far it may be whatever the
+    points' deviations, and units that are spared besides its parameters."""
+
+    gap: float
+    two: tuple[int, int]
+    equation: np.ndarray
+    allowed: float = LEVELLED_M
+    spared: float = 0.0
+
+
 def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> list[Planes]:
-    """The planes of all volumes fitted together, equal in what they have in common."""
-    members = members_of(volumes, sides, planes, scene) if len(volumes) > 1 else {}
-    if len(members) < 2:
-        return planes
+    """The planes of all volumes fitted together, equal in what they have in common and at the corners of the outline."""
+    members = members_of(volumes, sides, planes, scene)
     known = list(members.values())
-    start = unknowns_of(known)
-    nearly = sorted(likely(known, start), key=lambda one: one[0])
-    if not nearly:
+    if not known:
         return planes
-    held, basis = np.zeros((0, len(start))), np.eye(len(start))
-    best = free = fitted(known, basis, start, scene)
-    for gap, two, equation in nearly:
-        if gap > LEVELLED_M and not may_hold(equation, start, free.covariance):
-            continue
-        saved = int(np.linalg.matrix_rank(equation @ basis, tol=HELD))
-        if saved == 0:
-            continue
-        with_it = np.vstack([held, equation])
-        left = null_space(with_it)
-        found = fitted(known, left, start, scene)
-        spared = scene.evidence * PARAMETER_COST * saved + LEVEL_SLACK * sum(known[k].points.shape[1] for k in two)
-        if found.cost <= best.cost + spared:
-            held, basis, best = with_it, left, found
-    if len(held) == 0:
+    start = unknowns_of(known)
+    at_corners = (Asked(*one, np.inf, SPARED_UNITS) for one in creases_at_corners(known, start, scene.corners[0]))
+    asked = sorted((*likely(known, start), *at_corners), key=lambda one: one.gap)
+    found = fitted_as_asked(known, start, asked, scene) if asked else None
+    if found is None:
         return planes
     agreed_planes = list(planes)
-    for k, member, rows in zip(members, known, best.rows, strict=True):
-        agreed_planes[k] = replace(planes[k], rows=rows, design=member.own, covariance=best.covariance)
+    for k, member, rows in zip(members, known, found.rows, strict=True):
+        agreed_planes[k] = replace(planes[k], rows=rows, design=member.own, covariance=found.covariance)
     return agreed_planes
+
+
+def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked], scene: Scene) -> Fit | None:
+    """The fit under all that may hold of what is `asked`, one after another; None where nothing does."""
+    held, basis = np.zeros((0, len(start))), np.eye(len(start))
+    best = free = fitted(members, basis, start, scene)
+    while asked:
+        later, before = [], len(held)
+        for one in asked:
+            far = one.gap * still_left(one, start, best)
+            if far > one.allowed and not may_hold(one.equation, start, free.covariance):
+                later.append(one)  # what holds may bring it nearer
+                continue
+            saved = int(np.linalg.matrix_rank(one.equation @ basis, tol=HELD))
+            if saved == 0:
+                continue
+            with_it = np.vstack([held, one.equation])
+            left = null_space(with_it)
+            found = fitted(members, left, start, scene)
+            if found.cost <= best.cost + worth(one, saved, members, scene):
+                held, basis, best = with_it, left, found
+        asked = later if len(held) > before else []
+    return best if len(held) else None
+
+
+def worth(one: Asked, saved: int, members: list[Member], scene: Scene) -> float:
+    """What may stay unexplained where an equation holds that saves so many parameters (points)."""
+    slack = LEVEL_SLACK * sum(members[k].points.shape[1] for k in one.two)
+    return float(scene.evidence * (PARAMETER_COST * saved + one.spared) + slack)
+
+
+def still_left(one: Asked, start: np.ndarray, fit: Fit) -> float:
+    """What is left of how far an equation was from holding at `start`."""
+    return float(np.abs(one.equation @ fit.unknowns).max() / max(np.abs(one.equation @ start).max(), HELD))
 
 
 def may_hold(equation: np.ndarray, unknowns: np.ndarray, covariance: np.ndarray) -> bool:
     """Whether `equation` (m, p) is no further from holding than the points leave open."""
     sigma = np.sqrt(np.maximum(((equation @ covariance) * equation).sum(axis=1), 0.0))
     return bool((np.abs(equation @ unknowns) < SIGMAS * sigma).all())
-
-
-def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> dict[int, Member]:
-    """The volumes whose planes points tell, by their number."""
-    shown = shown_points(volumes, scene)
-    free = [k for k, own in enumerate(planes) if own.design.shape[2] and len(shown[k]) >= FEWEST_POINTS]
-    size, start, found = sum(planes[k].design.shape[2] for k in free), 0, {}
-    for k in free:
-        rows, design, direction = planes[k].rows, planes[k].design, int(volumes[k, DIRECTION])
-        own = np.zeros((*design.shape[:2], size))
-        own[:, :, start : start + design.shape[2]] = design
-        start += design.shape[2]
-        c, s = scene.turn[direction]
-        common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
-        one = np.ones(len(shown[k]))
-        points = np.array([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
-        places = np.array([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
-        found[k] = Member(rows, own, common, points, places, lowest_planes(rows, points), sides[k])
-    return found
-
-
-def lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.ndarray]:
-    """The planes (5, 3) that are the lowest at any of `points` (3, n), by their numbers: at which, by theirs."""
-    there = np.flatnonzero(np.isfinite(rows[:, 2])).tolist()
-    z = rows[there] @ np.array([points[0], points[1], np.ones(points.shape[1])])
-    lowest = z.argmin(axis=0)
-    on = {number: np.flatnonzero(lowest == k) for k, number in enumerate(there)}
-    return {number: own for number, own in on.items() if len(own)}
-
-
-def unknowns_of(members: list[Member]) -> np.ndarray:
-    """The unknowns (p,) that give the members' rows."""
-    there = [np.isfinite(member.rows) for member in members]
-    design = np.concatenate([member.own[at] for member, at in zip(members, there, strict=True)])
-    rows = np.concatenate([member.rows[at] for member, at in zip(members, there, strict=True)])
-    return np.linalg.lstsq(design, rows, rcond=None)[0]
 
 
 class Seen(NamedTuple):
@@ -159,8 +128,8 @@ class Measure(NamedTuple):
     reach: float
 
 
-def likely(members: list[Member], start: np.ndarray) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
-    """Equations (m, p) that nearly hold at the unknowns `start`: how far in height (m) they are from it, between which two."""
+def likely(members: list[Member], start: np.ndarray) -> Iterator[Asked]:
+    """What nearly holds between members at the unknowns `start`."""
     planes = [seen_planes(member, start) for member in members]
     measures = [
         [list(kind) for kind in (slopes(member, start), ridges(member, start), eaves(member, start))]
@@ -171,13 +140,13 @@ def likely(members: list[Member], start: np.ndarray) -> Iterator[tuple[float, tu
             for other in planes[k]:
                 gap = gap_of_planes(one, other)
                 if gap < NEAR_M:
-                    yield gap, (j, k), one_plane(one, other)
+                    yield Asked(gap, (j, k), one_plane(one, other))
         for some, others in zip(measures[j], measures[k], strict=True):
             for x in some:
                 for y in others:
                     gap = max(x.reach, y.reach) * abs(x.value - y.value)
                     if gap < NEAR_M:
-                        yield gap, (j, k), (x.equation - y.equation)[None]
+                        yield Asked(gap, (j, k), (x.equation - y.equation)[None])
 
 
 def seen_planes(member: Member, start: np.ndarray) -> list[Seen]:
@@ -258,4 +227,4 @@ def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: S
     cost = sum(cost_of(own, member.points, scene.dead, scene.width) for member, own in zip(members, rows, strict=True))
     if not all(proper(own) for own in rows):
         cost = np.inf
-    return Fit(inverse * misfit / max(total, 1.0), rows, cost)
+    return Fit(unknowns, inverse * misfit / max(total, 1.0), rows, cost)

@@ -13,6 +13,7 @@ from .improve import simplify
 from .moves import move_all_edges, refit_each
 from .objective import objective
 from .plan import Plan
+from .run_on import run_on
 from .scene import Scene, directions_of, scene_of, seen_through
 from .trim import trim
 
@@ -51,6 +52,7 @@ def find_volumes(
     volumes, _ = simplify(volumes, lenient, objective(volumes, lenient, np.inf), LENIENT_SLOPE)
     volumes, value = settled_on_all(volumes, every)
     volumes, value = trim(volumes, every, value)
+    volumes, value = run_on(volumes, every, value)
     return volumes, value, every
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from ...compiled import compiled
 from .moves import refit_each, without
 from .objective import objective
+from .run_on import stands_out
 from .scene import Scene, nodes
 from .volumes import (
     DIRECTION,
@@ -28,6 +29,7 @@ from .volumes import (
 FEWEST_SEEN = 3  # points over which a volume of several is the highest: two on a wall at one height are chance
 NARROW_M = 0.45  # what shows of a plane is as wide at least, along its own fall
 DEAREST_UNITS = 3.0  # what leaving a plane out may cost
+ALIKE = 0.05  # rise over run; planes of a hip are equally steep
 
 
 def without_specks(volumes: np.ndarray, scene: Scene) -> np.ndarray:
@@ -55,10 +57,17 @@ def without_slivers(volumes: np.ndarray, scene: Scene) -> np.ndarray:
             trial[k, OFFSET + plane] = np.inf
             trial[k, [SLOPE + plane, LEAN + plane]] = 0.0
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
-            if found < value + DEAREST_UNITS * scene.evidence:
+            if found < value + DEAREST_UNITS * scene.evidence and not opens_a_hip(volumes, trial, k, plane, scene):
                 volumes, value = trial, min(value, found)
                 _, top = roof_heights(volumes, U, V)
     return volumes
+
+
+def opens_a_hip(volumes: np.ndarray, trial: np.ndarray, k: int, plane: int, scene: Scene) -> bool:
+    """Whether `plane`, without which volume k is a `trial`, falls as others of the volume do and ends it: no wall does."""
+    others = [p for p in range(SIDES) if p != plane and volumes[k, OFFSET + p] < np.inf]
+    as_others = min(abs(volumes[k, SLOPE + p] - volumes[k, SLOPE + plane]) for p in others) if others else np.inf
+    return as_others < ALIKE and len(stands_out(trial, k, plane, scene)) > len(stands_out(volumes, k, plane, scene))
 
 
 def narrow_planes(volumes: np.ndarray, k: int, U: np.ndarray, V: np.ndarray, top: np.ndarray) -> list[int]:

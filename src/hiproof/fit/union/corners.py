@@ -1,0 +1,80 @@
+"""Hips and valleys that end beside a corner of the outline end in it.
+
+Points lie some centimetres beside their place and walls a decimetre beside theirs, so that planes meet a little off the corner that a
+draughtsman draws. That they meet there is a linear equation between their unknowns, one of those that `agree` asks the points about.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+
+from .members import Member, heights_at
+
+# m by plan and by height within which a crease is asked to end in a corner, and units of evidence that this may cost: clouds lie a
+# decimetre beside their outlines, and nobody draws the short edge
+NEAR_M, SPARED_UNITS = 0.2, 3.0
+AT_CORNER_M = 0.01  # one that ends so near does
+REACH_M = 0.4  # a volume that ends so near a corner is drawn on to it
+LEAST_BREAK = 0.1  # rise over run; planes less apart have no crease to speak of
+FROM_CORNER_M, ON_ROOF_M = 0.6, 0.02  # where beside the corner a crease must be on the roof, and how nearly
+
+
+class Plane(NamedTuple):
+    """A member's plane at a corner: whose, which, its height there and a, b, c (3,) in the first direction's axes."""
+
+    member: int
+    number: int
+    height: float
+    coefficients: np.ndarray
+
+
+def creases_at_corners(
+    members: list[Member], start: np.ndarray, ring: np.ndarray
+) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
+    """Equations (1, p) between planes that meet beside one of the corners `ring` (c, 2), at the unknowns `start` (p,): how far apart in
+    height (m) they are at it, and between which two members."""
+    rows = [np.where(np.isfinite(member.rows), member.common @ start, np.nan) for member in members]
+    for corner in ring:
+        at = np.array([*corner, 1.0])
+        for one, other in combinations(planes_at(members, rows, corner), 2):
+            if meet_beside(one, other) and is_crease(one, other, corner, members, rows):
+                equation = at @ (members[one.member].common[one.number] - members[other.member].common[other.number])
+                yield abs(one.height - other.height), (one.member, other.member), equation[None]
+
+
+def planes_at(members: list[Member], rows: list[np.ndarray], corner: np.ndarray) -> list[Plane]:
+    """The planes that points show of the members that reach a corner, no lower or higher there than NEAR_M from the roof."""
+    heights, at = heights_at(members, rows, corner, REACH_M), np.array([*corner, 1.0])
+    found = [
+        Plane(k, p, float(rows[k][p] @ at), rows[k][p])
+        for k in np.flatnonzero(heights > heights.max(initial=-np.inf) - NEAR_M).tolist()
+        for p in members[k].seen
+    ]
+    return [plane for plane in found if plane.height < heights[plane.member] + NEAR_M]
+
+
+def meet_beside(one: Plane, other: Plane) -> bool:
+    """Whether the crease of two planes lies beside the corner at which they were looked at, but not at it."""
+    gap, apart = abs(one.height - other.height), break_of(one, other)
+    return bool(apart > LEAST_BREAK and gap < NEAR_M and AT_CORNER_M < gap / apart < NEAR_M)
+
+
+def break_of(one: Plane, other: Plane) -> float:
+    """By how much (rise over run) two planes fall differently."""
+    return float(np.hypot(*(one.coefficients - other.coefficients)[:2]))
+
+
+def is_crease(one: Plane, other: Plane, corner: np.ndarray, members: list[Member], rows: list[np.ndarray]) -> bool:
+    """Whether two planes meet on the roof, a step from the corner on either side along their crease."""
+    across = (one.coefficients - other.coefficients)[:2] / break_of(one, other)
+    foot = corner - across * (one.height - other.height) / break_of(one, other)
+    for way in (-FROM_CORNER_M, FROM_CORNER_M):
+        place = foot + way * np.array([-across[1], across[0]])
+        heights, z = heights_at(members, rows, place), float(one.coefficients @ (*place, 1.0))
+        if max(abs(z - heights[k]) for k in (one.member, other.member)) < ON_ROOF_M and heights.max() < z + ON_ROOF_M:
+            return True
+    return False

@@ -1,0 +1,92 @@
+"""The volumes of a roof whose planes points tell, each linear in the unknowns of all."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from .finish import FEWEST_POINTS, Planes, shown_points
+from .scene import Scene
+from .sides import Side
+from .volumes import DIRECTION
+
+
+@dataclass(frozen=True)
+class Member:
+    """A volume as one of several.
+
+    `rows` (5, 3) are its planes in its own axes, by all p unknowns `own` (5, 3, p) there and `common` (5, 3, p) in the first
+    direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
+    the numbers of its planes on which any lie, with the numbers of those.
+    """
+
+    rows: np.ndarray
+    own: np.ndarray
+    common: np.ndarray
+    points: np.ndarray
+    places: np.ndarray
+    seen: dict[int, np.ndarray]
+    sides: list[Side]
+    turn: np.ndarray
+
+
+def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> dict[int, Member]:
+    """The volumes whose planes points tell, by their number."""
+    shown = shown_points(volumes, scene)
+    free = [k for k, own in enumerate(planes) if own.design.shape[2] and len(shown[k]) >= FEWEST_POINTS]
+    size, start, found = sum(planes[k].design.shape[2] for k in free), 0, {}
+    for k in free:
+        rows, design, direction = planes[k].rows, planes[k].design, int(volumes[k, DIRECTION])
+        own = np.zeros((*design.shape[:2], size))
+        own[:, :, start : start + design.shape[2]] = design
+        start += design.shape[2]
+        c, s = scene.turn[direction]
+        common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
+        one = np.ones(len(shown[k]))
+        points = np.array([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
+        places = np.array([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
+        found[k] = Member(
+            rows, own, common, points, places, lowest_planes(rows, points), sides[k], scene.turn[direction]
+        )
+    return found
+
+
+def lowest_planes(rows: np.ndarray, points: np.ndarray) -> dict[int, np.ndarray]:
+    """The planes (5, 3) that are the lowest at any of `points` (3, n), by their numbers: at which, by theirs."""
+    there = np.flatnonzero(np.isfinite(rows[:, 2])).tolist()
+    z = rows[there] @ np.array([points[0], points[1], np.ones(points.shape[1])])
+    lowest = z.argmin(axis=0)
+    on = {number: np.flatnonzero(lowest == k) for k, number in enumerate(there)}
+    return {number: own for number, own in on.items() if len(own)}
+
+
+def unknowns_of(members: list[Member]) -> np.ndarray:
+    """The unknowns (p,) that give the members' rows."""
+    there = [np.isfinite(member.rows) for member in members]
+    design = np.concatenate([member.own[at] for member, at in zip(members, there, strict=True)])
+    rows = np.concatenate([member.rows[at] for member, at in zip(members, there, strict=True)])
+    return np.linalg.lstsq(design, rows, rcond=None)[0]
+
+
+def heights_at(members: list[Member], rows: list[np.ndarray], place: np.ndarray, reach_m: float = 0.0) -> np.ndarray:
+    """Heights (m,) of the members, whose planes are `rows` (5, 3), at a `place` u, v of the first direction's axes.
+
+    Minus infinity of those that end more than `reach_m` before it.
+    """
+    at = np.array([*place, 1.0])
+    inside = [is_inside(member, place, reach_m) for member in members]
+    return np.array([np.nanmin(own @ at) if there else -np.inf for own, there in zip(rows, inside, strict=True)])
+
+
+def is_inside(member: Member, place: np.ndarray, reach_m: float) -> bool:
+    """Whether a place u, v of the first direction's axes lies inside a member's sides, or so near them."""
+    (c, s), (left, right, front, back) = member.turn, member.sides
+    u, v = c * place[0] + s * place[1], c * place[1] - s * place[0]
+    beyond = (
+        left.at + left.lean * v - u,
+        u - right.at - right.lean * v,
+        front.at + front.lean * u - v,
+        v - back.at - back.lean * u,
+    )
+    return bool(max(beyond) < reach_m)

@@ -1,0 +1,121 @@
+"""Volumes that end a little short of where they die in a neighbour, or a little beyond, end there: a wing's ridge ends in the roof it meets.
+
+What stands out of the neighbour at such an end is a small triangle, narrower than the places at which the search looks at edges lie
+apart, and no points tell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+import numpy as np
+
+from .objective import objective
+from .scene import Scene
+from .steps import INSIDE_M
+from .volumes import DIRECTION, FREE, LEAN, OFFSET, SIDES, SLOPE, TIE, U0, V0, roof_heights
+
+SAMPLE_M, MOST_SAMPLES = 0.1, 400  # m between the places at which an end is looked at, and how many at most
+LOW_M, HIGH_M, WIDEST_M = 0.01, 0.6, 1.2  # an end that stands out; by more, in height or along the edge, it is meant
+STEP_M, FARTHEST_M = 0.1, 1.5  # m by which it is moved on, and how far at most
+COVER_M = 0.25  # m to either side that it lies hidden then: planes are fitted once more
+BESIDE_M = 0.001  # m from the edge, on either side
+
+
+def run_on(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+    """The volumes with ends that stand out a little moved to where they lie hidden, where that costs less than a step; the objective."""
+    for k in range(1, len(volumes)):
+        for edge in range(SIDES):
+            out = stands_out(volumes, k, edge, scene)
+            if not len(out) or len(out) * SAMPLE_M > WIDEST_M or out.max() > HIGH_M:
+                continue
+            limit = value + scene.edge_prices.any_step * scene.evidence
+            for trial in ends(volumes, k, edge, scene):
+                found = objective(trial, scene, limit)
+                if found < np.inf:
+                    volumes, value = trial, found
+                    break
+    return volumes, value
+
+
+def ends(volumes: np.ndarray, k: int, edge: int, scene: Scene) -> Iterator[np.ndarray]:
+    """The volumes with other ends of volume k, the best first: safely hidden, as a neighbour's, or just hidden."""
+    yield from hidden(volumes, k, edge, scene, COVER_M)
+    yield from in_neighbours_plane(volumes, k, edge)
+    yield from hidden(volumes, k, edge, scene, 0.0)
+
+
+def in_neighbours_plane(volumes: np.ndarray, k: int, edge: int) -> Iterator[np.ndarray]:
+    """The volumes with volume k sloping at an edge as one does that lies around it there, and ending where that does: a hip goes through
+    both."""
+    outwards = 1.0 if edge % 2 else -1.0
+    for other in volumes[1:]:
+        further = outwards * (other[U0 + edge] - volumes[k, U0 + edge]) > 0.0
+        if (
+            further
+            and other[DIRECTION] == volumes[k, DIRECTION]
+            and other[OFFSET + edge] < np.inf == volumes[k, OFFSET + edge]
+        ):
+            trial = volumes.copy()
+            for column in (U0 + edge, OFFSET + edge, SLOPE + edge, LEAN + edge):
+                trial[k, column] = other[column]
+            trial[k, TIE] = FREE
+            yield trial
+
+
+def hidden(volumes: np.ndarray, k: int, edge: int, scene: Scene, cover_m: float) -> Iterator[np.ndarray]:
+    """The volumes with an edge of volume k moved, no further than it must be, to where it is below the others, and `cover_m` to either
+    side; none where it never is."""
+    low, high = volumes[k, U0 + (edge & 2)], volumes[k, U0 + (edge | 1)]
+    for step, way in product(range(1, round(FARTHEST_M / STEP_M) + 1), (1.0, -1.0)):
+        trial, at = volumes.copy(), volumes[k, U0 + edge] + way * step * STEP_M
+        for place in (at - cover_m, at + cover_m, at):
+            trial[k, U0 + edge] = place
+            if (
+                (edge % 2 == 0 and place >= high)
+                or (edge % 2 and place <= low)
+                or len(stands_out(trial, k, edge, scene))
+            ):
+                break
+        else:
+            yield trial
+            return
+
+
+def stands_out(volumes: np.ndarray, k: int, edge: int, scene: Scene) -> np.ndarray:
+    """By how much (m) volume k stands out at an edge of it, at those places inside the outline where it does."""
+    axis, across = edge // 2, V0 - 2 * (edge // 2)
+    at, outwards = volumes[k, U0 + edge], BESIDE_M if edge % 2 else -BESIDE_M
+    start, end = volumes[k, across], volumes[k, across + 1]
+    along = np.linspace(start, end, min(max(round((end - start) / SAMPLE_M), 1), MOST_SAMPLES) + 1)
+    direction = int(volumes[k, DIRECTION])
+    inner, outer = (
+        in_all_directions(
+            (np.full_like(along, x), along) if axis == 0 else (along, np.full_like(along, x)), direction, scene
+        )
+        for x in (at - outwards, at + outwards)
+    )
+    there = is_inside(inner[0][0], inner[1][0], scene)
+    if not there.any():
+        return np.zeros(0)
+    z, top = roof_heights(volumes, *inner)
+    z_beyond, _ = roof_heights(volumes, *outer)
+    gap = np.abs(z - z_beyond)
+    return gap[there & (top == k) & (gap > LOW_M)]
+
+
+def in_all_directions(uv: tuple[np.ndarray, np.ndarray], direction: int, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Places in the axes of one direction in those of all: U, V (directions, n)."""
+    turn = scene.turn @ np.array([[c := scene.turn[direction, 0], -(s := scene.turn[direction, 1])], [s, c]])
+    c, s = turn[:, :1], turn[:, 1:]
+    return c * uv[0] + s * uv[1], c * uv[1] - s * uv[0]
+
+
+def is_inside(u: np.ndarray, v: np.ndarray, scene: Scene) -> np.ndarray:
+    """Which places (n,) of the first direction's axes lie so far inside the outline that steps show there."""
+    i = np.rint((u - scene.corner_u) / scene.pitch).astype(int)
+    j = np.rint((v - scene.corner_v) / scene.pitch).astype(int)
+    rows, columns = scene.depth.shape
+    on = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
+    return on & (scene.depth[np.clip(i, 0, rows - 1), np.clip(j, 0, columns - 1)] >= INSIDE_M)

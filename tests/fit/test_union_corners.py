@@ -1,0 +1,82 @@
+"""Creases end in corners, steps where hips come down to the eaves, and ridges in the roofs that they meet; not where points say otherwise."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.compose import compose
+from hiproof.fit.union import fit_building
+from hiproof.frames import LocalFrame
+from hiproof.model import ROOF, Roof
+from points_of_roofs import sampled
+
+DRAWN_M = 0.3  # a draughtsman draws no shorter edge on these roofs
+EAVE, SLOPE = 3.0, 0.8
+# rectangles (low x, low y, high x, high y) of the wings, and the sides (of west, east, south, north) on which each has a gable
+HOUSES = {
+    "L of hips": (((0, 0, 14, 8), ""), ((0, 0, 7, 15), "")),
+    "L of gables": (((0, 0, 14, 8), "we"), ((0, 0, 7, 15), "ns")),
+    "T of hips": (((0, 0, 16, 8), ""), ((5, 0, 11, 13), "s")),
+    "T of gables": (((0, 0, 16, 8), "we"), ((5, 0, 11, 13), "ns")),
+    "hip with a gabled wing": (((0, 0, 16, 8), ""), ((5, 0, 11, 13), "ns")),
+    "cross": (((0, 4, 18, 11), ""), ((6, 0, 12, 15), "")),
+}
+
+
+def wing(x, y, rectangle, gables, eave=EAVE):
+    """Height of one wing, minus infinity beside it."""
+    west, south, east, north = rectangle
+    inside = (x >= west) & (x <= east) & (y >= south) & (y <= north)
+    away = {"w": x - west, "e": east - x, "s": y - south, "n": north - y}
+    rise = np.min([d for side, d in away.items() if side not in gables], axis=0)
+    return np.where(inside, eave + SLOPE * rise, -np.inf)
+
+
+def house(name):
+    """Outline and height of one of HOUSES."""
+    outline = shapely.union_all([shapely.box(*rectangle) for rectangle, _ in HOUSES[name]])
+    return outline, lambda x, y: np.max([wing(x, y, *own) for own in HOUSES[name]], axis=0)
+
+
+def roof_edges(fit):
+    """Lengths in plan (m,) of all edges of the solid's roof."""
+    solid = compose(Roof(fit.roof_parts, fit.outline, LocalFrame(np.zeros(3))), -3.0)
+    rings = [solid.vertices[list(ring)][:, :2] for face in solid.of_kind(ROOF) for ring in face.rings]
+    return np.concatenate([np.hypot(*(np.roll(ring, -1, axis=0) - ring).T) for ring in rings])
+
+
+@pytest.mark.parametrize("name", HOUSES)
+@pytest.mark.parametrize("beside", [(0.0, 0.0), (0.05, 0.04), (-0.06, 0.03)])
+@pytest.mark.parametrize("seed", range(2))
+def test_creases_end_in_corners_where_points_lie_a_little_beside_the_outline(name, beside, seed):
+    outline, height = house(name)
+    fit = fit_building(sampled(height, outline, 5.0, 0.02, seed) + (*beside, 0.0), outline)
+    assert len(fit.roof_parts) == 2
+    assert roof_edges(fit).min() > DRAWN_M
+
+
+@pytest.mark.parametrize("lower", [0.25, 0.5])
+def test_eaves_of_two_heights_keep_them_though_their_hip_ends_beside_the_corner(lower):
+    outline = shapely.box(0, 0, 14, 8)
+
+    def height(x, y):
+        return np.minimum(wing(x, y, (0, 0, 14, 8), ""), EAVE - lower + SLOPE * x)
+
+    points = sampled(height, outline, 10.0, 0.02)
+    fit = fit_building(points, outline)
+    error = Roof(fit.roof_parts, fit.outline, None).height_at(points[:, :2]) - points[:, 2]
+    assert np.sqrt(np.mean(error**2)) < 0.04
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_step_below_a_hip_lies_where_its_plane_meets_the_eaves(seed):
+    outline = shapely.box(0, 0, 16, 8)
+
+    def height(x, y):
+        return np.where(x < 10.3, wing(x, y, (0, 0, 10.3, 8), ""), 1.0)
+
+    fit = fit_building(sampled(height, outline, 2.0, 0.02, seed), outline)
+    lowest = min(fit.roof_parts, key=lambda part: part.pieces[0].planes[:, 2].min())
+    assert lowest.type == "flat"
+    assert min(piece.outline.bounds[0] for piece in lowest.pieces) == pytest.approx(10.3, abs=0.1)
+    assert roof_edges(fit).min() > DRAWN_M
