@@ -1,4 +1,4 @@
-"""Hips and valleys that end beside a corner of the outline end in it.
+"""Hips and valleys that end beside a corner of the outline, or beside a step's end at a wall, end in it.
 
 Points lie some centimetres beside their place and walls a decimetre beside theirs, so that planes meet a little off the corner that a
 draughtsman draws. That they meet there is a linear equation between their unknowns, one of those that `agree` asks the points about.
@@ -13,10 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from .members import Member, heights_at
+from .sides import CORNER_SIDES, corners_of
 
 # m by plan and by height within which a crease is asked to end in a corner, and units of evidence that this may cost: clouds lie a
 # decimetre beside their outlines, and nobody draws the short edge
-NEAR_M, SPARED_UNITS = 0.2, 3.0
+NEAR_M, SPARED_UNITS = 0.2, 2.0
 AT_CORNER_M = 0.01  # one that ends so near does
 REACH_M = 0.4  # a volume that ends so near a corner is drawn on to it
 LEAST_BREAK = 0.1  # rise over run; planes less apart have no crease to speak of
@@ -35,15 +36,24 @@ class Plane(NamedTuple):
 def creases_at_corners(
     members: list[Member], start: np.ndarray, ring: np.ndarray
 ) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
-    """Equations (1, p) between planes that meet beside one of the corners `ring` (c, 2), at the unknowns `start` (p,): how far apart in
-    height (m) they are at it, and between which two members."""
+    """Equations (1, p) between planes that meet beside a corner, of the outline's `ring` (c, 2) or where a step ends at it, at the
+    unknowns `start` (p,): how far apart in height (m) they are there, and between which two members."""
     rows = [np.where(np.isfinite(member.rows), member.common @ start, np.nan) for member in members]
-    for corner in ring:
+    for corner in np.vstack([ring, *(own_corners(member, ring) for member in members)]):
         at = np.array([*corner, 1.0])
         for one, other in combinations(planes_at(members, rows, corner), 2):
             if meet_beside(one, other) and is_crease(one, other, corner, members, rows):
                 equation = at @ (members[one.member].common[one.number] - members[other.member].common[other.number])
                 yield abs(one.height - other.height), (one.member, other.member), equation[None]
+
+
+def own_corners(member: Member, ring: np.ndarray) -> np.ndarray:
+    """The places (m, 2) besides the `ring`'s corners where a member's sides meet, one of which lies on the outline."""
+    c, s = member.turn
+    corners = corners_of(member.sides) @ np.array([[c, s], [-s, c]])
+    anchored = [member.sides[k].anchored or member.sides[j].anchored for k, j in CORNER_SIDES]
+    apart = np.hypot(*(corners[:, None] - ring).T).min(axis=0) > AT_CORNER_M
+    return corners[apart & np.array(anchored)]
 
 
 def planes_at(members: list[Member], rows: list[np.ndarray], corner: np.ndarray) -> list[Plane]:

@@ -31,6 +31,7 @@ MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see h
 NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
 NEEDED, FEWEST_NEEDED = 0.3, 3  # a point that costs so much more without a volume needs it; fewer show nothing
 PLACE_M = 0.03  # standard deviation of where points themselves are in plan: of their swath and in their beam
+CORNER_SIDES = (0, 2), (1, 2), (1, 3), (0, 3)  # the sides that meet in each corner, in order around a volume
 LEAST_KNOWN = 0.05  # a place so likely at the end of the way is not known
 
 
@@ -248,9 +249,9 @@ def shared(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> S
 
 
 def corners_of(sides: list[Side]) -> np.ndarray:
-    """The corners (4, 2) where a volume's sides meet, in order around it, in its direction's axes."""
+    """The corners (4, 2) where a volume's sides meet, those of CORNER_SIDES, in its direction's axes."""
     found = []
-    for i, j in ((0, 2), (1, 2), (1, 3), (0, 3)):
+    for i, j in CORNER_SIDES:
         a, b = sides[i], sides[j]
         u = (a.at + a.lean * b.at) / (1.0 - a.lean * b.lean)
         found.append((u, b.at + b.lean * u))
