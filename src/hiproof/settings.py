@@ -136,7 +136,7 @@ class ComposeSettings:
 
     snap_m: float = setting(0.001, "plan vertices closer than this are one", "m", 0.001, 0.05)
     min_face_area_m2: float = setting(0.01, "smaller roof faces join a neighbour", "m2", 0.0, 10.0)
-    min_face_width_m: float = setting(0.01, "thinner roof faces join a neighbour", "m", 0.0, 1.0)
+    min_face_width_m: float = setting(0.25, "thinner roof faces, which nobody draws, join a neighbour", "m", 0.0, 1.0)
     ground_clearance_m: float = setting(0.1, "the ground lies at least this far below the lowest eave", "m", 0.01, 10.0)
     planarity_m: float = setting(0.001, "vertices of a face lie within this of its plane", "m", 0.0005, 0.05)
 

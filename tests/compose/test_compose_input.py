@@ -70,9 +70,10 @@ def test_slivers_join_a_neighbour_by_the_settings():
     pieces = [Piece(shapely.box(0, 0, 5, 8), FLAT), Piece(shapely.box(5, 0, 5.05, 8), FLAT + [[0, 0, 1]])]
     pieces.append(Piece(shapely.box(5.05, 0, 10, 8), FLAT + [[0, 0, 2]]))
     roof = roof_zoo.roof(pieces, HOUSE)
-    wide = Settings.from_dict({"compose": {"min_face_width_m": 0.1}})
-    assert len(compose(roof, 0.0).of_kind("RoofSurface")) == 3
+    narrow, wide = (Settings.from_dict({"compose": {"min_face_width_m": width}}) for width in (0.01, 0.1))
+    assert len(compose(roof, 0.0, narrow).of_kind("RoofSurface")) == 3
     assert len(compose(roof, 0.0, wide).of_kind("RoofSurface")) == 2
+    assert len(compose(roof, 0.0).of_kind("RoofSurface")) == 2
 
 
 def test_coordinates_are_multiples_of_a_tenth_of_a_millimetre():
