@@ -19,6 +19,8 @@ from .joined import join, root_of
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
+UNSEEN_UNITS = 100.0  # a centimetre: a face thinner than that is none
+BEYOND_UNITS = 1000.0  # a decimetre by which a face may rise or fall further than what is around it
 COLLINEAR_UNITS = 5.0  # units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
 
 
@@ -394,9 +396,11 @@ def edge_lengths(xy, edges):
 
 
 @compiled
-def merge_slivers(xy, edges, face, area, label, min_area, min_width):
-    """Give every region too small or too thin to the neighbour it shares the longest border with, smallest first."""
-    length = edge_lengths(xy, edges)
+def merge_slivers(xy, edges, face, area, label, planes, min_area, min_width):
+    """Give every region too small or too thin to the neighbour it shares the longest border with, smallest first.
+
+    One that would carry its plane on to where no roof is around keeps out, unless nobody could see the region."""
+    length, kept = edge_lengths(xy, edges), np.zeros(len(label), np.bool_)
     for _ in range(len(label)):
         region = regions_of(edges, face, label)
         size, border = np.zeros(len(label)), np.zeros(len(label))
@@ -413,21 +417,51 @@ def merge_slivers(xy, edges, face, area, label, min_area, min_width):
         smallest = -1
         for r in range(1, len(label)):
             sliver = region[r] == r and open_to[r] and (size[r] < min_area or 2 * size[r] < min_width * border[r])
-            if sliver and (smallest < 0 or size[r] < size[smallest]):
+            if sliver and not kept[r] and (smallest < 0 or size[r] < size[smallest]):
                 smallest = r
         if smallest < 0:
             break
-        shared = np.zeros(len(label))
-        for e in range(len(edges)):
-            a, b = region[face[2 * e]], region[face[2 * e + 1]]
-            if a != b and (a == smallest or b == smallest):
-                other = b if a == smallest else a
-                if label[other] != OUTSIDE:
-                    shared[other] += length[e]
-        into = label[np.argmax(shared)]
+        unseen = size[smallest] < min_area or 2 * size[smallest] < min(min_width, UNSEEN_UNITS) * border[smallest]
+        into = heir_of(xy, edges, face, label, region, length, planes, smallest, unseen)
         for f in range(len(label)):
             if region[f] == smallest:
-                label[f] = into
+                kept[f] = into == OUTSIDE
+                label[f] = label[f] if kept[f] else into
+
+
+@compiled
+def heir_of(xy, edges, face, label, region, length, planes, sliver, anyone):
+    """The label of the region that shares the longest border with a sliver, of those whose planes stay over it within the heights around
+    it (or `anyone`'s); OUTSIDE where there is none."""
+    shared, fits = np.zeros(len(label)), np.ones(len(label), np.bool_)
+    low, high = np.inf, -np.inf
+    for e in range(len(edges)):
+        a, b = region[face[2 * e]], region[face[2 * e + 1]]
+        if a == b or (a != sliver and b != sliver):
+            continue
+        other = b if a == sliver else a
+        shared[other] += length[e] if label[other] != OUTSIDE else 0.0
+        for r in (sliver, other):
+            if label[r] >= 0:
+                for end in range(2):
+                    z = height_of(planes[label[r]], xy[edges[e, end]])
+                    low, high = min(low, z), max(high, z)
+    for e in range(len(edges)):
+        if (region[face[2 * e]] == sliver) != (region[face[2 * e + 1]] == sliver):
+            for r in range(1, len(label)):
+                if shared[r] > 0.0 and label[r] >= 0:
+                    for end in range(2):
+                        z = height_of(planes[label[r]], xy[edges[e, end]])
+                        fits[r] = fits[r] and low - BEYOND_UNITS < z < high + BEYOND_UNITS
+    if label[sliver] < 0 or (anyone and not (fits & (shared > 0.0)).any()):
+        fits[:] = True
+    best = np.argmax(np.where(fits, shared, 0.0))
+    return label[best] if fits[best] and shared[best] > 0.0 else OUTSIDE
+
+
+@compiled(inline="always")
+def height_of(plane, place):
+    return plane[0] * place[0] + plane[1] * place[1] + plane[2]
 
 
 @compiled
@@ -538,7 +572,7 @@ def plan_cells(
     face, area = trace_faces(xy, edges, next_half_edges(edges, order, start))
     points = face_points(xy, edges, face, len(area))
     label = label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label)
-    merge_slivers(xy, edges, face, area, label, min_area, min_width)
+    merge_slivers(xy, edges, face, area, label, planes, min_area, min_width)
     keep_largest_component(edges, face, area, label)
     side = label[face].reshape(-1, 2)
     return dissolve(xy, edges, side)
