@@ -26,6 +26,7 @@ from .volumes import LEVEL, PARAMETER_COST, SIDES
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
 LEVELLED_M, SIGMAS = 0.01, 2.5
+REACHED_M = 0.003  # m within which others have brought what is further apart: nobody builds such a difference
 RIDGE = 1e-9  # of the mean diagonal of the normal equations: what no point tells stays as it was
 LEVEL_FALL = 1e-9  # rise over run; numerically level
 HELD = 1e-6  # an equation that the others leave so little of holds by them
@@ -71,14 +72,17 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
 
 
 def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked], scene: Scene) -> Fit | None:
-    """The fit under all that may hold of what is `asked`, one after another; None where nothing does."""
-    held, basis = np.zeros((0, len(start))), np.eye(len(start))
+    """The fit under all that may hold of what is `asked`, one after another; None where nothing does.
+
+    Its covariance is what the points tell: a corner of the outline says where planes meet, not how well that is known.
+    """
+    held, told, basis = np.zeros((0, len(start))), np.zeros((0, len(start))), np.eye(len(start))
     best = free = fitted(members, basis, start, scene)
     while asked:
         later, before = [], len(held)
         for one in asked:
-            far = one.gap * still_left(one, start, best)
-            if far > one.allowed and not may_hold(one.equation, start, free.covariance):
+            near = one.gap <= one.allowed or one.gap * still_left(one, start, best) <= REACHED_M
+            if not near and not may_hold(one.equation, start, free.covariance):
                 later.append(one)  # what holds may bring it nearer
                 continue
             saved = int(np.linalg.matrix_rank(one.equation @ basis, tol=HELD))
@@ -89,7 +93,10 @@ def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked]
             found = fitted(members, left, start, scene)
             if found.cost <= best.cost + worth(one, saved, members, scene):
                 held, basis, best = with_it, left, found
+                told = told if one.spared else np.vstack([told, one.equation])
         asked = later if len(held) > before else []
+    if len(held) > len(told):
+        best = replace(best, covariance=fitted(members, null_space(told), start, scene).covariance)
     return best if len(held) else None
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from .members import Member, heights_at
 from .sides import CORNER_SIDES, corners_of
+from .volumes import LEVEL
 
 # m by plan and by height within which a crease is asked to end in a corner, and units of evidence that this may cost: clouds lie a
 # decimetre beside their outlines, and nobody draws the short edge
@@ -68,7 +69,12 @@ def planes_at(members: list[Member], rows: list[np.ndarray], corner: np.ndarray)
 
 
 def meet_beside(one: Plane, other: Plane) -> bool:
-    """Whether the crease of two planes lies beside the corner at which they were looked at, but not at it."""
+    """Whether the crease of two planes lies beside the corner at which they were looked at, but not at it.
+
+    The slopes of one volume and the level plane of another cross along an eave, which ends in no corner.
+    """
+    if one.member != other.member and LEVEL in (one.number, other.number):
+        return False
     gap, apart = abs(one.height - other.height), break_of(one, other)
     return bool(apart > LEAST_BREAK and gap < NEAR_M and AT_CORNER_M < gap / apart < NEAR_M)
 
