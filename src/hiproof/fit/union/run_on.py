@@ -11,6 +11,7 @@ from itertools import product
 
 import numpy as np
 
+from ...compiled import compiled
 from .objective import objective
 from .scene import Scene
 from .steps import INSIDE_M
@@ -27,8 +28,8 @@ def run_on(volumes: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray,
     """The volumes with ends that stand out a little moved to where they lie hidden, where that costs less than a step; the objective."""
     for k in range(1, len(volumes)):
         for edge in range(SIDES):
-            out = stands_out(volumes, k, edge, scene)
-            if not len(out) or len(out) * SAMPLE_M > WIDEST_M or out.max() > HIGH_M:
+            places, most = stands_out(volumes, k, edge, scene)
+            if places == 0 or places * SAMPLE_M > WIDEST_M or most > HIGH_M:
                 continue
             limit = value + scene.edge_prices.any_step * scene.evidence
             for trial in ends(volumes, k, edge, scene):
@@ -75,7 +76,7 @@ def hidden(volumes: np.ndarray, k: int, edge: int, scene: Scene, cover_m: float)
             if (
                 (edge % 2 == 0 and place >= high)
                 or (edge % 2 and place <= low)
-                or len(stands_out(trial, k, edge, scene))
+                or stands_out(trial, k, edge, scene)[0]
             ):
                 break
         else:
@@ -83,39 +84,36 @@ def hidden(volumes: np.ndarray, k: int, edge: int, scene: Scene, cover_m: float)
             return
 
 
-def stands_out(volumes: np.ndarray, k: int, edge: int, scene: Scene) -> np.ndarray:
-    """By how much (m) volume k stands out at an edge of it, at those places inside the outline where it does."""
+@compiled
+def stands_out(volumes, k, edge, scene):
+    """At how many places along an edge of volume k, inside the outline, it stands out there, and by how much (m) at most."""
     axis, across = edge // 2, V0 - 2 * (edge // 2)
-    at, outwards = volumes[k, U0 + edge], BESIDE_M if edge % 2 else -BESIDE_M
-    start, end = volumes[k, across], volumes[k, across + 1]
-    along = np.linspace(start, end, min(max(round((end - start) / SAMPLE_M), 1), MOST_SAMPLES) + 1)
-    direction = int(volumes[k, DIRECTION])
-    inner, outer = (
-        in_all_directions(
-            (np.full_like(along, x), along) if axis == 0 else (along, np.full_like(along, x)), direction, scene
-        )
-        for x in (at - outwards, at + outwards)
-    )
-    there = is_inside(inner[0][0], inner[1][0], scene)
-    if not there.any():
-        return np.zeros(0)
-    z, top = roof_heights(volumes, *inner)
-    z_beyond, _ = roof_heights(volumes, *outer)
-    gap = np.abs(z - z_beyond)
-    return gap[there & (top == k) & (gap > LOW_M)]
+    outwards = BESIDE_M if edge % 2 else -BESIDE_M
+    start, length = volumes[k, across], volumes[k, across + 1] - volumes[k, across]
+    count = min(max(int(round(length / SAMPLE_M)), 1), MOST_SAMPLES) + 1
+    shape = len(scene.turn), 2 * count  # inside, then outside
+    U, V = np.empty(shape), np.empty(shape)
+    own = int(volumes[k, DIRECTION])
+    for d in range(len(scene.turn)):
+        c = scene.turn[d, 0] * scene.turn[own, 0] + scene.turn[d, 1] * scene.turn[own, 1]
+        s = scene.turn[d, 1] * scene.turn[own, 0] - scene.turn[d, 0] * scene.turn[own, 1]
+        for q in range(2 * count):
+            x = volumes[k, U0 + edge] + (-outwards if q < count else outwards)
+            y = start + length * (q % count) / (count - 1)
+            u, v = (x, y) if axis == 0 else (y, x)
+            U[d, q], V[d, q] = c * u + s * v, c * v - s * u
+    z, top = roof_heights(volumes, U, V)
+    places, most = 0, 0.0
+    for q in range(count):
+        gap = abs(z[q] - z[count + q])
+        if gap > LOW_M and top[q] == k and is_inside(U[0, q], V[0, q], scene):
+            places, most = places + 1, max(most, gap)
+    return places, most
 
 
-def in_all_directions(uv: tuple[np.ndarray, np.ndarray], direction: int, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
-    """Places in the axes of one direction in those of all: U, V (directions, n)."""
-    turn = scene.turn @ np.array([[c := scene.turn[direction, 0], -(s := scene.turn[direction, 1])], [s, c]])
-    c, s = turn[:, :1], turn[:, 1:]
-    return c * uv[0] + s * uv[1], c * uv[1] - s * uv[0]
-
-
-def is_inside(u: np.ndarray, v: np.ndarray, scene: Scene) -> np.ndarray:
-    """Which places (n,) of the first direction's axes lie so far inside the outline that steps show there."""
-    i = np.rint((u - scene.corner_u) / scene.pitch).astype(int)
-    j = np.rint((v - scene.corner_v) / scene.pitch).astype(int)
+@compiled
+def is_inside(u, v, scene):
+    """Whether a place in the first direction's axes lies so far inside the outline that steps show there."""
+    i, j = round((u - scene.corner_u) / scene.pitch), round((v - scene.corner_v) / scene.pitch)
     rows, columns = scene.depth.shape
-    on = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-    return on & (scene.depth[np.clip(i, 0, rows - 1), np.clip(j, 0, columns - 1)] >= INSIDE_M)
+    return 0 <= i < rows and 0 <= j < columns and scene.depth[i, j] >= INSIDE_M

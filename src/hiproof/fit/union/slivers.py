@@ -67,7 +67,7 @@ def opens_a_hip(volumes: np.ndarray, trial: np.ndarray, k: int, plane: int, scen
     """Whether `plane`, without which volume k is a `trial`, falls as others of the volume do and ends it: no wall does."""
     others = [p for p in range(SIDES) if p != plane and volumes[k, OFFSET + p] < np.inf]
     as_others = min(abs(volumes[k, SLOPE + p] - volumes[k, SLOPE + plane]) for p in others) if others else np.inf
-    return as_others < ALIKE and len(stands_out(trial, k, plane, scene)) > len(stands_out(volumes, k, plane, scene))
+    return as_others < ALIKE and stands_out(trial, k, plane, scene)[0] > stands_out(volumes, k, plane, scene)[0]
 
 
 def narrow_planes(volumes: np.ndarray, k: int, U: np.ndarray, V: np.ndarray, top: np.ndarray) -> list[int]:
