@@ -39,10 +39,11 @@ def creases_at_corners(
 ) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
     """Equations (1, p) between planes that meet beside a corner, of the outline's `ring` (c, 2) or where a step ends at it, at the
     unknowns `start` (p,): how far apart in height (m) they are there, and between which two members."""
-    rows = [np.where(np.isfinite(member.rows), member.common @ start, np.nan) for member in members]
-    for corner in np.vstack([ring, *(own_corners(member, ring) for member in members)]):
+    rows = np.array([np.where(np.isfinite(member.rows), member.common @ start, np.nan) for member in members])
+    corners = np.vstack([ring, *(own_corners(member, ring) for member in members)])
+    for corner, planes in zip(corners, planes_at(members, rows, corners), strict=True):
         at = np.array([*corner, 1.0])
-        for one, other in combinations(planes_at(members, rows, corner), 2):
+        for one, other in combinations(planes, 2):
             if meet_beside(one, other) and is_crease(one, other, corner, members, rows):
                 equation = at @ (members[one.member].common[one.number] - members[other.member].common[other.number])
                 yield abs(one.height - other.height), (one.member, other.member), equation[None]
@@ -57,15 +58,16 @@ def own_corners(member: Member, ring: np.ndarray) -> np.ndarray:
     return corners[apart & np.array(anchored)]
 
 
-def planes_at(members: list[Member], rows: list[np.ndarray], corner: np.ndarray) -> list[Plane]:
-    """The planes that points show of the members that reach a corner, no lower or higher there than NEAR_M from the roof."""
-    heights, at = heights_at(members, rows, corner, REACH_M), np.array([*corner, 1.0])
-    found = [
-        Plane(k, p, float(rows[k][p] @ at), rows[k][p])
-        for k in np.flatnonzero(heights > heights.max(initial=-np.inf) - NEAR_M).tolist()
-        for p in members[k].seen
-    ]
-    return [plane for plane in found if plane.height < heights[plane.member] + NEAR_M]
+def planes_at(members: list[Member], rows: np.ndarray, corners: np.ndarray) -> list[list[Plane]]:
+    """By corner (c, 2), the planes that points show of the members that reach it, no lower or higher there than NEAR_M from the roof."""
+    each = rows @ np.column_stack([corners, np.ones(len(corners))]).T
+    heights = heights_at(members, rows, corners, REACH_M)
+    near = (heights > heights.max(axis=0) - NEAR_M)[:, None] & (each < heights[:, None] + NEAR_M)
+    near &= np.array([[p in member.seen for p in range(LEVEL + 1)] for member in members])[:, :, None]
+    found: list[list[Plane]] = [[] for _ in corners]
+    for c, k, p in np.argwhere(near.transpose(2, 0, 1)).tolist():
+        found[c].append(Plane(k, p, float(each[k, p, c]), rows[k, p]))
+    return found
 
 
 def meet_beside(one: Plane, other: Plane) -> bool:
@@ -84,13 +86,11 @@ def break_of(one: Plane, other: Plane) -> float:
     return float(np.hypot(*(one.coefficients - other.coefficients)[:2]))
 
 
-def is_crease(one: Plane, other: Plane, corner: np.ndarray, members: list[Member], rows: list[np.ndarray]) -> bool:
+def is_crease(one: Plane, other: Plane, corner: np.ndarray, members: list[Member], rows: np.ndarray) -> bool:
     """Whether two planes meet on the roof, a step from the corner on either side along their crease."""
     across = (one.coefficients - other.coefficients)[:2] / break_of(one, other)
     foot = corner - across * (one.height - other.height) / break_of(one, other)
-    for way in (-FROM_CORNER_M, FROM_CORNER_M):
-        place = foot + way * np.array([-across[1], across[0]])
-        heights, z = heights_at(members, rows, place), float(one.coefficients @ (*place, 1.0))
-        if max(abs(z - heights[k]) for k in (one.member, other.member)) < ON_ROOF_M and heights.max() < z + ON_ROOF_M:
-            return True
-    return False
+    places = foot + np.array([[-FROM_CORNER_M], [FROM_CORNER_M]]) * np.array([-across[1], across[0]])
+    heights, z = heights_at(members, rows, places), places @ one.coefficients[:2] + one.coefficients[2]
+    on_roof = np.abs(z - heights[[one.member, other.member]]).max(axis=0) < ON_ROOF_M
+    return bool((on_roof & (heights.max(axis=0) < z + ON_ROOF_M)).any())

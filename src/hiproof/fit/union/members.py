@@ -69,24 +69,19 @@ def unknowns_of(members: list[Member]) -> np.ndarray:
     return np.linalg.lstsq(design, rows, rcond=None)[0]
 
 
-def heights_at(members: list[Member], rows: list[np.ndarray], place: np.ndarray, reach_m: float = 0.0) -> np.ndarray:
-    """Heights (m,) of the members, whose planes are `rows` (5, 3), at a `place` u, v of the first direction's axes.
+def heights_at(members: list[Member], rows: np.ndarray, places: np.ndarray, reach_m: float = 0.0) -> np.ndarray:
+    """Heights (m, n) of the members, whose planes are `rows` (m, 5, 3), at `places` (n, 2), u, v of the first direction's axes.
 
     Minus infinity of those that end more than `reach_m` before it.
     """
-    at = np.array([*place, 1.0])
-    inside = [is_inside(member, place, reach_m) for member in members]
-    return np.array([np.nanmin(own @ at) if there else -np.inf for own, there in zip(rows, inside, strict=True)])
+    at = np.column_stack([places, np.ones(len(places))]).T
+    inside = np.array([is_inside(member, places, reach_m) for member in members])
+    return np.where(inside, np.fmin.reduce(rows @ at, axis=1), -np.inf)
 
 
-def is_inside(member: Member, place: np.ndarray, reach_m: float) -> bool:
-    """Whether a place u, v of the first direction's axes lies inside a member's sides, or so near them."""
-    (c, s), (left, right, front, back) = member.turn, member.sides
-    u, v = c * place[0] + s * place[1], c * place[1] - s * place[0]
-    beyond = (
-        left.at + left.lean * v - u,
-        u - right.at - right.lean * v,
-        front.at + front.lean * u - v,
-        v - back.at - back.lean * u,
-    )
-    return bool(max(beyond) < reach_m)
+def is_inside(member: Member, places: np.ndarray, reach_m: float) -> np.ndarray:
+    """Which of `places` (n, 2), u, v of the first direction's axes, lie inside a member's sides, or so near them."""
+    (c, s), (left, right, front, back), (x, y) = member.turn.tolist(), member.sides, places.T
+    u, v = c * x + s * y, c * y - s * x
+    across_u = (left.at + left.lean * v - u < reach_m) & (u - right.at - right.lean * v < reach_m)
+    return across_u & (front.at + front.lean * u - v < reach_m) & (v - back.at - back.lean * u < reach_m)
