@@ -58,5 +58,4 @@ def reconstruct(
     ground = stages.find_ground(fitted.outline, points, frame, terrain, roof)
     roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, ground, settings)
-    building = stages.cautioned(building, points)
     return stages.remarked(stages.remarked(building, of_footprint), remark)

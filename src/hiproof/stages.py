@@ -19,6 +19,7 @@ from .settings import Settings
 from .status import Doubt, Status
 
 if TYPE_CHECKING:
+    from .evaluate.metrics import Inner
     from .read.terrain import Terrain
 
 LIKELY = 0.05
@@ -147,12 +148,18 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
 def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
     """The largest polygon of a geometry, made valid; an empty polygon where there is none."""
     geometry = geometry if geometry.is_valid else enclosed(geometry)
+    if geometry.geom_type == "Polygon":
+        return geometry
     polygons = [g for g in shapely.get_parts(geometry) if g.geom_type == "Polygon"]
     return max(polygons, key=lambda polygon: polygon.area, default=shapely.Polygon())
 
 
 def distinct(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) sorted by x, y, z without repeats: the same set gives the same array."""
+    plan = np.ascontiguousarray(points[:, :2]).view(complex)[:, 0]  # complex numbers are in order by x, then by y
+    order = np.argsort(plan)
+    if (plan[order[1:]] != plan[order[:-1]]).all():  # none over another, as nearly always
+        return points[order]
     points = points[np.lexsort(points.T[::-1])]
     differs = points[1:] != points[:-1]
     return points[np.r_[True, differs[:, 0] | differs[:, 1] | differs[:, 2]]] if len(points) else points
@@ -368,13 +375,15 @@ def judge(
     ground: Ground,
     settings: Settings,
 ) -> Building:
-    """The finished building: quality measured on its solid, an honest status, everything back in the world's frame."""
+    """The finished building: quality measured on its solid, an honest status and what is in doubt, everything back in the
+    world's frame."""
     from .compose.settle import settled_building
-    from .evaluate.metrics import quality
+    from .evaluate.metrics import quality, well_inside
 
     if solid is None:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
-    measured = quality(solid, points, roof.outline)
+    inner = well_inside(points, roof.outline)
+    measured = quality(solid, points, roof.outline, inner)
     status, detail = fitted.status, fitted.detail
     if status is Status.MODELLED and measured.share_within_20cm < settings.reconstruct.poor_share:
         share = 100 * measured.share_within_20cm
@@ -394,16 +403,14 @@ def judge(
         objective=fitted.objective,
         types=fitted.types,
     )
-    return settled_building(judged)
+    return cautioned(settled_building(judged), points, inner)
 
 
-def cautioned(building: Building, points: np.ndarray) -> Building:
-    """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in the roof's frame, places without
-    any, or two surfaces one over the other."""
+def cautioned(building: Building, points: np.ndarray, inner: Inner) -> Building:
+    """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in the roof's frame and those well
+    `inner`, places without any, or two surfaces one over the other."""
     from .evaluate.layers import two_surfaces, unseen_share
 
-    if building.built is None:
-        return building
     roof = [building.solid.vertices[list(ring), 2] for face in building.solid.of_kind(ROOF) for ring in face.rings]
     sunk = building.z_ground - float(np.concatenate(roof).min())
     if sunk > SUNK_M:
@@ -416,7 +423,7 @@ def cautioned(building: Building, points: np.ndarray) -> Building:
         building = remarked(
             building, f"{100 * unseen:.0f} % {Doubt.PLACES_WITHOUT_POINTS.value}; the roof there is a guess"
         )
-    share, apart_m = two_surfaces(points, building.roof)
+    share, apart_m = two_surfaces(points, building.roof, inner)
     if share:
         building = remarked(
             building,

@@ -20,7 +20,7 @@ import shapely
 from ..frames import LocalFrame
 from ..model import ROOF, Quality, Solid
 from ..write.values import rounded
-from .metrics import iou, plan_outline, quality, share_near
+from .metrics import iou, plan_outline, quality, share_near, well_inside
 from .models import BuildingModel
 
 
@@ -65,7 +65,7 @@ def evaluate_building(
 ) -> BuildingFigures:
     """Figures of one model against its `points` (n, 3), its footprint and another model, all in world metres."""
     if model.solid is None:
-        share = share_near(points, np.full(len(points), np.inf), footprint or shapely.Polygon())
+        share = share_near(np.full(len(points), np.inf), well_inside(points, footprint or shapely.Polygon()))
         missed = Quality(points=len(points), share_within_20cm=share)
         return BuildingFigures(model.id, model.roof_type, model.status, missed)
     from ..write.roof_figures import roof_figures

@@ -14,7 +14,7 @@ import shapely
 
 from ..fit.union.shown import highest_of
 from ..model import Roof
-from .metrics import FACADE_M, NEAR_M
+from .metrics import NEAR_M, Inner, well_inside
 
 CELL_POINTS = 8.0
 """Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large as what stands on a roof."""
@@ -51,8 +51,11 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
     some = points[np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2]
     places = places_in(outline)
     x, y = some.T.copy()  # side by side they are told from the places in a third of the time
-    gap = ((places[:, :1] - x) ** 2 + (places[:, 1:] - y) ** 2).min(axis=1)
-    share = np.mean(gap > REACH**2 * outline.area / len(some)) if len(places) else 0.0
+    gap, north = places[:, :1] - x, places[:, 1:] - y
+    gap *= gap  # in place: these are the largest arrays of a building
+    north *= north
+    gap += north
+    share = np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(some)) if len(places) else 0.0
     return float(share) if share > LEAST_GAP else 0.0
 
 
@@ -65,20 +68,20 @@ def places_in(outline: shapely.Polygon) -> np.ndarray:
     return np.column_stack([x.ravel()[inside], y.ravel()[inside]])
 
 
-def two_surfaces(points: np.ndarray, roof: Roof) -> tuple[float, float]:
+def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> tuple[float, float]:
     """Share of the `points` (n, 3), in the roof's frame, where they lie on two surfaces, and how far apart these are [m]; zeros
     where that is not clear.
 
-    Points less than 0.3 m inside the outline, where walls answer, do not count. The distance is the median of the cells'.
+    Those less than 0.3 m inside the outline do not count, `inner` are the others, where that is known. The distance is the median of the cells'.
     """
-    inner = shapely.buffer(roof.outline, -FACADE_M)
-    shapely.prepare(inner)
-    points = points[shapely.intersects_xy(inner, points[:, 0], points[:, 1])]
+    inner = inner or well_inside(points, roof.outline)
+    points = points[inner.holds]
     dz = points[:, 2] - highest_of(roof.parts, points[:, :2])[0]
-    points, dz = points[np.isfinite(dz)], dz[np.isfinite(dz)]
+    if not (known := np.isfinite(dz)).all():
+        points, dz = points[known], dz[known]
     if len(points) < FEWEST_POINTS:
         return 0.0, 0.0
-    counts, smaller, apart, within = split_cells(points, dz, math.sqrt(CELL_POINTS * inner.area / len(points)))
+    counts, smaller, apart, within = split_cells(points, dz, math.sqrt(CELL_POINTS * inner.area_m2 / len(points)))
     asked = counts >= LEAST_POINTS_A_CELL
     two = asked & (within < MOST_WITHIN) & (apart > NEAR_M) & (smaller >= np.maximum(2, SMALLER_GROUP * counts))
     share = counts[two].sum() / max(counts[asked].sum(), 1)
@@ -93,9 +96,10 @@ def split_cells(
     Returns by cell (m,): how many values, how many in the lesser group, the distance of the groups' means, and the share of
     the variance that is within the groups (1 where all values are one).
     """
-    column, row = np.floor((xy[:, :2] - xy[:, :2].min(axis=0)) / cell_m).astype(np.int64).T
+    column, row = (np.floor((along - along.min()) / cell_m).astype(np.int64) for along in xy[:, :2].T)
     cell = row * (column.max() + 1) + column
-    order = np.lexsort((values, cell))
+    order = np.argsort(values)
+    order = order[np.argsort(cell[order].astype(np.min_scalar_type(cell.max())), kind="stable")]  # 16 bits are counted
     start = np.flatnonzero(np.diff(cell[order], prepend=-1))
     counts = np.diff(start, append=len(order))
     cell = np.repeat(np.arange(len(start)), counts)

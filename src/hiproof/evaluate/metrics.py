@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -33,6 +34,20 @@ LOST_M2 = 1e-6
 """Polygons that together have all but their areas' sum share nothing, and none of them is lost."""
 
 Polygons = Sequence[np.ndarray | Sequence[np.ndarray]]
+
+
+class Inner(NamedTuple):
+    """Which (n,) of some points lie FACADE_M or more inside an outline, where walls do not answer, and the area there."""
+
+    holds: np.ndarray
+    area_m2: float
+
+
+def well_inside(points: np.ndarray, outline: shapely.Geometry) -> Inner:
+    """Of the points (n, 2 or 3) those well inside the outline."""
+    area = shapely.buffer(outline, -FACADE_M)
+    shapely.prepare(area)
+    return Inner(shapely.intersects_xy(area, points[:, 0], points[:, 1]), area.area)
 
 
 def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
@@ -73,11 +88,16 @@ def iou(a: shapely.Geometry, b: shapely.Geometry) -> float:
     return float(common / together) if together > 0 else float("nan")
 
 
-def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.Polygon | None = None) -> Quality:
+def quality(
+    model: Solid | Fit | Polygons,
+    points: np.ndarray,
+    outline: shapely.Polygon | None = None,
+    inner: Inner | None = None,
+) -> Quality:
     """Every residual figure of one model against the `points` (n, 3) it stands for, all in one frame.
 
     `outline` is the plan polygon asked for (a footprint); without one the alpha shape of the points takes its place, as
-    in the paper. `share_within_20cm` (of the points 0.3 m or more inside the outline, NaN for fewer than ten) and
+    in the paper; `inner` are the finite points well inside it, where that is known. `share_within_20cm` (of the points 0.3 m or more inside the outline, NaN for fewer than ten) and
     `unexplained_area_m2` count vertical distances, and a point with no roof over or under it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
@@ -92,24 +112,23 @@ def quality(model: Solid | Fit | Polygons, points: np.ndarray, outline: shapely.
         figures["density"] = len(points) / outline.area
         figures["nodata_share"] = nodata_share(points, outline)
     if len(points) and polygons:
+        inner = inner or well_inside(points, plan_outline(polygons) if outline is None else outline)
         distances, dz = surface_and_vertical_distances(points, polygons)
         figures |= {
             "psd_mean": float(distances.mean()),
             "psd_std": float(distances.std()),
             "rmse": float(np.sqrt(np.mean(distances**2))),
             "p95": percentile(distances, 0.95),
-            "share_within_20cm": share_near(points, dz, plan_outline(polygons) if outline is None else outline),
+            "share_within_20cm": share_near(dz, inner),
             "unexplained_area_m2": unexplained_area(points, dz),
         }
     return Quality(points=len(points), **figures)
 
 
-def share_near(points: np.ndarray, dz: np.ndarray, outline: shapely.Geometry) -> float:
-    """Share of the points (n, 3) at least 0.3 m inside `outline` with |dz| (n,) below 0.2 m; NaN for fewer than ten."""
-    inner = shapely.buffer(outline, -FACADE_M)
-    shapely.prepare(inner)
-    inside = shapely.intersects_xy(inner, points[:, 0], points[:, 1])
-    return float(np.mean(dz[inside] < NEAR_M)) if inside.sum() >= MIN_INNER_POINTS else float("nan")
+def share_near(dz: np.ndarray, inner: Inner) -> float:
+    """Share of the points well inside an outline with |dz| (n,) below 0.2 m; NaN for fewer than ten."""
+    well_inside = dz[inner.holds]
+    return float(np.mean(well_inside < NEAR_M)) if len(well_inside) >= MIN_INNER_POINTS else float("nan")
 
 
 def percentile(values: np.ndarray, share: float) -> float:
