@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from typing import Any
 
+import numpy as np
 import shapely
 
 from ..model import Building, Part
@@ -114,7 +115,7 @@ def building_record(building: Building) -> dict[str, Any]:
         "shift": [float(value) for value in building.shift],
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
-        "terrain_line": [[numbers(xyz) for xyz in line.tolist()] for line in building.terrain_intersection],
+        "terrain_line": [places(line) for line in building.terrain_intersection],
         "attributes": {plain_text(name): plain(value) for name, value in building.attributes.items()},
         "points": int(quality.points),
         "residuals": {
@@ -160,6 +161,13 @@ def by_name(values: dict[str, float]) -> dict[str, float | None]:
 def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
     """A rounded number; None for NaN and infinities, which JSON does not know."""
     return round(float(value), digits) + 0.0 if math.isfinite(value) else None  # + 0.0: minus zero is zero
+
+
+def places(xyz: np.ndarray) -> list[list[float | None]]:
+    """A line (m, 3) as `numbers` has each of its vertices: at once where all are known."""
+    if not np.isfinite(xyz).all():
+        return [numbers(place) for place in xyz.tolist()]
+    return (np.round(xyz, LENGTH_DIGITS) + 0.0).tolist()
 
 
 def numbers(values: Iterable[float], digits: int = LENGTH_DIGITS) -> list[float | None]:

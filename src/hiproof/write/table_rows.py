@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,8 +12,8 @@ import shapely
 
 from ..errors import OutputError
 from ..frames import METRES, Units
-from ..model import ROOF, Building, Part
-from .attribute_list import PARTS_LAYER, SHAPE
+from ..model import ROOF, Building, Face, Part
+from .attribute_list import SHAPE
 from .roof_figures import RoofFigures
 from .shown import shown_areas
 from .values import metres, plain_text, rounded
@@ -70,11 +71,10 @@ def known_outline(building: Building) -> shapely.Geometry | None:
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """A row a part: where it shows, its type, every parameter and its standard deviation."""
+    """A row a part: where it shows, its type, every parameter that it has and its standard deviation."""
     rows = []
     for number, shown in enumerate(shown_areas(building)):
-        known = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
-        values = {a.name: known.pop(a.name, None) for a in PARTS_LAYER} | known
+        values = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
         rows.append((wkb_of(None if shown.is_empty else shown, units), values))
     return tuple(rows)
 
@@ -110,10 +110,10 @@ def surface_rows(building: Building, figures: RoofFigures | None, units: Units =
     if figures is None:
         return ()
     vertices = np.round(units.from_metres(building.solid.vertices), 4)
+    roofs = [(index, face) for index, face in enumerate(building.solid.faces) if face.kind == ROOF]
+    polygons = shapely.to_wkb(polygons_of(vertices, [face for _, face in roofs]))
     rows: list[Row] = []
-    for index, face in enumerate(building.solid.faces):
-        if face.kind != ROOF:
-            continue
+    for (index, face), polygon in zip(roofs, polygons, strict=True):
         azimuth = float(figures.face_azimuth_deg[index])
         known = 0 <= face.part < len(building.parts)
         values = {
@@ -125,9 +125,18 @@ def surface_rows(building: Building, figures: RoofFigures | None, units: Units =
             "azimuth_deg": rounded(azimuth, 3) if math.isfinite(azimuth) else None,
             "area_m2": metres(figures.face_area_m2[index]),
         }
-        outer, *holes = (vertices[list(ring)] for ring in face.rings)
-        rows.append((shapely.to_wkb(shapely.Polygon(outer, holes)), values))
+        rows.append((polygon, values))
     return tuple(rows)
+
+
+def polygons_of(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
+    """The polygons (k,) of faces over `vertices` (n, 3), all made at once."""
+    rings = [ring for face in faces for ring in face.rings]
+    corners = vertices[[vertex for ring in rings for vertex in ring]]
+    lines = shapely.linearrings(corners, indices=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]))
+    without_holes = len(rings) == len(faces)  # then in a tenth of the time
+    face_of = None if without_holes else np.repeat(np.arange(len(faces)), [len(face.rings) for face in faces])
+    return shapely.polygons(lines, indices=face_of)
 
 
 def wkb_of(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
