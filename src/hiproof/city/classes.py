@@ -12,9 +12,10 @@ import numpy as np
 from ..errors import InputError, InputWarning
 from ..log import counted
 from ..read.pointcloud import iter_points
+from ..read.runs import RUN_POINTS
 from ..settings import ReadSettings, Settings
 
-PEEK_POINTS = 100_000  # points of a file looked at to learn its classes; a thinner look than a whole chunk
+PEEK_POINTS = RUN_POINTS  # looked at at once to learn the classes: one chunk of LAZ, which is decoded whole
 
 
 def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:

@@ -8,6 +8,7 @@ that a neighbour's roof goes on beyond tells nothing, so a house in a row is not
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass, field
 from itertools import product
@@ -118,12 +119,18 @@ def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
     for step, reach in ((COARSE_M, FARTHEST_M), (FINE_M, COARSE_M)):
-        moves = np.arange(-reach, reach + 0.5 * step, step)
-        tried = best + np.array(list(product(moves, moves)))
+        tried = best + moves_around(step, reach)
         tried = tried[np.hypot(*tried.T) <= FARTHEST_M]
         cost = slid_costs(few, costs, low, 2 * PITCH_M, tried) + 0.1 * (tried**2).sum(axis=1)
         best = tried[int(np.argmin(cost))]
     return best
+
+
+@functools.cache
+def moves_around(step: float, reach: float) -> np.ndarray:
+    """Moves (m, 2), `step` apart, up to `reach` along either axis."""
+    moves = np.arange(-reach, reach + 0.5 * step, step)
+    return np.array(list(product(moves, moves)))
 
 
 @compiled

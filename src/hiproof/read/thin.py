@@ -48,9 +48,11 @@ def hashes(xyz: np.ndarray) -> np.ndarray:
     bits = np.ascontiguousarray(np.asarray(xyz, float)[:, :3]).view(np.uint64)
     mixed = np.zeros(len(bits), np.uint64)
     for column in bits.T:
-        mixed = (mixed ^ column) + np.uint64(0x9E3779B97F4A7C15)
-        mixed = (mixed ^ (mixed >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-        mixed = (mixed ^ (mixed >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+        mixed ^= column
+        mixed += np.uint64(0x9E3779B97F4A7C15)
+        for shift, factor in ((30, 0xBF58476D1CE4E5B9), (27, 0x94D049BB133111EB)):
+            mixed ^= mixed >> np.uint64(shift)
+            mixed *= np.uint64(factor)
         mixed ^= mixed >> np.uint64(31)
     return mixed
 
