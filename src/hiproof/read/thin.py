@@ -10,6 +10,7 @@ import numpy as np
 from .cell_kernel import cell_keys, is_first
 
 UNITS_PER_M = 10_000  # sums and comparisons run on whole tenths of a millimetre: integers do not mind their order
+MOST_COUNTED = 2**16  # cells: numbers of 16 bits NumPy sorts by counting them
 MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cells
 
 
@@ -40,7 +41,7 @@ def without_repeats(xyz: np.ndarray) -> np.ndarray:
     2
     """
     xyz = np.ascontiguousarray(xyz, float)
-    return xyz[is_first(xyz, hashes(xyz))]
+    return xyz.compress(is_first(xyz, hashes(xyz)), axis=0)
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
@@ -70,7 +71,10 @@ def rank_in_cells(xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], n
     mean = np.column_stack([np.bincount(cell_of, values) for values in units]) / counts[:, None]
     heights = np.rint(xyz[:, 2] * UNITS_PER_M).astype(np.int64)
     lowest, span = heights.min(), int(np.ptp(heights)) + 1
-    ascending = np.sort(cell_of * span + (heights - lowest)) % span + lowest  # cell by cell
+    order = cell_of * span + (heights - lowest)
+    if len(occupied) <= MOST_COUNTED:  # cell by cell, so that little is left to be sorted
+        order = order[np.argsort(cell_of.astype(np.uint16), kind="stable")]
+    ascending = np.sort(order, kind="stable") % span + lowest
     chosen = np.cumsum(counts) - counts + np.minimum(rank(counts), counts - 1)
     return np.column_stack([corner + mean / UNITS_PER_M, ascending[chosen] / UNITS_PER_M])
 
