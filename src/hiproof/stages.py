@@ -110,8 +110,7 @@ def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple
 
     polygon = largest_polygon(footprint)
     origin = np.floor(polygon.bounds[:2])
-    xy = points[:, :2]
-    found = find_shift(xy[np.isfinite(xy).all(axis=1)] - origin, shapely.transform(polygon, lambda c: c - origin))
+    found = find_shift(finite(points[:, :2]) - origin, shapely.transform(polygon, lambda c: c - origin))
     remarks = []
     if found.is_clear:
         shift = (round(float(found.xy[0]), 3), round(float(found.xy[1]), 3))
@@ -133,10 +132,9 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
         footprint = largest_polygon(footprint)
         if footprint.is_empty or not footprint.area >= 0.1:
             return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
-    if not np.isfinite(points).all():
-        points = points[np.isfinite(points).all(axis=1)]
+    points = finite(points)
     if footprint is not None:
-        points = points[shapely.intersects_xy(footprint, points[:, 0], points[:, 1])]
+        points = points.compress(shapely.intersects_xy(footprint, points[:, 0], points[:, 1]), axis=0)
     points = distinct(points)
     if len(points) == 0:
         return points, footprint, Status.NO_POINTS
@@ -154,12 +152,18 @@ def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
     return max(polygons, key=lambda polygon: polygon.area, default=shapely.Polygon())
 
 
+def finite(points: np.ndarray) -> np.ndarray:
+    """Those of the points (n, 2 or 3) whose coordinates are numbers."""
+    known = np.isfinite(points)
+    return points if known.all() else points[known.all(axis=1)]
+
+
 def distinct(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) sorted by x, y, z without repeats: the same set gives the same array."""
     plan = np.ascontiguousarray(points[:, :2]).view(complex)[:, 0]  # complex numbers are in order by x, then by y
     order = np.argsort(plan)
     if (plan[order[1:]] != plan[order[:-1]]).all():  # none over another, as nearly always
-        return points[order]
+        return points.take(order, axis=0)
     points = points[np.lexsort(points.T[::-1])]
     differs = points[1:] != points[:-1]
     return points[np.r_[True, differs[:, 0] | differs[:, 1] | differs[:, 2]]] if len(points) else points

@@ -58,7 +58,7 @@ class Surroundings:
         """
         read = self.plan.settings.read
         if read.by_class or job.area.is_empty:
-            return FoundRoof(self.roof[self.grid.within(job.area, self.plan.around_m)])
+            return FoundRoof(self.roof.take(self.grid.within(job.area, self.plan.around_m), axis=0))
         near = self.points_near(job, 0.0)
         if read.roofs == "alone":
             return found_alone(near, job.area)

@@ -137,11 +137,10 @@ class Gatherer:
             wanted = bits > 0
             candidates, bits = candidates[wanted], bits[wanted]
             kind = kinds[candidates]
-            self.keep(tile, "roof", cloud.xyz[candidates[(kind == ROOF) & (bits & 1 > 0)]])
-            self.keep(tile, "ground", cloud.xyz[candidates[(kind == GROUND) & (bits & 2 > 0)]])
-            self.keep(
-                tile, "low", lowest_in_cells(cloud.xyz[candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]])
-            )
+            self.keep(tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0))
+            self.keep(tile, "ground", cloud.xyz.take(candidates[(kind == GROUND) & (bits & 2 > 0)], axis=0))
+            low = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
+            self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(low, axis=0)))
         if self.held > HELD_POINTS:
             self.flush()
 

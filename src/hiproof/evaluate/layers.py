@@ -75,7 +75,7 @@ def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> 
     Those less than 0.3 m inside the outline do not count, `inner` are the others, where that is known. The distance is the median of the cells'.
     """
     inner = inner or well_inside(points, roof.outline)
-    points = points[inner.holds]
+    points = points.compress(inner.holds, axis=0)
     dz = points[:, 2] - highest_of(roof.parts, points[:, :2])[0]
     if not (known := np.isfinite(dz)).all():
         points, dz = points[known], dz[known]

@@ -34,6 +34,7 @@ LEAST_POINTS, LEAST_SIDE_M = 20, 1.5  # points; with fewer every shift holds as 
 FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may be so many points of those behind it
 SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
 REACH_SIGMA_M = 0.5  # how far roofs usually reach beyond footprints, or stay behind
+PRIOR = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
 ROUNDS, NEAR_M = 3, 0.2  # of putting each side where its points are, from the last shift; m that counts as no shift
 # m; standard deviations; m that sides may disagree by; share of the border that must be free
 LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.5
@@ -86,7 +87,8 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
     >>> shift.is_clear, bool(np.abs(shift.xy - [-1.0, 0.5]).max() < 0.1)
     (True, True)
     """
-    ring = shapely.get_coordinates(shapely.geometry.polygon.orient(shapely.simplify(footprint, PITCH_M)).exterior)[:-1]
+    border = shapely.get_exterior_ring(shapely.simplify(footprint, PITCH_M))
+    ring = shapely.get_coordinates(border)[:: 1 if shapely.is_ccw(border) else -1][:-1]
     if len(xy) < LEAST_POINTS or len(ring) < 3:
         return Shift()
     xy, lines = np.ascontiguousarray(xy), lines_through(ring)
@@ -173,11 +175,10 @@ def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndar
     wanted = side_offsets(xy, normals, distances[free], ends[free], density) + normals @ start
     design = np.column_stack([normals, np.ones(len(told))])
     weight = 1.0 / sigma**2
-    prior = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
-    inverse = np.linalg.inv((design.T * weight) @ design + prior)
+    inverse = np.linalg.inv((design.T * weight) @ design + PRIOR)
     solution = inverse @ (design.T @ (weight * wanted))
     gap = wanted - design @ solution
-    disagreement = math.sqrt(float(np.average(gap**2, weights=told)))
+    disagreement = math.sqrt(float((gap**2 * told).sum() / told.sum()))
     spread = np.sqrt(np.diag(inverse)) * max(1.0, math.sqrt(float((weight * gap**2).mean())))
     return Shift(solution[:2], spread[:2], float(solution[2]), float(spread[2]), disagreement)
 

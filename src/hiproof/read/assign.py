@@ -63,7 +63,8 @@ class PointGrid:
             return np.empty(0, np.int64)
         found = self.candidates(polygon.bounds)
         shapely.prepare(polygon)
-        return np.sort(found[shapely.intersects_xy(polygon, self.xy[found, 0], self.xy[found, 1])])
+        x, y = self.xy.take(found, axis=0)[:, :2].T
+        return np.sort(found[shapely.intersects_xy(polygon, x, y)])
 
     def within(self, polygon: shapely.Polygon, distance_m: float) -> np.ndarray:
         """Ascending indices of the points at most `distance_m` from `polygon` or inside it."""

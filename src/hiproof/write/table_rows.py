@@ -18,6 +18,7 @@ from .roof_figures import RoofFigures
 from .shown import shown_areas
 from .values import metres, plain_text, rounded
 
+TEXT = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column
 
 
@@ -31,7 +32,7 @@ class Rows(NamedTuple):
     def to_text(self) -> bytes:
         """The rows as JSON, a line a table, geometries in hexadecimal digits."""
         tables = ([[wkb and wkb.hex(), values] for wkb, values in table] for table in self)
-        return b"\n".join(json.dumps(table).encode() for table in tables)
+        return b"\n".join(TEXT.encode(table).encode() for table in tables)
 
 
 def lines_of(text: bytes) -> dict[str, bytes]:
