@@ -34,9 +34,11 @@ class Cells:
 
     def inside(self, box: np.ndarray) -> np.ndarray:
         """Points (m, 3) of the known cells inside the whole-metre `box` (xmin, ymin, xmax, ymax)."""
-        left, low, right, high = (np.asarray(box) - np.tile(self.low, 2)).astype(int).clip(0)
-        tables = np.stack([table[low:high, left:right] for table in (self.x, self.y, self.z)], axis=-1)
-        return tables[np.isfinite(tables[..., 2])]
+        left, low, right, high = (
+            max(int(side) - first, 0) for side, first in zip(box, self.low.tolist() * 2, strict=True)
+        )
+        known = np.isfinite(self.z[low:high, left:right])
+        return np.column_stack([table[low:high, left:right][known] for table in (self.x, self.y, self.z)])
 
 
 class GroundAround:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from ..model import GROUND, ROOF, Building, Solid
 
 LEVEL_RIDGE_M = 0.05  # ends of a ridge differ in height by less
 FLAT_SLOPE_DEG = 3.0  # a face below drains but does not slope to the eye; it has no azimuth worth telling
+STEEP = np.tan(np.radians(FLAT_SLOPE_DEG))
 
 
 @dataclass(frozen=True)
@@ -87,14 +89,14 @@ def roof_figures(solid: Solid) -> RoofFigures:
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     roof = is_roof[face_of]
     plan = triangles[roof, 2]
-    edges = corners[roof, 1:], fan[roof, 1:], area[face_of[roof]]
+    edges = roof_edges(corners[roof, 1:], fan[roof, 1:], area[face_of[roof]])
     heights = roof_heights(np.sort(corners[roof, :, 2], axis=1), plan, float(origin[2]))
-    eave = eave_height(*edges) + float(origin[2])
+    eave = eave_height(edges) + float(origin[2])
     size = np.where(is_roof, np.sqrt((area * area).sum(axis=1)), 0.0)
     largest = int(size.argmax())
     return RoofFigures(
         **heights,
-        h_ridge=ridge_height(*edges) + float(origin[2]),
+        h_ridge=ridge_height(edges) + float(origin[2]),
         h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),  # it is rounded, and no eave leaves the roof
         h_base=base_height(solid),
         volume_m3=volume(solid),
@@ -158,50 +160,58 @@ def base_height(solid: Solid) -> float:
     return float(solid.vertices[ground or slice(None), 2].min())
 
 
-def ridge_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float:
-    """Height of the longest level ridge among the roof's directed edges, NaN if it has none.
+class RoofEdges(NamedTuple):
+    """The roof's directed edges: height of their middle (m,), length in plan, a number that is the same for both directions, whether
+    they are level, and whether the face left of them falls away from them."""
 
-    `edges` (m, 2, 3) start and end, `ends` (m, 2) their vertex indices, `area` (m, 3) vector area of each edge's
+    height: np.ndarray
+    length: np.ndarray
+    number: np.ndarray
+    is_level: np.ndarray
+    falls_away: np.ndarray
+
+
+def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdges:
+    """Of `edges` (m, 2, 3), start and end, with `ends` (m, 2), their vertex indices, and `area` (m, 3), the vector area of each edge's
     face. A face lies left of its edges and falls along its vector area's plan direction, so it falls away from an
     edge when that direction points left.
     """
-    along = edges[:, 1] - edges[:, 0]
-    usable = np.flatnonzero(falls_away(along, area) & (np.abs(along[:, 2]) < LEVEL_RIDGE_M))
-    key = undirected(ends)[usable]
+    start, end = edges[:, 0], edges[:, 1]
+    x, y, rise = (end - start).T
+    first, last = ends.T
+    falls = area[:, 1] * x - area[:, 0] * y > 1e-9
+    return RoofEdges(
+        (start[:, 2] + end[:, 2]) / 2,
+        # rounding to the millimetre keeps a choice among edges of one length, or half of all, from hanging on the last bit
+        np.round(np.hypot(x, y), 3),
+        np.minimum(first, last) * (int(ends.max()) + 1) + np.maximum(first, last),
+        np.abs(rise) < LEVEL_RIDGE_M,
+        falls & (np.hypot(area[:, 0], area[:, 1]) > STEEP * area[:, 2]),
+    )
+
+
+def ridge_height(edges: RoofEdges) -> float:
+    """Height of the longest level ridge among the roof's edges, NaN if it has none."""
+    usable = np.flatnonzero(edges.falls_away & edges.is_level)
+    key = edges.number[usable]
     order = np.argsort(key, kind="stable")
     twice = order[:-1][key[order[1:]] == key[order[:-1]]]
     if not len(twice):
         return float("nan")
     ridges = usable[twice]
-    # Rounding to the millimetre keeps the choice among ridges of one length from hanging on the last bit.
-    length = np.round(np.hypot(along[ridges, 0], along[ridges, 1]), 3)
-    height = edges[ridges, :, 2].mean(axis=1)
-    return float(height[np.lexsort((height, length))[-1]])
+    height = edges.height[ridges]
+    return float(height[np.lexsort((height, edges.length[ridges]))[-1]])
 
 
-def falls_away(along: np.ndarray, area: np.ndarray) -> np.ndarray:
-    """Whether (m,) the face left of each edge `along` (m, 3) slopes and falls away from it."""
-    falls = area[:, 1] * along[:, 0] - area[:, 0] * along[:, 1] > 1e-9
-    return falls & (np.hypot(area[:, 0], area[:, 1]) > np.tan(np.radians(FLAT_SLOPE_DEG)) * area[:, 2])
-
-
-def undirected(ends: np.ndarray) -> np.ndarray:
-    """A number (m,) for each edge (m, 2), the same for both of its directions."""
-    return ends.min(axis=1) * (int(ends.max()) + 1) + ends.max(axis=1)
-
-
-def eave_height(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> float:
-    """Height that half of the length of the eaves lies below; arguments as of `ridge_height`.
+def eave_height(edges: RoofEdges) -> float:
+    """Height that half of the length of the eaves lies below.
 
     Eaves are level edges of one roof face alone that does not fall away from them; of a roof without one, all its outer edges.
     """
-    along = edges[:, 1] - edges[:, 0]
-    key = undirected(ends)
-    ordered = np.sort(key)
-    outer = np.searchsorted(ordered, key, side="right") - np.searchsorted(ordered, key) == 1
-    eaves = outer & (np.abs(along[:, 2]) < LEVEL_RIDGE_M) & ~falls_away(along, area)
+    ordered = np.sort(edges.number)
+    outer = np.searchsorted(ordered, edges.number, side="right") - np.searchsorted(ordered, edges.number) == 1
+    eaves = outer & edges.is_level & ~edges.falls_away
     chosen = eaves if eaves.any() else outer
-    # Rounding as for ridges: neither the order nor the half hangs on the last bit.
-    height, length = np.round(edges[chosen, :, 2].mean(axis=1), 4), np.round(np.hypot(*along[chosen, :2].T), 3)
+    height, length = np.round(edges.height[chosen], 4), edges.length[chosen]  # nor does the order hang on it
     order = np.argsort(height, kind="stable")
     return float(height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)])
