@@ -112,10 +112,20 @@ def iter_points(
     Raises InputError as `read_points` does, an empty file excepted, which yields nothing.
     """
     kind, most = file_kind(path), chunk_points or CHUNK_POINTS
-    if kind == "las":
+    if kind == "las":  # whose points lie within its header's bounds, and these are plausible (las_header.py)
         chunks = las.las_chunks(path, most, None if box is None else box_in_file(box, units), runs, noted)
     else:
-        chunks = READERS[kind].chunks(path, most)
+        chunks = plausible_chunks(READERS[kind].chunks(path, most), path)
+    for xyz, classes in chunks:
+        xyz = xyz if units.are_metres else units.to_metres(xyz)
+        if box is not None:
+            xyz, classes = chosen(xyz, classes, in_box(xyz, box))
+        if len(xyz):
+            yield PointCloud(xyz, classes, None, (str(path),), units)
+
+
+def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[las.Chunk]:
+    """The chunks of a file without points that have no numbers as coordinates; it may hold none that no place has."""
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)
@@ -124,11 +134,7 @@ def iter_points(
             keep = np.all(finite, axis=1)
             dropped += len(xyz) - int(keep.sum())
             xyz, classes = chosen(xyz, classes, keep)
-        xyz = xyz if units.are_metres else units.to_metres(xyz)
-        if box is not None:
-            xyz, classes = chosen(xyz, classes, in_box(xyz, box))
-        if len(xyz):
-            yield PointCloud(xyz, classes, None, (str(path),), units)
+        yield xyz, classes
     if dropped:
         warnings.warn(f"{path}: {counted(dropped, 'point')} with NaN or infinite coordinates left out", InputWarning)
 
