@@ -25,7 +25,6 @@ from .lines import SAME_RAD, area_of, find_corners, quarter_gap, shares_directio
 from .soft import SURE_BLURS, share_inside
 
 SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
-TOGETHER = 16  # points next to each other in y for which sides are looked up once
 
 # x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
 # court: whether the border is a court's, whose corners lie within box: x_low, x_high, y_low, y_high (m). blur (m), stray (share): see above.
@@ -43,13 +42,9 @@ def drawing_of(lines, kappa, border):
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
         return Drawing(lines, kappa, corners, own, np.inf, np.inf)
-    reach = SURE_BLURS * border.blur
-    for first in range(0, len(own), TOGETHER):
-        last = min(first + TOGETHER, len(own))
-        sides = sides_near(corners, border.y[first] - reach, border.y[last - 1] + reach)
-        for k in range(first, last):
-            x, y, wall = border.x[k], border.y[k], border.wall[k]
-            own[k] = point_cost(x, y, corners, sides, border.court, wall, border.blur, border.stray)
+    squared, inside = nearest_sides(corners, border, 0, len(own))
+    for k in range(len(own)):
+        own[k] = point_cost(squared[k], inside[k], border.wall[k], border.blur, border.stray)
     misfit, structure = border.density * area_of(corners) + own.sum(), structure_cost(lines, kappa, border)
     return Drawing(lines, kappa, corners, own, structure, misfit + structure)
 
@@ -80,28 +75,41 @@ def structure_cost(lines, kappa, border):
 
 
 @compiled
-def point_cost(x, y, corners, sides, court, wall, blur, stray):
-    """Minus the logarithm of how likely a point at x, y is, against one deep inside; `sides` are all that come near its y.
+def nearest_sides(corners, border, first, last):
+    """Squared distances (n,) to the nearest side of the points from `first` to `last`, next to each other in y, at most what is sure;
+    and whether each is inside (n,).
 
-    That of a `wall` is compared with one on the border.
+    Side after side, without branches, so that a processor does several points at once.
     """
-    inside, reach = court, SURE_BLURS * blur
-    nearest = reach * reach
-    for i in sides:
+    reach = SURE_BLURS * border.blur
+    squared, inside = np.full(last - first, reach * reach), np.full(last - first, border.court)
+    x, y = border.x[first:last], border.y[first:last]
+    for i in range(len(corners)):
         k = i + 1 if i + 1 < len(corners) else 0
-        y0, y1 = corners[i, 1], corners[k, 1]
-        if (y < y0 - reach and y < y1 - reach) or (y > y0 + reach and y > y1 + reach):  # neither near nor crossed
-            continue
-        x0, x1 = corners[i, 0], corners[k, 0]
-        dx, dy = x1 - x0, y1 - y0
-        if flips(x0, y0, x1, y1, x, y):
-            inside = not inside
-        if (x < x0 - reach and x < x1 - reach) or (x > x0 + reach and x > x1 + reach):
-            continue
-        t = min(max(((x - x0) * dx + (y - y0) * dy) / max(dx * dx + dy * dy, 1e-18), 0.0), 1.0)
-        squared = (x0 + t * dx - x) ** 2 + (y0 + t * dy - y) ** 2
-        nearest = min(nearest, squared)
-    depth = math.sqrt(nearest) / blur
+        x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[k, 0], corners[k, 1]
+        low, high = min(y0, y1) - reach, max(y0, y1) + reach
+        if last > first and low <= y[-1] and high >= y[0]:
+            near = slice(np.searchsorted(y, low), np.searchsorted(y, high))
+            beside_side(x0, y0, x1, y1, x[near], y[near], squared[near], inside[near])
+    return squared, inside
+
+
+@compiled
+def beside_side(x0, y0, x1, y1, x, y, squared, inside):
+    """What `nearest_sides` says of points at x, y (n,) after one side more."""
+    dx, dy = x1 - x0, y1 - y0
+    length = max(dx * dx + dy * dy, 1e-18)
+    for k in range(len(x)):
+        inside[k] ^= flips(x0, y0, x1, y1, x[k], y[k])
+        t = min(max(((x[k] - x0) * dx + (y[k] - y0) * dy) / length, 0.0), 1.0)
+        squared[k] = min(squared[k], (x0 + t * dx - x[k]) ** 2 + (y0 + t * dy - y[k]) ** 2)
+
+
+@compiled
+def point_cost(squared, inside, wall, blur, stray):
+    """Minus the logarithm of how likely a point at that `squared` distance from the nearest side is, against one deep inside; that of
+    a `wall` is compared with one on the border."""
+    depth = math.sqrt(squared) / blur
     return cost_at_depth(depth if inside else -depth, wall, stray)
 
 
@@ -116,58 +124,74 @@ def cost_at_depth(depth, wall, stray):
 
 
 @compiled
-def sides_near(corners, low, high):
-    """Which sides (m,) of the polygon come between y = low and high."""
-    found, m = np.empty(len(corners), np.int64), 0
-    for i in range(len(corners)):
-        k = i + 1 if i + 1 < len(corners) else 0
-        if max(corners[i, 1], corners[k, 1]) >= low and min(corners[i, 1], corners[k, 1]) <= high:
-            found[m] = i
-            m += 1
-    return found[:m]
-
-
-@compiled
-def cost_of_change(lines, drawing, i, count, fresh, border):
-    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on."""
-    return change_of(lines, drawing, i, count, fresh, border)[0].cost
+def cost_of_change(lines, drawing, i, count, fresh, border, limit):
+    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on; infinite as soon as
+    that is known to be above `limit`."""
+    corners = corners_of_change(lines, drawing, i, count, fresh, border)
+    if len(corners) == 0:
+        return np.inf
+    reach = SURE_BLURS * border.blur
+    x_low, x_high, y_low, y_high = box_of_change(drawing.corners, corners, i, count, fresh)
+    first, last = np.searchsorted(border.y, y_low - reach), np.searchsorted(border.y, y_high + reach)
+    cost = cost_without_points(lines, drawing, corners, border)
+    for k in range(first, last):
+        cost -= drawing.own[k] if x_low - reach < border.x[k] < x_high + reach else 0.0
+    if cost > limit:  # no point gains by being there
+        return np.inf
+    squared, inside = nearest_sides(corners, border, first, last)
+    for k in range(first, last):
+        if x_low - reach < border.x[k] < x_high + reach:
+            cost += point_cost(squared[k - first], inside[k - first], border.wall[k], border.blur, border.stray)
+            if cost > limit:
+                return np.inf
+    return cost
 
 
 @compiled
 def changed(lines, drawing, i, count, fresh, border):
-    """The drawing of `lines` that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on."""
-    new, first = change_of(lines, drawing, i, count, fresh, border)
-    own = drawing.own.copy()
-    own[first : first + len(new.own)] = new.own
-    return Drawing(new.lines, new.kappa, new.corners, own, new.structure, new.cost)
-
-
-@compiled
-def change_of(lines, drawing, i, count, fresh, border):
-    """The drawing of `changed` with the costs of some points alone, next to each other in y, and which is the first of them.
+    """The drawing of `lines` that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on.
 
     Points away from the corners that come and go cost what they did.
     """
+    corners, own = corners_of_change(lines, drawing, i, count, fresh, border), drawing.own.copy()
+    if len(corners) == 0:
+        return Drawing(lines, drawing.kappa, corners, own, np.inf, np.inf)
+    reach = SURE_BLURS * border.blur
+    x_low, x_high, y_low, y_high = box_of_change(drawing.corners, corners, i, count, fresh)
+    first, last = np.searchsorted(border.y, y_low - reach), np.searchsorted(border.y, y_high + reach)
+    squared, inside = nearest_sides(corners, border, first, last)
+    cost = cost_without_points(lines, drawing, corners, border)
+    for k in range(first, last):
+        if x_low - reach < border.x[k] < x_high + reach:
+            own[k] = point_cost(squared[k - first], inside[k - first], border.wall[k], border.blur, border.stray)
+            cost += own[k] - drawing.own[k]
+    return Drawing(lines, drawing.kappa, corners, own, structure_cost(lines, drawing.kappa, border), cost)
+
+
+@compiled
+def corners_of_change(lines, drawing, i, count, fresh, border):
+    """The corners (n, 2) of a drawing's lines changed as `changed` has it; none where they are no polygon."""
     corners, old = np.empty((len(lines), 2)), drawing.corners
     for k in range(fresh, len(lines)):
         corners[k] = old[(i + count + 1 + k - fresh) % len(old)]
     if len(lines) < 3 or not find_corners(lines, corners, fresh) or not is_allowed(corners, border):
-        return Drawing(lines, drawing.kappa, corners, np.empty(0), np.inf, np.inf), 0
+        return corners[:0]
+    return corners
+
+
+@compiled
+def box_of_change(old, corners, i, count, fresh):
+    """Lowest and highest x, lowest and highest y of the corners that come and go."""
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
     for k in range(count + 1 + fresh):
         ring, at = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
         x, y = ring[at, 0], ring[at, 1]
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
-    reach = SURE_BLURS * border.blur
-    sides = sides_near(corners, y_low - 2.0 * reach, y_high + 2.0 * reach)
-    misfit = border.density * (area_of(corners) - area_of(old))
-    first, last = np.searchsorted(border.y, np.array([y_low - reach, y_high + reach]))
-    own = drawing.own[first:last].copy()
-    for k in range(first, last):
-        x, y, wall = border.x[k], border.y[k], border.wall[k]
-        if x_low - reach < x < x_high + reach:
-            own[k - first] = point_cost(x, y, corners, sides, border.court, wall, border.blur, border.stray)
-            misfit += own[k - first] - drawing.own[k]
+    return x_low, x_high, y_low, y_high
+
+
+@compiled
+def cost_without_points(lines, drawing, corners, border):
+    """What changed lines cost, were each point to cost what it did."""
     structure = structure_cost(lines, drawing.kappa, border)
-    cost = drawing.cost + misfit + structure - drawing.structure
-    return Drawing(lines, drawing.kappa, corners, own, structure, cost), first
+    return drawing.cost + border.density * (area_of(corners) - area_of(drawing.corners)) + structure - drawing.structure

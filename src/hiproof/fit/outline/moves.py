@@ -48,12 +48,12 @@ def simplified(drawing, border, step_m):
     for _ in range(MOST_CHANGES):
         for i in range(len(gains)):
             if gains[i] == np.inf:
-                gains[i] = max(drawing.cost - best_change(drawing, i, border)[0], -1e9)
+                gains[i] = drawing.cost - best_change(drawing, i, border)[0]
         i = int(np.argmax(gains))
         if gains[i] <= GAIN:
             break
         cost, lines, count, fresh = best_change(drawing, i, border)
-        gains[i] = max(drawing.cost - cost, -1e9)  # those of lines far off may be of an earlier drawing
+        gains[i] = drawing.cost - cost  # those of lines far off may be of an earlier drawing
         if gains[i] <= GAIN:
             continue
         known, gains = gains, np.full(len(lines), np.inf)
@@ -65,17 +65,19 @@ def simplified(drawing, border, step_m):
 
 @compiled
 def best_change(drawing, i, border):
-    """The cheapest change that begins at line `i`: its cost and the lines, with how many of the old ones the first of them is
-    come in place of, and how many corners are new."""
+    """The cheapest change that begins at line `i`, or none where all are dearer: its cost and the lines, with how many of the old ones
+    the first of them is come in place of, and how many corners are new."""
     n = len(drawing.lines)
-    best, lines, gone, fresh = np.inf, drawing.lines, 1, 1
+    best, lines, gone, fresh = drawing.cost, drawing.lines, 1, 1
     if n > 3:
-        lines = dropped(drawing.lines, i)
-        best = cost_of_change(lines, drawing, i, 1, 1, border)
+        new = dropped(drawing.lines, i)
+        cost = cost_of_change(new, drawing, i, 1, 1, border, best)
+        if cost < best:
+            best, lines = cost, new
     for count in range(1, min(LONGEST_RUN, n - 2) + 1):
         for azimuth, distance in joint_lines(drawing, i, count):
             new = replaced(drawing.lines, i, count, azimuth, distance)
-            cost = cost_of_change(new, drawing, i, count, 2, border)
+            cost = cost_of_change(new, drawing, i, count, 2, border, best)
             if cost < best:
                 best, lines, gone, fresh = cost, new, count, 2
     return best, lines, gone, fresh
@@ -165,7 +167,8 @@ def first_shifted(drawing, border, step):
         while True:
             lines = drawing.lines.copy()
             lines[0, 1] += sign * step
-            if not cost_of_change(lines, drawing, 0, 1, 2, border) < drawing.cost - GAIN:
+            enough = drawing.cost - GAIN
+            if not cost_of_change(lines, drawing, 0, 1, 2, border, enough) < enough:
                 break
             drawing, moved = changed(lines, drawing, 0, 1, 2, border), True
         if moved:
