@@ -152,5 +152,6 @@ def drawn(lines: np.ndarray, border: Border, step_m: float) -> Drawing:
     """The cheapest drawing found from `lines` (n, 2) on, mostly along the axes: few of them at first, then with what breaks them."""
     drawing = redrawn(drawing_of(lines, 0.0, border), border, step_m)
     for longest in (1, RUN):  # bays of single sides come first: fewer runs go wrong
-        drawing = redrawn(stepped(drawing, border, longest), border, step_m)
+        broken = stepped(drawing, border, longest)
+        drawing = redrawn(broken, border, step_m) if broken.cost < drawing.cost else drawing
     return drawing

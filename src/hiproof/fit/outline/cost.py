@@ -21,9 +21,10 @@ import numpy as np
 
 from ...compiled import compiled
 from ...parity import flips
-from .lines import SAME_RAD, area_of, find_corners, quarter_gap, shares_direction
+from .lines import SAME_RAD, area_of, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
 
+QUARTER = 0.5 * math.pi  # rad; lines so far apart have one direction
 SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
 
 # x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
@@ -64,14 +65,24 @@ def is_allowed(corners, border):
 @compiled
 def structure_cost(lines, kappa, border):
     """Price of the lines, of directions other than the main one, of lines in these, and of sharp corners."""
-    cost = border.line * len(lines)
+    cost, ways = border.line * len(lines), np.empty(len(lines))
     for i in range(len(lines)):
+        ways[i] = quarter_gap(lines[i, 0] - kappa)
         if math.cos(lines[i, 0] - lines[i - 1, 0]) < SHARP:
             cost += border.sharp
-        if abs(quarter_gap(lines[i, 0] - kappa)) < SAME_RAD:
-            continue
-        cost += border.skew if shares_direction(lines, i) else border.skew + border.direction
+        if abs(ways[i]) >= SAME_RAD:
+            cost += border.skew if is_among(ways[i], ways[:i]) else border.skew + border.direction
     return cost
+
+
+@compiled
+def is_among(way, ways):
+    """Whether one of `ways` (n,), angles from -45 to 45 degrees, is the same as `way`; those at the ends are one."""
+    found = False
+    for other in ways:
+        apart = abs(way - other)
+        found |= (apart < SAME_RAD) | (apart > QUARTER - SAME_RAD)
+    return found
 
 
 @compiled

@@ -50,27 +50,29 @@ def find_corners(lines, corners, fresh=-1):
         if along - math.sin(lines[i, 0]) * (corners[k, 0] - corners[i, 0]) < -1e-9:
             return False
     for k in range(asked):
-        i = (k - 1) % n
-        for j in range(n):
-            apart = (j - i) % n
-            if 1 < apart < n - 1 and cross(corners, i, k, j, (j + 1) % n):
-                return False
+        if crosses_another(corners, (k - 1) % n):
+            return False
     return True
 
 
 @compiled
-def cross(corners, a, b, c, d):
-    """Whether the segments between the corners a and b and between c and d cross."""
-    return (
-        left_of(corners, a, b, c) * left_of(corners, a, b, d) < 0.0
-        and left_of(corners, c, d, a) * left_of(corners, c, d, b) < 0.0
-    )
-
-
-@compiled
-def left_of(corners, a, b, c):
-    u, v = corners[b, 0] - corners[a, 0], corners[b, 1] - corners[a, 1]
-    return u * (corners[c, 1] - corners[a, 1]) - v * (corners[c, 0] - corners[a, 0])
+def crosses_another(corners, i):
+    """Whether side i crosses another that is not next to it."""
+    n = len(corners)
+    before, after = i - 1 if i > 0 else n - 1, i + 1 if i + 1 < n else 0
+    x, y = corners[i, 0], corners[i, 1]
+    u, v = corners[after, 0] - x, corners[after, 1] - y
+    for j in range(n):
+        k = j + 1 if j + 1 < n else 0
+        start = u * (corners[j, 1] - y) - v * (corners[j, 0] - x)
+        end = u * (corners[k, 1] - y) - v * (corners[k, 0] - x)
+        if start * end < 0.0 and j != i and j != before and j != after:  # ends on either side of the line of side i
+            p, q = corners[k, 0] - corners[j, 0], corners[k, 1] - corners[j, 1]
+            one = p * (y - corners[j, 1]) - q * (x - corners[j, 0])
+            other = p * (y + v - corners[j, 1]) - q * (x + u - corners[j, 0])
+            if one * other < 0.0:
+                return True
+    return False
 
 
 @compiled

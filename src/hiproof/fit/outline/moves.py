@@ -35,7 +35,8 @@ def redrawn(drawing, border, step_m):
             drawing = shifted(drawing, border, step)
         for turn in TURNS_RAD:
             drawing = turned(drawing, border, turn)
-        drawing = simplified(drawing, border, step_m)
+        if drawing.cost < before:
+            drawing = simplified(drawing, border, step_m)
         if drawing.cost > before - 0.1:
             break
     return drawing

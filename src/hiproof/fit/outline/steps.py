@@ -97,21 +97,34 @@ def column_costs(drawing, border, azimuth, distance, low, width, columns):
     costs, far_out = np.empty((columns, LEVELS)), cost_at_depth(-SURE_BLURS, False, border.stray)
     for level in range(LEVELS):
         costs[:, level] = border.density * width * (LEVEL_M * level - DEEPEST_M)
-    c, s = math.cos(azimuth), math.sin(azimuth)
-    for k in range(len(border.x)):
+    c, s, sure = math.cos(azimuth), math.sin(azimuth), SURE_BLURS * border.blur
+    first, last = band_of(border.y, azimuth, distance, low, low + columns * width)
+    for k in range(first, last):
         x, y, wall = border.x[k], border.y[k], border.wall[k]
         depth, column = distance - (x * c + y * s), math.floor((y * c - x * s - low) / width)
         if not 0 <= column < columns or not -FARTHEST_M < depth < DEEPEST_M:
             continue
         if depth < 0.0 and not wall and drawing.own[k] < INSIDE:  # beyond another side
             continue
-        for level in range(LEVELS):
+        inner = 0 if wall else min(max(math.ceil((DEEPEST_M - depth - sure) / LEVEL_M), 0), LEVELS)
+        outer = LEVELS if wall else min(max(math.floor((DEEPEST_M - depth + sure) / LEVEL_M) + 1, 0), LEVELS)
+        for level in range(inner):
+            costs[column, level] += far_out
+        for level in range(inner, outer):
             deep = (depth + LEVEL_M * level - DEEPEST_M) / border.blur
-            if wall or abs(deep) < SURE_BLURS:
-                costs[column, level] += cost_at_depth(deep, wall, border.stray)
-            elif deep < 0.0:
-                costs[column, level] += far_out
+            costs[column, level] += cost_at_depth(deep, wall, border.stray)
     return costs
+
+
+@compiled
+def band_of(y, azimuth, distance, low, high):
+    """The first and last of points, ascending in `y` (n,), that may lie beside a line between `low` and `high` along it."""
+    c, s = math.cos(azimuth), math.sin(azimuth)
+    least, most = np.inf, -np.inf
+    for out in (distance - DEEPEST_M, distance + FARTHEST_M):
+        for at in (low, high):
+            least, most = min(least, out * s + at * c), max(most, out * s + at * c)
+    return np.searchsorted(y, least), np.searchsorted(y, most)
 
 
 @compiled

@@ -73,11 +73,7 @@ def hidden(volumes: np.ndarray, k: int, edge: int, scene: Scene, cover_m: float)
         trial, at = volumes.copy(), volumes[k, U0 + edge] + way * step * STEP_M
         for place in (at - cover_m, at + cover_m, at):
             trial[k, U0 + edge] = place
-            if (
-                (edge % 2 == 0 and place >= high)
-                or (edge % 2 and place <= low)
-                or stands_out(trial, k, edge, scene)[0]
-            ):
+            if (edge % 2 == 0 and place >= high) or (edge % 2 and place <= low) or stands_out(trial, k, edge, scene)[0]:
                 break
         else:
             yield trial
