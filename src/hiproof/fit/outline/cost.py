@@ -43,7 +43,7 @@ def drawing_of(lines, kappa, border):
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
         return Drawing(lines, kappa, corners, own, np.inf, np.inf)
-    squared, inside = nearest_sides(corners, border, 0, len(own))
+    squared, inside = nearest_sides(corners, border.x, border.y, border.court, SURE_BLURS * border.blur)
     for k in range(len(own)):
         own[k] = point_cost(squared[k], inside[k], border.wall[k], border.blur, border.stray)
     misfit, structure = border.density * area_of(corners) + own.sum(), structure_cost(lines, kappa, border)
@@ -86,20 +86,20 @@ def is_among(way, ways):
 
 
 @compiled
-def nearest_sides(corners, border, first, last):
-    """Squared distances (n,) to the nearest side of the points from `first` to `last`, next to each other in y, at most what is sure;
-    and whether each is inside (n,).
+def nearest_sides(corners, x, y, court, reach):
+    """Squared distances (n,) to the nearest side of points at x, y (n,), ascending in y, at most that of `reach`; and whether each is
+    inside (n,).
 
     Side after side, without branches, so that a processor does several points at once.
     """
-    reach = SURE_BLURS * border.blur
-    squared, inside = np.full(last - first, reach * reach), np.full(last - first, border.court)
-    x, y = border.x[first:last], border.y[first:last]
+    squared, inside = np.full(len(x), reach * reach), np.full(len(x), court)
+    if len(x) == 0:
+        return squared, inside
     for i in range(len(corners)):
         k = i + 1 if i + 1 < len(corners) else 0
         x0, y0, x1, y1 = corners[i, 0], corners[i, 1], corners[k, 0], corners[k, 1]
         low, high = min(y0, y1) - reach, max(y0, y1) + reach
-        if last > first and low <= y[-1] and high >= y[0]:
+        if low <= y[-1] and high >= y[0]:
             near = slice(np.searchsorted(y, low), np.searchsorted(y, high))
             beside_side(x0, y0, x1, y1, x[near], y[near], squared[near], inside[near])
     return squared, inside
@@ -141,20 +141,19 @@ def cost_of_change(lines, drawing, i, count, fresh, border, limit):
     corners = corners_of_change(lines, drawing, i, count, fresh, border)
     if len(corners) == 0:
         return np.inf
-    reach = SURE_BLURS * border.blur
-    x_low, x_high, y_low, y_high = box_of_change(drawing.corners, corners, i, count, fresh)
-    first, last = np.searchsorted(border.y, y_low - reach), np.searchsorted(border.y, y_high + reach)
-    cost = cost_without_points(lines, drawing, corners, border)
-    for k in range(first, last):
-        cost -= drawing.own[k] if x_low - reach < border.x[k] < x_high + reach else 0.0
+    near, cost = (
+        points_near(drawing.corners, corners, i, count, fresh, border),
+        without_points(lines, drawing, corners, border),
+    )
+    for k in near:
+        cost -= drawing.own[k]
     if cost > limit:  # no point gains by being there
         return np.inf
-    squared, inside = nearest_sides(corners, border, first, last)
-    for k in range(first, last):
-        if x_low - reach < border.x[k] < x_high + reach:
-            cost += point_cost(squared[k - first], inside[k - first], border.wall[k], border.blur, border.stray)
-            if cost > limit:
-                return np.inf
+    squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
+    for k in range(len(near)):
+        cost += point_cost(squared[k], inside[k], border.wall[near[k]], border.blur, border.stray)
+        if cost > limit:
+            return np.inf
     return cost
 
 
@@ -167,15 +166,14 @@ def changed(lines, drawing, i, count, fresh, border):
     corners, own = corners_of_change(lines, drawing, i, count, fresh, border), drawing.own.copy()
     if len(corners) == 0:
         return Drawing(lines, drawing.kappa, corners, own, np.inf, np.inf)
-    reach = SURE_BLURS * border.blur
-    x_low, x_high, y_low, y_high = box_of_change(drawing.corners, corners, i, count, fresh)
-    first, last = np.searchsorted(border.y, y_low - reach), np.searchsorted(border.y, y_high + reach)
-    squared, inside = nearest_sides(corners, border, first, last)
-    cost = cost_without_points(lines, drawing, corners, border)
-    for k in range(first, last):
-        if x_low - reach < border.x[k] < x_high + reach:
-            own[k] = point_cost(squared[k - first], inside[k - first], border.wall[k], border.blur, border.stray)
-            cost += own[k] - drawing.own[k]
+    near, cost = (
+        points_near(drawing.corners, corners, i, count, fresh, border),
+        without_points(lines, drawing, corners, border),
+    )
+    squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
+    for k in range(len(near)):
+        own[near[k]] = point_cost(squared[k], inside[k], border.wall[near[k]], border.blur, border.stray)
+        cost += own[near[k]] - drawing.own[near[k]]
     return Drawing(lines, drawing.kappa, corners, own, structure_cost(lines, drawing.kappa, border), cost)
 
 
@@ -191,18 +189,24 @@ def corners_of_change(lines, drawing, i, count, fresh, border):
 
 
 @compiled
-def box_of_change(old, corners, i, count, fresh):
-    """Lowest and highest x, lowest and highest y of the corners that come and go."""
+def points_near(old, corners, i, count, fresh, border):
+    """The points (m,), ascending, near the box around the corners that come and go."""
     x_low, y_low, x_high, y_high = np.inf, np.inf, -np.inf, -np.inf
     for k in range(count + 1 + fresh):
         ring, at = (old, (i + k) % len(old)) if k <= count else (corners, k - count - 1)
         x, y = ring[at, 0], ring[at, 1]
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
-    return x_low, x_high, y_low, y_high
+    reach = SURE_BLURS * border.blur
+    first, last = np.searchsorted(border.y, y_low - reach), np.searchsorted(border.y, y_high + reach)
+    near, m = np.empty(last - first, np.int64), 0
+    for k in range(first, last):
+        near[m] = k
+        m += int(x_low - reach < border.x[k] < x_high + reach)
+    return near[:m]
 
 
 @compiled
-def cost_without_points(lines, drawing, corners, border):
+def without_points(lines, drawing, corners, border):
     """What changed lines cost, were each point to cost what it did."""
     structure = structure_cost(lines, drawing.kappa, border)
     return drawing.cost + border.density * (area_of(corners) - area_of(drawing.corners)) + structure - drawing.structure
