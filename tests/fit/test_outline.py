@@ -12,7 +12,16 @@ from hiproof.compose import check_solid
 from hiproof.errors import FitError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit.outline import estimate_outline, with_courts
-from hiproof.fit.outline.cost import Border, changed, cost_of_change, drawing_of, structure_cost
+from hiproof.fit.outline.cost import (
+    Border,
+    changed,
+    cost_at_depth,
+    cost_of_change,
+    costs_by_depth,
+    drawing_of,
+    known_cost,
+    structure_cost,
+)
 from hiproof.fit.outline.lines import BACK, dropped, find_corners, lines_through, replaced, replaced_by
 from hiproof.fit.outline.settle import (
     BLURS_M,
@@ -160,7 +169,9 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     truth = shapely.box(0, 0, 14, 8) - shapely.box(5, 6.5, 8, 8)
     x, y = points_in(truth, 8.0, angle=0.0)[0].T
     order = np.argsort(y)
-    border = Border(x[order], y[order], np.zeros(len(x), bool), 8.0, False, ANYWHERE, 0.15, 0.02, 3.0, 3.0, 1.0, 6.0)
+    border = Border(
+        x[order], y[order], np.zeros(len(x), bool), 8.0, False, ANYWHERE, 0.15, costs_by_depth(0.02), 3.0, 3.0, 1.0, 6.0
+    )
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
     drawing = drawing_of(lines_through(np.array(wedge, float)), 0.0, border)
     assert len(stepped(drawing, border, 1).lines) == 7  # no matter of single sides
@@ -235,7 +246,9 @@ def test_points_of_chance_are_as_uneven_as_chance_and_rows_are_less():
 def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
-    border = Border(x, np.sort(y), rng.random(300) < 0.3, 3.0, court, ANYWHERE, 0.15, 0.02, 2.5, 3.0, 1.0, 6.0)
+    border = Border(
+        x, np.sort(y), rng.random(300) < 0.3, 3.0, court, ANYWHERE, 0.15, costs_by_depth(0.02), 2.5, 3.0, 1.0, 6.0
+    )
     ring = np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float)
     lines = lines_through(ring[::-1] if court else ring)
     drawing = drawing_of(lines, 0.0, border)
@@ -248,16 +261,26 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
         changes += [(dropped(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
         for new, fresh in changes:
             found, anew = changed(new, drawing, i, 1, fresh, border), drawing_of(new, 0.0, border)
-            assert cost_of_change(new, drawing, i, 1, fresh, border) == found.cost
+            assert cost_of_change(new, drawing, i, 1, fresh, border, np.inf) == pytest.approx(found.cost)
             if np.isfinite(anew.cost):
+                assert cost_of_change(new, drawing, i, 1, fresh, border, found.cost - 1e-6) == np.inf
+                assert cost_of_change(new, drawing, i, 1, fresh, border, found.cost + 1e-6) < np.inf
                 assert found.cost == pytest.approx(anew.cost) and found.structure == anew.structure
                 assert found.own == pytest.approx(anew.own) and found.corners == pytest.approx(anew.corners)
                 priced += 1
     assert priced >= 12
 
 
+@pytest.mark.parametrize("wall", [False, True])
+def test_what_points_cost_is_looked_up_as_it_is_computed(wall):
+    for depth in np.random.default_rng(5).uniform(-5.0, 5.0, 300).tolist():
+        sure = min(max(depth, -SURE_BLURS), SURE_BLURS)
+        expected = cost_at_depth(sure, wall, 0.02)
+        assert known_cost(depth, wall, costs_by_depth(0.02)) == pytest.approx(expected, abs=5e-5)
+
+
 def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
-    border = Border(*np.zeros((3, 0)), 3.0, False, ANYWHERE, 0.15, 0.02, 3.0, 5.0, 1.0, 7.0)
+    border = Border(*np.zeros((3, 0)), 3.0, False, ANYWHERE, 0.15, costs_by_depth(0.02), 3.0, 5.0, 1.0, 7.0)
     rings = {"square": [(0, 0), (8, 0), (8, 6), (0, 6)], "wedge": [(0, 0), (12, 0), (0, 5)]}
     rings |= {"slant": [(0, 0), (9, 0), (7, 6), (-2, 6)]}
     costs = {k: structure_cost(lines_through(np.array(ring, float)), 0.0, border) for k, ring in rings.items()}

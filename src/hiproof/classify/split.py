@@ -230,7 +230,7 @@ def houses_of(
 
 def hull_area(xy: np.ndarray) -> float:
     """Plan area of the points' convex hull, wider by what a roof is expected to reach beyond its outermost points."""
-    return shapely.MultiPoint(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
+    return shapely.multipoints(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
 
 
 def cell_area(xy: np.ndarray, cell_m: float) -> shapely.Geometry:

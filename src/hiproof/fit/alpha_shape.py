@@ -17,7 +17,7 @@ SPACINGS = 2.5
 
 def default_radius(xy: np.ndarray) -> float:
     """Radius in metres for `xy` (n, 2): 2.5 spacings, those of the points spread evenly over their hull."""
-    hull_area = shapely.convex_hull(shapely.MultiPoint(xy)).area
+    hull_area = shapely.convex_hull(shapely.multipoints(xy)).area
     return SPACINGS * float(np.sqrt(hull_area / max(len(xy), 1)))
 
 

@@ -21,7 +21,7 @@ import shapely
 
 from ..direction import main_direction
 from ..walls import on_walls
-from .cost import Border, Drawing, drawing_of
+from .cost import Border, Drawing, costs_by_depth, drawing_of
 from .lines import area_of, find_corners, lines_through, quarter_gap
 from .moves import redrawn
 from .rough import LEAST_COURT_M2, Rough, largest, rough_outline
@@ -129,7 +129,7 @@ def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
     dense = max(density / CHANCE_DENSE, 1.0)
     prices = (cloud.dearness * price * dense**growth for price, growth in zip(PRICES, GROWTH, strict=True))
     box = low[0], high[0], low[1], high[1]
-    return Border(x, y, wall[order], density, court, box, BLUR_M, STRAY, *prices)
+    return Border(x, y, wall[order], density, court, box, BLUR_M, costs_by_depth(STRAY), *prices)
 
 
 def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shapely.Polygon:

@@ -14,6 +14,7 @@ is outside.
 
 from __future__ import annotations
 
+import functools
 import math
 from collections import namedtuple
 
@@ -24,13 +25,14 @@ from ...parity import flips
 from .lines import SAME_RAD, area_of, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
 
+FINE = 100  # places a blur at which costs are kept; between them they are straight, to a hundred thousandth of a nat
 QUARTER = 0.5 * math.pi  # rad; lines so far apart have one direction
 SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
 
 # x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
-# court: whether the border is a court's, whose corners lie within box: x_low, x_high, y_low, y_high (m). blur (m), stray (share): see above.
+# court: whether the border is a court's, whose corners lie within box: x_low, x_high, y_low, y_high (m). blur (m): see above; costs: `costs_by_depth`.
 # line, direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
-Border = namedtuple("Border", "x y wall density court box blur stray line direction skew sharp")
+Border = namedtuple("Border", "x y wall density court box blur costs line direction skew sharp")
 
 # lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, structure: the price of
 # the lines, cost: all of it.
@@ -45,7 +47,7 @@ def drawing_of(lines, kappa, border):
         return Drawing(lines, kappa, corners, own, np.inf, np.inf)
     squared, inside = nearest_sides(corners, border.x, border.y, border.court, SURE_BLURS * border.blur)
     for k in range(len(own)):
-        own[k] = point_cost(squared[k], inside[k], border.wall[k], border.blur, border.stray)
+        own[k] = point_cost(squared[k], inside[k], border.wall[k], border)
     misfit, structure = border.density * area_of(corners) + own.sum(), structure_cost(lines, kappa, border)
     return Drawing(lines, kappa, corners, own, structure, misfit + structure)
 
@@ -117,11 +119,27 @@ def beside_side(x0, y0, x1, y1, x, y, squared, inside):
 
 
 @compiled
-def point_cost(squared, inside, wall, blur, stray):
+def point_cost(squared, inside, wall, border):
     """Minus the logarithm of how likely a point at that `squared` distance from the nearest side is, against one deep inside; that of
     a `wall` is compared with one on the border."""
-    depth = math.sqrt(squared) / blur
-    return cost_at_depth(depth if inside else -depth, wall, stray)
+    depth = math.sqrt(squared) / border.blur
+    return known_cost(depth if inside else -depth, wall, border.costs)
+
+
+@compiled
+def known_cost(depth, wall, costs):
+    """`cost_at_depth` from its table `costs`, straight between its places."""
+    place = (min(max(depth, -SURE_BLURS), SURE_BLURS) + SURE_BLURS) * FINE
+    k = min(int(place), costs.shape[1] - 2)
+    own = costs[int(wall)]
+    return own[k] + (place - k) * (own[k + 1] - own[k])
+
+
+@functools.cache
+def costs_by_depth(stray: float) -> np.ndarray:
+    """What points of the roof and of walls cost (2, 2 SURE_BLURS FINE + 1) from sure outside to sure inside."""
+    depths = np.linspace(-SURE_BLURS, SURE_BLURS, round(2 * SURE_BLURS * FINE) + 1)
+    return np.array([[cost_at_depth(depth, wall, stray) for depth in depths.tolist()] for wall in (False, True)])
 
 
 @compiled
@@ -151,7 +169,7 @@ def cost_of_change(lines, drawing, i, count, fresh, border, limit):
         return np.inf
     squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
     for k in range(len(near)):
-        cost += point_cost(squared[k], inside[k], border.wall[near[k]], border.blur, border.stray)
+        cost += point_cost(squared[k], inside[k], border.wall[near[k]], border)
         if cost > limit:
             return np.inf
     return cost
@@ -172,7 +190,7 @@ def changed(lines, drawing, i, count, fresh, border):
     )
     squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
     for k in range(len(near)):
-        own[near[k]] = point_cost(squared[k], inside[k], border.wall[near[k]], border.blur, border.stray)
+        own[near[k]] = point_cost(squared[k], inside[k], border.wall[near[k]], border)
         cost += own[near[k]] - drawing.own[near[k]]
     return Drawing(lines, drawing.kappa, corners, own, structure_cost(lines, drawing.kappa, border), cost)
 

@@ -40,8 +40,9 @@ class Rough(NamedTuple):
 def rough_outline(points: np.ndarray) -> Rough:
     """What `points` (m, 2 or 3) are drawn from. Raises FitError for points that span no area."""
     xy = points[:, :2]
-    thinner = math.sqrt(len(xy) / telling_count(points))
-    shape = with_large_holes(alpha_shape(xy, NARROWER * thinner * default_radius(xy), holes=True))
+    radius = default_radius(xy)
+    thinner = math.sqrt(len(xy) / telling_count(points, radius / SPACINGS))
+    shape = with_large_holes(alpha_shape(xy, NARROWER * thinner * radius, holes=True))
     spacing = thinner * math.sqrt(shape.area / len(xy))
     closed = shapely.buffer(shape, CLOSING_SPACINGS * spacing, join_style="mitre")
     pushed = shapely.buffer(closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre")
@@ -52,11 +53,12 @@ def rough_outline(points: np.ndarray) -> Rough:
     return Rough(rings[:1] + [[corners[::-1] for corners in court] for court in rings[1:]], spacing, shape)
 
 
-def telling_count(points: np.ndarray) -> int:
-    """How many of `points` (m, 2 or 3) tell how far apart they are: all, or where many stand one over another on walls the roof's."""
+def telling_count(points: np.ndarray, spacing: float) -> int:
+    """How many of `points` (m, 2 or 3), about `spacing` (m) apart, tell how far that is: all, or where many stand one over another on walls
+    the roof's."""
     if points.shape[1] < 3 or len(points) < 3:
         return max(len(points), 1)
-    roof = int((~on_walls(points, points, default_radius(points[:, :2]) / SPACINGS)).sum())
+    roof = int((~on_walls(points, points, spacing)).sum())
     return roof if 0 < MOST_A_ROOF_POINT * roof < len(points) else len(points)
 
 

@@ -20,8 +20,8 @@ def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
     cell = CELL_SPACINGS * spacing
     index = np.floor(xy / cell).astype(int)
     low = index.min(axis=0)
-    counts = np.zeros(index.max(axis=0) - low + 1)
-    np.add.at(counts, tuple((index - low).T), 1)
+    columns, rows = index.max(axis=0) - low + 1
+    counts = np.bincount((index - low) @ (rows, 1), minlength=columns * rows).reshape(columns, rows).astype(float)
     centres = shapely.points((np.moveaxis(np.indices(counts.shape), 0, -1) + low + 0.5) * cell)
     ring = shape.exterior
     shapely.prepare([shape, ring])

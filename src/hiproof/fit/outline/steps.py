@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from ...compiled import compiled
-from .cost import changed, cost_at_depth
+from .cost import changed, known_cost
 from .lines import quarter_gap, replaced, replaced_by
 from .moves import GAIN, TURN_RAD
 from .soft import SURE_BLURS
@@ -94,7 +94,7 @@ def along(azimuth, place):
 @compiled
 def column_costs(drawing, border, azimuth, distance, low, width, columns):
     """What each of the `columns` (columns, LEVELS) along a line costs at each level."""
-    costs, far_out = np.empty((columns, LEVELS)), cost_at_depth(-SURE_BLURS, False, border.stray)
+    costs, far_out = np.empty((columns, LEVELS)), border.costs[0, 0]
     for level in range(LEVELS):
         costs[:, level] = border.density * width * (LEVEL_M * level - DEEPEST_M)
     c, s, sure = math.cos(azimuth), math.sin(azimuth), SURE_BLURS * border.blur
@@ -112,7 +112,7 @@ def column_costs(drawing, border, azimuth, distance, low, width, columns):
             costs[column, level] += far_out
         for level in range(inner, outer):
             deep = (depth + LEVEL_M * level - DEEPEST_M) / border.blur
-            costs[column, level] += cost_at_depth(deep, wall, border.stray)
+            costs[column, level] += known_cost(deep, wall, border.costs)
     return costs
 
 

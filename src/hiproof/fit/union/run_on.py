@@ -86,7 +86,7 @@ def stands_out(volumes, k, edge, scene):
     axis, across = edge // 2, V0 - 2 * (edge // 2)
     outwards = BESIDE_M if edge % 2 else -BESIDE_M
     start, length = volumes[k, across], volumes[k, across + 1] - volumes[k, across]
-    count = min(max(int(round(length / SAMPLE_M)), 1), MOST_SAMPLES) + 1
+    count = min(max(round(length / SAMPLE_M), 1), MOST_SAMPLES) + 1
     shape = len(scene.turn), 2 * count  # inside, then outside
     U, V = np.empty(shape), np.empty(shape)
     own = int(volumes[k, DIRECTION])
