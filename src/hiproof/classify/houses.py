@@ -8,7 +8,7 @@ enough for a house on either side. The best cut is made, then both sides are loo
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import shapely
@@ -47,16 +47,25 @@ STRAIGHT_M = 0.7  # corners of the block's border that are none
 
 @dataclass(frozen=True)
 class Bonds:
-    """Pairs of points: their places `ends` (b, 2, 2) in plan, and `state` (b,): HELD, LOOSE, or UNKNOWN between leaves."""
+    """Pairs of points (b, 2), by their numbers: their places `ends` (b, 2, 2) in plan, `middle` (b, 2) between these, `state` (b,): HELD,
+    LOOSE, or UNKNOWN between leaves, and `weight` (b,): short ones count more."""
 
+    points: np.ndarray
     ends: np.ndarray
+    middle: np.ndarray
     state: np.ndarray
+    weight: np.ndarray
 
     def among(self, chosen: np.ndarray) -> Bonds:
-        return Bonds(self.ends[chosen], self.state[chosen])
+        """The `chosen` ones, by a mask (b,) or their numbers."""
+        return Bonds(*(getattr(self, f.name)[chosen] for f in fields(self)))
 
     def inside(self, area: shapely.Geometry) -> Bonds:
-        return self.among(shapely.intersects_xy(area, *self.ends.mean(axis=1).T))
+        return self.among(shapely.intersects_xy(area, *self.middle.T))
+
+    def across(self, cut: Cut) -> np.ndarray:
+        """How far (b, 2) the ends lie before the line of a cut."""
+        return (self.ends.reshape(-1, 2) @ cut.normal - cut.offset).reshape(-1, 2)
 
 
 HELD, LOOSE, UNKNOWN = 0, 1, 2  # states of a bond between neighbouring points
@@ -183,10 +192,11 @@ def bonds_of(surfaces: Surfaces) -> Bonds:
     kept = is_roof(surfaces) | ~surfaces.is_smooth
     xyz, normal, smooth = (values[kept] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth))
     if len(xyz) < 2:
-        return Bonds(np.empty((0, 2, 2)), np.empty(0, np.int64))
+        return Bonds(np.empty((0, 2), np.int64), np.empty((0, 2, 2)), np.empty((0, 2)), *np.empty((2, 0), np.int64))
     tree = cKDTree(xyz[:, :2])
     spacing = np.median(tree.query(xyz[:, :2], k=2)[0][:, 1])
-    one, other = tree.query_pairs(max(REACH_M, REACH_SPACINGS * spacing), output_type="ndarray").T
+    points = tree.query_pairs(max(REACH_M, REACH_SPACINGS * spacing), output_type="ndarray")
+    one, other = points.T
     slope = -normal[:, :2] / np.where(np.abs(normal[:, 2]) < UPRIGHT, 1.0, normal[:, 2])[:, None]
     between = xyz[other] - xyz[one]
     above = between[:, 2] - (slope[one] * between[:, :2]).sum(axis=1)
@@ -194,7 +204,8 @@ def bonds_of(surfaces: Surfaces) -> Bonds:
     goes_on = (np.minimum(np.abs(above), np.abs(below)) < STEP_M) | (above * below > 0)
     rough = np.where(np.abs(between[:, 2]) > ROUGH_STEP_M, LOOSE, UNKNOWN)
     state = np.where(smooth[one] & smooth[other], np.where(goes_on, HELD, LOOSE), rough)
-    return Bonds(np.stack([xyz[one, :2], xyz[other, :2]], axis=1), state)
+    ends, length = xyz[points, :2], np.hypot(between[:, 0], between[:, 1])
+    return Bonds(points, ends, ends.mean(axis=1), state, 1.0 / np.maximum(length, SHORT_M))
 
 
 def directions_of(area: shapely.Geometry, surfaces: Surfaces) -> np.ndarray:
@@ -233,7 +244,7 @@ def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
 
 def refined(cut: Cut, bonds: Bonds) -> Cut | None:
     """The best of the lines near `cut`, turned a little and at a tenth of a metre; None where it is none to cut at."""
-    near = bonds.among(np.hypot(*(bonds.ends.mean(axis=1) - cut.middle).T) < 0.5 * cut.length + 2.0)
+    near = bonds.among(np.hypot(*(bonds.middle - cut.middle).T) < 0.5 * cut.length + 2.0)
     angle = math.atan2(cut.normal[1], cut.normal[0])
     tried = [other for turn in np.radians(FINE_TURNS_DEG) for other in cuts_along(angle + turn, near, FINE_LINE_M)]
     like = [
@@ -244,8 +255,8 @@ def refined(cut: Cut, bonds: Bonds) -> Cut | None:
     if not like:
         return None
     best = max(like, key=lambda other: other.gain)
-    across = bonds.ends @ best.normal - best.offset
-    crossing = bonds.among((across.min(axis=1) < NEXT_M) & (across.max(axis=1) > -NEXT_M))
+    one, other = bonds.across(best).T
+    crossing = bonds.among((np.minimum(one, other) < NEXT_M) & (np.maximum(one, other) > -NEXT_M))
     whole = cuts_along(math.atan2(best.normal[1], best.normal[0]), crossing, FINE_LINE_M)
     return next((other for other in whole if abs(other.offset - best.offset) < 0.5 * FINE_LINE_M), None)
 
@@ -255,8 +266,8 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
     if not len(bonds.state):
         return []
     normal = np.array([math.cos(angle), math.sin(angle)])
-    crossed, first, start = crossings(bonds.ends, bonds.state, normal, lines_m, STRETCH_M)
-    crossed *= is_between(bonds.ends, normal, lines_m, first, start, crossed[0])
+    crossed, first, start = crossings(bonds.ends, bonds.state, bonds.weight, normal, lines_m)
+    crossed *= is_between(bonds.points, bonds.ends, normal, lines_m, first, start, crossed[0])
     line, runs = runs_of(crossed, start, strictness * LEAST_APART)
     length = runs[:, 1] - runs[:, 0]
     is_long = (runs[:, 2] > 0) & (runs[:, 3] > strictness * LEAST_GAIN * length) & (length >= LEAST_LENGTH_M)
@@ -264,41 +275,44 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
 
 
 @compiled
-def crossings(ends, state, normal, lines_m, stretch_m):
-    """How many bonds of each state cross each line in each stretch (3, lines, stretches), short ones counting more; the
-    first line's number, and where the first stretch begins along it."""
-    v, u = np.empty((len(ends), 2)), np.empty((len(ends), 2))
-    for b in range(len(ends)):
-        for e in range(2):
-            v[b, e] = (ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]) / lines_m
-            u[b, e] = (ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1]) / stretch_m
+def crossings(ends, state, weight, normal, lines_m):
+    """How many bonds of each state cross each line in each stretch (3, lines, stretches), by their `weight` (b,); the first line's number,
+    and where the first stretch begins along it."""
+    n, c, s = len(ends), normal[0] / lines_m, normal[1] / lines_m
+    v, u, along = np.empty((2, n)), np.empty((2, n)), lines_m / STRETCH_M
+    for e in range(2):
+        x, y, across, beside = ends[:, e, 0], ends[:, e, 1], v[e], u[e]
+        for b in range(n):
+            across[b], beside[b] = c * x[b] + s * y[b], (c * y[b] - s * x[b]) * along
     first, start = math.floor(v.min()), math.floor(u.min())
     crossed = np.zeros((3, int(math.floor(v.max()) - first) + 1, int(math.floor(u.max()) - start) + 1))
-    for b in range(len(ends)):
-        low, high = (0, 1) if v[b, 0] < v[b, 1] else (1, 0)
-        length = math.hypot(ends[b, 1, 0] - ends[b, 0, 0], ends[b, 1, 1] - ends[b, 0, 1])
-        for line in range(math.ceil(v[b, low]), math.floor(v[b, high]) + 1):
-            share = (line - v[b, low]) / max(v[b, high] - v[b, low], 1e-9)
-            place = u[b, low] + share * (u[b, high] - u[b, low])
-            crossed[state[b], int(line - first), int(place - start)] += 1.0 / max(length, SHORT_M)
-    return crossed, first, start * stretch_m
+    for b in range(n):
+        low, high = (0, 1) if v[0, b] < v[1, b] else (1, 0)
+        v_low, u_low = v[low, b], u[low, b]
+        slope = (u[high, b] - u_low) / max(v[high, b] - v_low, 1e-9)
+        for line in range(math.ceil(v_low), math.floor(v[high, b]) + 1):
+            crossed[state[b], int(line - first), int(u_low + (line - v_low) * slope - start)] += weight[b]
+    return crossed, first, start * STRETCH_M
 
 
 @compiled
-def is_between(ends, normal, lines_m, first, start, like):
+def is_between(points, ends, normal, lines_m, first, start, like):
     """Whether something lies on both sides of each line, away from it, in each stretch, as a table (lines, stretches) `like` this:
     along the border of a block there is nothing to be cut."""
-    beside = np.zeros((2, *like.shape))
+    beside, seen = np.zeros((2, *like.shape), np.bool_), np.zeros(points.max() + 1, np.bool_)
     for b in range(len(ends)):
         for e in range(2):
+            if seen[points[b, e]]:
+                continue
+            seen[points[b, e]] = True
             v = ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]
             stretch = int((ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1] - start) / STRETCH_M)
             for side in range(2):
                 low = v - AWAY_M - REACH_M if side else v + AWAY_M
-                for line in range(math.ceil(low / lines_m) - first, math.floor((low + REACH_M) / lines_m) - first + 1):
-                    if 0 <= line < like.shape[0]:
-                        beside[side, int(line), stretch] = 1.0
-    return beside[0] * beside[1]
+                last = math.floor((low + REACH_M) / lines_m) - first
+                for line in range(max(math.ceil(low / lines_m) - first, 0), min(last + 1, like.shape[0])):
+                    beside[side, int(line), stretch] = True
+    return beside[0] & beside[1]
 
 
 @compiled
