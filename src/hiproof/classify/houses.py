@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -57,8 +59,9 @@ class Bonds:
     weight: np.ndarray
 
     def among(self, chosen: np.ndarray) -> Bonds:
-        """The `chosen` ones, by a mask (b,) or their numbers."""
-        return Bonds(*(getattr(self, f.name)[chosen] for f in fields(self)))
+        """The `chosen` (b,) ones."""
+        number = np.flatnonzero(chosen)
+        return Bonds(*(getattr(self, f.name).take(number, axis=0) for f in fields(self)))
 
     def inside(self, area: shapely.Geometry) -> Bonds:
         return self.among(shapely.intersects_xy(area, *self.middle.T))
@@ -80,7 +83,7 @@ class Cut:
     offset: float
     runs: np.ndarray
 
-    @property
+    @cached_property
     def along(self) -> np.ndarray:
         return np.array([-self.normal[1], self.normal[0]])
 
@@ -88,7 +91,7 @@ class Cut:
     def gain(self) -> float:
         return float(self.runs[self.runs[:, 2] > 0, 3].sum())
 
-    @property
+    @cached_property
     def longest(self) -> np.ndarray:
         """The longest run (4,) in which it may be cut."""
         runs = self.runs[self.runs[:, 2] > 0]
@@ -98,7 +101,7 @@ class Cut:
     def length(self) -> float:
         return float(self.longest[1] - self.longest[0])
 
-    @property
+    @cached_property
     def middle(self) -> np.ndarray:
         return self.at(self.longest[:2].mean())
 
@@ -126,16 +129,16 @@ def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[sh
     """
     origin = np.floor(xyz.min(axis=0))
     surfaces = surfaces_of(xyz - origin)
-    bonds, local = bonds_of(surfaces), shapely.transform(area, lambda xy: xy - origin[:2])
+    roofs, bonds = roofs_of(surfaces), bonds_of(surfaces)
     houses = [
         shapely.intersection(house, block)
-        for block in without_necks(local, gap_m, surfaces)
-        for house in houses_in(shapely.buffer(block, gap_m, join_style="mitre"), surfaces, bonds)
+        for block in without_necks(shapely.transform(area, lambda xy: xy - origin[:2]), gap_m, roofs)
+        for house in houses_in(shapely.buffer(block, gap_m, join_style="mitre"), roofs, bonds)
     ]
     return [area] if len(houses) == 1 else [shapely.transform(house, lambda xy: xy + origin[:2]) for house in houses]
 
 
-def without_necks(area: shapely.Geometry, gap_m: float, surfaces: Surfaces) -> list[shapely.Geometry]:
+def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[shapely.Geometry]:
     """`area` in parts where hardly more than a few returns of what stands between two houses joins them: a gutter, a tree."""
     wide = shapely.buffer(
         shapely.buffer(area, 0.5 * gap_m, join_style="mitre"), -0.5 * (gap_m + NECK_M), join_style="mitre"
@@ -145,21 +148,21 @@ def without_necks(area: shapely.Geometry, gap_m: float, surfaces: Surfaces) -> l
         side = shapely.buffer(part, 0.5 * NECK_M, join_style="mitre")
         sides.append(shapely.intersection(rest, side))
         rest = shapely.difference(rest, side)
-    return with_crumbs([*sides, *shapely.get_parts(rest)], surfaces)
+    return with_crumbs([*sides, *shapely.get_parts(rest)], roofs)
 
 
-def houses_in(area: shapely.Geometry, surfaces: Surfaces, bonds: Bonds) -> list[shapely.Geometry]:
+def houses_in(area: shapely.Geometry, roofs: Roofs, bonds: Bonds) -> list[shapely.Geometry]:
     """`area` cut at the best cut that leaves a house on either side, and the sides again."""
-    if roof_m2(area, surfaces) < 2 * LEAST_HOUSE_M2:
+    if roof_m2(area, roofs) < 2 * LEAST_HOUSE_M2:
         return [area]
     bonds = bonds.inside(area)
-    for rough in best_cuts(bonds, directions_of(area, surfaces)):
+    for rough in best_cuts(bonds, directions_of(area, roofs)):
         cut = refined(rough, bonds)
         if cut is None:
             continue
-        sides = with_crumbs(sides_of(area, cut), surfaces)
-        if len(sides) > 1 and all(depth_m(side, cut, surfaces) > LEAST_DEPTH_M for side in sides):
-            return [house for side in sides for house in houses_in(side, surfaces, bonds)]
+        sides = with_crumbs(sides_of(area, cut), roofs)
+        if len(sides) > 1 and all(depth_m(side, cut, roofs) > LEAST_DEPTH_M for side in sides):
+            return [house for side in sides for house in houses_in(side, roofs, bonds)]
     return [area]
 
 
@@ -167,19 +170,30 @@ def is_roof(surfaces: Surfaces) -> np.ndarray:
     return surfaces.is_smooth & (np.abs(surfaces.normal[:, 2]) > UPRIGHT)
 
 
-def roof_m2(area: shapely.Geometry, surfaces: Surfaces) -> float:
-    """How much of `area` lies under smooth surfaces that are no walls, in plan."""
+class Roofs(NamedTuple):
+    """Voxels on smooth surfaces that are no walls: places (r, 2), `m2` (r,) in plan, normals (r, 3)."""
+
+    xy: np.ndarray
+    m2: np.ndarray
+    normal: np.ndarray
+
+
+def roofs_of(surfaces: Surfaces) -> Roofs:
     roof = is_roof(surfaces)
+    normal = surfaces.normal[roof]
+    return Roofs(surfaces.xyz[roof, :2], surfaces.own_m2[roof] * np.abs(normal[:, 2]), normal)
+
+
+def roof_m2(area: shapely.Geometry, roofs: Roofs) -> float:
+    """How much of `area` lies under roofs, in plan."""
     shapely.prepare(area)
-    inside = shapely.intersects_xy(area, *surfaces.xyz[roof, :2].T)
-    return float((surfaces.own_m2[roof] * np.abs(surfaces.normal[roof, 2]))[inside].sum())
+    return float(roofs.m2[shapely.intersects_xy(area, *roofs.xy.T)].sum())
 
 
-def depth_m(side: shapely.Geometry, cut: Cut, surfaces: Surfaces) -> float:
+def depth_m(side: shapely.Geometry, cut: Cut, roofs: Roofs) -> float:
     """How far a `side` of the cut reaches away from it: twice what half of its roof does."""
-    xy = surfaces.xyz[is_roof(surfaces), :2]
-    inside = shapely.intersects_xy(side, *xy.T)
-    return 2.0 * float(np.median(np.abs(xy[inside] @ cut.normal - cut.offset)))
+    inside = shapely.intersects_xy(side, *roofs.xy.T)
+    return 2.0 * float(np.median(np.abs(roofs.xy[inside] @ cut.normal - cut.offset)))
 
 
 def bonds_of(surfaces: Surfaces) -> Bonds:
@@ -208,11 +222,10 @@ def bonds_of(surfaces: Surfaces) -> Bonds:
     return Bonds(points, ends, ends.mean(axis=1), state, 1.0 / np.maximum(length, SHORT_M))
 
 
-def directions_of(area: shapely.Geometry, surfaces: Surfaces) -> np.ndarray:
+def directions_of(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
     """Azimuths (d,) in which cuts are looked for: those of slopes and of the block's border, and across them."""
     shapely.prepare(area)
-    roof = is_roof(surfaces) & shapely.intersects_xy(area, *surfaces.xyz[:, :2].T)
-    normal = surfaces.normal[roof]
+    normal = roofs.normal[shapely.intersects_xy(area, *roofs.xy.T)]
     rings = [
         np.diff(shapely.get_coordinates(p.exterior), axis=0)
         for p in shapely.get_parts(area.simplify(STRAIGHT_M))
@@ -244,7 +257,9 @@ def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
 
 def refined(cut: Cut, bonds: Bonds) -> Cut | None:
     """The best of the lines near `cut`, turned a little and at a tenth of a metre; None where it is none to cut at."""
-    near = bonds.among(np.hypot(*(bonds.middle - cut.middle).T) < 0.5 * cut.length + 2.0)
+    x, y = bonds.middle.T
+    away2 = (x - cut.middle[0]) ** 2 + (y - cut.middle[1]) ** 2
+    near = bonds.among(away2 < (0.5 * cut.length + 2.0) ** 2)
     angle = math.atan2(cut.normal[1], cut.normal[0])
     tried = [other for turn in np.radians(FINE_TURNS_DEG) for other in cuts_along(angle + turn, near, FINE_LINE_M)]
     like = [
@@ -353,9 +368,9 @@ def sides_of(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
     return [joined([p for p, g in zip(parts, group, strict=True) if g == number]) for number in sorted(set(group))]
 
 
-def with_crumbs(sides: list[shapely.Geometry], surfaces: Surfaces) -> list[shapely.Geometry]:
+def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geometry]:
     """The sides as large as a house, each with the smaller ones nearest to it."""
-    is_large = [roof_m2(side, surfaces) >= LEAST_HOUSE_M2 for side in sides]
+    is_large = [roof_m2(side, roofs) >= LEAST_HOUSE_M2 for side in sides]
     houses = [[side] for side, large in zip(sides, is_large, strict=True) if large]
     if len(houses) < 2:
         return [joined(sides)]
