@@ -209,3 +209,15 @@ def test_a_sparse_cloud_gets_models_as_good_as_it_allows(tmp_path, density):
         assert row["status"] in ("modelled", "sparse")
         corners = shapely.get_coordinates(town.footprints[f"house-{i}"].buffer(-1.0))
         assert (height_of(row, corners) > 2.0 + 4.5).all()  # the eave lies 5 m above the ground at 2 m
+
+
+def test_where_classes_tell_the_ground_nothing_low_beside_a_roof_is_taken_for_one(tmp_path):
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-10.0, 24.0, 0.4), np.arange(-10.0, 16.0, 0.4)))
+    inside, roof = (x > 0) & (x < 14) & (y > 0) & (y < 6), (x > 0) & (x < 9) & (y > 0) & (y < 6)
+    z = np.where(roof, 5.0, np.where(inside, 0.2, 0.0))  # beside the house a bed of plants
+    house = {"house": shapely.box(0, 0, 14, 6)}
+    rows = run(tmp_path, np.column_stack([x, y, z]), np.where(inside, 1, 2), house, asked("shape"))
+    (row,) = rows.values()
+    assert all(
+        part["type"] == "flat" and abs(part["position"][2] + row["origin"][2] - 5.0) < 0.1 for part in row["parts"]
+    )

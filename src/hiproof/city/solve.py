@@ -75,6 +75,8 @@ class Surroundings:
         """The ground around the building; the terrain model's alone among roofs cut out beforehand, whose lowest are no ground."""
         from ..classify.cut_out import is_cut_out
 
+        if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):  # classes tell it
+            return TerrainChain(self.grounds_of(job))
         around = self.points_near(job, BESIDE_ALL_M)
         return TerrainChain([self.model] if len(around) and is_cut_out(around) else self.grounds_of(job))
 
