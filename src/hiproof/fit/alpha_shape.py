@@ -17,7 +17,8 @@ SPACINGS = 2.5
 
 def default_radius(xy: np.ndarray) -> float:
     """Radius in metres for `xy` (n, 2): 2.5 spacings, those of the points spread evenly over their hull."""
-    hull_area = shapely.convex_hull(shapely.multipoints(xy)).area
+    # one line through all: many points would be as many geometries
+    hull_area = shapely.convex_hull(shapely.linestrings(xy)).area if len(xy) > 2 else 0.0
     return SPACINGS * float(np.sqrt(hull_area / max(len(xy), 1)))
 
 
