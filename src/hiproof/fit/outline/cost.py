@@ -25,7 +25,7 @@ from ...parity import flips
 from .lines import SAME_RAD, area_of, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
 
-FINE = 100  # places a blur at which costs are kept; between them they are straight, to a hundred thousandth of a nat
+FINE = 100  # places a blur at which costs are kept; between them they are straight, to 5e-5 nats
 QUARTER = 0.5 * math.pi  # rad; lines so far apart have one direction
 SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
 
@@ -159,10 +159,8 @@ def cost_of_change(lines, drawing, i, count, fresh, border, limit):
     corners = corners_of_change(lines, drawing, i, count, fresh, border)
     if len(corners) == 0:
         return np.inf
-    near, cost = (
-        points_near(drawing.corners, corners, i, count, fresh, border),
-        without_points(lines, drawing, corners, border),
-    )
+    near = points_near(drawing.corners, corners, i, count, fresh, border)
+    cost = without_points(lines, drawing, corners, border)
     for k in near:
         cost -= drawing.own[k]
     if cost > limit:  # no point gains by being there
@@ -184,10 +182,8 @@ def changed(lines, drawing, i, count, fresh, border):
     corners, own = corners_of_change(lines, drawing, i, count, fresh, border), drawing.own.copy()
     if len(corners) == 0:
         return Drawing(lines, drawing.kappa, corners, own, np.inf, np.inf)
-    near, cost = (
-        points_near(drawing.corners, corners, i, count, fresh, border),
-        without_points(lines, drawing, corners, border),
-    )
+    near = points_near(drawing.corners, corners, i, count, fresh, border)
+    cost = without_points(lines, drawing, corners, border)
     squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
     for k in range(len(near)):
         own[near[k]] = point_cost(squared[k], inside[k], border.wall[near[k]], border)
