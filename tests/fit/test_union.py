@@ -86,6 +86,17 @@ def test_what_lies_beyond_the_points_is_a_part_unless_it_is_the_tip_of_a_corner(
     assert sum(areas) == pytest.approx(64.0) and min(areas) > LEAST_M2
 
 
+def test_a_steep_plane_that_falls_further_than_points_may_miss_an_eave_ends_near_the_lowest_point():
+    # Delft's 503100000017310 at half its points: eleven square metres stood 1.3 m below all of them
+    steep, spacing = Part("monopitch", (Piece(shapely.box(0, 0, 8, 8), np.array([[2.5, 0.0, 0.0]])),)), 0.5
+    missed = MISSED_SPACINGS * spacing * 2.5
+    (eave,) = clamped([steep], CLAMP_M + 0.9 * missed, 30.0, spacing)
+    assert eave is steep
+    fallen = clamped([steep], CLAMP_M + 3.0, 30.0, spacing)
+    assert [part.type for part in fallen] == ["monopitch", "flat"]
+    assert fallen[1].translation[2] == pytest.approx(3.0) and fallen[1].area == pytest.approx(8 * 3.0 / 2.5)
+
+
 def test_fewer_than_four_points_give_a_flat_roof_at_their_median():
     fit = fit_building(np.array([[1.0, 1.0, 4.0], [2.0, 2.0, 5.0], [3.0, 1.0, 9.0]]), HOUSE)
     assert [part.type for part in fit.roof_parts] == ["flat"]

@@ -24,19 +24,21 @@ def clamped(parts: list[Part], low: float, high: float, spacing: float) -> list[
     found = []
     for part in parts:
         steepest = max(float(np.hypot(*piece.planes[:, :2].T).max()) for piece in part.pieces)
-        margin = CLAMP_M + MISSED_SPACINGS * spacing * steepest
-        found += clamped_part(part, low - margin, high + margin)
+        missed = MISSED_SPACINGS * spacing * steepest
+        found += clamped_part(part, low - CLAMP_M, high + CLAMP_M + missed, missed)
     return found
 
 
-def clamped_part(part: Part, low: float, high: float) -> list[Part]:
-    """The part where it is between `low` and `high`, and a level part where it is below or above; itself where it is neither."""
+def clamped_part(part: Part, low: float, high: float, missed: float = 0.0) -> list[Part]:
+    """The part where it is between `low` and `high`, and a level part where it is below or above; itself where it is neither, or falls below
+    `low` by no more than what points may have `missed` (m) of an eave."""
     kept, beneath, above = [], [], []
     for piece in part.pieces:
-        sunken, risen = beyond(piece, low, high)
+        sunken, risen = beyond(piece, low - missed, high)
         if sunken.area + risen.area < LEAST_M2:
             kept.append(piece)
             continue
+        sunken = beyond(piece, low, high)[0] if sunken.area > 0.0 else sunken
         beneath += polygons_of(sunken)
         above += polygons_of(risen)
         rest = shapely.difference(piece.outline, shapely.union(sunken, risen), grid_size=GRID_M)
