@@ -1,7 +1,9 @@
 """Laws of compiled code: it is what all its sources say, it is kept, and where it cannot be kept that is said once."""
 
 import ast
+import base64
 import errno
+import hashlib
 import importlib
 import os
 import pickle
@@ -19,7 +21,7 @@ import pytest
 
 import hiproof
 from hiproof.city import warm
-from hiproof.compiled import kept, news, stamp
+from hiproof.compiled import kept, kinds, news, stamp
 from hiproof.errors import NotKeptWarning
 
 PACKAGE = Path(hiproof.__file__).parent
@@ -118,9 +120,9 @@ def test_code_for_a_kind_of_processors_is_loaded_on_each_of_them(town, monkeypat
     script = """
 import llvmlite.binding
 llvmlite.binding.get_host_cpu_name = lambda: {host!r}
-from hiproof.city.warm import mark
+from hiproof.city.warm import mark, own_processor
 from town.outer import answer
-print(mark("solid", "stamp"), answer(10), bool(answer._cache_hits))
+print(mark("solid", "stamp", own_processor()), answer(10), bool(answer._cache_hits))
 """
     here, there = (run(town, "-c", script.format(host=host)).split() for host in ("here", "there"))
     assert here[1:] == ["61", "False"] and there[1:] == ["61", "True"]
@@ -161,6 +163,42 @@ def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path, monkeypatch
     assert answers == [(61, False, 0), (81, False, 0)]
 
 
+HASWELL = dict.fromkeys(("sse4.2", "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), True)
+NEHALEM = {"sse4.2": True}
+OTHER_VERSIONS = "importlib.metadata.version = lambda name: '0'"
+
+
+@pytest.mark.skipif(not kinds.runs_kind(), reason=f"makes code for {kinds.KIND}")
+@pytest.mark.parametrize(
+    "name, features, more, is_loaded",
+    [("haswell", HASWELL, "", True), ("nehalem", NEHALEM, "", False), ("haswell", HASWELL, OTHER_VERSIONS, False)],
+)
+def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_passed_over(
+    tmp_path, name, features, more, is_loaded
+):
+    pytest.importorskip("wheel", reason="needs wheel, to pack wheels")
+    from release.compiled_wheel import compiled_wheel
+
+    wheel = compiled_wheel(write_wheel(tmp_path, 3), tmp_path, ["-c", "from town.outer import answer; answer(10)"])
+    packages = tmp_path / "installed"
+    run(packages, "-m", "pip", "install", "--no-index", "--no-deps", "--target", str(packages), str(wheel))
+    assert "numba==" in (packages / "town-3.dist-info" / "METADATA").read_text()
+    script = f"""
+import importlib.metadata, llvmlite.binding as binding
+binding.get_host_cpu_name = lambda: {name!r}
+binding.get_host_cpu_features = lambda: binding.targets.FeatureMap({features})
+{more}
+from town.outer import answer
+print(answer(10), bool(answer._cache_hits))
+"""
+    assert run(packages, "-c", script).split() == ["61", str(is_loaded)]
+    assert run(packages, "-c", script).split() == ["61", "True"], "what was compiled is kept as ever"
+
+
+def digest_of(text):
+    return base64.urlsafe_b64encode(hashlib.sha256(text.encode()).digest()).decode().rstrip("=")
+
+
 def write_wheel(folder, factor):
     wheel, info = folder / f"town-{factor}-py3-none-any.whl", f"town-{factor}.dist-info"
     files = {
@@ -171,7 +209,8 @@ def write_wheel(folder, factor):
     with zipfile.ZipFile(wheel, "w") as archive:
         for name, text in files.items():
             archive.writestr(name, text)
-        archive.writestr(f"{info}/RECORD", "".join(f"{name},,\n" for name in [*files, f"{info}/RECORD"]))
+        lines = [f"{name},sha256={digest_of(text)},{len(text)}\n" for name, text in files.items()]
+        archive.writestr(f"{info}/RECORD", "".join([*lines, f"{info}/RECORD,,\n"]))
     return wheel
 
 
@@ -276,6 +315,23 @@ def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypa
     warm.make_ready(["solid", "single"])
     assert runs == ["solid", "solid", "single"]
     assert len(files_in(tmp_path)) == 2
+
+
+@pytest.mark.parametrize("runs, compiles", [(True, []), (False, ["solid"])])
+def test_what_came_in_a_wheel_is_compiled_only_when_asked_for_or_on_other_processors(
+    tmp_path, monkeypatch, runs, compiles
+):
+    asked = []
+    monkeypatch.setattr(warm, "compiled_pieces", lambda left: (piece for piece in left if not asked.append(piece)))
+    monkeypatch.setattr(warm, "runs_kind", lambda: runs)
+    monkeypatch.setattr(warm, "own_processor", lambda: "mine")
+    monkeypatch.setattr(warm, "stamp_of_all", lambda: "stamp")
+    monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path,))
+    (tmp_path / warm.mark("solid", "stamp", kinds.KIND)).touch()
+    warm.make_ready(["solid"])
+    assert asked == compiles
+    warm.make_ready(["solid"], own=True)
+    assert asked == ["solid"]
 
 
 def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):

@@ -31,8 +31,8 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
     return solve.solve_tile(folder, tile, terrain, avoid)
 
 
-def make_ready(pieces: Sequence[str]) -> None:
+def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     """See warm.py."""
     from . import warm
 
-    warm.make_ready(pieces)
+    warm.make_ready(pieces, own)

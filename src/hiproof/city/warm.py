@@ -15,15 +15,23 @@ from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
 from ..compiled import kept, news
+from ..compiled.kinds import KIND, own_processor, runs_kind
 from ..compiled.stamp import PACKAGE, stamp_of_all
 from ..log import LOGGER
 
 
-def make_ready(pieces: Sequence[str]) -> None:
-    """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news` tells."""
+def make_ready(pieces: Sequence[str], own: bool = False) -> None:
+    """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news` tells.
+
+    Code that came with hiproof for processors like this one will do, unless it is to be its `own`.
+    """
     places = kept.folders(make_ready, str(PACKAGE / "__init__.py"))
-    stamp = stamp_of_all()
-    missing = [piece for piece in pieces if not any((place / mark(piece, stamp)).exists() for place in places)]
+    stamp, processors = stamp_of_all(), (own_processor(), KIND)[: 1 if own else 1 + runs_kind()]
+    missing = [
+        piece
+        for piece in pieces
+        if not any((place / mark(piece, stamp, processor)).exists() for processor in processors for place in places)
+    ]
     folder = kept.place_to_write(places) if missing else None
     if folder is None:  # all is there, or nothing can be kept, so that every process has to compile anyway
         return
@@ -34,7 +42,7 @@ def make_ready(pieces: Sequence[str]) -> None:
 
     def work_off() -> None:
         for piece in compiled_pieces(left):
-            (folder / mark(piece, stamp)).touch()
+            (folder / mark(piece, stamp, own_processor())).touch()
 
     with ThreadPoolExecutor(news.processes) as pool:
         for done in [pool.submit(work_off) for _ in range(news.processes)]:
@@ -66,21 +74,15 @@ def compiled_pieces(left: Iterator[str]) -> Iterator[str]:
 
 
 def environment() -> dict[str, str]:
-    """This process's, with its places to import from."""
-    return {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+    """This process's, with its places to import from, and the processor to compile for."""
+    path = os.pathsep.join(filter(None, sys.path))
+    return {**os.environ, "PYTHONPATH": path, "NUMBA_CPU_NAME": own_processor()}
 
 
 def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def mark(piece: str, stamp: str) -> str:
+def mark(piece: str, stamp: str, processor: str) -> str:
     """The name of a piece's mark: another state of any compiled source, another processor or Python has another."""
-    return f"warm.{piece}.{processor()}-{stamp}-run.{kept.PYTHON}.nbc"
-
-
-def processor() -> str:
-    """What is compiled for: this machine's processor, or the kind that numba's own variables name, which runs on several."""
-    from llvmlite.binding import get_host_cpu_name
-
-    return os.environ.get("NUMBA_CPU_NAME") or get_host_cpu_name()
+    return f"warm.{piece}.{processor}-{stamp}-run.{kept.PYTHON}.nbc"

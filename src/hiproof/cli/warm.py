@@ -12,9 +12,9 @@ def warm(
         bool, typer.Option("--all", help="also what only runs without footprints or with --parts one call")
     ] = False,
 ) -> None:
-    """Compile what runs call, once for each version and machine, so that the first run starts at once."""
+    """Compile what runs call, once for each version, for this machine's own processor, so that the first run starts at once."""
     from ..city.tasks import ALL, MAIN_JOB, make_ready
     from .running import Bar
 
     with Bar():
-        make_ready(ALL if everything else MAIN_JOB)
+        make_ready(ALL if everything else MAIN_JOB, own=True)

@@ -5,8 +5,8 @@
 
 numba's own cache looks at the file of the function alone, though functions and constants of other files are compiled
 into it, and takes old code for new after an upgrade. Here code belongs to a stamp of all its sources (stamp.py) and is
-kept under it (kept.py); large functions are called, not copied (linking.py); who wants to show that something is being
-compiled is told by news.py.
+kept under it (kept.py); wheels and images carry code for a kind of processors (kinds.py); large functions are called, not
+copied (linking.py); who wants to show that something is being compiled is told by news.py.
 """
 
 from __future__ import annotations

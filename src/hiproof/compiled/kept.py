@@ -1,5 +1,7 @@
 """Where compiled code is kept: a file for each function, stamp of its sources, argument types and processor.
 
+Code for the kind of processors that wheels carry (kinds.py) is read where there is none for this machine's own.
+
 What has another stamp is never read, and is removed when its successor is written. Files lie in NUMBA_CACHE_DIR, beside
 the sources, or in the user's cache folder: read from any, written to the first that can be written. Where none can,
 functions are compiled in every process, and a warning says so once.
@@ -10,11 +12,10 @@ from __future__ import annotations
 import functools
 import hashlib
 import pickle
-import sys
 import tempfile
 import uuid
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -25,9 +26,9 @@ from numba.core.serialize import dumps
 
 from ..errors import NotKeptWarning
 from . import linking, news
-from .stamp import stamp_of
+from .kinds import KIND, runs_kind
+from .stamp import PYTHON, stamp_of
 
-PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
 DAMAGED = (EOFError, pickle.UnpicklingError)
 
 
@@ -50,9 +51,9 @@ class Kept:
         What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs its memory alone.
         """
         rtsys.initialize(context)
-        for folder in self.folders:
+        for file in self.places(signature, context.codegen().magic_tuple()):
             try:
-                kept, *code = pickle.loads((folder / self.file_name(signature, context.codegen())).read_bytes())
+                kept, *code = pickle.loads(file.read_bytes())
             except (OSError, *DAMAGED):
                 continue
             if kept == signature:
@@ -75,7 +76,7 @@ class Kept:
         folder = place_to_write(self.folders)
         if folder is None:
             return
-        file = folder / self.file_name(signature, result.codegen)
+        file = folder / self.file_name(signature, result.codegen.magic_tuple())
         beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
             beside.write_bytes(dumps((signature, reduced(result), *linking.links(result))))
@@ -85,8 +86,16 @@ class Kept:
             return
         remove_outdated(folder, self.module, self.stamp)
 
-    def file_name(self, signature: Any, codegen: Any) -> str:
-        key = hashlib.sha256(repr((signature, codegen.magic_tuple())).encode()).hexdigest()[:16]
+    def places(self, signature: Any, processor: tuple[str, str, str]) -> Iterator[Path]:
+        """Where the code may lie, that for this machine's own processor first."""
+        system, _, _ = processor
+        for kind in (processor, (system, KIND, ""))[: 1 + runs_kind()]:
+            name = self.file_name(signature, kind)
+            yield from (folder / name for folder in self.folders)
+
+    def file_name(self, signature: Any, processor: tuple[str, str, str]) -> str:
+        """`processor` is numba's name of the system, of the processor and of its features."""
+        key = hashlib.sha256(repr((signature, processor)).encode()).hexdigest()[:16]
         return f"{self.start}-{key}.{PYTHON}.nbc"
 
     def flush(self) -> None:

@@ -19,6 +19,7 @@ IMPORT = re.compile(
     r"^(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ \t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
     re.MULTILINE,
 )
+PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"  # its patches run the same code
 VERSIONS = ("numba", "llvmlite", "numpy")
 HERE = Path(__file__).parent
 PACKAGE = HERE.parent
@@ -48,7 +49,7 @@ def compiled_files() -> list[Path]:
 
 def digest(files: Iterable[Path]) -> str:
     """One stamp of several files, whatever their order and wherever their package lies."""
-    said = hashlib.sha256(" ".join([sys.version, *map(version_of, VERSIONS)]).encode())
+    said = hashlib.sha256(" ".join([PYTHON, *map(version_of, VERSIONS)]).encode())
     for file in sorted(files, key=place_in_package):
         said.update(digest_of(file))
     return said.hexdigest()[:16]

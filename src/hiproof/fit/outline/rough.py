@@ -50,7 +50,7 @@ def rough_outline(points: np.ndarray) -> Rough:
     filled = [from_farthest_corner(shapely.Polygon(ring)) for ring in (pushed.exterior, *pushed.interiors)]
     unit = max(spacing, LEAST_SPACING_M)
     rings = [[corners_of(ring, spacings * unit) for spacings in SIMPLIFY_SPACINGS] for ring in filled]
-    return Rough(rings[:1] + [[corners[::-1] for corners in court] for court in rings[1:]], spacing, shape)
+    return Rough(rings[:1] + [[corners[::-1].copy() for corners in court] for court in rings[1:]], spacing, shape)
 
 
 def telling_count(points: np.ndarray, spacing: float) -> int:
