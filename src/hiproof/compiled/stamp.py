@@ -19,7 +19,8 @@ IMPORT = re.compile(
     r"^(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ \t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
     re.MULTILINE,
 )
-PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"  # its patches run the same code
+# the same for all its patches, which run the same code
+PYTHON = f"py{sys.version_info.major}{sys.version_info.minor}{getattr(sys, 'abiflags', '')}"
 VERSIONS = ("numba", "llvmlite", "numpy")
 HERE = Path(__file__).parent
 PACKAGE = HERE.parent
