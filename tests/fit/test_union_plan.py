@@ -9,7 +9,8 @@ import shapely
 
 from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.apart import told_apart
-from hiproof.fit.union.finish import cost_of, finished, inverse_of, least_squares, weighted_moments
+from hiproof.fit.union.cants import finished, walls_of
+from hiproof.fit.union.finish import cost_of, inverse_of, least_squares, weighted_moments
 from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
@@ -54,7 +55,9 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     volumes = level_volumes(rng, 1 + seed % 4)
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, lines_of(outline, plan, scene), scene)
-    regions = regions_of(volumes, finished(volumes, sides, scene, {}), sides, plan, outline, scene, base)
+    regions = regions_of(
+        volumes, finished(volumes, sides, walls_of(outline, plan), scene, {}), sides, plan, outline, scene, base
+    )
     assert len(regions) == len(volumes)
     polygons = [polygon for own in regions for polygon in own]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
@@ -71,7 +74,9 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     volumes[-1, REPLACES] = 1.0
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, lines_of(outline, plan, scene), scene)
-    regions = regions_of(volumes, finished(volumes, sides, scene, {}), sides, plan, outline, scene, True)
+    regions = regions_of(
+        volumes, finished(volumes, sides, walls_of(outline, plan), scene, {}), sides, plan, outline, scene, True
+    )
     recess = shapely.union_all(regions[-1])
     assert recess.area > 1.0
     assert all(polygon.intersection(recess).area < 1e-3 for own in regions[:-1] for polygon in own)

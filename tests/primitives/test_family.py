@@ -21,10 +21,22 @@ def str_of(shape):
 
 
 def members(shape, count=12):
-    """Members of that shape: irregular ones, regular ones (those of the catalogue) and skewed ones in turn."""
+    """Members of that shape: irregular ones, regular ones (those of the catalogue), skewed ones and canted ones in turn."""
     for seed in range(count):
         rng = np.random.default_rng([seed, SHAPE_NAMES.index(shape)])
-        yield member_of_shape(rng, shape, regular=seed % 3 == 1, skewed=seed % 3 == 2)
+        member = member_of_shape(rng, shape, regular=seed % 4 == 1, skewed=seed % 4 == 2)
+        yield with_cants(rng, member) if seed % 4 == 3 and any(member.has) else member
+
+
+def with_cants(rng, member, most=3):
+    """The member with one to `most` planes over walls that cut corners of its rectangle off."""
+    count = rng.integers(1, most + 1)
+    facing = 0.5 * math.pi * rng.permutation(4)[:count] + rng.uniform(0.3, 1.2, count)
+    distance = np.hypot(*member.half) * rng.uniform(0.6, 0.9, count)
+    return replace(
+        member,
+        cants=np.array([facing, distance, member.base + rng.uniform(-0.5, 2, count), rng.uniform(0.3, 2, count)]),
+    )
 
 
 def over_plan(member):
@@ -174,8 +186,16 @@ def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes
 def test_several_members_are_measured_as_each_of_them(shape, regular):
     member = member_of_shape(np.random.default_rng(3), shape, regular=regular).canonical()
     kind = get(shape) if regular else None
+    if not regular and any(member.has):
+        member = with_cants(np.random.default_rng(4), member)
     each = [
-        replace(member, half=member.half + change, eaves=member.eaves + change, slopes=member.slopes * (1.0 + change))
+        replace(
+            member,
+            half=member.half + change,
+            eaves=member.eaves + change,
+            slopes=member.slopes * (1.0 + change),
+            cants=member.cants + [[0.0], [change], [change], [change]],
+        )
         for change in (0.0, 1e-3, 0.02)
     ]
     looks_alike = member.turned(2).has == member.has  # else it is seen from one side alone
@@ -191,7 +211,31 @@ def several(members):
         for of in ("centre", "half", "eaves", "slopes", "leans")
     )
     centre, half, eaves, slopes, leans = arrays
-    return Member(members[0].kappa, centre, half, eaves, slopes, np.array([own.top for own in members]), leans)
+    tops, cants = np.array([own.top for own in members]), np.stack([own.cants for own in members], axis=2)
+    return Member(members[0].kappa, centre, half, eaves, slopes, tops, leans, cants)
+
+
+@each_shape
+def test_a_cant_rises_square_from_its_wall(shape):
+    """Where its parameters say that its wall is, a cant is as high as its eave, and along it all the way."""
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        member = member_of_shape(rng, shape)
+        if not any(member.has):
+            continue
+        parameters, kappa, translation = with_cants(rng, member).describe()
+        told = [name.split("_")[1] for name in parameters if name.startswith("facing_")]
+        planes = member_of(member.name, parameters, kappa, translation).planes()[-len(told) - member.has_top :][
+            : len(told)
+        ]
+        for cant, plane in zip(told, planes, strict=True):
+            out = kappa + math.radians(parameters[f"facing_{cant}"])
+            way = np.array([math.cos(out), math.sin(out)])
+            wall = translation[:2] + parameters[f"distance_{cant}"] * way
+            places = wall + np.outer([-2.0, 0.0, 2.0], [-way[1], way[0]])
+            eave = translation[2] + parameters[f"eave_{cant}"]
+            assert places @ plane[:2] + plane[2] == pytest.approx(eave, abs=1e-9)
+            assert math.degrees(math.atan(-plane[:2] @ way)) == pytest.approx(parameters[f"pitch_{cant}"], abs=1e-9)
 
 
 def planted_gable(eaves):

@@ -10,6 +10,7 @@ from importlib.resources import files
 import numpy as np
 
 from ..model import Building
+from ..write.attribute_list import ANGLES
 from .view import TILT_DEG, colours_of, lightness, seen_faces, shaded, turn_of
 
 SIZE = (360, 260)  # pixels, width and height: beside a notebook's table
@@ -74,7 +75,7 @@ def parameters_text(part) -> str:
     """Parameters as a person reads them: degrees for angles, else metres."""
     told = []
     for name, value in part.parameters.items():
-        unit = "°" if name.startswith(("pitch_", "skew_")) else "" if name == "teeth" else " m"
+        unit = "°" if name.startswith(ANGLES) else "" if name == "teeth" else " m"
         sigma = f" ± {part.sigma[name]:.2f}" if name in part.sigma else ""
         told.append(f"{escape(name)} {value:.2f}{sigma}{unit}")
     return ", ".join(told)

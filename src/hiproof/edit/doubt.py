@@ -9,6 +9,7 @@ from typing import Any
 from ..log import counted
 from ..status import Doubt as Remark
 from ..status import Status
+from ..write.attribute_list import ANGLES
 
 POOR_SHARE = 0.9  # of points within 0.2 m of the roof
 CLOSE_CALL = 0.2  # by which the most probable type leads
@@ -16,7 +17,6 @@ LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
 LOOSE_M = 0.3  # standard deviation of a part that few points support
 UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT)
 REMARKED = 0.3  # for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
-ANGLES = ("pitch_", "skew_", "rotation")  # beginnings of names: their deviations are degrees
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def is_loose(sigma: Mapping[str, float]) -> bool:
-    return any(value > LOOSE_M for name, value in sigma.items() if not name.startswith(ANGLES))
+    return any(value > LOOSE_M for name, value in sigma.items() if name != "rotation" and not name.startswith(ANGLES))
 
 
 def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:

@@ -10,6 +10,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Roof
+from ..primitives.cants import cants_left_in_place
 from .change import polygon_of, with_sizes
 
 INNER = {"length": ("ridge_length", "top_length"), "width": ("top_width", "break_width", "ridge_offset")}
@@ -42,10 +43,11 @@ def split_part(part: dict[str, Any], side: str = "length", share: float = 0.5) -
     halves = []
     for size, middle, sign in ((share, 0.5 * share - 0.5, -1.0), (1.0 - share, 0.5 * share, 1.0)):
         x, y = np.array(part["position"][:2]) + middle * whole * axis
+        moved = (middle * whole, 0.0) if side == "length" else (0.0, middle * whole)
         halves.append(
             {
                 **part,
-                "parameters": resized(part["parameters"], side, size * whole),
+                "parameters": cants_left_in_place(resized(part["parameters"], side, size * whole), *moved),
                 "position": [float(x), float(y), part["position"][2]],
                 "outlines": outlines_beyond(part["outlines"], cut, sign * axis),
             }
@@ -63,6 +65,8 @@ def merged_parts(one: dict[str, Any], other: dict[str, Any]) -> dict[str, Any]:
     x, y = 0.5 * (low + high) @ np.array([along, across])
     parameters = resized(main["parameters"], "length", float(high[0] - low[0]))
     parameters = resized(parameters, "width", float(high[1] - low[1]))
+    moved = np.array([x, y]) - main["position"][:2]
+    parameters = cants_left_in_place(parameters, float(moved @ along), float(moved @ across))
     together = shapely.union_all([polygon_of(o) for part in (main, side) for o in part["outlines"]], grid_size=GRID_M)
     merged = {key: value for key, value in main.items() if key != "sigma"}
     position = [float(x), float(y), main["position"][2]]

@@ -104,7 +104,7 @@ def rise_of(part: dict[str, Any]) -> float:
 
 
 def rise_of_member(member: Member) -> float:
-    """Height of a member's highest place over its base, within its rectangle, skews left aside."""
+    """Height of a member's highest place over its base, within its rectangle, skews and cants left aside."""
     reach = []
     for axis in (0, 1):
         sides = [side for side in (2 * axis, 2 * axis + 1) if member.has[side]]

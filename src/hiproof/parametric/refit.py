@@ -24,7 +24,7 @@ from ..write.parameters import building_record
 from .edit import built
 from .shape import SIDED
 
-HELD = ("width", "length", "teeth")
+HELD = ("width", "length", "teeth", "skew", "facing", "distance")  # parameters, or beginnings of their names
 STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian
 SCALES_M = (3.0, 0.8, 0.25)  # residuals beyond are outliers, from coarse to fine
 ROUNDS = 6  # at each scale
@@ -89,7 +89,7 @@ def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
 
 
 def unknowns_of(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:
-    """All parameters of all parts but their rectangles, skews and those `fixed` by part; the position's z is "z"."""
+    """All parameters of all parts but their rectangles, where their planes face and those `fixed` by part; the position's z is "z"."""
     rows = []
     for index, part in enumerate(parts):
         held = set(fixed.get(index, ()))
@@ -102,7 +102,7 @@ def unknowns_of(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -
         if Z not in held and not SIDED & part.parameters.keys():  # a member's eaves are free one by one
             rows.append((index, Z, float(part.translation[2]), -np.inf, np.inf))
         for name, value in part.parameters.items():
-            if name not in held and name not in HELD and not name.startswith("skew_"):
+            if name not in held and name.split("_")[0] not in HELD:
                 rows.append((index, name, value, *bounds_of(name, part.parameters)))
     start, low, high = (np.array([row[k] for row in rows], float) for k in (2, 3, 4))
     low, high = np.minimum(low, start), np.maximum(high, start)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
 from ..status import Status
@@ -91,7 +92,8 @@ def described(attributes: tuple[Attribute, ...], kinds: dict[str, Any], required
 
 def parameters_by_type() -> list[dict[str, Any]]:
     """What the parameters of a part of each type must hold, unless they are given side by side."""
-    side_by_side = {"propertyNames": {"pattern": "^(width|length|height|(pitch|eave|skew)_(left|right|front|back))$"}}
+    sides, cants = "(pitch|eave|skew)_(left|right|front|back)", f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]"
+    side_by_side = {"propertyNames": {"pattern": f"^(width|length|height|{sides}|{cants})$"}}
     rules = []
     for kind, shape in CATALOGUE.items():
         own = [

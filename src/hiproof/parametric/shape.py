@@ -8,12 +8,13 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import FitError, InputError
+from ..primitives.cants import CANTED, MEASURES, cants_named
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.contract import LEVEL
 from ..primitives.family import COMPONENTS, SIDES, eaves_of
 
-SIDED = frozenset(f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew"))
-"""Parameters of a member's sides; a part that has one gives all of its shape side by side."""
+SIDED = CANTED | {f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew")}
+"""Parameters of a member's sides and cants; a part that has one gives all of its shape side by side."""
 
 STEEPEST_DEG = 89.0  # degrees; steeper is a wall, and its height at an edge is beyond any file's digits
 SHOWN = 8  # names in a sentence; more would hide what is said
@@ -81,7 +82,8 @@ def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> 
         refuse_other_names(kind, parameters, list(CATALOGUE[kind].parameters), [], where)
     needed = side_by_side_names(kind)
     skews = [name.replace("pitch", "skew") for name in needed if name.startswith("pitch_")]
-    refuse_other_names(kind, parameters, list(needed), skews, where)
+    cants = [f"{what}_{cant}" for cant in cants_named(parameters) for what in MEASURES]
+    refuse_other_names(kind, parameters, [*needed, *cants], skews, where)
     for name, value in parameters.items():
         low = 0.0 if name.startswith("pitch_") else -STEEPEST_DEG
         if name.startswith(("pitch_", "skew_")) and not low <= value <= STEEPEST_DEG:
@@ -100,7 +102,7 @@ def names_of(kind: str) -> tuple[str, ...]:
 
 
 def side_by_side_names(kind: str) -> tuple[str, ...]:
-    """The parameters of a member of the family, each side's own; skews, which are seldom there, left out."""
+    """The parameters of a member of the family, each side's own; skews and cants, which are seldom there, left out."""
     shape = CATALOGUE[kind]
     of_sides = [f"{what}_{SIDES[side]}" for side in eaves_of(shape) for what in ("pitch", "eave")]
     return ("width", "length", *(["height"] if LEVEL in shape.sides else []), *of_sides)

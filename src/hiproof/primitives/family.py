@@ -12,6 +12,8 @@ catalogue (level eaves, equal pitches) its parameters are that shape's, else the
     pitch_SIDE      the slope of the side's plane (degrees)
     eave_SIDE       the height of that side's eave in its middle above T_L (m), which is the lowest eave
     skew_SIDE       how far the side's plane faces off its axis (degrees), where it does
+
+Where walls cut a corner of the rectangle off it may have planes over these, too (`cants`).
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ import shapely
 
 from ..errors import FitError
 from ..model import Part, Piece
+from .cants import cants_of_words, cants_turned, no_cants, planes_of_cants, words_of_cants
 from .catalogue import CATALOGUE, get
 from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, Q0, RIGHT, Primitive
 
@@ -72,8 +75,9 @@ COMPONENTS = {
 class Member:
     """A shape of the family: `kappa` (rad), `centre` (2,) and `half` (2,) extents along u and v, heights of the eaves (4,) at
     their own sides, infinite where a side has no plane, `slopes` (4,), and the height of the level `top`, infinite without one.
-    `leans` (4,) are what the planes rise along their sides, as shares of their slopes. Several of one `kappa` that have planes on the
-    same sides may be one `Member`: its arrays then have a further axis, and its `top` is an array, of one place for each.
+    `leans` (4,) are what the planes rise along their sides, as shares of their slopes, `cants` (4, c) further planes. Several of one
+    `kappa` that have planes on the same sides may be one `Member`: its arrays then have a further axis, and its `top` is an array, of
+    one place for each.
 
     >>> gable = Member(0.0, np.zeros(2), np.array([6.0, 4.0]), np.array([np.inf, np.inf, 5.0, 5.0]), np.array([0, 0, 0.5, 0.5]))
     >>> gable.name, gable.describe()[0]
@@ -87,6 +91,7 @@ class Member:
     slopes: np.ndarray
     top: Any = math.inf
     leans: np.ndarray = field(default_factory=lambda: np.zeros(4))
+    cants: np.ndarray = field(default_factory=no_cants)
 
     @cached_property
     def has(self) -> tuple[bool, ...]:
@@ -113,20 +118,23 @@ class Member:
     @property
     def base(self) -> Any:
         """Height of the lowest eave, of the top where there is none: z of T_L."""
-        return self.eaves.min(axis=0) if any(self.has) else self.top
+        eaves = [eaves.min(axis=0) for eaves in (self.eaves, self.cants[2]) if len(eaves)]
+        return np.minimum.reduce(eaves) if any(self.has) else self.top
 
     def those(self, which: int | list[int]) -> Member:
         """One or some of several."""
         centre, half, eaves, slopes = (of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes))
-        return Member(self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which])
+        cants = self.cants[..., which] if self.cants.shape[1] else no_cants()
+        return Member(self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which], cants)
 
     def own_planes(self) -> list[tuple[float, float, float]]:
-        """Planes a, b, c over u, v about the centre: those of the sides in order, then the top."""
-        planes = []
+        """Planes a, b, c over u, v about the centre: those of the sides in order, of the cants, then the top."""
+        planes: list[tuple[float, float, float]] = []
         for side in self.sides:
             rise, along = SIGN[side] * self.slopes[side], self.leans[side] * self.slopes[side]
             middle = self.eaves[side] + self.slopes[side] * self.half[side // 2]
             planes.append((rise, along, middle) if side < FRONT else (along, rise, middle))
+        planes += planes_of_cants(self.cants)
         return [*planes, (0.0, 0.0, self.top)] if self.has_top else planes
 
     def planes(self) -> np.ndarray:
@@ -157,7 +165,7 @@ class Member:
         sides, leans_turn = TURNS[quarters]
         half = self.half[::-1].copy() if quarters % 2 else self.half
         eaves, slopes, leans = self.eaves[sides], self.slopes[sides], (self.leans[sides].T * leans_turn).T
-        return Member(kappa, self.centre, half, eaves, slopes, self.top, leans)
+        return Member(kappa, self.centre, half, eaves, slopes, self.top, leans, cants_turned(self.cants, quarters))
 
     def canonical(self) -> Member:
         """The same surface in the direction in which it is named: the ridge along u, planes on the sides that SHAPES says."""
@@ -219,7 +227,7 @@ class Member:
     @cached_property
     def in_catalogue(self) -> tuple[Primitive, np.ndarray] | None:
         """The catalogue's shape that is the same surface, and its canonical theta (9,), of a member in its canonical direction."""
-        if self.leans.any():
+        if self.leans.any() or self.cants.shape[1]:
             return None
         own = self.own_planes()
         for shape in get(self.name).variants:
@@ -267,7 +275,7 @@ class Member:
             parameters[f"eave_{SIDES[side]}"] = self.eaves[side] - base
             if self.leans[side].any():
                 parameters[f"skew_{SIDES[side]}"] = degrees(self.leans[side])
-        return parameters
+        return parameters | words_of_cants(self.cants, base)
 
     def measures_of(self, shape: Primitive | None, kappa: float) -> list[Any]:
         """The parameters and t_z that this member, or each of several, has as `shape`, side by side without one; seen from `kappa` or its
@@ -358,13 +366,14 @@ def member_of(name: str, parameters: Mapping[str, float], kappa: float, translat
             eaves[side] = translation[2] + parameters[f"eave_{SIDES[side]}"]
             slopes[side] = math.tan(math.radians(parameters[f"pitch_{SIDES[side]}"]))
             leans[side] = math.tan(math.radians(parameters.get(f"skew_{SIDES[side]}", 0.0)))
+        cants = cants_of_words(parameters, translation[2])
         height = translation[2] + parameters["height"] if top else math.inf
         half = 0.5 * np.array([parameters["length"], parameters["width"]])
     except KeyError as missing:
         raise FitError(
             f"expected the parameter {missing.args[0]} of a {name} roof, got {', '.join(parameters)}; give every one"
         ) from missing
-    return Member(kappa, np.asarray(translation[:2], float), half, eaves, slopes, height, leans)
+    return Member(kappa, np.asarray(translation[:2], float), half, eaves, slopes, height, leans, cants)
 
 
 def member_like(shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> Member:

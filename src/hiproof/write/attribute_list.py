@@ -201,7 +201,10 @@ SHAPE = {
     },
     **{f"{what}_{side}": told for side in ("front", "back", "left", "right") for what, told in OF_SIDES.items()},
 }
-"""Every parameter of a part by name: unit and meaning."""
+"""Every parameter of a part by name, but for those of cants: unit and meaning."""
+
+ANGLES = tuple(f"{what}_" for what in ("pitch", "skew", "facing"))
+"""Beginnings of the names of parameters in degrees; all others but a number of teeth are in metres."""
 
 PARTS_LAYER = (
     Attribute("building_id", "text", "", "id of the building"),
@@ -213,6 +216,12 @@ PARTS_LAYER = (
     Attribute("z_eave", "number", "m", "height of its lowest eave in the world; of its ridge or top: z_eave + height"),
     Attribute("rotation", "number", "deg", "from the x axis to its length, counter-clockwise"),
     *(Attribute(name, "number", unit, meaning) for name, (unit, meaning) in SHAPE.items()),
+    Attribute(
+        "cants",
+        "text",
+        "deg, m, m, deg",
+        "planes over walls that cut a corner off, as JSON: a list of facing, distance, eave, pitch for each",
+    ),
     *(
         Attribute(f"{name}_sigma", "number", unit, f"standard deviation of {name}")
         for name, unit in {

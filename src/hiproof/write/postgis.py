@@ -28,7 +28,8 @@ from .attribute_list import OWN, PARTS_LAYER
 from .triangles import faces_triangles
 
 PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
-MEASURES = ", ".join(f"{a.name} double precision" for a in PARTS_LAYER if a.kind == "number")
+KINDS = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
+MEASURES = ", ".join(f"{a.name} {KINDS[a.kind]}" for a in PARTS_LAYER[3:])
 SCHEMA = """
 create extension if not exists postgis;
 create table if not exists {buildings} (

@@ -13,6 +13,7 @@ import shapely
 from ..errors import OutputError
 from ..frames import METRES, Units
 from ..model import ROOF, Building, Face, Part
+from ..primitives.cants import CANTED, MEASURES, cants_named
 from .attribute_list import SHAPE
 from .roof_figures import RoofFigures
 from .shown import shown_areas
@@ -91,9 +92,17 @@ def part_values(building: Building, number: int, shown: shapely.Geometry) -> dic
         "y": metres(y),
         "z_eave": metres(z),
         "rotation": rounded(math.degrees(part.kappa)),
-        **{name: rounded(value) for name, value in part.parameters.items()},
+        **{name: rounded(value) for name, value in part.parameters.items() if name not in CANTED},
+        **cants_in_one(part),
         **sigmas_of(part),
     }
+
+
+def cants_in_one(part: Part) -> dict[str, str]:
+    """The column of a part's cants, where it has any: thirty columns that hardly a part fills would hide the others."""
+    cants = cants_named(part.parameters)
+    told = [[rounded(part.parameters[f"{what}_{cant}"]) for what in MEASURES] for cant in cants]
+    return {"cants": TEXT.encode(told)} if cants else {}
 
 
 def sigmas_of(part: Part) -> dict[str, float]:

@@ -20,7 +20,9 @@ slivers     planes of which a narrow strip shows
 apart       volumes that show in several places
 sides       each side on the line of the outline that it all but follows
 finish      all planes to all points, along their sides, eaves level where the points allow it
-unite       volumes that only skewed walls keep apart, made one
+cants       planes over walls that cut a volume's corners off
+cut_corners one volume over such walls in place of several
+unite       volumes that only skewed walls or cut corners keep apart, made one
 bays        level volumes over small pieces that walls cut off the outline
 members     the volumes whose planes points tell, by the unknowns of all
 agree       planes, slopes, ridges and eaves that volumes have in common

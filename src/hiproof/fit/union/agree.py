@@ -21,7 +21,7 @@ from .finish import LEVEL_SLACK, ROUNDS, SIGN, Planes, cost_of, normal_equations
 from .members import Member, members_of, unknowns_of
 from .scene import Scene
 from .sides import Side
-from .volumes import LEVEL, PARAMETER_COST, SIDES
+from .volumes import PARAMETER_COST, SIDES
 
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
@@ -34,7 +34,7 @@ HELD = 1e-6  # an equation that the others leave so little of holds by them
 
 @dataclass(frozen=True)
 class Fit:
-    """The unknowns (p,) and their covariance (p, p), every member's rows (5, 3) and what the points cost."""
+    """The unknowns (p,) and their covariance (p, p), every member's rows (k, 3) and what the points cost."""
 
     unknowns: np.ndarray
     covariance: np.ndarray
@@ -217,6 +217,7 @@ def null_space(equations: np.ndarray) -> np.ndarray:
 def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: Scene) -> Fit:
     """All planes by biweighted least squares on their points, over unknowns (p,) that are `basis` (p, q) times any."""
     own, rows = np.concatenate([member.own for member in members]), [member.rows for member in members]
+    ends = np.cumsum([len(planes) for planes in rows])[:-1]
     absent, scale = np.isnan(np.concatenate(rows)), scene.dead + scene.width
     for turn in range(ROUNDS):
         normal, right, total, misfit = np.zeros((len(start), len(start))), np.zeros(len(start)), 0.0, 0.0
@@ -230,8 +231,8 @@ def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: S
         unknowns = inverse @ (right + ridge * start)
         every = own @ unknowns
         every[absent] = np.nan
-        rows = list(every.reshape(len(members), LEVEL + 1, 3))
+        rows = np.split(every, ends)
     cost = sum(cost_of(own, member.points, scene.dead, scene.width) for member, own in zip(members, rows, strict=True))
-    if not all(proper(own) for own in rows):
+    if not all(proper(own, member.walls) for member, own in zip(members, rows, strict=True)):
         cost = np.inf
     return Fit(unknowns, inverse * misfit / max(total, 1.0), rows, cost)

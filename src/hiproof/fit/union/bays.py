@@ -13,12 +13,11 @@ import numpy as np
 import shapely
 
 from .add import UNEXPLAINED
-from .objective import base_shows
+from .objective import base_shows, misfits
 from .plan import Plan
-from .regions import THICK_M, misfits
+from .regions import THICK_M
 from .scene import Scene
-from .sides import lines_of
-from .unite import Drawn, drawn
+from .unite import Drawn, drawn, ends_of
 from .volumes import COLUMNS, DIRECTION, LEVEL, OFFSET, PLANES, REPLACES, U0, U1, V0, V1, is_allowed, roof_heights
 
 # m2 of a bay, and its share of the outline at most: what is larger has points enough for the search; m of its narrower side
@@ -56,7 +55,7 @@ def with_bays(roof: Drawn, outline: shapely.Polygon, plan: Plan, scene: Scene, u
             break
         volumes = np.vstack([volumes, levels[best]])
         del left[best]
-    return roof if volumes is roof.volumes else drawn(volumes, lines_of(outline, plan, scene), scene, {})
+    return roof if volumes is roof.volumes else drawn(volumes, ends_of(outline, plan, scene), scene, {})
 
 
 def all_points(plan: Plan, scene: Scene) -> Seen:

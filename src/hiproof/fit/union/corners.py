@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .members import Member, heights_at
+from .members import Member, heights_at, rows_at
 from .sides import CORNER_SIDES, corners_of
 from .volumes import LEVEL
 
@@ -39,7 +39,7 @@ def creases_at_corners(
 ) -> Iterator[tuple[float, tuple[int, int], np.ndarray]]:
     """Equations (1, p) between planes that meet beside a corner, of the outline's `ring` (c, 2) or where a step ends at it, at the
     unknowns `start` (p,): how far apart in height (m) they are there, and between which two members."""
-    rows = np.array([np.where(np.isfinite(member.rows), member.common @ start, np.nan) for member in members])
+    rows = rows_at(members, start)
     corners = np.vstack([ring, *(own_corners(member, ring) for member in members)])
     for corner, planes in zip(corners, planes_at(members, rows, corners), strict=True):
         at = np.array([*corner, 1.0])
@@ -63,7 +63,7 @@ def planes_at(members: list[Member], rows: np.ndarray, corners: np.ndarray) -> l
     each = rows @ np.column_stack([corners, np.ones(len(corners))]).T
     heights = heights_at(members, rows, corners, REACH_M)
     near = (heights > heights.max(axis=0) - NEAR_M)[:, None] & (each < heights[:, None] + NEAR_M)
-    near &= np.array([[p in member.seen for p in range(LEVEL + 1)] for member in members])[:, :, None]
+    near &= np.array([[p in member.seen for p in range(rows.shape[1])] for member in members])[:, :, None]
     found: list[list[Plane]] = [[] for _ in corners]
     for c, k, p in np.argwhere(near.transpose(2, 0, 1)).tolist():
         found[c].append(Plane(k, p, float(each[k, p, c]), rows[k, p]))

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -40,38 +41,39 @@ FLATTEST = 0.02  # rise over run; a flatter plane does not tell which way it fac
 SQUARE = 1e-3  # a side that leans less is square to the others
 
 
+class Wall(NamedTuple):
+    """A wall of the outline in a volume's axes: the way it looks out (rad), and how far out that way from the origin it lies (m)."""
+
+    facing: float
+    offset: float
+
+
 @dataclass(frozen=True)
 class Planes:
-    """A volume's planes by place (left, right, front, back, top): z = a u + b v + c as rows (5, 3), NaN where it has none.
+    """A volume's planes by place (left, right, front, back, top, over each of `walls`): z = a u + b v + c as rows (k, 3), NaN where it
+    has none.
 
-    `cost` is that of their points. They are `design` (5, 3, p) times p unknowns with this `covariance` (p, p).
+    `cost` is that of their points, `price` that of the parameters of those over walls. They are `design` (k, 3, p) times p unknowns with
+    this `covariance` (p, p).
     """
 
     rows: np.ndarray
     cost: float
     design: np.ndarray
     covariance: np.ndarray
+    walls: tuple[Wall, ...] = ()
+    price: float = 0.0
+
+    @property
+    def inclined(self) -> int:
+        """How many planes rise from sides."""
+        return int(np.isfinite(self.rows[:LEVEL, 2]).sum())
 
     @property
     def modes(self) -> np.ndarray:
-        """Independent changes (5, 3, p) of the rows, of one standard deviation each."""
+        """Independent changes (k, 3, p) of the rows, of one standard deviation each."""
         variances, axes = np.linalg.eigh(self.covariance)
         return self.design @ (axes * np.sqrt(np.maximum(variances, 0.0)))
-
-
-# planes by all that they depend on in one scene: their volume, its sides, and the points over which it shows
-Known = dict[tuple[bytes, tuple[Side, ...], bytes], Planes]
-
-
-def finished(volumes: np.ndarray, sides: list[list[Side]], scene: Scene, known: Known) -> list[Planes]:
-    """The planes of every volume, in its direction's axes; those `known` are not fitted again, those found become known."""
-    planes = []
-    for volume, own, members in zip(volumes, sides, shown_points(volumes, scene), strict=True):
-        key = volume.tobytes(), tuple(own), members.tobytes()
-        if key not in known:
-            known[key] = finished_volume(volume, own, scene, members)
-        planes.append(known[key])
-    return planes
 
 
 def shown_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
@@ -81,11 +83,16 @@ def shown_points(volumes: np.ndarray, scene: Scene) -> list[np.ndarray]:
     return [np.nonzero(top == k)[0] for k in range(len(volumes))]
 
 
+def points_of(volume: np.ndarray, members: np.ndarray, scene: Scene) -> np.ndarray:
+    """The points `members` (m,) in a volume's own axes: u, v, z (3, m)."""
+    direction = int(volume[DIRECTION])
+    return np.array([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
+
+
 def finished_volume(volume: np.ndarray, sides: list[Side], scene: Scene, members: np.ndarray) -> Planes:
     """One volume's planes from the points `members` (m,) over which it shows."""
     there = np.flatnonzero(volume[OFFSET : OFFSET + LEVEL + 1] < np.inf).tolist()
-    direction = int(volume[DIRECTION])
-    points = np.array([scene.U[direction][members], scene.V[direction][members], scene.z[members]])
+    points = points_of(volume, members, scene)
     start = planes_as_found(volume, there, points, scene)
     if len(members) < FEWEST_POINTS:
         return start
@@ -305,7 +312,15 @@ def cost_of(rows, points, dead, width):
     return total
 
 
-def proper(rows: np.ndarray) -> bool:
-    """Whether every inclined plane rises from its own side, neither too flat nor too steep."""
-    slopes = rows[0, 0], -rows[1, 0], rows[2, 1], -rows[3, 1]
+def proper(rows: np.ndarray, walls: tuple[Wall, ...] = ()) -> bool:
+    """Whether every inclined plane rises from its own side or wall, neither too flat nor too steep."""
+    slopes = rows[0, 0], -rows[1, 0], rows[2, 1], -rows[3, 1], *slopes_over(walls, rows[LEVEL + 1 :])
     return all(FLATTEST < slope < SLOPE_HIGH for slope in slopes if math.isfinite(slope))
+
+
+def slopes_over(walls: tuple[Wall, ...], rows: np.ndarray) -> list[float]:
+    """By how much planes (c, 3) rise from their walls."""
+    return [
+        -float(a * math.cos(wall.facing) + b * math.sin(wall.facing))
+        for wall, (a, b, _) in zip(walls, rows, strict=True)
+    ]

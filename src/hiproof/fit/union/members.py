@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .finish import FEWEST_POINTS, Planes, shown_points
+from .finish import FEWEST_POINTS, Planes, Wall, shown_points
 from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION
@@ -16,7 +16,7 @@ from .volumes import DIRECTION
 class Member:
     """A volume as one of several.
 
-    `rows` (5, 3) are its planes in its own axes, by all p unknowns `own` (5, 3, p) there and `common` (5, 3, p) in the first
+    `rows` (k, 3) are its planes in its own axes, by all p unknowns `own` (k, 3, p) there and `common` (k, 3, p) in the first
     direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
     the numbers of its planes on which any lie, with the numbers of those.
     """
@@ -28,6 +28,7 @@ class Member:
     places: np.ndarray
     seen: dict[int, np.ndarray]
     sides: list[Side]
+    walls: tuple[Wall, ...]
     turn: np.ndarray
 
 
@@ -47,7 +48,15 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         points = np.array([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
         places = np.array([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
         found[k] = Member(
-            rows, own, common, points, places, lowest_planes(rows, points), sides[k], scene.turn[direction]
+            rows,
+            own,
+            common,
+            points,
+            places,
+            lowest_planes(rows, points),
+            sides[k],
+            planes[k].walls,
+            scene.turn[direction],
         )
     return found
 
@@ -69,8 +78,16 @@ def unknowns_of(members: list[Member]) -> np.ndarray:
     return np.linalg.lstsq(design, rows, rcond=None)[0]
 
 
+def rows_at(members: list[Member], unknowns: np.ndarray) -> np.ndarray:
+    """The members' planes (m, k, 3) in the first direction's axes where the unknowns (p,) are these; NaN where there is none."""
+    rows = np.full((len(members), max(len(member.rows) for member in members), 3), np.nan)
+    for own, member in zip(rows, members, strict=True):
+        own[: len(member.rows)] = np.where(np.isfinite(member.rows), member.common @ unknowns, np.nan)
+    return rows
+
+
 def heights_at(members: list[Member], rows: np.ndarray, places: np.ndarray, reach_m: float = 0.0) -> np.ndarray:
-    """Heights (m, n) of the members, whose planes are `rows` (m, 5, 3), at `places` (n, 2), u, v of the first direction's axes.
+    """Heights (m, n) of the members, whose planes are `rows` (m, k, 3), at `places` (n, 2), u, v of the first direction's axes.
 
     Minus infinity of those that end more than `reach_m` before it.
     """
@@ -81,7 +98,12 @@ def heights_at(members: list[Member], rows: np.ndarray, places: np.ndarray, reac
 
 def is_inside(member: Member, places: np.ndarray, reach_m: float) -> np.ndarray:
     """Which of `places` (n, 2), u, v of the first direction's axes, lie inside a member's sides, or so near them."""
-    (c, s), (left, right, front, back), (x, y) = member.turn.tolist(), member.sides, places.T
-    u, v = c * x + s * y, c * y - s * x
+    c, s = member.turn
+    return lies_inside(places @ np.array([[c, -s], [s, c]]), member.sides, reach_m)
+
+
+def lies_inside(places: np.ndarray, sides: list[Side], reach_m: float = 0.0) -> np.ndarray:
+    """Which of `places` (n, 2), u, v of their volume's axes, lie inside its sides, or so near them."""
+    (left, right, front, back), (u, v) = sides, places.T
     across_u = (left.at + left.lean * v - u < reach_m) & (u - right.at - right.lean * v < reach_m)
     return across_u & (front.at + front.lean * u - v < reach_m) & (v - back.at - back.lean * u < reach_m)

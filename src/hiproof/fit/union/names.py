@@ -10,7 +10,7 @@ import shapely
 
 from ...model import Part
 from ...primitives.family import AXIS, SIGN, Member, name_among
-from .finish import Planes
+from .finish import Planes, Wall
 from .plan import Plan
 from .scene import Scene
 from .sides import Side
@@ -23,7 +23,7 @@ STRAIGHT = 1e-9  # rad; numerically the same direction
 GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
 # standard deviations of a swath's place and height, which no point of a building tells: roofs lie beside their outline by the former
 REGISTERED_PLAN_M, REGISTERED_M = 0.03, 0.01
-RAISED = np.tile([[0.0], [0.0], [REGISTERED_M]], (SIDES + 1, 1, 1))  # planes (5, 3, 1) changed by the latter
+RAISED = np.array([[0.0], [0.0], [REGISTERED_M]])  # a plane (3, 1) changed by the latter
 PROBE_M = 0.01  # how far an end is moved to see which parameters depend on it
 
 
@@ -52,28 +52,30 @@ def part_of(
     tried = np.array([ends, ends, ends, *known, *unknown]).T
     every = np.repeat(rows[:, :, None], tried.shape[1], axis=2)
     every[:, :, 1:3] += turned(registrations, turn)
-    members = regular(every, tried, math.atan2(axes[0, 1], axes[0, 0]))
+    walls = tuple(wall._replace(facing=wall.facing - turn) for wall in planes.walls)
+    members = regular(every, tried, math.atan2(axes[0, 1], axes[0, 0]), walls)
     member = members.those(0)
     turns = member.quarter_turns
-    modes = np.concatenate([turned(planes.modes, turn), RAISED], axis=2)
-    changes = changed(members, modes).turned(turns)
+    modes = np.concatenate([turned(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2)
+    shown = np.isfinite(rows[:, 2])
+    changes = changed(members, np.vstack([modes[: LEVEL + 1], modes[LEVEL + 1 :][shown[LEVEL + 1 :]]])).turned(turns)
     member = replace(member.turned(turns), centre=member.centre @ axes + plan.frame.origin[:2])
     return member.part(regions, name_among(member.name, allowed), changes, len(unknown))
 
 
 def registered(planes: Planes, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """By how much (5, 3, 2) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
+    """By how much (k, 3, 2) planes change were their points' swath to lie further along u or along v by a standard deviation: as those
     that show (`rows`) can over the corners `at` (n, 3), u, v, 1, tied to sides of the outline as they are."""
     there = np.isfinite(rows[:, 2])
     if not rows[there, :2].any():  # level ones stay as high
-        return np.zeros((SIDES + 1, 3, 2))
+        return np.zeros((len(rows), 3, 2))
     design = (at @ planes.design[there]).reshape(there.sum() * len(at), planes.design.shape[2])
     shifted = -REGISTERED_PLAN_M * rows[there, :2].repeat(len(at), axis=0)
     return planes.design @ np.linalg.lstsq(design, shifted, rcond=None)[0]
 
 
 def showing(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Which planes (5,) are not everywhere above some single other one over the regions' corners `at` (n, 3), u, v, 1."""
+    """Which planes (k,) are not everywhere above some single other one over the regions' corners `at` (n, 3), u, v, 1."""
     there = np.isfinite(rows[:, 2])
     if there.sum() < 2:
         return there
@@ -97,7 +99,7 @@ def common_lean(rows: np.ndarray) -> float:
 
 
 def turned(rows: np.ndarray, angle: float) -> np.ndarray:
-    """Planes (5, 3), or several (5, 3, m), over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
+    """Planes (k, 3), or several (k, 3, m), over axes turned by `angle`; what then faces along an axis but for rounding does so exactly."""
     if angle == 0.0:
         return rows
     c, s = math.cos(angle), math.sin(angle)
@@ -143,11 +145,11 @@ def ends_moved(sides: list[Side], ends: list[float]) -> tuple[list[list[float]],
     return known, unknown
 
 
-def regular(rows: np.ndarray, ends: np.ndarray, kappa: float) -> Member:
-    """Members over m rectangles, lowest and highest u, v `ends` (4, m), with planes `rows` (5, 3, m), which all have the same sides,
-    in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are."""
+def regular(rows: np.ndarray, ends: np.ndarray, kappa: float, walls: tuple[Wall, ...] = ()) -> Member:
+    """Members over m rectangles, lowest and highest u, v `ends` (4, m), with planes `rows` (5 and those over `walls`, 3, m), which all
+    have the same sides, in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are."""
     centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
-    there = np.flatnonzero(np.isfinite(rows[:, 2, 0])).tolist()
+    there = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
     sides, count = [k for k in there if k < SIDES], rows.shape[2]
     eaves, slopes, leans = np.full((SIDES, count), np.inf), np.zeros((SIDES, count)), np.zeros((SIDES, count))
     for k in sides:
@@ -158,7 +160,21 @@ def regular(rows: np.ndarray, ends: np.ndarray, kappa: float) -> Member:
     top = rows[LEVEL, 2] if LEVEL in there else np.full(count, np.inf)
     if sides:
         centre, half, eaves = level(centre, half, eaves, slopes, leans, sides)
-    return with_one_apex(Member(kappa, centre, half, eaves, slopes, top, leans))
+    return with_one_apex(
+        Member(kappa, centre, half, eaves, slopes, top, leans, cants_of(rows[LEVEL + 1 :], walls, centre))
+    )
+
+
+def cants_of(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray) -> np.ndarray:
+    """The cants (4, c, m) of members about `centre` (2, m), whose planes over `walls` are `rows` (n, 3, m), NaN where one shows nowhere."""
+    cants = []
+    for wall, (a, b, z) in zip(walls, rows, strict=True):
+        c, s = math.cos(wall.facing), math.sin(wall.facing)
+        out = wall.offset - c * centre[0] - s * centre[1]
+        eave = a * (centre[0] + out * c) + b * (centre[1] + out * s) + z
+        cants.append([np.full_like(out, wall.facing), out, eave, -c * a - s * b])
+    shown = [cant for cant in cants if np.isfinite(cant[3]).all()]
+    return np.array(shown).reshape(-1, 4, centre.shape[1]).swapaxes(0, 1)
 
 
 def level(
@@ -178,7 +194,7 @@ def level(
 
 
 def changed(members: Member, changes: np.ndarray) -> Member:
-    """The first of several with its planes changed by each of `changes` (5, 3, p), its sides where they are; and the others."""
+    """The first of several with its planes changed by each of `changes` (5 and cants, 3, p), its sides where they are; and the others."""
     count = changes.shape[2]
     found = members.those([0] * count + list(range(1, members.eaves.shape[1])))
     for k in members.sides:
@@ -188,6 +204,11 @@ def changed(members: Member, changes: np.ndarray) -> Member:
         found.slopes[k, :count] += SIGN[k] * changes[k, axis]
         found.eaves[k, :count] += changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
     found.top[:count] += changes[LEVEL, 2]
+    for k, (a, b, z) in enumerate(changes[LEVEL + 1 :]):
+        facing, out = members.cants[:2, k, 0]
+        c, s = math.cos(facing), math.sin(facing)
+        found.cants[2, k, :count] += a * (members.centre[0, 0] + out * c) + b * (members.centre[1, 0] + out * s) + z
+        found.cants[3, k, :count] -= c * a + s * b
     return found
 
 

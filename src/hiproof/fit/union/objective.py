@@ -26,6 +26,11 @@ def point_cost(z_point, z_roof, dead, width):
     return r if r < 1.0 else 1.0
 
 
+def misfits(z: np.ndarray, height: np.ndarray | float, scene) -> np.ndarray:
+    """What each point at `z` (n,) costs under a roof so high (n,)."""
+    return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
+
+
 @compiled(inline="always")
 def ghost_cost(z_roof, weight, shade, low, high):
     return weight if (z_roof < low) | (z_roof > high) else shade * (z_roof - low) / (high - low)

@@ -11,6 +11,7 @@ from ...model import Part
 from ...rings import GRID_M
 from .apart import IN_LINE_M
 from .finish import Planes
+from .objective import misfits
 from .plan import Plan
 from .scene import Scene
 from .sides import Side, corners_of
@@ -113,11 +114,6 @@ def points_in(region: shapely.Geometry, plan: Plan, scene: Scene) -> tuple[np.nd
     xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
     inside = shapely.contains_xy(region, xy[:, 0], xy[:, 1])
     return xy[inside], scene.z[: scene.n][inside]
-
-
-def misfits(z: np.ndarray, height: np.ndarray | float, scene: Scene) -> np.ndarray:
-    """What each point at `z` (n,) costs under a roof so high (n,)."""
-    return np.clip((np.abs(z - height) - scene.dead) / scene.width, 0.0, 1.0) ** 2
 
 
 def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan, scene: Scene) -> np.ndarray:

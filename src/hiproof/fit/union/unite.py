@@ -9,22 +9,48 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from .finish import SQUARE, Known, Planes, finished
+from .cants import Known, finished, walls_of
+from .cut_corners import over_cut_corners
+from .finish import SQUARE, Planes
 from .moves import refit_each, without
-from .objective import base_shows, edges_cost, objective
+from .objective import base_shows, costs, edges_cost, objective
 from .plan import Plan
 from .scene import Scene
 from .sides import Lines, Side, lines_of, sides_of
-from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, PLANES, REPLACES, SLOPE, U0, V0, V1, distances_up, volume_cost
+from .volumes import (
+    DIRECTION,
+    LEAN,
+    LEVEL,
+    OFFSET,
+    PLANES,
+    REPLACES,
+    SLOPE,
+    U0,
+    V0,
+    V1,
+    distances_up,
+    roof_heights,
+    volume_cost,
+)
 
 BESIDE_M, IN_LINE_M = 0.4, 1.0  # how far apart the rectangles may lie, and their sides along the line of both
 SLOPES_ALIKE, HEIGHTS_ALIKE_M = 0.15, 0.5  # rise over run, m: further apart, two volumes are not tried as one
 # so much dearer along the axes, no roof is made cheaper by planes that face otherwise: of ten the most was 9
 HOPELESS_UNITS = 20.0
+HOPEFUL_UNITS = 2.0  # that fitting may still gain
+MOST_CUT = 2  # volumes drawn out over walls that cut corners off: a house has one bay or two
+
+
+class Ends(NamedTuple):
+    """What an outline ends volumes with: the lines that sides may take, by direction, and its walls (m, 2, 2)."""
+
+    lines: list[list[Lines]]
+    walls: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -39,9 +65,9 @@ class Drawn:
 
 def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
     """The volumes along their sides, without those that do not pay once planes face as these do."""
-    lines, value = lines_of(outline, plan, scene), objective(volumes, scene, np.inf)
+    ends, value = ends_of(outline, plan, scene), objective(volumes, scene, np.inf)
     known: Known = {}
-    best = drawn(volumes, lines, scene, known)
+    best = with_cut_corners(drawn(volumes, ends, scene, known), ends, scene, known)
     tried = True
     while tried:
         tried = False
@@ -51,11 +77,43 @@ def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Sce
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
             if found > value + HOPELESS_UNITS * scene.evidence:
                 continue
-            roof = drawn(trial, lines, scene, known)
+            roof = drawn(trial, ends, scene, known)
             if roof.cost < best.cost:
                 best, value, tried = roof, found, True
                 break
     return best
+
+
+def ends_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> Ends:
+    return Ends(lines_of(outline, plan, scene), walls_of(outline, plan))
+
+
+def with_cut_corners(roof: Drawn, ends: Ends, scene: Scene, known: Known) -> Drawn:
+    """The roof with one volume over walls that cut its corners off in place of several, where that is cheaper, at most MOST_CUT times."""
+    for _ in range(MOST_CUT):
+        before = roof
+        for trial in over_cut_corners(before.volumes, ends.walls, scene):
+            if at_least(trial, scene) > roof.cost + HOPEFUL_UNITS * scene.evidence:
+                continue
+            if base_shows(trial, scene) and not base_shows(before.volumes, scene):
+                continue
+            trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
+            found = drawn(trial, ends, scene, known)
+            roof = found if found.cost < roof.cost else roof
+        if roof is before:
+            break
+    return roof
+
+
+def at_least(volumes: np.ndarray, scene: Scene) -> float:
+    """What a roof costs whatever further planes lower it: its volumes, its edges, and the points above it."""
+    z, _ = roof_heights(volumes, scene.U, scene.V)
+    above = scene.z[: scene.n] > z[: scene.n]
+    return float(costs(z, scene)[: scene.n][above].sum()) + structure_cost(volumes, scene)
+
+
+def structure_cost(volumes: np.ndarray, scene: Scene) -> float:
+    return scene.evidence * sum(volume_cost(volume) for volume in volumes[1:]) + edges_cost(volumes, scene, np.inf)
 
 
 def fewer(roof: Drawn) -> Iterator[np.ndarray]:
@@ -70,12 +128,12 @@ def fewer(roof: Drawn) -> Iterator[np.ndarray]:
             yield without(roof.volumes, k)
 
 
-def drawn(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene, known: Known) -> Drawn:
-    """The volumes with the sides, on the outline's `lines` where these are near, and the planes that suit them."""
-    sides = sides_of(volumes, lines, scene)
-    planes = finished(volumes, sides, scene, known)
-    structure = scene.evidence * sum(volume_cost(volume) for volume in volumes[1:]) + edges_cost(volumes, scene, np.inf)
-    return Drawn(volumes, sides, planes, sum(own.cost for own in planes) + structure)
+def drawn(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known) -> Drawn:
+    """The volumes with the sides, on the outline's lines where these are near, and the planes that suit them."""
+    sides = sides_of(volumes, ends.lines, scene)
+    planes = finished(volumes, sides, ends.walls, scene, known)
+    misfit = sum(own.cost + own.price for own in planes)
+    return Drawn(volumes, sides, planes, misfit + structure_cost(volumes, scene))
 
 
 def alike(one: np.ndarray, other: np.ndarray) -> bool:

@@ -1,0 +1,104 @@
+"""Planes over walls that cut corners off: bays with slanted sides, eight-sided towers; none where the roof runs on over such a wall."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import shapely
+from shapely import affinity
+
+import hiproof
+from hiproof.compose import check_solid
+from hiproof.fit.union import fit_building
+from points_of_roofs import sampled
+
+EAVE = 3.0
+OCTAGON = shapely.Polygon([(5 * math.cos(a), 5 * math.sin(a)) for a in np.arange(8) * math.pi / 4 + math.pi / 8])
+CANTED_END = shapely.Polygon([(0, 0), (12, 0), (14.5, 2.5), (14.5, 5.5), (12, 8), (0, 8)])
+
+
+def over_walls(outline, slope, gable=()):
+    """Height of a roof that rises from every wall of a convex outline but those of these numbers."""
+    ring = shapely.get_coordinates(shapely.orient_polygons(outline))
+    walls = [(a, b - a) for k, (a, b) in enumerate(pairwise(ring)) if k not in gable]
+
+    def height(x, y):
+        off = [(way[0] * (y - at[1]) - way[1] * (x - at[0])) / np.hypot(*way) for at, way in walls]
+        return EAVE + slope * np.min(off, axis=0)
+
+    return height
+
+
+def house(name):
+    """Outline and height of one of the houses."""
+    if name == "tower":
+        return OCTAGON, over_walls(OCTAGON, 1.0)
+    return CANTED_END, over_walls(CANTED_END, 0.7, gable=[5])
+
+
+def cants_in(part):
+    return sorted(value for name, value in part.parameters.items() if name.startswith("facing_cant"))
+
+
+def misfit(parts, outline, height):
+    xy = np.random.default_rng(7).uniform(outline.bounds[:2], outline.bounds[2:], (4000, 2))
+    xy = xy[shapely.contains_xy(outline, xy[:, 0], xy[:, 1])]
+    roof = np.max([part.height_at(xy) for part in parts], axis=0)
+    return float(np.sqrt(np.mean((roof - height(*xy.T)) ** 2)))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize(("name", "kind", "count"), [("tower", "pyramid", 4), ("bay", "side_hip", 2)])
+def test_a_roof_that_rises_from_every_wall_is_one_part(name, kind, count, seed):
+    outline, height = house(name)
+    (part,) = fit_building(sampled(height, outline, 8.0, 0.02, seed), outline).roof_parts
+    assert part.type == kind
+    assert len(cants_in(part)) == count
+    assert misfit([part], outline, height) < 0.03
+    assert all(0.0 < part.sigma[f"pitch_cant{k + 1}"] < 3.0 for k in range(count))
+
+
+@pytest.mark.parametrize("degrees", [33.0, 117.0, 250.0])
+def test_cants_turn_with_the_points(degrees):
+    outline, height = house("bay")
+    points = sampled(height, outline, 8.0, 0.02, 1)
+    turned = affinity.rotate(outline, degrees, (0, 0))
+    c, s = math.cos(math.radians(degrees)), math.sin(math.radians(degrees))
+    moved = np.column_stack([points[:, :2] @ np.array([[c, s], [-s, c]]), points[:, 2]])
+    (one,), (other,) = fit_building(points, outline).roof_parts, fit_building(moved, turned).roof_parts
+    xy = points[:, :2] @ np.array([[c, s], [-s, c]])
+    assert other.pieces[0].height_at(xy) == pytest.approx(one.pieces[0].height_at(points[:, :2]), abs=0.02)
+
+
+def test_a_gable_over_a_cut_corner_has_no_cant():
+    outline = shapely.Polygon([(0, 0), (10, 0), (12, 2), (12, 8), (0, 8)])
+    points = sampled(lambda x, y: 8.0 - 0.8 * np.abs(y - 4.0), outline, 8.0, 0.02)
+    (part,) = fit_building(points, outline).roof_parts
+    assert part.type == "gable" and not cants_in(part)
+
+
+def test_a_canted_roof_is_built_again_of_its_parameters():
+    outline, height = house("bay")
+    building = hiproof.reconstruct(sampled(height, outline, 8.0, 0.02), outline)
+    record = hiproof.write.parameters.building_record(building)
+    again = hiproof.build(record)
+    assert cants_in(building.parts[0]) and not check_solid(building.solid)
+    assert np.array_equal(again.solid.vertices, building.solid.vertices)
+    higher = building.with_part(0, ridge_height=float(building.solid.vertices[:, 2].max()) + 1.0)
+    assert cants_in(higher.parts[0]) == cants_in(building.parts[0]) and not check_solid(higher.solid)
+    refitted = higher.refit(sampled(height, outline, 8.0, 0.02, 3))
+    assert (
+        misfit(
+            refitted.roof.parts,
+            shapely.transform(outline, refitted.roof.frame.to_local),
+            lambda x, y: local(refitted, height, x, y),
+        )
+        < 0.04
+    )
+
+
+def local(building, height, x, y):
+    """`height` seen from the frame of a building's roof."""
+    origin = building.roof.frame.origin
+    return height(x + origin[0], y + origin[1]) - origin[2]
