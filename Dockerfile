@@ -7,7 +7,7 @@ FROM python:3.13-slim AS built
 ENV NUMBA_CPU_NAME=x86-64-v3 NUMBA_CPU_FEATURES=""
 COPY . /source
 RUN python -m venv /opt/hiproof \
- && /opt/hiproof/bin/pip install --no-cache-dir "/source[city,parquet,postgis,report]" \
+ && /opt/hiproof/bin/pip install --no-cache-dir "/source[all]" \
  && /opt/hiproof/bin/hiproof warm --all
 
 FROM python:3.13-slim

@@ -8,7 +8,7 @@ from hiproof.simulate import demo_files
 
 out = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
 files = demo_files()
-request = Request((str(files["cloud"]),), out, str(files["footprints"]), str(files["terrain"]), restart=True)
+request = Request((str(files["cloud"]),), out, str(files["footprints"]), restart=True)
 summary = reconstruct_area(request)
 print(f"{summary.buildings} buildings: {summary.by_status}, roof types {summary.by_type}")
 

@@ -32,7 +32,8 @@ def reconstruct(
     beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
     `hiproof.Terrain`; without one the ground is assumed below the lowest point, or at the foot of walls that are seen.
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError
-    for points of another shape, and for a footprint, a terrain or settings of another kind.
+    for points of another shape, for a footprint, a terrain or settings of another kind, and for settings that ask the network
+    where the extra `network` is not installed.
 
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
     >>> roof = np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)])
@@ -41,6 +42,7 @@ def reconstruct(
     """
     stages.refuse_other_kinds(footprint, terrain, settings)
     points, settings = as_xyz(points), settings or Settings()
+    stages.refuse_without_network(settings)
     building = stages.asked_for(footprint, id)
     building, footprint, of_footprint = stages.aligned(building, points, settings)
     points, outline, status = stages.usable(points, footprint)

@@ -95,7 +95,10 @@ class FitSettings:
         fewest=1,
     )
     parts: str = setting(
-        "compound", "as many primitives as the evidence pays for, or one", choices=("compound", "one"), option="--parts"
+        "compound",
+        "as many primitives as the evidence pays for, or one (extra `network`, unless --no-network)",
+        choices=("compound", "one"),
+        option="--parts",
     )
 
 
@@ -123,7 +126,7 @@ class SegmentSettings:
     )
     always: bool = setting(
         False,
-        "ask it of every building and write its answer, though a fit of several does without",
+        "ask it of every building and write its answer, though a fit of several does without (extra `network`)",
         option="--network",
     )
     weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")

@@ -87,6 +87,25 @@ def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> 
         )
 
 
+def fits_one(settings: Settings) -> bool:
+    """Whether one primitive is fitted to a building, as the paper has it, and not several."""
+    return settings.fit.parts == "one" or settings.fit.objective == "paper"
+
+
+def asks_network(settings: Settings) -> bool:
+    """Whether the network is asked: where one primitive is fitted it is heeded, where several are its opinion may be wanted beside."""
+    return settings.segment.enabled and (fits_one(settings) or settings.segment.always)
+
+
+def refuse_without_network(settings: Settings) -> None:
+    """Raise InputError where the network is to be asked and cannot be. Evidence alone names other types, and builds other roofs,
+    in some buildings: what is installed must not decide that unsaid, so who wants it has to say so."""
+    if asks_network(settings):
+        from .segment.inference import import_onnxruntime
+
+        import_onnxruntime(otherwise="--no-network (segment.enabled = false) to go by the points alone")
+
+
 def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
     """The outcome to start from: the building's name, its footprint and the attributes it came with."""
     if isinstance(footprint, Footprint):
@@ -210,8 +229,7 @@ def without_doubt(detail: str, doubt: Doubt) -> str:
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
     """The network's opinion of the points (paper section 3.1), none where nobody heeds or asks for it, or it cannot tell."""
-    heeded = settings.fit.parts == "one" or settings.fit.objective == "paper"
-    if not settings.segment.enabled or not (heeded or settings.segment.always):
+    if not asks_network(settings):
         return Recognised()
     from .segment import segment
 
@@ -219,14 +237,14 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
         found = segment(points, settings)
     except FitError:
         return Recognised()
-    return Recognised(found.weights if heeded else None, found.types)
+    return Recognised(found.weights if fits_one(settings) else None, found.types)
 
 
 def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
     """Roof parts that explain the points: one primitive (the paper's case) or as many as the evidence pays for."""
     if len(points) < FEWEST_POINTS:
         return flat(points, outline, Status.FLAT_FALLBACK)
-    road = fit_one if settings.fit.parts == "one" or settings.fit.objective == "paper" else fit_several
+    road = fit_one if fits_one(settings) else fit_several
     try:
         return road(points, outline, recognised, settings)
     except FitError as error:

@@ -7,6 +7,7 @@ from typing import Any
 
 from ..errors import InputError, SettingsError
 from ..settings import Settings, shown
+from ..stages import refuse_without_network
 
 MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill any machine's memory
 
@@ -22,20 +23,41 @@ def refuse_unusable(request: Any) -> None:
             option = "--" + name.replace("_", "-")
             raise SettingsError(f"expected footprints with {option}, got none; name them with --footprints")
     refuse_settings(request.settings)
+    refuse_missing_packages(request)
+
+
+def refuse_missing_packages(request: Any) -> None:
+    """Raise InputError where a package is not installed that this request needs, and most do not."""
+    from ..read.database import import_psycopg, is_database
+    from ..read.remote import import_fsspec, is_url
+
+    if request.scheduler:
+        from .executors import import_distributed
+
+        import_distributed()
+    if any(map(is_url, request.clouds)):
+        import_fsspec()
+    if is_database(request.footprints):
+        import_psycopg()
+    if request.terrain:
+        from ..read.terrain import import_rasterio
+
+        import_rasterio()
+    if request.settings.write.parquet:
+        from ..write.geoparquet import import_pyarrow
+
+        import_pyarrow()
 
 
 def refuse_settings(settings: Settings) -> None:
     """Raise SettingsError or InputError for values that are well formed, but that nothing here can be done with."""
     refuse_unknown_types(settings.fit)
     refuse_crs(settings.read)
+    refuse_without_network(settings)
     if settings.segment.enabled and (settings.segment.weights or settings.segment.device != "cpu"):
         from ..segment.inference import SHIPPED_WEIGHTS, load
 
         load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
-    if settings.write.parquet:
-        from ..write.geoparquet import import_pyarrow
-
-        import_pyarrow()
 
 
 def refuse_unknown_types(fit: Any) -> None:

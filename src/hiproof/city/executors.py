@@ -27,6 +27,7 @@ from .. import log
 from ..compiled import news
 from ..compiled.stamp import count_compiled
 from ..errors import InputError, NotKeptWarning, OutputError
+from ..extras import needed
 from .tasks import make_ready
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
@@ -155,13 +156,10 @@ class Dask:
     """A Dask cluster at `address`; its workers must have hiproof installed and see the same files (a shared file system)."""
 
     def __init__(self, address: str):
-        try:
-            from distributed import Client
-        except ImportError as error:
-            raise InputError("expected the extra `city` for --scheduler; try: pip install 'hiproof[city]'") from error
+        distributed = import_distributed()
         self.address = address
         try:
-            self.client = Client(address, timeout=CONNECT_S)
+            self.client = distributed.Client(address, timeout=CONNECT_S)
         except (OSError, ValueError) as error:
             raise InputError(f"expected a Dask scheduler at {address}, got: {error}; check the address") from error
 
@@ -231,6 +229,11 @@ class Dask:
 
     def close(self) -> None:
         self.client.close()
+
+
+def import_distributed() -> Any:
+    """What speaks to a Dask cluster. Raises InputError where it is missing."""
+    return needed("distributed", "city", "--scheduler")
 
 
 def make_executor(processes: int, scheduler: str | None) -> InProcess | Processes | Dask:

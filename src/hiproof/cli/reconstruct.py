@@ -26,7 +26,9 @@ def reconstruct(
         str | None, typer.Option(help="only buildings in this box: xmin,ymin,xmax,ymax in the clouds' coordinates")
     ] = None,
     id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
-    terrain: Annotated[str | None, typer.Option(help="terrain model (GeoTIFF); else the cloud's ground class")] = None,
+    terrain: Annotated[
+        str | None, typer.Option(help="terrain model (GeoTIFF; extra `terrain`); else the cloud's ground class")
+    ] = None,
     overrides: Annotated[
         str | None, typer.Option(help="what is known better of some buildings (JSONL or a table); the fit obeys it")
     ] = None,

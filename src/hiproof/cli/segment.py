@@ -18,7 +18,7 @@ def segment(
     weights: Annotated[str, typer.Option(help="ONNX file with other weights than the shipped ones")] = "",
     device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
-    """Label every point with a roof type or not-roof, and name each building's type.
+    """Label every point with a roof type or not-roof, and name each building's type (extra `network`).
 
     The LAZ has the extra dimensions roof_type (number of the type in the table's columns, from 1; 0 is no roof),
     not_roof (probability) and building (the file's number on the command line, from 1). Exit code 1 if a building

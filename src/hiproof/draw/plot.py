@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
+from ..extras import needed
 from ..log import counted
 from ..model import Building
 from .view import TILT_DEG, colours_of, lightness, shaded, turn_of
@@ -57,10 +57,7 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
 
 def new_axes(turn_deg: float) -> Any:
     """Three-dimensional axes in a figure of their own, seen as the view of a notebook is."""
-    try:
-        import matplotlib.pyplot as plt
-    except ImportError as error:
-        raise InputError("expected matplotlib for plots, got none; try: pip install 'hiproof[report]'") from error
+    plt = needed("matplotlib.pyplot", "report", "plots")
     ax = plt.figure(figsize=(7, 6)).add_subplot(projection="3d")
     ax.view_init(elev=TILT_DEG, azim=-90.0 - turn_deg)  # seen from the south where nothing is turned
     return ax

@@ -18,6 +18,7 @@ from ..city.sort import Gatherer, Reaches, load_points, wanted_points
 from ..errors import HiproofError, InputError
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
+from ..read.terrain import import_rasterio
 from ..read.thin import thin_to_count
 
 # work tiles and buildings whose points stay in memory: those a person goes back and forth between
@@ -40,6 +41,8 @@ class RunPoints:
             self.missing = "no run of `hiproof reconstruct` in this folder: its points are not known, refitting is off"
         elif inputs.gone:
             self.missing = f"{inputs.told_gone}: all but refitting works; say with --clouds FOLDER where they lie now"
+        elif inputs.terrain:
+            self.missing = missing_reader()
         self.known = None if self.missing else WorkPlan.load(plan)
         jobs = self.known.jobs if self.known else ()
         self.jobs = {job.id: job for job in reversed(jobs)}
@@ -63,7 +66,7 @@ class RunPoints:
             with self.lock:  # one file is read once, however many windows ask
                 found = self.of_job(job.index)
         except (HiproofError, OSError) as error:
-            self.missing = f"the run's points cannot be read: all but refitting works ({error})"
+            self.missing = told_unreadable(error)
             return np.zeros((0, 3))
         return stages.usable(found, outline)[0]
 
@@ -87,3 +90,16 @@ class RunPoints:
             points = load_points(Path(folder), tile)
         model = terrain_model(self.terrain, self.plan.crs_wkt, self.plan.units, threading.get_ident())
         return Surroundings(points, model, self.plan)
+
+
+def missing_reader() -> str:
+    """A sentence where the run's terrain model cannot be read for want of a package; empty otherwise."""
+    try:
+        import_rasterio()
+    except InputError as error:
+        return told_unreadable(error)
+    return ""
+
+
+def told_unreadable(error: Exception) -> str:
+    return f"the run's points cannot be read: all but refitting works ({error})"

@@ -17,20 +17,17 @@ The only room that imports torch, and not before `train` is asked for.
 
 from __future__ import annotations
 
-from ..errors import InputError
+from ..extras import needed
 
 __all__ = ["TrainSettings", "train"]
 
 
 def __getattr__(name: str):
-    """`train` and `TrainSettings`, imported when used. Raises InputError where PyTorch is missing."""
+    """`train` and `TrainSettings`, imported when used. Raises InputError where what training takes is missing."""
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    try:
-        from . import training
-    except ImportError as error:
-        raise InputError(
-            f"expected PyTorch, onnx and matplotlib for training, got: {error}; "
-            "install hiproof with its extra: pip install 'hiproof[train]'"
-        ) from error
+    for package in ("torch", "onnx", "matplotlib"):
+        needed(package, "train", "training")
+    from . import training
+
     return getattr(training, name)

@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..extras import needed
 from ..masking import masked
 
 SCHEMES = ("postgresql", "postgres")
@@ -143,9 +144,5 @@ def geometry_column(cursor: Any, table: str, source: str) -> str:
 
 
 def import_psycopg() -> Any:
-    try:
-        import psycopg
-        import psycopg.sql
-    except ImportError as error:
-        raise InputError("expected the extra `postgis` for databases; try: pip install 'hiproof[postgis]'") from error
-    return psycopg
+    """What speaks to PostgreSQL. Raises InputError where it is missing."""
+    return needed("psycopg", "postgis", "databases")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from ..errors import InputError
+from ..extras import needed
 
 BLOCK_BYTES = 1 << 20  # bytes a request; a server's answer takes longer than a megabyte's way
 
@@ -41,8 +42,5 @@ def open_address(url: str) -> BinaryIO:
 
 
 def import_fsspec() -> Any:
-    try:
-        import fsspec
-    except ImportError as error:
-        raise InputError("expected the extra `city` for files by address; try: pip install 'hiproof[city]'") from error
-    return fsspec
+    """What reads files by address. Raises InputError where it is missing."""
+    return needed("fsspec", "city", "files by address")

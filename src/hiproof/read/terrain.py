@@ -16,6 +16,7 @@ import numpy as np
 from pyproj import CRS
 
 from ..errors import InputError, InputWarning
+from ..extras import needed
 from ..frames import Units
 from ..masking import masked
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
@@ -66,7 +67,7 @@ class RasterTerrain:
 
     @cached_property
     def dataset(self):
-        import rasterio
+        rasterio = import_rasterio()
         from rasterio.errors import RasterioError
 
         try:
@@ -217,8 +218,14 @@ class TerrainChain:
 def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) -> RasterTerrain:
     """The terrain model at `path`, to be asked in world metres of `crs`, the cloud's. Raises InputError.
 
-    `units` tell those of a cloud without a CRS.
+    `units` tell those of a cloud without a CRS. It takes rasterio, the extra `terrain`.
     """
+    import_rasterio()
     if "://" not in str(path) and not str(path).startswith("/vsi") and not Path(path).is_file():
         raise InputError(f"expected a terrain model at {path}, got no such file; check the path")
     return RasterTerrain(path, crs, units)
+
+
+def import_rasterio() -> Any:
+    """What reads rasters. Raises InputError where it is missing."""
+    return needed("rasterio", "terrain", "terrain models")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import FitError, InputError, SettingsError
+from ..extras import needed
 from ..log import counted
 from ..settings import Settings
 from .arrange import Arrangement, Layout, arrange
@@ -98,7 +99,8 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
     `("pyramid", "gable", "hip")`.
 
     Raises FitError for points no roof can be told from (fewer than 10, all in one place, not finite), InputError for
-    an array of another shape or weights that are missing or of another kind, SettingsError for a device not there.
+    an array of another shape, for weights that are missing or of another kind and without ONNX Runtime (the extra `network`),
+    SettingsError for a device not there.
 
     >>> x, y = np.meshgrid(np.arange(0, 12, 0.5), np.arange(0, 8, 0.5))
     >>> gable = np.column_stack([x.ravel(), y.ravel(), 6 - 0.7 * abs(y.ravel() - 3.75)])
@@ -190,8 +192,7 @@ def checked_points(points: np.ndarray) -> np.ndarray:
 @lru_cache(maxsize=4)
 def load(weights: str, device: str = "cpu") -> Model:
     """The network in the ONNX file `weights`, loaded once a process, on one thread. Raises as `segment` does."""
-    import onnxruntime
-
+    onnxruntime = import_onnxruntime()
     if device == "cuda" and "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
         found = ", ".join(onnxruntime.get_available_providers())
         raise SettingsError(
@@ -224,6 +225,11 @@ def load(weights: str, device: str = "cpu") -> Model:
     layout["levels"] = tuple(layout["levels"])
     types = tuple(json.loads(metadata["types"]))
     return Model(session, types, Layout(**layout))
+
+
+def import_onnxruntime(otherwise: str = "") -> Any:
+    """What runs the network. Raises InputError where it is missing, with how to do without it, if that can be."""
+    return needed("onnxruntime", "network", "recognising roofs", otherwise)
 
 
 def first_line(error: Exception) -> str:

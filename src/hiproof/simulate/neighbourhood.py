@@ -63,7 +63,10 @@ def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> fl
 
 def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     """Write the neighbourhood's FILES to `folder`; counts of buildings and points. Made by
-    `python -m hiproof.simulate neighbourhood FOLDER`."""
+    `python -m hiproof.simulate neighbourhood FOLDER`. Raises InputError without rasterio (the extra `terrain`)."""
+    from ..read.terrain import import_rasterio
+
+    import_rasterio()
     lots, terrain = neighbourhood(seed)
     corners = np.array([lot.building.footprint.bounds for lot in lots])
     low, high = np.floor(corners[:, :2].min(axis=0)) - BORDER_M, np.ceil(corners[:, 2:].max(axis=0)) + BORDER_M

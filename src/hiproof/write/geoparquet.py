@@ -7,7 +7,7 @@ import json
 import os
 from typing import Any
 
-from ..errors import InputError
+from ..extras import needed
 from ..settings import WriteSettings
 from .attributes import BUILDINGS, AttributesWriter, column_names
 from .building_attributes import PREFIX
@@ -76,7 +76,5 @@ def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:
 
 
 def import_pyarrow() -> None:
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise InputError("expected the extra `parquet` for GeoParquet; try: pip install 'hiproof[parquet]'") from error
+    """Raise InputError where what writes GeoParquet is missing."""
+    needed("pyarrow", "parquet", "GeoParquet")

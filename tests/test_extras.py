@@ -1,0 +1,212 @@
+"""What only some need is an extra: nothing else asks for it, and what does says so in one sentence before any work."""
+
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import shapely
+from typer.testing import CliRunner
+
+import hiproof
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli import main
+from hiproof.edit.points import RunPoints
+from hiproof.errors import InputError
+from hiproof.segment import inference, segment
+from hiproof.segment.files import segment_files
+from hiproof.settings import Settings
+from hiproof.simulate import demo_files
+from hiproof.simulate.__main__ import app as simulate
+from test_docs import ENVIRONMENT
+
+ROOT = Path(__file__).parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+OPTIONAL = PROJECT["optional-dependencies"]
+PACKAGES = {
+    "rasterio": "terrain",
+    "onnxruntime": "network",
+    "pyarrow": "parquet",
+    "psycopg": "postgis",
+    "distributed": "city",
+    "fsspec": "city",
+    "matplotlib": "report",
+}
+
+# name: (package that is missing, TOML, further options)
+NEEDY = {
+    "a terrain model": ("rasterio", "", ["--terrain", "dtm.tif"]),
+    "a terrain model by address": ("rasterio", "", ["--terrain", "https://example.org/dtm.tif"]),
+    "the network's opinion": ("onnxruntime", "", ["--network"]),
+    "one primitive": ("onnxruntime", "", ["--parts", "one"]),
+    "the paper's objective": ("onnxruntime", "", ["--objective", "paper"]),
+    "one primitive by the settings": ("onnxruntime", '[fit]\nparts = "one"', []),
+    "other weights": ("onnxruntime", '[segment]\nweights = "{cloud}"', []),
+    "GeoParquet": ("pyarrow", "", ["--parquet"]),
+    "a cluster": ("distributed", "", ["--scheduler", "tcp://127.0.0.1:1"]),
+    "footprints from a database": ("psycopg", "", ["--footprints", "postgresql://host/db?table=t"]),
+}
+FOOTPRINT = shapely.box(0, 0, 12, 8)
+
+
+def gable_points():
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8, 0.4)))
+    return np.column_stack([x, y, 8 - 0.7 * np.abs(y - 4)])
+
+
+@pytest.fixture
+def hidden(monkeypatch):
+    """Hides a package, as if it were not installed."""
+
+    def hide(package):
+        for name in [name for name in sys.modules if name.split(".")[0] == package]:
+            monkeypatch.delitem(sys.modules, name)
+        monkeypatch.setitem(sys.modules, package, None)
+        inference.load.cache_clear()  # a network that was loaded before runs on
+
+    yield hide
+    inference.load.cache_clear()
+
+
+def told(package):
+    return (
+        rf"^expected the package {package}[\w.]* for [^;]+, got: .+; try: pip install 'hiproof\[{PACKAGES[package]}\]'"
+    )
+
+
+def command(*arguments):
+    """Exit code of the command."""
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(SystemExit) as ended:
+        patch.setattr(sys, "argv", ["hiproof", *map(str, arguments)])
+        main()
+    return ended.value.code
+
+
+@pytest.mark.parametrize("name", NEEDY)
+def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(name, hidden, tmp_path, capsys):
+    package, toml, options = NEEDY[name]
+    cloud, config, out = tmp_path / "cloud.laz", tmp_path / "settings.toml", tmp_path / "out"
+    cloud.write_bytes(b"nothing that could be read")
+    config.write_text(toml.format(cloud=cloud.as_posix()))
+    out.mkdir()
+    (out / "buildings.gml").write_text("an earlier run's")
+    hidden(package)
+    assert command("reconstruct", cloud, "--out", out, "--config", config, "--restart", *options) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.match(told(package), line.removeprefix("hiproof: "))
+    assert [path.read_text() for path in out.iterdir()] == ["an earlier run's"]
+
+
+@pytest.mark.parametrize("options", [["--parts", "one"], ["--objective", "paper"]])
+def test_one_primitive_by_the_points_alone_is_said_to_do_without(options, hidden, town_files, tmp_path, capsys):
+    hidden("onnxruntime")
+    arguments = ["reconstruct", town_files[0], "--footprints", town_files[1], "--out", tmp_path, *options]
+    assert command(*arguments) == 2
+    assert capsys.readouterr().err.endswith("or --no-network (segment.enabled = false) to go by the points alone\n")
+    if options == ["--parts", "one"]:
+        assert command(*arguments, "--no-network") == 0
+
+
+def test_points_by_address_are_refused_before_anything_is_written(hidden, tmp_path):
+    hidden("fsspec")
+    with pytest.raises(InputError, match=told("fsspec")):
+        reconstruct_area(Request(("https://example.org/a.laz",), tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+def test_labelling_is_refused_before_it_reads_or_writes(hidden, tmp_path, capsys):
+    hidden("onnxruntime")
+    assert command("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert re.match(told("onnxruntime"), line.removeprefix("hiproof: ")) and line.endswith("'hiproof[network]'")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_neighbourhood_is_refused_before_it_is_written(hidden, tmp_path):
+    hidden("rasterio")
+    done = CliRunner().invoke(simulate, ["neighbourhood", str(tmp_path / "town")])
+    assert done.exit_code == 2 and re.match(told("rasterio"), done.output.removeprefix("error: "))
+    assert not (tmp_path / "town").exists()
+
+
+@pytest.mark.parametrize(
+    ("package", "call"),
+    [
+        ("rasterio", lambda: hiproof.read_terrain(demo_files()["terrain"])),
+        ("onnxruntime", lambda: segment(gable_points())),
+        ("onnxruntime", lambda: segment_files([], Path("labelled.laz"), Settings())),
+        ("matplotlib", lambda: hiproof.plot(hiproof.reconstruct(gable_points(), FOOTPRINT))),
+        *(
+            (
+                "onnxruntime",
+                lambda given=given: hiproof.reconstruct(gable_points(), FOOTPRINT, settings=Settings.from_dict(given)),
+            )
+            for given in ({"fit": {"parts": "one"}}, {"fit": {"objective": "paper"}}, {"segment": {"always": True}})
+        ),
+    ],
+)
+def test_python_gets_the_same_sentence(package, call, hidden):
+    hidden(package)
+    with pytest.raises(InputError, match=told(package)):
+        call()
+
+
+def test_training_names_its_extra(hidden):
+    hidden("torch")
+    with pytest.raises(InputError, match=r"expected the package torch for training, got: .+'hiproof\[train\]'$"):
+        hiproof.learn.train  # noqa: B018
+
+
+@pytest.mark.parametrize("given", [{}, {"fit": {"parts": "one"}, "segment": {"enabled": False}}])
+def test_a_roof_is_the_same_without_what_it_does_not_ask_for(given, hidden):
+    settings = Settings.from_dict(given)
+    before = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
+    hidden("onnxruntime"), hidden("rasterio")
+    after = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
+    assert after.type == "gable" and np.array_equal(after.solid.vertices, before.solid.vertices)
+
+
+def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(hidden, town_files, tmp_path):
+    files = demo_files()
+    inside = shapely.box(91990, 450990, 92015, 451015).bounds
+    out, inputs = tmp_path / "out", (str(files["cloud"]),)
+    reconstruct_area(Request(inputs, out, str(files["footprints"]), str(files["terrain"]), bbox=inside))
+    assert RunPoints(out).missing == ""
+    hidden("rasterio")
+    assert "all but refitting works (expected the package rasterio" in RunPoints(out).missing
+
+
+def test_the_demo_asks_for_no_extra(tmp_path):
+    """Whatever is installed: with all of them hidden it runs, and it loads none where they are there."""
+    hide = "import sys; sys.modules.update(dict.fromkeys(sys.argv.pop().split()));"
+    run = "from hiproof.cli import main\ntry: main()\nexcept SystemExit as end: code = end.code\n"
+    tell = "print(code, [m for m in ('rasterio', 'onnxruntime') if sys.modules.get(m)])"
+    for names in (" ".join(PACKAGES), "nothing"):
+        arguments = [sys.executable, "-c", f"{hide}{run}{tell}", "demo", str(tmp_path / names[:7]), names]
+        done = subprocess.run(arguments, capture_output=True, text=True, env=ENVIRONMENT, check=True)
+        assert done.stdout.splitlines()[-1] == "0 []"
+    models = [path.read_bytes() for path in tmp_path.glob("*/buildings.gml")]
+    assert len(models) == 2 and models[0] == models[1]
+
+
+def names_in(requirements):
+    """The packages that requirements name: `laspy` of "laspy[lazrs]>=2.5.3"; of dask[distributed] what it is there for too."""
+    return {name for text in requirements for name in re.findall(r"[a-z]\w+", text.partition(">=")[0])}
+
+
+def test_each_sentence_names_an_extra_that_brings_the_package_and_the_core_install_has_none_of_them():
+    sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
+    assert dict(re.findall(r'(?<!>> )needed\("(\w+)[\w.]*", "(\w+)"', sources)) == PACKAGES
+    assert [package for package, extra in PACKAGES.items() if package not in names_in(OPTIONAL[extra])] == []
+    assert names_in(PROJECT["dependencies"]).isdisjoint(PACKAGES)
+    assert names_in(OPTIONAL["all"]) == {"hiproof", *PACKAGES.values()}
+
+
+def test_the_page_of_installing_tells_of_every_extra():
+    text = (ROOT / "docs/install.md").read_text(encoding="utf-8")
+    ours = {"lint", "test", "experiments", "all"}  # those who develop hiproof have a Makefile
+    assert [extra for extra in OPTIONAL if extra not in ours and f"| `{extra}` |" not in text] == []
+    assert "hiproof[all]" in text
