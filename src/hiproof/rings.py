@@ -22,6 +22,17 @@ def enclosed(polygons: Any) -> Any:
     return shapely.make_valid(polygons, method="structure", keep_collapsed=False)
 
 
+def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
+    """What of a geometry has an area: areas that only touch have lines and points in common, with which nothing more can be intersected.
+
+    >>> one, other = shapely.box(0, 0, 2, 2), shapely.Polygon([(1, 0), (3, 0), (3, 4), (2, 4), (2, 1), (1, 1)])
+    >>> shapely.intersection(one, other).geom_type, with_area(shapely.intersection(one, other)).area
+    ('GeometryCollection', 1.0)
+    """
+    polygons = [part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"]
+    return polygons[0] if len(polygons) == 1 else shapely.MultiPolygon(polygons)
+
+
 def ring_normal(ring: np.ndarray) -> np.ndarray:
     """Vector area (3,) of a closed ring (m, 3) without its repeated last vertex (Newell)."""
     return ring_normals([ring])[0]

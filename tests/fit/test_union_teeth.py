@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 import shapely
+from benchmarks.compounds import drawn
 
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.larger import put_together
@@ -81,3 +82,10 @@ def test_a_strip_a_grid_step_off_its_neighbour_joins_it():
     one, other = (Part("flat", (Piece(shapely.Polygon(ring), level),)) for ring in (flat, strip))
     (part,) = with_slivers([one], other, math.inf)
     assert part.area == pytest.approx(one.area + other.area, abs=1e-3)
+
+
+def test_a_row_that_only_touches_what_it_would_reach_into_is_a_saw_tooth():
+    """Two areas that touch have a line in common, and the building failed on it."""
+    building, points = drawn("saw_tooth_hall", 2.0, 2036)
+    fit = fit_building(points, building.outline)
+    assert sorted(part.type for part in fit.roof_parts) == ["flat", "shed"]

@@ -17,7 +17,7 @@ import shapely
 
 from ..compiled import compiled
 from ..fit.direction import quarter_gap, support_of
-from ..rings import GRID_M
+from ..rings import GRID_M, with_area
 from .surfaces import Surfaces, surfaces_of
 
 REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most
@@ -146,8 +146,8 @@ def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[sh
     sides, rest = [], area
     for part in shapely.get_parts(wide):
         side = shapely.buffer(part, 0.5 * NECK_M, join_style="mitre")
-        sides.append(shapely.intersection(rest, side))
-        rest = shapely.difference(rest, side)
+        sides.append(with_area(shapely.intersection(rest, side)))
+        rest = with_area(shapely.difference(rest, side))
     return with_crumbs([*sides, *shapely.get_parts(rest)], roofs)
 
 

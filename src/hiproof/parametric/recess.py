@@ -13,7 +13,7 @@ import shapely
 
 from ..errors import InputError
 from ..model import Roof
-from ..rings import enclosed
+from ..rings import enclosed, with_area
 from .arrange import BLOCK_HEIGHT_M, BLOCK_M, GRID_M, corners_of, rings_of
 from .change import with_sizes
 from .record import list_at, number, numbers_by_name, place, polygon
@@ -74,11 +74,6 @@ def roofed_by(part: dict[str, Any]) -> shapely.Geometry:
         return covered(part)
     outlines = [enclosed(polygon(outline, "an outline")) for outline in list_at(part, "outlines")]
     return with_area(shapely.union_all(outlines, grid_size=GRID_M))
-
-
-def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
-    """What of a geometry has an area."""
-    return shapely.MultiPolygon([part for part in shapely.get_parts(geometry) if part.geom_type == "Polygon"])
 
 
 def covered(part: dict[str, Any]) -> shapely.Polygon:

@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from ...model import Part, Piece
-from ...rings import GRID_M
+from ...rings import GRID_M, with_area
 from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen
@@ -55,13 +55,13 @@ def beyond(piece: Piece, low: float, high: float) -> tuple[shapely.Geometry, sha
     if z.min() < low:
         rings = [ring_above(box_around(piece.outline), *line) for line in ([0.0, 0.0, low] - piece.planes).tolist()]
         below = shapely.union_all([shapely.Polygon(ring) for ring in rings], grid_size=GRID_M)
-        sunken = shapely.intersection(piece.outline, below, grid_size=GRID_M)
+        sunken = with_area(shapely.intersection(piece.outline, below, grid_size=GRID_M))
     if z.max(axis=0).min() > high:
         ring = box_around(piece.outline)
         for line in (piece.planes - [0.0, 0.0, high]).tolist():
             ring = ring_above(ring, *line)
         if ring:
-            risen = shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=GRID_M)
+            risen = with_area(shapely.intersection(piece.outline, shapely.Polygon(ring), grid_size=GRID_M))
     return sunken, risen
 
 

@@ -17,7 +17,7 @@ import shapely
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
-from ...rings import GRID_M
+from ...rings import GRID_M, with_area
 from .regions import area_of, besides, polygons_of
 from .shown import with_slivers
 
@@ -109,7 +109,7 @@ def as_high(tooth: Part, part: Part) -> Part:
     """The `tooth` over what a part covers of it and near it, as high there as that part."""
     (piece,) = tooth.pieces
     around = shapely.buffer(piece.outline, SIZE_ALIKE * tooth.parameters["width"], join_style="mitre")
-    outline = shapely.intersection(area_of([part]), around)
+    outline = with_area(shapely.intersection(area_of([part]), around))
     middle = shapely.get_coordinates(shapely.point_on_surface(shapely.intersection(outline, piece.outline)))
     rise = np.array([0.0, 0.0, float((part.height_at(middle) - piece.height_at(middle))[0])])
     pieces = tuple(Piece(polygon, piece.planes + rise) for polygon in polygons_of(outline))
@@ -245,7 +245,7 @@ def cut(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: Ground) -> tuple[
     """The pieces of a saw-tooth, a tooth each, over what its row covers and reaches further."""
     further = [ground.strip(breaks[0], ground.first), ground.strip(ground.last, breaks[-1])]
     more = shapely.union_all(further, grid_size=GRID_M)
-    over = shapely.union(ground.covered, shapely.intersection(ground.roof, more), grid_size=GRID_M)
+    over = shapely.union(ground.covered, with_area(shapely.intersection(ground.roof, more)), grid_size=GRID_M)
     strips = [ground.strip(foot, top) for foot, top in pairwise(breaks.tolist())]
     return tuple(
         Piece(polygon, piece.planes)
