@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,9 @@ from .volumes import DIRECTION, LEVEL, SIDES
 
 EACH = np.arange(SIDES)
 LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
+HIDDEN_SHARE = (
+    0.8  # of the half of its rectangle, by which a side that lies hidden may be moved to where its eave is level
+)
 APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
 STRAIGHT = 1e-9  # rad; numerically the same direction
 GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
@@ -53,7 +57,8 @@ def part_of(
     every = np.repeat(rows[:, :, None], tried.shape[1], axis=2)
     every[:, :, 1:3] += turned(registrations, turn)
     walls = tuple(wall._replace(facing=wall.facing - turn) for wall in planes.walls)
-    members = regular(every, tried, math.atan2(axes[0, 1], axes[0, 0]), walls)
+    hidden = [k for k, side in enumerate(sides) if side.sigma == math.inf and not side.anchored]
+    members = regular(every, tried, math.atan2(axes[0, 1], axes[0, 0]), walls, hidden)
     member = members.those(0)
     turns = member.quarter_turns
     modes = np.concatenate([turned(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2)
@@ -145,9 +150,12 @@ def ends_moved(sides: list[Side], ends: list[float]) -> tuple[list[list[float]],
     return known, unknown
 
 
-def regular(rows: np.ndarray, ends: np.ndarray, kappa: float, walls: tuple[Wall, ...] = ()) -> Member:
+def regular(
+    rows: np.ndarray, ends: np.ndarray, kappa: float, walls: tuple[Wall, ...] = (), hidden: Sequence[int] = ()
+) -> Member:
     """Members over m rectangles, lowest and highest u, v `ends` (4, m), with planes `rows` (5 and those over `walls`, 3, m), which all
-    have the same sides, in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are."""
+    have the same sides, in axes of which the first is at `kappa`: with eaves and an apex in common where they nearly are, or where a
+    side lies `hidden`."""
     centre, half = 0.5 * (ends[::2] + ends[1::2]), 0.5 * (ends[1::2] - ends[::2])
     there = np.flatnonzero(np.isfinite(rows[: LEVEL + 1, 2, 0])).tolist()
     sides, count = [k for k in there if k < SIDES], rows.shape[2]
@@ -159,7 +167,7 @@ def regular(rows: np.ndarray, ends: np.ndarray, kappa: float, walls: tuple[Wall,
         eaves[k] = rows[k, 0] * centre[0] + rows[k, 1] * centre[1] + rows[k, 2] - slopes[k] * half[axis]
     top = rows[LEVEL, 2] if LEVEL in there else np.full(count, np.inf)
     if sides:
-        centre, half, eaves = level(centre, half, eaves, slopes, leans, sides)
+        centre, half, eaves = level(centre, half, eaves, slopes, leans, sides, hidden)
     return with_one_apex(
         Member(kappa, centre, half, eaves, slopes, top, leans, cants_of(rows[LEVEL + 1 :], walls, centre))
     )
@@ -178,13 +186,26 @@ def cants_of(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray) -> n
 
 
 def level(
-    centre: np.ndarray, half: np.ndarray, eaves: np.ndarray, slopes: np.ndarray, leans: np.ndarray, sides: list[int]
+    centre: np.ndarray,
+    half: np.ndarray,
+    eaves: np.ndarray,
+    slopes: np.ndarray,
+    leans: np.ndarray,
+    sides: list[int],
+    hidden: Sequence[int] = (),
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centres and halves (2, m) and eaves (4, m) of members with `sides` moved out to the lowest eave's height where that is near."""
-    lowest, outwards, eaves = eaves.min(axis=0), np.zeros_like(eaves), eaves.copy()
+    """Centres and halves (2, m) and eaves (4, m) of members with `sides` moved out to the lowest eave's height where that is near.
+
+    Those that lie `hidden` under other parts are where nothing tells, and go there from afar, and inwards as well.
+    """
+    told = [k for k in sides if k not in hidden] or sides
+    lowest, outwards, eaves = eaves[told].min(axis=0), np.zeros_like(eaves), eaves.copy()
     for k in sides:
         further = (eaves[k] - lowest) / slopes[k]
-        outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
+        if k in told:
+            outwards[k] = np.where(further < LEVEL_EAVE_M, further, 0.0)
+        else:
+            outwards[k] = np.where(np.abs(further) < HIDDEN_SHARE * half[k // 2], further, 0.0)
     low, high = outwards[::2], outwards[1::2]
     shift = 0.5 * (high - low)
     for k in sides:

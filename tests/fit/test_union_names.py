@@ -1,0 +1,34 @@
+"""What parts are called and where their rectangles end, where no points tell."""
+
+import math
+
+import numpy as np
+import pytest
+
+from hiproof.fit.union.names import regular
+
+SLOPE, EAVE = 0.8, 3.0
+
+
+def hip_rows(half_u, half_v):
+    """Planes (5, 3, 1) of a hip about the origin whose eaves are all at EAVE on the sides of that rectangle."""
+    rows = [(SLOPE, 0.0, EAVE + SLOPE * half_u), (-SLOPE, 0.0, EAVE + SLOPE * half_u)]
+    rows += [(0.0, SLOPE, EAVE + SLOPE * half_v), (0.0, -SLOPE, EAVE + SLOPE * half_v), (np.nan,) * 3]
+    return np.array(rows)[:, :, None]
+
+
+@pytest.mark.parametrize("by", [-2.0, -0.9, 0.9, 2.0])
+def test_a_hidden_side_lies_where_its_eave_is_level(by):
+    ends = np.array([[-6.0], [6.0 + by], [-4.0], [4.0]])
+    member = regular(hip_rows(6.0, 4.0), ends, 0.0, hidden=[1]).those(0)
+    assert member.name == "hip"
+    assert member.eaves == pytest.approx(EAVE)
+    assert member.half == pytest.approx([6.0, 4.0]) and member.centre == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+@pytest.mark.parametrize("by", [-2.0, -0.9])
+def test_a_side_that_points_tell_stays_where_it_is(by):
+    ends = np.array([[-6.0], [6.0 + by], [-4.0], [4.0]])
+    member = regular(hip_rows(6.0, 4.0), ends, 0.0).those(0)
+    assert member.half[0] == pytest.approx(6.0 + 0.5 * by)
+    assert member.eaves[1] == pytest.approx(EAVE - SLOPE * by) and math.isfinite(member.slopes[1])
