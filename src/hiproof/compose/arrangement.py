@@ -363,15 +363,15 @@ def active_plane(x, y, soup, soup_start, planes, plane_start):
 
 @compiled
 def label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label):
-    """Label of each face (f,): the group of the plane active at its point, or what the last patch over it says."""
-    label = np.full(len(points), OUTSIDE, np.int64)
+    """Label of each face (f,): the group of the plane active at its point, or what the last patch over it says; and which have a patch."""
+    label, patched = np.full(len(points), OUTSIDE, np.int64), np.zeros(len(points), np.bool_)
     for f in range(1, len(points)):
         plane = active_plane(points[f, 0], points[f, 1], soup, soup_start, planes, plane_start)
         label[f] = group[plane] if plane >= 0 else plane
         for p in range(len(patch_label)):
             if covers(patches, patch_start[p], patch_start[p + 1], points[f, 0], points[f, 1]):
-                label[f] = patch_label[p]
-    return label
+                label[f], patched[f] = patch_label[p], True
+    return label, patched
 
 
 @compiled
@@ -396,17 +396,18 @@ def edge_lengths(xy, edges):
 
 
 @compiled
-def merge_slivers(xy, edges, face, area, label, planes, min_area, min_width):
+def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_width):
     """Give every region too small or too thin to the neighbour it shares the longest border with, smallest first.
 
-    One that would carry its plane on to where no roof is around keeps out, unless nobody could see the region."""
+    A patch alone comes last, for what lies between it and the region it belongs to may become that region's. One that would carry its plane on to where no roof is around keeps out, unless nobody could see the region."""
     length, kept = edge_lengths(xy, edges), np.zeros(len(label), np.bool_)
     for _ in range(len(label)):
         region = regions_of(edges, face, label)
         size, border = np.zeros(len(label)), np.zeros(len(label))
-        open_to = np.zeros(len(label), np.bool_)
+        open_to, is_patch = np.zeros(len(label), np.bool_), np.ones(len(label), np.bool_)
         for f in range(1, len(label)):
             size[region[f]] += area[f]
+            is_patch[region[f]] &= patched[f]
         for e in range(len(edges)):
             a, b = region[face[2 * e]], region[face[2 * e + 1]]
             if a != b:
@@ -417,8 +418,10 @@ def merge_slivers(xy, edges, face, area, label, planes, min_area, min_width):
         smallest = -1
         for r in range(1, len(label)):
             sliver = region[r] == r and open_to[r] and (size[r] < min_area or 2 * size[r] < min_width * border[r])
-            if sliver and not kept[r] and (smallest < 0 or size[r] < size[smallest]):
-                smallest = r
+            if sliver and not kept[r]:
+                sooner = is_patch[smallest] and not is_patch[r]
+                if smallest < 0 or sooner or (is_patch[smallest] == is_patch[r] and size[r] < size[smallest]):
+                    smallest = r
         if smallest < 0:
             break
         unseen = size[smallest] < min_area or 2 * size[smallest] < min(min_width, UNSEEN_UNITS) * border[smallest]
@@ -571,8 +574,10 @@ def plan_cells(
     order, start = half_edge_order(xy, edges)
     face, area = trace_faces(xy, edges, next_half_edges(edges, order, start))
     points = face_points(xy, edges, face, len(area))
-    label = label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label)
-    merge_slivers(xy, edges, face, area, label, planes, min_area, min_width)
+    label, patched = label_faces(
+        points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label
+    )
+    merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_width)
     keep_largest_component(edges, face, area, label)
     side = label[face].reshape(-1, 2)
     return dissolve(xy, edges, side)

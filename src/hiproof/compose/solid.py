@@ -17,7 +17,7 @@ from .check_kernel import enclosed_volume
 from .shell import Saddle, raise_shell
 
 # factor on the snap distance and whether straight walls become one, tried in turn until the solid is valid
-ATTEMPTS = ((1.0, True), (1.0, False), (3.0, False), (10.0, False), (30.0, False))
+ATTEMPTS = ((1.0, True), (1.0, False), (3.0, False), (10.0, False), (20.0, False), (30.0, False))
 MAX_PATCHES = 40  # crosswise corners mended in one building, so that it comes to an end
 
 
