@@ -71,6 +71,21 @@ def test_cants_turn_with_the_points(degrees):
     assert other.pieces[0].height_at(xy) == pytest.approx(one.pieces[0].height_at(points[:, :2]), abs=0.02)
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_a_bay_runs_into_the_roof_behind_it(seed):
+    """A hipped bay with slanted sides on a gabled house: two parts, the bay's planes over three of its walls and a part of the house."""
+    bay = shapely.Polygon([(4.5, 3), (9.5, 3), (9.5, 10), (8.5, 11.5), (5.5, 11.5), (4.5, 10)])
+    outline, over_bay = shapely.union(shapely.box(0, 0, 14, 9), bay), over_walls(bay, 0.8)
+
+    def height(x, y):
+        main = np.where(y <= 9, EAVE + 0.8 * np.minimum(y, 9 - y), -np.inf)
+        return np.where(shapely.intersects_xy(bay, x, y), np.maximum(main, over_bay(x, y)), main)
+
+    parts = fit_building(sampled(height, outline, 10.0, 0.02, seed), outline).roof_parts
+    assert sorted(len(cants_in(part)) for part in parts) == [0, 2]
+    assert misfit(parts, outline, height) < 0.03
+
+
 def test_a_gable_over_a_cut_corner_has_no_cant():
     outline = shapely.Polygon([(0, 0), (10, 0), (12, 2), (12, 8), (0, 8)])
     points = sampled(lambda x, y: 8.0 - 0.8 * np.abs(y - 4.0), outline, 8.0, 0.02)
