@@ -454,9 +454,9 @@ def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
     script = f"""
 import sys
 from pathlib import Path
-from hiproof.city.run import Request, reconstruct_area
-from hiproof.city.tasks import ALL, MAIN_JOB
+from hiproof.city.run import Request, pieces_of, reconstruct_area
 from hiproof.city.warm_pieces import PIECES
+from hiproof.settings import Settings
 from hiproof.compiled import kept
 from hiproof.simulate import demo_files
 
@@ -467,14 +467,17 @@ def noted(self, signature, context):
 kept.Kept.load_overload = noted
 files = {{name: str(path) for name, path in demo_files().items()}}
 with_footprints = dict(footprints=files["footprints"], terrain=files["terrain"])
-for pieces, given in ((MAIN_JOB, with_footprints), (ALL, dict(bbox=(91990, 451000, 92034, 451040)))):
-    for piece in pieces:
+few = dict(bbox=(91990, 451000, 92034, 451040))
+one = dict(footprints=files["footprints"], settings=Settings().replace({{"fit": {{"parts": "one"}}}}), **few)
+for given in (with_footprints, few, one):
+    request = Request((files["cloud"],), Path({str(tmp_path)!r}), restart=True, **given)
+    for piece in pieces_of(request):
         PIECES[piece]()
     beforehand = set(asked)
-    assert reconstruct_area(Request((files["cloud"],), Path({str(tmp_path)!r}), restart=True, **given)).buildings > 3
+    assert reconstruct_area(request).buildings > 3
     print(sorted(asked - beforehand))
 """
-    assert run(tmp_path, "-c", script) == "[]\n[]\n"
+    assert run(tmp_path, "-c", script) == "[]\n[]\n[]\n"
 
 
 @pytest.mark.parametrize("total", [1, 7, 222])

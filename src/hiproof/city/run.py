@@ -21,6 +21,7 @@ from ..formats import places_of_models
 from ..frames import METRES, Units
 from ..log import LOGGER, counted
 from ..masking import masked, masked_values
+from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
 from .checks import refuse_unusable
@@ -34,7 +35,7 @@ from .plan import WorkPlan
 from .quarantine import is_loss, run_alone, solve_in_quarantine
 from .request import Request
 from .resume import open_ledger, open_state, resume_or_plan
-from .tasks import ALL, MAIN_JOB, ONE_PRIMITIVE, solve_tile, sort_cloud
+from .tasks import MAIN_JOB, ONE_PRIMITIVE, RECOGNISING, WITHOUT_FOOTPRINTS, solve_tile, sort_cloud
 
 MOST_LOSSES = 3  # deaths of its process until a task is tried alone: two may be a neighbour's doing
 Progress = Callable[[str, int, int], None]
@@ -115,9 +116,10 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
 
 def pieces_of(request: Request) -> tuple[str, ...]:
     """What of the compiled code the run needs."""
+    besides = RECOGNISING if asks_network(request.settings) else ()
     if request.footprints is None:
-        return ALL
-    return ONE_PRIMITIVE if request.settings.fit.parts == "one" else MAIN_JOB
+        return (*WITHOUT_FOOTPRINTS, *besides)
+    return (*(ONE_PRIMITIVE if fits_one(request.settings) else MAIN_JOB), *besides)
 
 
 class Clock:

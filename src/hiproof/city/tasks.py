@@ -13,8 +13,13 @@ MAIN_JOB = ("moves", "planes", "solid", "check", "points")
 ONE_PRIMITIVE = (*MAIN_JOB, "single")
 """Those of runs that fit one primitive a building."""
 
-ALL = (*ONE_PRIMITIVE, "outlines")
-"""All pieces: those of runs without footprints."""
+WITHOUT_FOOTPRINTS = (*ONE_PRIMITIVE, "outlines")
+"""Those of runs without footprints."""
+
+RECOGNISING = ("recognising",)
+"""What runs that ask the network need besides."""
+
+ALL = (*WITHOUT_FOOTPRINTS, *RECOGNISING)
 
 
 def sort_cloud(folder: str, number: int, address: str) -> dict:

@@ -99,6 +99,13 @@ def single() -> None:
     fit_roof(house())
 
 
+def recognising() -> None:
+    """What the network is given of a cloud."""
+    from ..segment.arrange import Layout, arrange
+
+    arrange(house(), Layout())
+
+
 def outlines() -> None:
     """What runs without footprints draw: touching houses told apart, the outline of each."""
     from ..classify.houses import told_apart
@@ -124,7 +131,7 @@ def points() -> None:
 
 
 PIECES: dict[str, Callable[[], None]] = {
-    piece.__name__: piece for piece in (moves, planes, outlines, solid, check, points, single)
+    piece.__name__: piece for piece in (moves, planes, outlines, solid, check, points, single, recognising)
 }
 
 

@@ -9,7 +9,7 @@ import typer
 
 def warm(
     everything: Annotated[
-        bool, typer.Option("--all", help="also what only runs without footprints or with --parts one call")
+        bool, typer.Option("--all", help="also what only runs without footprints, with --parts one or the network call")
     ] = False,
 ) -> None:
     """Compile what runs call, once for each version, for this machine's own processor, so that the first run starts at once."""
