@@ -19,7 +19,7 @@ from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, 
 # m by which a volume may be drawn out to a corner of the outline, at how many places a side, and how far beside the volume these may be
 FURTHEST_M, MOST_STEPS, BESIDE_M = 6.0, 2, 0.3
 LEAST_M = 0.1  # nearer, a corner is where the volume ends
-MOST_ASLANT = 16  # walls of an outline that face along no axis: with more its walls are round
+MOST_ASLANT = 16  # walls of an outline that face along no axis of its main direction: with more its walls are round
 WITHIN = 0.8  # of a volume's points, from which on it stands within another
 NEAR_M = 0.1  # m inside a wall, in its middle, where a volume must be
 
@@ -28,7 +28,7 @@ def over_cut_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> It
     """The volumes with one of them drawn out over `walls` (m, 2, 2) that cut its corners off, as far as a corner of the outline on one
     side or none, and without those over these walls that then stand within it."""
     places, aslant = beside_walls(walls, scene)
-    if not 0 < aslant.any(axis=0).sum() <= MOST_ASLANT:
+    if not 0 < aslant[0].sum() <= MOST_ASLANT:
         return
     shown = shown_points(volumes, scene)
     for k in range(1, len(volumes)):
@@ -38,14 +38,10 @@ def over_cut_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> It
             cut = aslant[direction] & lies_within(places[direction], row)
             if not 0 < cut.sum() <= MOST_CANTS or inclined(row) < FEWEST_INCLINED or not is_allowed(row, scene.allowed):
                 continue
+            over = [(cut & lies_within(places[int(other[DIRECTION])], other)).any() for other in volumes]
             inside = lies_within(np.column_stack([scene.U[direction], scene.V[direction]]), row)
-            gone = [
-                j
-                for j in range(1, len(volumes))
-                if j != k
-                and (cut & lies_within(places[int(volumes[j, DIRECTION])], volumes[j])).any()
-                and inside[shown[j]].sum() > WITHIN * len(shown[j])
-            ]
+            within = [inside[own].sum() > WITHIN * len(own) for own in shown]
+            gone = [j for j in range(1, len(volumes)) if j != k and over[j] and within[j]]
             if gone or row is not joined:
                 trial = volumes.copy()
                 trial[k] = row
