@@ -336,14 +336,14 @@ function showNumbers(part, handle) {
     numberRow("ridge", input("ridge_height", z + handle.ridge, value => changePart({ ridge_height: value }, heightsOf(part))), "m");
     numberRow("eave", input("eave_height", z + handle.eave, value => changePart({ eave_height: value, ...(handle.ridge > handle.eave ? { ridge_height: z + handle.ridge } : {}) }, heightsOf(part))), "m", sigma.t_z, "z");
   }
-  for (const [name, value] of Object.entries(part.parameters)) numberRow(name, input(name, value, v => changePart({ [name]: v }, [name])), unitOf(name), sigma[name], ["width", "length", "teeth"].includes(name) ? null : name);
+  for (const [name, value] of Object.entries(part.parameters)) numberRow(name, input(name, value, v => changePart({ [name]: v }, [name])), unitOf(name), sigma[name], /^(width|length|teeth|facing_.*|distance_.*)$/.test(name) ? null : name);
   const [x, y] = part.position;
   numberRow("x", input("x", x, v => changePart({ position: [v, y, part.position[2]] }, [])), "m", sigma.t_x);
   numberRow("y", input("y", y, v => changePart({ position: [x, v, part.position[2]] }, [])), "m", sigma.t_y);
   numberRow("rotation", input("rotation", part.rotation || 0, v => changePart({ rotation: v }, [])), "°", sigma.rotation);
 }
 
-const unitOf = name => /^(pitch|skew)_/.test(name) ? "°" : name === "teeth" ? "" : "m";
+const unitOf = name => /^(pitch|skew|facing)_/.test(name) ? "°" : name === "teeth" ? "" : "m";
 
 function input(name, value, changed) {
   const field = document.createElement("input");
