@@ -19,7 +19,7 @@ from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, 
 # m by which a volume may be drawn out to a corner of the outline, at how many places a side, and how far beside the volume these may be
 FURTHEST_M, MOST_STEPS, BESIDE_M = 6.0, 2, 0.3
 LEAST_M = 0.1  # nearer, a corner is where the volume ends
-MOST_ASLANT = 16  # walls of an outline that face along no axis of its main direction: with more its walls are round
+MOST_ASLANT = 8  # walls of an outline that face along no axis of its main direction: with more its walls are round
 WITHIN = 0.8  # of a volume's points, from which on it stands within another
 NEAR_M = 0.1  # m inside a wall, in its middle, where a volume must be
 
