@@ -11,6 +11,7 @@ from shapely import affinity
 import hiproof
 from hiproof.compose import check_solid
 from hiproof.fit.union import fit_building
+from hiproof.parametric.arrange import merged_parts, split_part
 from points_of_roofs import sampled
 
 EAVE = 3.0
@@ -111,6 +112,18 @@ def test_a_canted_roof_is_built_again_of_its_parameters():
         )
         < 0.04
     )
+
+
+@pytest.mark.parametrize("side", ["length", "width"])
+def test_a_part_cut_in_two_and_merged_again_has_its_cants_over_the_same_walls(side):
+    outline, height = house("bay")
+    building = hiproof.reconstruct(sampled(height, outline, 8.0, 0.02), outline)
+    record = hiproof.write.parameters.building_record(building)
+    halves = split_part(record["parts"][0], side, 0.6)
+    merged = hiproof.build({**record, "parts": [merged_parts(*halves)]})
+    xy = shapely.get_coordinates(building.roof.outline.buffer(-0.5))
+    assert len(cants_in(merged.parts[0])) == 2
+    assert merged.roof.height_at(xy) == pytest.approx(building.roof.height_at(xy), abs=1e-6)
 
 
 def local(building, height, x, y):
