@@ -22,6 +22,15 @@ def enclosed(polygons: Any) -> Any:
     return shapely.make_valid(polygons, method="structure", keep_collapsed=False)
 
 
+def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
+    """Coordinates (n + 1, 2) of a ring in plan, its first corner last again, with what it encloses to the left.
+
+    >>> counterclockwise(shapely.LinearRing([(0, 0), (0, 1), (1, 1)])).tolist()
+    [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
+    """
+    return shapely.get_coordinates(ring)[:: 1 if shapely.is_ccw(ring) else -1]
+
+
 def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
     """What of a geometry has an area: areas that only touch have lines and points in common, with which nothing more can be intersected.
 

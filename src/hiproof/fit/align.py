@@ -17,6 +17,7 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
+from ..rings import counterclockwise
 from .outline.cost import cost_at_depth
 from .outline.lines import lines_through
 from .outline.settle import side_offsets, span_of
@@ -88,8 +89,7 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
     >>> shift.is_clear, bool(np.abs(shift.xy - [-1.0, 0.5]).max() < 0.1)
     (True, True)
     """
-    border = shapely.get_exterior_ring(shapely.simplify(footprint, PITCH_M))
-    ring = shapely.get_coordinates(border)[:: 1 if shapely.is_ccw(border) else -1][:-1]
+    ring = counterclockwise(shapely.get_exterior_ring(shapely.simplify(footprint, PITCH_M)))[:-1]
     if len(xy) < LEAST_POINTS or len(ring) < 3:
         return Shift()
     xy, lines = np.ascontiguousarray(xy), lines_through(ring)

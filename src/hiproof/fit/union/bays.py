@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...rings import counterclockwise
 from .add import UNEXPLAINED
 from .objective import base_shows, misfits
 from .plan import Plan
@@ -132,8 +133,7 @@ def rectangle_around(ring: np.ndarray, outline: shapely.Polygon, plan: Plan, sce
 
 def pieces_of(outline: shapely.Polygon) -> list[np.ndarray]:
     """Rings (m, 2), counterclockwise, of what is small of the pieces that walls cut off, drawn on from corners that point inwards."""
-    exterior = outline.exterior if outline.exterior.is_ccw else outline.exterior.reverse()
-    ring = shapely.get_coordinates(exterior)[:-1]
+    ring = counterclockwise(outline.exterior)[:-1]
     after = following(ring) - ring
     before = np.concatenate([after[-1:], after[:-1]])
     inwards = np.nonzero(cross(before, after) < 0.0)[0]

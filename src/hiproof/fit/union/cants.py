@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import combinations
 from typing import NamedTuple
 
@@ -17,6 +16,7 @@ import numpy as np
 import shapely
 
 from ...primitives.cants import MOST_CANTS
+from ...rings import counterclockwise
 from .finish import (
     FLATTEST,
     Planes,
@@ -75,19 +75,22 @@ def finished(
 
 def walls_of(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
     """Starts and ends (m, 2, 2) of the outline's outer walls, the inside to the left, in the first direction's axes."""
-    exterior = outline.exterior if outline.exterior.is_ccw else outline.exterior.reverse()
-    ring = (shapely.get_coordinates(exterior) - plan.frame.origin[:2]) @ plan.frame.rotation.T
+    ring = (counterclockwise(outline.exterior) - plan.frame.origin[:2]) @ plan.frame.rotation.T
     ends = np.stack([ring[:-1], ring[1:]], axis=1)
     return ends[np.hypot(*(ends[:, 1] - ends[:, 0]).T) > SHORTEST_M]
 
 
-def own_walls(walls: np.ndarray, sides: list[Side], turn: np.ndarray) -> list[Wall]:
-    """Those of the `walls` (m, 2, 2) that end a volume and face another way than its sides, in its own axes at `turn`."""
+def seen_along(walls: np.ndarray, turn: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The middles (m, 2) of `walls` (m, 2, 2) in the axes of the direction at `turn`, and which way they look out (m, 2)."""
     c, s = turn
     ends = walls @ np.array([[c, -s], [s, c]])
     ways = ends[:, 1] - ends[:, 0]
-    outwards = np.column_stack([ways[:, 1], -ways[:, 0]]) / np.hypot(*ways.T)[:, None]
-    middle = ends.mean(axis=1)
+    return ends.mean(axis=1), np.column_stack([ways[:, 1], -ways[:, 0]]) / np.hypot(*ways.T)[:, None]
+
+
+def own_walls(walls: np.ndarray, sides: list[Side], turn: np.ndarray) -> list[Wall]:
+    """Those of the `walls` (m, 2, 2) that end a volume and face another way than its sides, in its own axes at `turn`."""
+    middle, outwards = seen_along(walls, turn)
     facing = np.arctan2(outwards[:, 1], outwards[:, 0])
     off = np.abs(np.remainder(facing[:, None] - facings_of(sides) + np.pi, 2.0 * np.pi) - np.pi).min(axis=1)
     kept = np.flatnonzero(lies_inside(middle - NEAR_M * outwards, sides) & (off > OFF_RAD))
@@ -104,22 +107,33 @@ def facings_of(sides: list[Side]) -> np.ndarray:
 
 def canted(planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene) -> Planes:
     """The planes with one over each of the `walls` that pays, the best first; `points` (3, m) are the volume's."""
-    unit, left = scene.evidence * PARAMETER_COST, list(walls)
-    while left and len(planes.walls) < MOST_CANTS and misfit_below(planes, points, scene) > unit:
-        best, least, which = planes, planes.cost, None
-        for wall in left:
-            start = start_over(wall, planes, points, scene)
-            for way in ways_over(wall, planes, sides):
-                found = fitted_with(planes, wall, way, start, points, scene)
-                if found is None or found.cost + unit * max(way.more, 1) >= least:
-                    continue
-                least, which = found.cost + unit * max(way.more, 1), wall
-                best = replace(found, price=planes.price + unit * max(way.more, 1))
-        if which is None:
+    left = list(walls)
+    while left and len(planes.walls) < MOST_CANTS:
+        if misfit_below(planes, points, scene) <= scene.evidence * PARAMETER_COST:
             break
-        left.remove(which)
+        best = min(with_one_more(planes, left, sides, points, scene), key=worth, default=planes)
+        if worth(best) >= worth(planes):
+            break
+        left.remove(best.walls[-1])
         planes = best
     return planes
+
+
+def worth(planes: Planes) -> float:
+    return planes.cost + planes.price
+
+
+def with_one_more(
+    planes: Planes, walls: list[Wall], sides: list[Side], points: np.ndarray, scene: Scene
+) -> Iterator[Planes]:
+    """The planes with one more over one of the `walls`, in every way."""
+    places = meeting_places(planes, sides)
+    for wall in walls:
+        start = start_over(wall, planes, points, scene)
+        for way in ways_over(wall, planes, places):
+            found = fitted_with(planes, wall, way, start, points, scene)
+            if proper(found.rows, found.walls):
+                yield found
 
 
 def misfit_below(planes: Planes, points: np.ndarray, scene: Scene) -> float:
@@ -128,20 +142,19 @@ def misfit_below(planes: Planes, points: np.ndarray, scene: Scene) -> float:
     return float(misfits(points[2], np.maximum(z, points[2]), scene).sum())
 
 
-def ways_over(wall: Wall, planes: Planes, sides: list[Side]) -> Iterator[Way]:
-    """Ways for a plane to rise from `wall`, the more regular ones first."""
-    count = planes.design.shape[2]
+def ways_over(wall: Wall, planes: Planes, places: list[np.ndarray]) -> Iterator[Way]:
+    """Ways for a plane to rise from `wall`, through one of the `places` in which others meet or free, the more regular ones first."""
+    count, depth = planes.design.shape[2], wall.depth
     own, eave = np.eye(count + 2), level_eave(planes)
-    out = np.array([-math.cos(wall.facing), -math.sin(wall.facing), wall.offset])
     eaves = [own[count + 1]] if eave is None else [own[eave], own[count + 1]]
-    for place in meeting_places(planes, sides):
-        deep = float(out @ (*place, 1.0))
+    for place in places:
+        deep = float(depth @ (*place, 1.0))
         if deep > DEEP_M:
             top = np.append(height_by_unknowns(planes, place), [0.0, 0.0])
             for low in eaves:
-                yield trimmed(np.outer(out, (top - low) / deep) + np.outer([0.0, 0.0, 1.0], low), count)
+                yield trimmed(np.outer(depth, (top - low) / deep) + np.outer([0.0, 0.0, 1.0], low), count)
     for low in eaves:
-        yield trimmed(np.outer(out, own[count]) + np.outer([0.0, 0.0, 1.0], low), count)
+        yield trimmed(np.outer(depth, own[count]) + np.outer([0.0, 0.0, 1.0], low), count)
 
 
 def trimmed(design: np.ndarray, count: int) -> Way:
@@ -182,30 +195,23 @@ def height_by_unknowns(planes: Planes, place: np.ndarray) -> np.ndarray:
     return (at @ planes.design[meet]).mean(axis=0)
 
 
-def fitted_with(
-    planes: Planes, wall: Wall, way: Way, start: np.ndarray, points: np.ndarray, scene: Scene
-) -> Planes | None:
-    """All planes of a volume fitted with one more over `wall`, from `start` (3,) on; None where they are improper."""
+def fitted_with(planes: Planes, wall: Wall, way: Way, start: np.ndarray, points: np.ndarray, scene: Scene) -> Planes:
+    """All planes of a volume fitted with one more over `wall`, from `start` (3,) on."""
     before = np.pad(planes.design, ((0, 0), (0, 0), (0, way.more)))
     design = np.concatenate([before, way.design[None]])
     begun = np.vstack([planes.rows, start])
     rows, covariance, cost = least_squares(begun, design, points, scene.dead, scene.width)
-    walls = (*planes.walls, wall)
-    return (
-        replace(planes, rows=rows, cost=cost, design=design, covariance=covariance, walls=walls)
-        if proper(rows, walls)
-        else None
-    )
+    price = planes.price + scene.evidence * PARAMETER_COST * max(way.more, 1)
+    return Planes(rows, cost, design, covariance, (*planes.walls, wall), price)
 
 
 def start_over(wall: Wall, planes: Planes, points: np.ndarray, scene: Scene) -> np.ndarray:
     """The plane (3,) over `wall` that explains most of `points` (3, m), of some slopes and heights."""
-    out = np.array([-math.cos(wall.facing), -math.sin(wall.facing), wall.offset])
     inclined = planes.rows[np.isfinite(planes.rows[:, 2])][:, :2]
     slopes = {round(x, 2) for x in np.hypot(*inclined.T).tolist() if x > FLATTEST} | set(SLOPES)
-    depth = out[:2] @ points[:2] + out[2]
-    near = depth < np.quantile(depth, 0.2)
+    deep = wall.depth[:2] @ points[:2] + wall.depth[2]
+    near = deep < np.quantile(deep, 0.2)
     lows = np.quantile(points[2, near], [0.02, 0.25, 0.5]).tolist()
-    tried = [slope * out + [0.0, 0.0, low] for slope in sorted(slopes) for low in lows]
+    tried = [slope * wall.depth + [0.0, 0.0, low] for slope in sorted(slopes) for low in lows]
     costs = [cost_of(np.vstack([planes.rows, row]), points, scene.dead, scene.width) for row in tried]
     return tried[int(np.argmin(costs))]

@@ -11,7 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...primitives.cants import MOST_CANTS
-from .cants import FEWEST_INCLINED, OFF_RAD
+from ..direction import quarter_gap
+from .cants import FEWEST_INCLINED, NEAR_M, OFF_RAD, seen_along
 from .finish import shown_points
 from .scene import Scene
 from .volumes import DIRECTION, OFFSET, REPLACES, SIDES, SLOPE, U0, U1, V0, V1, is_allowed
@@ -21,7 +22,6 @@ FURTHEST_M, MOST_STEPS, BESIDE_M = 6.0, 2, 0.3
 LEAST_M = 0.1  # nearer, a corner is where the volume ends
 MOST_ASLANT = 8  # walls of an outline that face along no axis of its main direction: with more its walls are round
 WITHIN = 0.8  # of a volume's points, from which on it stands within another
-NEAR_M = 0.1  # m inside a wall, in its middle, where a volume must be
 
 
 def over_cut_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> Iterator[np.ndarray]:
@@ -34,6 +34,8 @@ def over_cut_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> It
     for k in range(1, len(volumes)):
         direction, joined = int(volumes[k, DIRECTION]), volumes[k].copy()
         joined[REPLACES] = 0.0
+        if not inclined(joined):
+            continue
         for row in (joined, *further_out(joined, scene.corners[direction])):
             cut = aslant[direction] & lies_within(places[direction], row)
             if not 0 < cut.sum() <= MOST_CANTS or inclined(row) < FEWEST_INCLINED or not is_allowed(row, scene.allowed):
@@ -51,11 +53,10 @@ def over_cut_corners(volumes: np.ndarray, walls: np.ndarray, scene: Scene) -> It
 def beside_walls(walls: np.ndarray, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
     """Places (directions, m, 2) just inside the middles of `walls` (m, 2, 2), in every direction's axes, and which walls (directions, m)
     face along no axis there."""
-    turns = np.array([[[c, -s], [s, c]] for c, s in scene.turn])
-    ways = (walls[:, 1] - walls[:, 0]) @ turns
-    inwards = np.stack([-ways[..., 1], ways[..., 0]], axis=2) / np.hypot(ways[..., 0], ways[..., 1])[..., None]
-    off = np.remainder(np.arctan2(ways[..., 1], ways[..., 0]) + 0.25 * np.pi, 0.5 * np.pi) - 0.25 * np.pi
-    return walls.mean(axis=1) @ turns + NEAR_M * inwards, np.abs(off) > OFF_RAD
+    seen = [seen_along(walls, turn) for turn in scene.turn]
+    places = np.array([middle - NEAR_M * outwards for middle, outwards in seen])
+    off = quarter_gap(np.array([np.arctan2(outwards[:, 1], outwards[:, 0]) for _, outwards in seen]))
+    return places, np.abs(off) > OFF_RAD
 
 
 def lies_within(places: np.ndarray, row: np.ndarray) -> np.ndarray:
@@ -79,7 +80,7 @@ def further_out(row: np.ndarray, corners: np.ndarray) -> Iterator[np.ndarray]:
         for step in np.unique(np.round(out[(out > LEAST_M) & (out < FURTHEST_M)], 1)).tolist()[-MOST_STEPS:]:
             trial = row.copy()
             trial[U0 + edge] += sign * step
-            yield with_plane(trial, edge) if inclined(row) else trial
+            yield with_plane(trial, edge)
 
 
 def with_plane(row: np.ndarray, edge: int) -> np.ndarray:

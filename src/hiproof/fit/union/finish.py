@@ -47,6 +47,11 @@ class Wall(NamedTuple):
     facing: float
     offset: float
 
+    @property
+    def depth(self) -> np.ndarray:
+        """How deep inside of it places lie: what u, v, 1 are multiplied with (3,)."""
+        return np.array([-math.cos(self.facing), -math.sin(self.facing), self.offset])
+
 
 @dataclass(frozen=True)
 class Planes:
@@ -320,7 +325,4 @@ def proper(rows: np.ndarray, walls: tuple[Wall, ...] = ()) -> bool:
 
 def slopes_over(walls: tuple[Wall, ...], rows: np.ndarray) -> list[float]:
     """By how much planes (c, 3) rise from their walls."""
-    return [
-        -float(a * math.cos(wall.facing) + b * math.sin(wall.facing))
-        for wall, (a, b, _) in zip(walls, rows, strict=True)
-    ]
+    return [float(row[:2] @ wall.depth[:2]) for wall, row in zip(walls, rows, strict=True)]

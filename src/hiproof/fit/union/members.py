@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .finish import FEWEST_POINTS, Planes, Wall, shown_points
+from .finish import FEWEST_POINTS, Planes, Wall, points_of, shown_points
 from .scene import Scene
 from .sides import Side
 from .volumes import DIRECTION
@@ -45,7 +45,7 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         c, s = scene.turn[direction]
         common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
         one = np.ones(len(shown[k]))
-        points = np.array([scene.U[direction][shown[k]], scene.V[direction][shown[k]], scene.z[shown[k]]])
+        points = points_of(volumes[k], shown[k], scene)
         places = np.array([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
         found[k] = Member(
             rows,

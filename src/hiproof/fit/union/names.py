@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import shapely
@@ -19,9 +20,8 @@ from .volumes import DIRECTION, LEVEL, SIDES
 
 EACH = np.arange(SIDES)
 LEVEL_EAVE_M = 0.5  # an eave that would be level if its side lay so little further out is level
-HIDDEN_SHARE = (
-    0.8  # of the half of its rectangle, by which a side that lies hidden may be moved to where its eave is level
-)
+# of the half of its rectangle, by which a side that lies hidden may be moved to where its eave is level
+HIDDEN_SHARE = 0.8
 APEX_M = 0.15  # a hip whose pairs of sides meet at heights so near each other is a pyramid
 STRAIGHT = 1e-9  # rad; numerically the same direction
 GIVEN_M = 1e-3  # a rectangle's end further from its side is given by the outline that cuts it off
@@ -62,8 +62,8 @@ def part_of(
     member = members.those(0)
     turns = member.quarter_turns
     modes = np.concatenate([turned(planes.modes, turn), np.tile(RAISED, (len(rows), 1, 1))], axis=2)
-    shown = np.isfinite(rows[:, 2])
-    changes = changed(members, np.vstack([modes[: LEVEL + 1], modes[LEVEL + 1 :][shown[LEVEL + 1 :]]])).turned(turns)
+    told = np.isfinite(rows[:, 2]) | (np.arange(len(rows)) <= LEVEL)  # of cants those that show
+    changes = changed(members, modes[told]).turned(turns)
     member = replace(member.turned(turns), centre=member.centre @ axes + plan.frame.origin[:2])
     return member.part(regions, name_among(member.name, allowed), changes, len(unknown))
 
@@ -176,13 +176,17 @@ def regular(
 def cants_of(rows: np.ndarray, walls: tuple[Wall, ...], centre: np.ndarray) -> np.ndarray:
     """The cants (4, c, m) of members about `centre` (2, m), whose planes over `walls` are `rows` (n, 3, m), NaN where one shows nowhere."""
     cants = []
-    for wall, (a, b, z) in zip(walls, rows, strict=True):
-        c, s = math.cos(wall.facing), math.sin(wall.facing)
-        out = wall.offset - c * centre[0] - s * centre[1]
-        eave = a * (centre[0] + out * c) + b * (centre[1] + out * s) + z
-        cants.append([np.full_like(out, wall.facing), out, eave, -c * a - s * b])
+    for wall, row in zip(walls, rows, strict=True):
+        out = wall.offset - math.cos(wall.facing) * centre[0] - math.sin(wall.facing) * centre[1]
+        cants.append([np.full_like(out, wall.facing), out, *eave_and_slope(row, wall.facing, out, centre)])
     shown = [cant for cant in cants if np.isfinite(cant[3]).all()]
     return np.array(shown).reshape(-1, 4, centre.shape[1]).swapaxes(0, 1)
+
+
+def eave_and_slope(plane: np.ndarray, facing: float, out: Any, centre: np.ndarray) -> tuple[Any, Any]:
+    """The height of a plane a, b, c (3, m) at a wall that lies so far `out`, facing that way, from `centre`, and by how much it rises there."""
+    (a, b, z), c, s = plane, math.cos(facing), math.sin(facing)
+    return a * (centre[0] + out * c) + b * (centre[1] + out * s) + z, -c * a - s * b
 
 
 def level(
@@ -225,11 +229,9 @@ def changed(members: Member, changes: np.ndarray) -> Member:
         found.slopes[k, :count] += SIGN[k] * changes[k, axis]
         found.eaves[k, :count] += changes[k, 0] * middle[0] + changes[k, 1] * middle[1] + changes[k, 2]
     found.top[:count] += changes[LEVEL, 2]
-    for k, (a, b, z) in enumerate(changes[LEVEL + 1 :]):
-        facing, out = members.cants[:2, k, 0]
-        c, s = math.cos(facing), math.sin(facing)
-        found.cants[2, k, :count] += a * (members.centre[0, 0] + out * c) + b * (members.centre[1, 0] + out * s) + z
-        found.cants[3, k, :count] -= c * a + s * b
+    for k, plane in enumerate(changes[LEVEL + 1 :]):
+        facing, out = members.cants[:2, k, 0].tolist()
+        found.cants[2:, k, :count] += eave_and_slope(plane, facing, out, members.centre[:, 0])
     return found
 
 

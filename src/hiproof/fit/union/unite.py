@@ -72,7 +72,7 @@ def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Sce
     while tried:
         tried = False
         for trial in fewer(best):
-            if base_shows(trial, scene) and not base_shows(best.volumes, scene):
+            if bares_the_base(trial, best.volumes, scene):
                 continue
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
             if found > value + HOPELESS_UNITS * scene.evidence:
@@ -95,7 +95,7 @@ def with_cut_corners(roof: Drawn, ends: Ends, scene: Scene, known: Known) -> Dra
         for trial in over_cut_corners(before.volumes, ends.walls, scene):
             if at_least(trial, scene) > roof.cost + HOPEFUL_UNITS * scene.evidence:
                 continue
-            if base_shows(trial, scene) and not base_shows(before.volumes, scene):
+            if bares_the_base(trial, before.volumes, scene):
                 continue
             trial, _ = refit_each(trial, scene, objective(trial, scene, np.inf))
             found = drawn(trial, ends, scene, known)
@@ -103,6 +103,11 @@ def with_cut_corners(roof: Drawn, ends: Ends, scene: Scene, known: Known) -> Dra
         if roof is before:
             break
     return roof
+
+
+def bares_the_base(trial: np.ndarray, volumes: np.ndarray, scene: Scene) -> bool:
+    """Whether the base shows under a trial and not under the volumes that it would take the place of."""
+    return bool(base_shows(trial, scene)) and not base_shows(volumes, scene)
 
 
 def at_least(volumes: np.ndarray, scene: Scene) -> float:
