@@ -334,6 +334,27 @@ def test_what_came_in_a_wheel_is_compiled_only_when_asked_for_or_on_other_proces
     assert asked == ["solid"]
 
 
+def test_functions_of_pieces_compiled_before_are_not_announced_again(tmp_path, monkeypatch):
+    def compiled_pieces(left):
+        for piece in left:
+            news.ready.add(f"functions.of_{piece}")
+            yield piece
+
+    told = []
+    monkeypatch.setattr(warm, "compiled_pieces", compiled_pieces)
+    monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path,))
+    monkeypatch.setattr(news, "ready", set())
+    monkeypatch.setattr(news, "listener", lambda done, total: told.append(done))
+    warm.make_ready(["solid", "points"])
+    news.ready.clear()  # another process, later
+    told.clear()
+    warm.make_ready(["solid", "points", "single"])
+    assert told == [2]
+    news.ready.clear()
+    warm.make_ready(["single"])
+    assert told == [2] and "functions.of_single" in news.ready
+
+
 def test_where_nothing_can_be_kept_nothing_is_compiled_beforehand(tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setattr(warm, "compiled_pieces", lambda left: pytest.fail("compiled for nothing"))

@@ -18,9 +18,9 @@ WITHOUT_POSIX = """
 import errno, os, pkgutil, importlib, signal
 del errno.EDQUOT, os.sched_getaffinity, os.fork, signal.SIGKILL
 import hiproof
-from hiproof.city import executors, lock, run, warm
+from hiproof.city import cores, executors, lock, run, warm
 from hiproof.write import files
-print(warm.cores() > 0)
+print(cores.cores() > 0)
 """
 
 

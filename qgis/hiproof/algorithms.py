@@ -93,7 +93,9 @@ class Reconstruct(Algorithm):
         self.add(QgsProcessingParameterRasterLayer("TERRAIN", "Terrain model", optional=True))
         self.add(QgsProcessingParameterExtent("EXTENT", "Only buildings in (the clouds' coordinates)", optional=True))
         self.add(QgsProcessingParameterCrs("CRS", "CRS of clouds that name none", optional=True))
-        self.add(QgsProcessingParameterNumber("PROCESSES", "Processes", defaultValue=1, minValue=1))
+        self.add(
+            QgsProcessingParameterNumber("PROCESSES", "Processes (else as many as pay)", optional=True, minValue=1)
+        )
         self.add(QgsProcessingParameterString("MORE", "Further options of hiproof reconstruct", "", optional=True))
         self.add(QgsProcessingParameterBoolean("LOAD", "Load the buildings", True))
         self.add(QgsProcessingParameterBoolean("RAISED", "Raise them in 2.5D", False))

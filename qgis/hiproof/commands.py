@@ -13,7 +13,7 @@ def reconstruct(
     bbox=None,
     terrain=None,
     crs=None,
-    processes=1,
+    processes=None,
     more="",
 ):
     """The main job. `bbox` is (xmin, ymin, xmax, ymax) in the clouds' coordinates, `more` further options as typed."""
@@ -24,7 +24,7 @@ def reconstruct(
         "--bbox": bbox and ",".join(f"{side:.10g}" for side in bbox),
         "--terrain": terrain,
         "--crs": crs,
-        "--jobs": str(processes) if processes > 1 else None,
+        "--jobs": processes and str(processes),
     }
     return [program, "reconstruct", *clouds, "--out", out, *pairs(given), *shlex.split(more)]
 

@@ -22,6 +22,7 @@ other_classes what the points of other classes say of a building
 merge         the tiles' parts are joined in plan order into the files of the output folder
 outputs       digests of what was written
 ledger        which tasks are done, what came of each building: SQLite
+cores         how many processes pay on this machine
 executors     where tasks run: this process, processes, a Dask cluster
 tasks         the tasks by name, for processes that have imported nothing yet
 quarantine    a task that kills its process, found by trying it alone

@@ -14,9 +14,10 @@ MOST_PROCESSES = 1024  # processes; more is a slip of the hand, and would fill a
 
 def refuse_unusable(request: Any) -> None:
     """Raise SettingsError or InputError for options of a `run.Request` that cannot be met here."""
-    if not (type(request.processes) is int and 1 <= request.processes <= MOST_PROCESSES):
+    asked = request.processes
+    if asked is not None and not (type(asked) is int and 1 <= asked <= MOST_PROCESSES):
         raise SettingsError(
-            f"expected --jobs between 1 and {MOST_PROCESSES}, got {shown(request.processes)}; a process a core is enough"
+            f"expected --jobs between 1 and {MOST_PROCESSES}, got {shown(asked)}; a process a core is enough, as it is without this option"
         )
     for name in ("layer", "where", "id_attribute"):
         if getattr(request, name) is not None and request.footprints is None:

@@ -28,6 +28,7 @@ from ..compiled import news
 from ..compiled.stamp import count_compiled
 from ..errors import InputError, NotKeptWarning, OutputError
 from ..extras import needed
+from .cores import one_thread_each
 from .tasks import make_ready
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
@@ -102,7 +103,8 @@ class Processes:
             given = (os.getpid(), heard, log.started())
             self.pool = ProcessPoolExecutor(self.count, mp_context=context, initializer=begin_worker, initargs=given)
         try:
-            return self.pool.submit(function, *task)
+            with one_thread_each():
+                return self.pool.submit(function, *task)
         except BrokenProcessPool as error:
             lost: Future = Future()
             lost.set_exception(error)
@@ -236,7 +238,7 @@ def import_distributed() -> Any:
     return needed("distributed", "city", "--scheduler")
 
 
-def make_executor(processes: int, scheduler: str | None) -> InProcess | Processes | Dask:
+def make_executor(processes: int, scheduler: str | None = None) -> InProcess | Processes | Dask:
     """The executor that the options ask for."""
     if scheduler:
         return Dask(scheduler)

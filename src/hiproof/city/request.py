@@ -19,7 +19,7 @@ class Request:
     `footprints` (file, address or database) with their `layer`, the `id_attribute` that names them, an SQL condition
     `where` and a `bbox` (xmin, ymin, xmax, ymax) in the coordinates of the clouds say which buildings there are; without
     footprints the clouds are split. `terrain` is a raster, `overrides` a file of what is known better; `processes` work on
-    this machine, or those of the Dask `scheduler`; `restart` begins anew in a folder that holds another run.
+    this machine (None: as many as pay, see cores.py), or those of the Dask `scheduler`; `restart` begins anew in a folder that holds another run.
 
     >>> from pathlib import Path
     >>> Request(("tile.laz",), Path("models"), footprints="footprints.gpkg").settings.fit.objective
@@ -34,7 +34,7 @@ class Request:
     layer: str | None = field(default=None, metadata=WHICH)
     settings: Settings = field(default_factory=Settings)
     overrides: str | None = field(default=None, metadata=NO_MATTER)  # the ledger knows them building by building
-    processes: int = field(default=1, metadata=NO_MATTER)
+    processes: int | None = field(default=1, metadata=NO_MATTER)
     scheduler: str | None = field(default=None, metadata=NO_MATTER)
     restart: bool = field(default=False, metadata=NO_MATTER)
     where: str | None = field(default=None, metadata=WHICH)

@@ -25,12 +25,13 @@ from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
 from .checks import refuse_unusable
+from .cores import as_many_as_pay
 from .executors import make_executor
 from .ledger import Failure, Ledger
 from .lock import held
 from .merge import merge, output_files
 from .outputs import claims
-from .overrides import REDO
+from .overrides import REDO, load_redo
 from .plan import WorkPlan
 from .quarantine import is_loss, run_alone, solve_in_quarantine
 from .request import Request
@@ -80,10 +81,12 @@ def reconstruct_area(request: Request, progress: Progress = lambda step, done, t
 def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summary:
     """The steps of a run that has its folder `state` to itself."""
     clock = Clock()
-    executor = make_executor(request.processes, request.scheduler)
+    executor = make_executor(request.processes or 1, request.scheduler)
     ledger = open_ledger(state, request.restart)
     try:
         plan = resume_or_plan(request, state, ledger)
+        if request.processes is None and not request.scheduler:
+            executor = make_executor(processes_for(plan, state, ledger))
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
             executor.prepare(pieces_of(request))
@@ -112,6 +115,12 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         with suppress(sqlite3.Error):
             ledger.interrupt()
         ledger.close()
+
+
+def processes_for(plan: WorkPlan, state: Path, ledger: Ledger) -> int:
+    """As many as pay for the buildings that are left to do."""
+    left, redo = [name.partition(":")[2] for name in ledger.open_tasks("solve")], load_redo(state)
+    return as_many_as_pay(sum(len(redo.get(tile, plan.tiles[tile])) for tile in left), len(left))
 
 
 def pieces_of(request: Request) -> tuple[str, ...]:

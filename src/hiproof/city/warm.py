@@ -2,7 +2,7 @@
 
 The processes are fresh ones that run `warm_pieces`, one piece of the code after the other, so that what pieces share of
 numba's own is compiled once a process: where they cannot be started, or one fails, the functions are compiled when they
-are called. A mark a piece lies beside the compiled code.
+are called. A mark a piece lies beside the compiled code, and names the functions that were ready by then.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from typing import Any
 
 from ..compiled import kept, news
 from ..compiled.kinds import KIND, own_processor, runs_kind
 from ..compiled.stamp import PACKAGE, stamp_of_all
 from ..log import LOGGER
+from .cores import cores
 
 
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:
@@ -27,11 +29,13 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     """
     places = kept.folders(make_ready, str(PACKAGE / "__init__.py"))
     stamp, processors = stamp_of_all(), (own_processor(), KIND)[: 1 if own else 1 + runs_kind()]
-    missing = [
-        piece
-        for piece in pieces
-        if not any((place / mark(piece, stamp, processor)).exists() for processor in processors for place in places)
-    ]
+    missing = []
+    for piece in pieces:
+        marks = [place / mark(piece, stamp, processor) for processor in processors for place in places]
+        if made := next(filter(Path.exists, marks), None):
+            news.ready.update(made.read_text(encoding="utf-8").split())
+        else:
+            missing.append(piece)
     folder = kept.place_to_write(places) if missing else None
     if folder is None:  # all is there, or nothing can be kept, so that every process has to compile anyway
         return
@@ -42,7 +46,8 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
 
     def work_off() -> None:
         for piece in compiled_pieces(left):
-            (folder / mark(piece, stamp, own_processor())).touch()
+            ready = "\n".join(sorted(news.ready.copy()))
+            (folder / mark(piece, stamp, own_processor())).write_text(ready, encoding="utf-8")
 
     with ThreadPoolExecutor(news.processes) as pool:
         for done in [pool.submit(work_off) for _ in range(news.processes)]:
@@ -77,10 +82,6 @@ def environment() -> dict[str, str]:
     """This process's, with its places to import from, and the processor to compile for."""
     path = os.pathsep.join(filter(None, sys.path))
     return {**os.environ, "PYTHONPATH": path, "NUMBA_CPU_NAME": own_processor()}
-
-
-def cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def mark(piece: str, stamp: str, processor: str) -> str:

@@ -35,7 +35,9 @@ def reconstruct(
     config: Annotated[
         Path | None, typer.Option(help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)")
     ] = None,
-    jobs: Annotated[int, typer.Option(help="processes on this machine")] = 1,
+    jobs: Annotated[
+        int | None, typer.Option(help="processes on this machine (default: one for every 150 buildings, a core each)")
+    ] = None,
     scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
     restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
     log_file: Annotated[Path | None, typer.Option(help="keep the log from progress on here, added at the end")] = None,

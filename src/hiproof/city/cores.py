@@ -1,0 +1,47 @@
+"""How many processes a run may take on this machine, and how many of them pay."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+# A process takes a second to start, as long as 50 buildings. 160 of Delft on two cores: 6.6 s by one process, 5.4 by two, which took 1.2 s
+# of CPU more; 300 of a simulated city: see benchmarks/RESULTS.md
+BUILDINGS_A_PROCESS = 150
+QUOTA = Path(
+    "/sys/fs/cgroup/cpu.max"
+)  # of a container on Linux: microseconds of CPU in a period, or "max", and the period
+THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+
+
+def cores() -> int:
+    """Those that this process may use, by the system and by the quota of its container."""
+    here = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    try:
+        quota, period = QUOTA.read_text(encoding="ascii").split()
+        return max(1, min(here, round(int(quota) / int(period))))
+    except (OSError, ValueError, ZeroDivisionError):
+        return here
+
+
+def as_many_as_pay(buildings: int, tiles: int) -> int:
+    """Processes for so many buildings in so many work tiles.
+
+    >>> as_many_as_pay(40, 3)
+    1
+    """
+    return max(1, min(cores(), tiles, buildings // BUILDINGS_A_PROCESS))
+
+
+@contextmanager
+def one_thread_each() -> Iterator[None]:
+    """Processes started in here do linear algebra in one thread, unless the user said otherwise: there are as many of them as cores."""
+    ours = [name for name in THREADS if name not in os.environ]
+    os.environ.update(dict.fromkeys(ours, "1"))
+    try:
+        yield
+    finally:
+        for name in ours:
+            os.environ.pop(name, None)

@@ -1,0 +1,67 @@
+"""How many processes a run takes where nobody says."""
+
+import os
+
+import pytest
+
+from hiproof.city import cores, run
+from hiproof.city.cores import BUILDINGS_A_PROCESS, as_many_as_pay, one_thread_each
+from hiproof.city.executors import InProcess, Processes
+from hiproof.city.request import Request
+
+
+@pytest.mark.parametrize(
+    "quota, there, expected",
+    [
+        ("200000 100000\n", 8, 2),
+        ("150000 100000", 8, 2),
+        ("10000 100000", 8, 1),
+        ("max 100000", 8, 8),
+        ("800000 100000", 2, 2),
+    ],
+)
+def test_a_container_has_the_cores_of_its_quota(tmp_path, monkeypatch, quota, there, expected):
+    file = tmp_path / "cpu.max"
+    file.write_text(quota)
+    monkeypatch.setattr(cores, "QUOTA", file)
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(there), raising=False)
+    assert cores.cores() == expected
+
+
+def test_without_a_quota_all_cores_count(tmp_path, monkeypatch):
+    monkeypatch.setattr(cores, "QUOTA", tmp_path / "none")
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: range(5), raising=False)
+    assert cores.cores() == 5
+
+
+def test_processes_never_outnumber_cores_tiles_or_what_the_buildings_pay_for(monkeypatch):
+    monkeypatch.setattr(cores, "cores", lambda: 4)
+    for buildings in (0, 1, BUILDINGS_A_PROCESS, 2 * BUILDINGS_A_PROCESS, 10**6):
+        for tiles in (0, 1, 3, 100):
+            count = as_many_as_pay(buildings, tiles)
+            assert 1 <= count <= max(1, min(4, tiles, buildings // BUILDINGS_A_PROCESS))
+    assert as_many_as_pay(2 * BUILDINGS_A_PROCESS, 2) == 2
+
+
+def test_linear_algebra_of_workers_takes_one_thread_unless_the_user_said_otherwise(monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "3")
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
+    before = dict(os.environ)
+    with one_thread_each():
+        assert (os.environ["OMP_NUM_THREADS"], os.environ["OPENBLAS_NUM_THREADS"]) == ("3", "1")
+    assert dict(os.environ) == before
+
+
+@pytest.mark.parametrize("pay, kind", [(1, InProcess), (2, Processes)])
+def test_a_run_takes_as_many_as_pay_for_what_is_left(tmp_path, town_files, monkeypatch, pay, kind):
+    """And an outcome that does not depend on how many these are."""
+    asked, taken = [], []
+    monkeypatch.setattr(run, "as_many_as_pay", lambda *left: asked.append(left) or pay)
+    make = run.make_executor
+    monkeypatch.setattr(run, "make_executor", lambda *given: taken.append(make(*given)) or taken[-1])
+    request = Request((town_files[0],), tmp_path / "out", town_files[1], processes=None)
+    summary = run.reconstruct_area(request)
+    run.reconstruct_area(request)
+    (buildings, tiles), again = asked
+    assert buildings == summary.buildings and tiles > 0 and again == (0, 0)
+    assert type(taken[1]) is kind
