@@ -41,6 +41,7 @@ def test_processes_never_outnumber_cores_tiles_or_what_the_buildings_pay_for(mon
             count = as_many_as_pay(buildings, tiles)
             assert 1 <= count <= max(1, min(4, tiles, buildings // BUILDINGS_A_PROCESS))
     assert as_many_as_pay(2 * BUILDINGS_A_PROCESS, 2) == 2
+    assert as_many_as_pay(BUILDINGS_A_PROCESS, 9, footprints=False) > 1
 
 
 def test_linear_algebra_of_workers_takes_one_thread_unless_the_user_said_otherwise(monkeypatch):
@@ -62,6 +63,6 @@ def test_a_run_takes_as_many_as_pay_for_what_is_left(tmp_path, town_files, monke
     request = Request((town_files[0],), tmp_path / "out", town_files[1], processes=None)
     summary = run.reconstruct_area(request)
     run.reconstruct_area(request)
-    (buildings, tiles), again = asked
-    assert buildings == summary.buildings and tiles > 0 and again == (0, 0)
+    (buildings, tiles, footprints), again = asked
+    assert buildings == summary.buildings and tiles > 0 and footprints and again == (0, 0, True)
     assert type(taken[1]) is kind

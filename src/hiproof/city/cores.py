@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-# A process takes a second to start, as long as 50 buildings. 160 of Delft on two cores: 6.6 s by one process, 5.4 by two, which took 1.2 s
-# of CPU more; 300 of a simulated city: see benchmarks/RESULTS.md
-BUILDINGS_A_PROCESS = 150
+# A process takes a second to start, as long as 50 buildings with footprints or five of those that a cloud is split into, where blocks of
+# houses are one and outlines are drawn. Delft's 160 on two cores: 6.6 s by one process, 5.4 by two, which took 1.2 s of CPU more.
+BUILDINGS_A_PROCESS, SPLIT_A_PROCESS = 150, 20
 QUOTA = Path(
     "/sys/fs/cgroup/cpu.max"
 )  # of a container on Linux: microseconds of CPU in a period, or "max", and the period
@@ -26,13 +26,13 @@ def cores() -> int:
         return here
 
 
-def as_many_as_pay(buildings: int, tiles: int) -> int:
-    """Processes for so many buildings in so many work tiles.
+def as_many_as_pay(buildings: int, tiles: int, footprints: bool = True) -> int:
+    """Processes for so many buildings in so many work tiles, with `footprints` or split from the cloud.
 
     >>> as_many_as_pay(40, 3)
     1
     """
-    return max(1, min(cores(), tiles, buildings // BUILDINGS_A_PROCESS))
+    return max(1, min(cores(), tiles, buildings // (BUILDINGS_A_PROCESS if footprints else SPLIT_A_PROCESS)))
 
 
 @contextmanager

@@ -86,7 +86,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
     try:
         plan = resume_or_plan(request, state, ledger)
         if request.processes is None and not request.scheduler:
-            executor = make_executor(processes_for(plan, state, ledger))
+            executor = make_executor(processes_for(request, plan, state, ledger))
         clock.lap("plan")
         if ledger.open_tasks("sort") or ledger.open_tasks("solve"):
             executor.prepare(pieces_of(request))
@@ -117,10 +117,11 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         ledger.close()
 
 
-def processes_for(plan: WorkPlan, state: Path, ledger: Ledger) -> int:
+def processes_for(request: Request, plan: WorkPlan, state: Path, ledger: Ledger) -> int:
     """As many as pay for the buildings that are left to do."""
     left, redo = [name.partition(":")[2] for name in ledger.open_tasks("solve")], load_redo(state)
-    return as_many_as_pay(sum(len(redo.get(tile, plan.tiles[tile])) for tile in left), len(left))
+    buildings = sum(len(redo.get(tile, plan.tiles[tile])) for tile in left)
+    return as_many_as_pay(buildings, len(left), request.footprints is not None)
 
 
 def pieces_of(request: Request) -> tuple[str, ...]:

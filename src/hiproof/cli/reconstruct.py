@@ -36,7 +36,7 @@ def reconstruct(
         Path | None, typer.Option(help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)")
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(help="processes on this machine (default: one for every 150 buildings, a core each)")
+        int | None, typer.Option(help="processes on this machine (default: as many as pay, a core each)")
     ] = None,
     scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
     restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
