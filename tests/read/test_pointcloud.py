@@ -82,6 +82,7 @@ def write_text(path, xyz, classes, delimiter=",", header="x,y,z,classification")
 
 FORMATS = {
     "las 1.2": lambda p, xyz, c: write_las(p / "a.las", xyz, c, version="1.2", point_format=1),
+    "las 1.4, old points": lambda p, xyz, c: write_las(p / "a.las", xyz, c, point_format=1),
     "laz 1.4": lambda p, xyz, c: write_las(p / "a.laz", xyz, c),
     "copc": lambda p, xyz, c: write_copc(p / "a.copc.laz", xyz, c),
     "ply ascii": lambda p, xyz, c: write_ply(p / "a.ply", xyz, c, "ascii"),
@@ -115,6 +116,12 @@ def test_chunks_and_boxes_agree_with_the_whole(tmp_path, name):
     box = (85010.0, 446005.0, 85030.0, 446030.0)
     inside = (xyz[:, 0] >= 85010) & (xyz[:, 0] <= 85030) & (xyz[:, 1] >= 446005) & (xyz[:, 1] <= 446030)
     assert np.allclose(read_points(path, box=box).xyz, xyz[inside], atol=1e-6)
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_coordinates_lie_in_one_piece_so_that_nothing_is_compiled_for_a_format(tmp_path, name):
+    path = FORMATS[name](tmp_path, *some_points())
+    assert all(cloud.xyz.flags.c_contiguous for cloud in iter_points(path))
 
 
 def test_copc_is_told_from_laz_by_its_first_record(tmp_path):

@@ -97,7 +97,8 @@ def parse_header(head: bytes, size: int) -> LasFacts:
     if minor >= 4:
         legacy = count
         far_start, far_count, count = struct.unpack_from("<QIQ", head, 235)
-        if point_format & ~COMPRESSED < 6 and legacy != count <= 2**32 - 1:
+        # a writer may leave the old field at 0 although older readers know the points' format: LAS 1.4 allows it
+        if point_format & ~COMPRESSED < 6 and legacy not in (0, count) and count <= 2**32 - 1:
             raise Implausible(f"its header tells of {count} points and, in the field for older readers, of {legacy}")
     numbers = np.array(struct.unpack_from("<12d", head, 131))
     ends = [start for start in (wave_start, far_start if far_count else 0) if start]

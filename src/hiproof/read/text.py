@@ -39,7 +39,8 @@ def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
             table = parse_rows(file, layout, chunk_points, path, read)
             read += len(table)
             if len(table):
-                yield table[:, :3], classes_of(table)
+                # in one piece, as from other files: what is compiled for these takes it
+                yield np.ascontiguousarray(table[:, :3]), classes_of(table)
             if len(table) < chunk_points:
                 return
 
