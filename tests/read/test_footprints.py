@@ -109,6 +109,15 @@ def test_ids_of_many_digits_stay_apart_where_a_feature_has_none(tmp_path):
     assert ids[::2] == ["9007199254740992", "9007199254740993"]
 
 
+def test_a_list_stays_a_list_however_long(tmp_path):
+    ring = [[0, 0], [9, 0], [9, 9], [0, 0]]
+    feature = {"type": "Feature", "properties": {"many": list(range(2000)), "names": ["a", "b"]}}
+    feature["geometry"] = {"type": "Polygon", "coordinates": [ring]}
+    path, crs = tmp_path / "a.geojson", {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
+    assert read_footprints(path)[0].attributes == feature["properties"]
+
+
 def test_heights_of_the_outline_are_left_out(tmp_path):
     path = write(tmp_path / "a.gpkg", [shapely.force_3d(SQUARE, 12.0)])
     assert not read_footprints(path)[0].polygon.has_z

@@ -194,7 +194,9 @@ def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> l
 
 
 def plain_value(value: Any) -> Any:
-    """A value as JSON knows it: NaN becomes None, dates ISO text, bytes hexadecimal."""
+    """A value as JSON knows it: NaN becomes None, dates ISO text, bytes hexadecimal, arrays lists."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
     if isinstance(value, float) and not np.isfinite(value):
         return None
     if hasattr(value, "isoformat"):
