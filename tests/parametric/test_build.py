@@ -140,6 +140,10 @@ BAD = {
     "no parts": (lambda r: r.update(parts=[], status="modelled"), "give one part at least"),
     "no ground": (lambda r: r.update(z_ground=None), "number as z_ground, got null"),
     "parts no list": (lambda r: r.update(parts={}), "expected a list as parts"),
+    "crossing": (
+        lambda r: r.update(outline=[[[-6, -4], [6, 4], [6, -4], [-6, 4], [-6, -4]]]),
+        r"does not cross itself, got one with Self-intersection\[0 0\]",
+    ),
     "ring of two": (lambda r: r.update(outline=[[[0, 0], [1, 1]]]), "rings of three"),
 }
 
@@ -171,6 +175,12 @@ def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
     assert columns[0].tolist() == ["modelled", "not_built", "modelled"]
     mended = {**rows["wrong"], "parts": house()["parts"]}
     assert hiproof.build(mended).status.is_model
+
+
+def test_a_first_building_whose_outline_crosses_itself_stops_no_other(tmp_path):
+    wrong = house() | {"id": "wrong", "outline": [[[-6, -4], [6, 4], [6, -4], [-6, 4], [-6, -4]]]}
+    built = build_file(write_lines(tmp_path / "p.jsonl", wrong, house() | {"id": "two"}), tmp_path / "out")
+    assert built.by_status == {"not_built": 1, "modelled": 1}
 
 
 @pytest.mark.parametrize(

@@ -76,7 +76,16 @@ def outline_of(record: Mapping[str, Any]) -> shapely.Polygon | None:
     if not record.get("parts") or record.get("outline") is None or record.get("origin") is None:
         return None
     frame = LocalFrame(rounded(place(record["origin"], "origin"), DIGITS))
-    return shapely.transform(settled_outline(polygon(record["outline"], "outline")), frame.to_world)
+    return shapely.transform(on_grid(polygon(record["outline"], "outline")), frame.to_world)
+
+
+def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
+    """The outline as solids are composed on it. Raises InputError where its rings cross."""
+    try:
+        return settled_outline(outline)
+    except shapely.GEOSException as error:
+        reason = shapely.is_valid_reason(outline)
+        raise InputError(f"expected an outline that does not cross itself, got one with {reason}; mend it") from error
 
 
 def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
@@ -85,7 +94,7 @@ def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | N
         raise InputError("expected an outline and an origin of a building with parts, got null; give both")
     if len(parts) > MOST_PARTS:
         raise InputError(f"expected at most {MOST_PARTS} parts, got {len(parts)}; split the building")
-    outline = settled_outline(outline)
+    outline = on_grid(outline)
     made = [part_of(part, outline, f"part {index}") for index, part in enumerate(parts)]
     refuse_alike(parts)
     return Roof(tuple(made), outline, LocalFrame(rounded(origin, DIGITS)))
