@@ -23,6 +23,7 @@ from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid
 from hiproof.errors import InputError, OutputError
+from hiproof.evaluate.run import evaluate_run
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from tiny_town import make_town, write_cloud, write_footprints, write_town
@@ -68,6 +69,21 @@ def test_the_run_record_names_settings_version_inputs_and_counts(finished):
     assert record["buildings"] == 4
     assert record["inputs"]["footprints"].endswith("footprints.geojson")
     assert set(record["seconds"]) == {"plan", "prepare", "sort", "solve", "merge"}
+
+
+def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
+    cloud, footprints = files
+    _, _, geometry, _ = pyogrio.raw.read(footprints)
+    numbered = tmp_path / "numbered.gpkg"  # whose features are numbered 1 to 4, and called 4 to 1
+    pyogrio.raw.write(numbered, geometry, [np.arange(4, 0, -1)], ["number"], geometry_type="Polygon", crs="EPSG:28992")
+    reconstruct_area(
+        Request((str(cloud),), tmp_path / "out", str(numbered), id_attribute="number", where="number <> 2")
+    )
+    run = evaluate_run(tmp_path / "out")
+    assert [model.id for model in run.models] == ["4", "3", "1"]
+    assert [f.quality.outline_iou > 0.95 for f in run.figures] == [True] * 3
+    of_id = dict(zip("4321", shapely.from_wkb(geometry), strict=True))
+    assert all(area.equals(of_id[m.id]) for m, area in zip(run.models, run.footprints, strict=True))
 
 
 def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(files, tmp_path):

@@ -11,10 +11,19 @@ import typer
 
 from hiproof.cli.evaluate import evaluate
 from hiproof.errors import HiproofError
-from hiproof.evaluate.evaluation import compare, evaluate_building, points_by_outline, summarise, to_csv, to_json
+from hiproof.evaluate.evaluation import (
+    compare,
+    evaluate_building,
+    match_by_id_or_overlap,
+    points_by_outline,
+    summarise,
+    to_csv,
+    to_json,
+)
+from hiproof.evaluate.metrics import plan_outline
 from hiproof.evaluate.models import BuildingModel
 from hiproof.evaluate.run import evaluate_run
-from sample_models import ORIGIN, gable_solid, sample_points, write_sample_run
+from sample_models import ORIGIN, courtyard_solid, gable_solid, sample_points, write_sample_run
 
 
 @pytest.fixture(scope="module")
@@ -72,6 +81,23 @@ def test_footprints_bring_points_beyond_the_roof(tmp_path, run_folder):
     path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
     run = evaluate_run(run_folder, [str(run_folder / "points.xyz")], footprints=str(path))
     assert run.figures[0].quality.outline_iou == pytest.approx(8 / 12)
+
+
+def block(id, x):
+    return BuildingModel(id, solid=courtyard_solid().moved(np.array([x, 0.0, 0.0])))
+
+
+@pytest.mark.parametrize(("ids", "expected"), [("ab", [0, 1]), ("ba", [0, 1]), ("cd", [0, 1]), ("ac", [0, 1])])
+def test_a_number_that_is_anothers_id_elsewhere_is_not_taken_for_it(ids, expected):
+    models = [block("a", 0.0), block("b", 18.0)]  # which share a strip
+    areas = [plan_outline(model.solid) for model in models]
+    assert match_by_id_or_overlap(models, list(zip(ids, areas, strict=True))) == expected
+
+
+def test_where_nothing_lies_nearby_the_id_tells():
+    far = shapely.box(900, 900, 910, 910)
+    assert match_by_id_or_overlap([block("a", 0.0), BuildingModel("b")], [("b", far), ("a", far)]) == [1, 0]
+    assert match_by_id_or_overlap([block("a", 0.0)], []) == [None]
 
 
 def test_points_go_to_every_outline_that_holds_them():

@@ -290,6 +290,7 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
             "clouds": list(request.clouds),
             "footprints": request.footprints,
             "layer": request.layer,
+            "id_attribute": request.id_attribute,
             "where": request.where,
             "bbox": request.bbox,
             "terrain": request.terrain,

@@ -119,17 +119,20 @@ def points_by_outline(points: np.ndarray, outlines: Sequence[shapely.Geometry | 
 def match_by_id_or_overlap(
     models: Sequence[BuildingModel], others: Sequence[tuple[str, shapely.Geometry]]
 ) -> list[int | None]:
-    """Index of the other area that stands for each model: the one of the same id, else the largest overlap in plan."""
+    """Index of the other area that stands for each model: the one of the same id, unless another overlaps it in plan more than
+    twice as much: ids that are numbers name other buildings in another file."""
     by_id = {id: i for i, (id, _) in enumerate(others)}
-    tree = shapely.STRtree([area for _, area in others]) if others else None
+    areas = np.array([area for _, area in others], dtype=object)
+    tree = shapely.STRtree(areas)
     found: list[int | None] = []
     for model in models:
         match = by_id.get(model.id)
-        if match is None and tree is not None and model.solid is not None:
+        if len(areas) and model.solid is not None:
             outline = plan_outline(model.solid)
             candidates = np.sort(tree.query(outline, predicate="intersects"))
-            overlaps = [shapely.intersection(outline, others[i][1]).area for i in candidates]
-            match = int(candidates[np.argmax(overlaps)]) if len(candidates) and max(overlaps) > 0 else None
+            overlaps = shapely.area(shapely.intersection(outline, areas[candidates]))
+            if overlaps.any() and overlaps[candidates == match].sum() < 0.5 * overlaps.max():
+                match = int(candidates[np.argmax(overlaps)])
         found.append(match)
     return found
 

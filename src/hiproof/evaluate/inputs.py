@@ -13,13 +13,17 @@ from ..read.remote import is_url
 class RunInputs:
     """What a run was made from, each where it lies now, None for what was not asked for or is not there.
 
-    `gone` are those of the clouds that are not there, as the run named them.
+    `gone` are those of the clouds that are not there, as the run named them. `id_attribute`, `where` and `bbox` say how the run read
+    its footprints: read otherwise, ids may be those of other buildings.
     """
 
     clouds: tuple[str, ...] = ()
     gone: tuple[str, ...] = ()
     footprints: str | None = None
     layer: str | int | None = None
+    id_attribute: str | None = None
+    where: str | None = None
+    bbox: tuple[float, ...] | None = None
     terrain: str | None = None
     overrides: str | None = None
 
@@ -46,7 +50,7 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
     """The inputs told of in run.json's `record`; files in the folder `moved_to` go before those where the run found them.
 
     >>> found_inputs({"inputs": {"clouds": ["no/such.laz", "https://example.org/a.laz"]}})
-    RunInputs(clouds=('https://example.org/a.laz',), gone=('no/such.laz',), footprints=None, layer=None, terrain=None, overrides=None)
+    RunInputs(clouds=('https://example.org/a.laz',), gone=('no/such.laz',), footprints=None, layer=None, id_attribute=None, where=None, bbox=None, terrain=None, overrides=None)
     """
     told = record.get("inputs") or {}
     started_in = told.get("started_in")
@@ -61,6 +65,9 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
         tuple(cloud for cloud, found in clouds if not found),
         place(told.get("footprints")),
         told.get("layer"),
+        told.get("id_attribute"),
+        told.get("where"),
+        tuple(told["bbox"]) if told.get("bbox") else None,
         place(told.get("terrain")),
         place(told.get("overrides")),
     )

@@ -32,6 +32,9 @@ RECORD: dict[tuple[str, ...], Any] = {
     ("inputs", "clouds"): list,
     ("inputs", "footprints"): str,
     ("inputs", "layer"): (str, int),
+    ("inputs", "id_attribute"): str,
+    ("inputs", "where"): str,
+    ("inputs", "bbox"): list,
     ("inputs", "terrain"): str,
     ("inputs", "overrides"): str,
     ("inputs", "started_in"): str,
@@ -81,10 +84,12 @@ def evaluate_run(
         left = "measured against the others alone" if known.files else "nothing to measure against"
         warnings.warn(f"{folder}: {known.told_gone}, {left}; name them after the folder", InputWarning)
     clouds = clouds or known.files
+    asked: dict[str, Any] = {}
     if footprints is None:
         footprints, layer = known.footprint_file, layer or known.layer
+        asked = {"id_attribute": known.id_attribute, "where": known.where, "bbox": known.bbox}
     models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record)))
-    outlines = footprint_of_each(models, footprints, layer, record)
+    outlines = footprint_of_each(models, footprints, layer, record, asked)
     areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
     if clouds:
         points = points_by_outline(building_points(clouds, record, areas), areas)
@@ -141,14 +146,18 @@ def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequen
 
 
 def footprint_of_each(
-    models: Sequence[BuildingModel], path: str | None, layer: str | int | None, record: dict[str, Any]
+    models: Sequence[BuildingModel],
+    path: str | None,
+    layer: str | int | None,
+    record: dict[str, Any],
+    asked: dict[str, Any],
 ) -> list[Any]:
-    """The footprint polygon of each model, None without one."""
+    """The footprint polygon of each model, None without one; `asked` is what else `read_footprints` is told."""
     if path is None:
         return [None] * len(models)
     from ..read.footprints import read_footprints
 
-    footprints = read_footprints(path, layer, target_crs=run_crs(record), settings=run_settings(record))
+    footprints = read_footprints(path, layer, target_crs=run_crs(record), settings=run_settings(record), **asked)
     areas = [(f.id, shapely.make_valid(f.polygon)) for f in footprints]
     matches = match_by_id_or_overlap(models, areas)
     return [None if match is None else areas[match][1] for match in matches]
