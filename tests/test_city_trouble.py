@@ -2,11 +2,13 @@
 
 import errno
 import json
+import shutil
 import sqlite3
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import shapely
 
 import planted
 from hiproof.city import run as city_run
@@ -146,6 +148,19 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_pat
     reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
     assert min(chunks.count(number) for number in (0, 1)) > 1
     assert records(tmp_path / "out") == records(undisturbed)
+
+
+def test_points_in_several_files_count_once_where_a_footprint_is_moved(tmp_path):
+    town = make_town(houses=1)
+    beside = {id: shapely.transform(area, lambda xy: xy + [0.6, -0.5]) for id, area in town.footprints.items()}
+    footprints = write_footprints(tmp_path / "footprints.geojson", beside)
+    east = town.xyz[:, 0] > np.median(town.xyz[:, 0])
+    whole = str(write_cloud(tmp_path / "whole.laz", town.xyz, town.classification))
+    part = str(write_cloud(tmp_path / "part.laz", town.xyz[east], town.classification[east]))
+    for name, clouds in (("one", (whole,)), ("three", (whole, part, shutil.copy(part, tmp_path / "again.laz")))):
+        reconstruct_area(Request(tuple(map(str, clouds)), tmp_path / name, str(footprints)))
+    assert any(by_id(tmp_path / "one")["house-0"]["shift"])
+    assert records(tmp_path / "three") == records(tmp_path / "one")
 
 
 def test_a_building_with_too_many_points_is_thinned_and_says_so(town_files, tmp_path):

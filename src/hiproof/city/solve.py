@@ -184,8 +184,8 @@ def solve_one(
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
         if not found.is_seen and override is None:
             return fragments(not_seen(job, found.remark), plan.names_of(job), plan.head)
-        points = found.points
-        used = points if len(points) <= most else thin_to_count(points := without_repeats(points), most)
+        points = without_repeats(found.points)  # first of all: a footprint is put where points are many
+        used = thin_to_count(points, most)
         known = used, job.footprint, surroundings.terrain_of(job), plan.settings
         building = reconstruct(*known, id=job.id) if override is None else overridden(override, *known, id=job.id)
         if len(used) < len(points):
