@@ -105,6 +105,15 @@ def test_a_choice_that_leaves_nothing_gets_a_sentence(chosen, message, houses):
         read_footprints(houses, **chosen)
 
 
+@pytest.mark.parametrize("ending", ["geojson", "shp", "fgb"])
+def test_a_condition_that_no_database_reads_gets_the_same_sentence(ending, houses, tmp_path):
+    path = tmp_path / f"houses.{ending}"
+    geometry = pyogrio.raw.read(houses)[2]
+    pyogrio.raw.write(path, geometry, [np.arange(len(geometry))], ["year"], geometry_type="Polygon", crs="EPSG:28992")
+    with pytest.raises(InputError, match=r"--where in SQL on the attributes of .*\(year\), got: 'height > 3'"):
+        read_footprints(path, where="height > 3")
+
+
 @pytest.mark.parametrize("text", ["1,2,3", "3,2,1,4", "a,b,c,d", "1,2,nan,4", ""])
 def test_a_box_that_is_none_gets_a_sentence(text, tmp_path):
     done = CliRunner().invoke(app, ["reconstruct", "a.laz", "--out", str(tmp_path), f"--bbox={text}"])

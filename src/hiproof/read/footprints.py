@@ -162,7 +162,7 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # pyogrio remarks on measured geometries and mixed layers, which are fine
             return read()
-    except FeatureError as error:
+    except (FeatureError, ValueError) as error:  # ValueError: a condition on other files than databases
         if info is None or "SQL" not in str(error):
             raise unreadable(path, error) from error
         told, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
@@ -172,7 +172,7 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
     except DataLayerError as error:
         layers = ", ".join(str(name) for name, _ in pyogrio.list_layers(str(path)))
         raise InputError(f"expected a layer of {path} (it has {layers}), got: {error}; use one of these") from error
-    except (DataSourceError, ValueError, OSError, RuntimeError) as error:
+    except (DataSourceError, OSError, RuntimeError) as error:
         raise unreadable(path, error) from error
 
 
