@@ -56,6 +56,16 @@ def test_a_cloud_of_water_or_of_noise_is_refused(tmp_path, kind):
     assert not (tmp_path / "out.laz").exists()
 
 
+def test_degrees_are_refused_although_no_crs_names_them(tmp_path):
+    header = laspy.LasHeader(version="1.4", point_format=6)
+    header.offsets, header.scales = [4.0, 52.0, 0.0], [1e-7, 1e-7, 1e-3]
+    las = laspy.LasData(header)
+    las.x, las.y, las.z = np.random.default_rng(0).uniform([4.8, 52.3, 0], [4.81, 52.31, 9], (100, 3)).T
+    las.write(tmp_path / "in.laz")
+    with pytest.raises(InputError, match="which look like degrees; reproject it"):
+        classify_file(tmp_path / "in.laz", tmp_path / "out.laz", Settings())
+
+
 def test_other_files_and_places_are_refused_with_a_sentence(tmp_path):
     town = make_town(1)
     path = write_cloud(tmp_path / "in.laz", town.xyz, np.ones(len(town.xyz)))

@@ -8,8 +8,10 @@ import laspy
 import numpy as np
 
 from ..errors import InputError, OutputError
+from ..frames import Units
 from ..read.crs import parse_crs, units_of
 from ..read.las import explained, las_crs, read_las_header
+from ..read.overlap import refuse_degrees
 from ..read.pointcloud import file_kind, refuse_implausible
 from ..settings import Settings
 from ..write.files import atomic
@@ -32,7 +34,7 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
             f"expected another file to write than the one that is read, got {out} for both; name a new one"
         )
     las = read_whole(path)
-    units = units_of(parse_crs(settings.read.crs) or las_crs(las.header, path), str(path), settings.read.unit)
+    units = units_in(las, path, settings)
     before = np.asarray(las.classification, np.uint8)
     asked = ~np.isin(before, LEFT_ALONE) & ~np.asarray(las.withheld, bool)
     if not asked.any():
@@ -45,6 +47,17 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
     write_whole(las, out)
     counts = {"points": len(before), "ground": (found == GROUND).sum(), "building": (found == BUILDING).sum()}
     return {name: int(count) for name, count in counts.items()}
+
+
+def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
+    """Units of the file's coordinates. Raises InputError for degrees, also where no CRS says that they are."""
+    crs = parse_crs(settings.read.crs) or las_crs(las.header, path)
+    if crs is None:
+        box = np.r_[las.header.mins[:2], las.header.maxs[:2]].reshape(1, 4)
+        refuse_degrees(
+            box, str(path), "reproject it to the UTM zone or the national grid of the place (`pdal translate`)"
+        )
+    return units_of(crs, str(path), settings.read.unit)
 
 
 def classes_after(before: np.ndarray, found: np.ndarray) -> np.ndarray:
