@@ -86,6 +86,21 @@ def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
     assert all(area.equals(of_id[m.id]) for m, area in zip(run.models, run.footprints, strict=True))
 
 
+def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp_path):
+    def run(**settings):
+        told = Settings.from_dict(settings)
+        reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), settings=told, restart=True))
+
+    run(write={"citygml": "both"})
+    (tmp_path / "buildings.parquet").write_text("not a file of this run")
+    run(city={"models": "tiles"})
+    assert {path.name for path in tmp_path.glob("*.*")} == {
+        *(".hiproof", "buildings.gpkg", "buildings.parquet", "parameters.jsonl", "run.json")
+    }
+    with pytest.raises(InputError, match="got those of work tiles alone"):
+        evaluate_run(tmp_path)
+
+
 def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(files, tmp_path):
     cloud, footprints = map(str, files)
     asked = ["--citygml", "both", "--osm-tags", "--lods", "0,2.2"]

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from .. import __version__
 from ..errors import OutputError, OutputWarning
+from ..formats import FORMATS
 from ..log import LOGGER, counted
 from ..masking import masked_values
 from ..write.files import atomic
@@ -19,7 +20,7 @@ from . import noted
 from .changed import take_over
 from .ledger import Ledger, Task
 from .marks import changed_files, choice_of, inputs_of, mark_of
-from .merge import remove_tiles, tile_parts
+from .merge import remove_tiles, tile_parts, whole_files
 from .outputs import broken_claims
 from .overrides import REDO, settle_overrides
 from .plan import PLAN_FILE, WorkPlan
@@ -103,6 +104,7 @@ def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | N
 
 def begin(plan: WorkPlan, request: Request, state: Path, ledger: Ledger) -> None:
     """Put the run on `plan`, with nothing done yet."""
+    remove_unasked(plan, Path(request.out), ledger)
     forget(state, ledger)
     with atomic(state / PLAN_FILE) as beside:
         plan.save(Path(beside))
@@ -158,8 +160,16 @@ def has_parts(plan: WorkPlan, state: Path) -> bool:
     return all(tile_parts(state, tile).exists() for tile in plan.tiles)
 
 
+def remove_unasked(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
+    """Remove files that an earlier run wrote and this one will not: they would pass for its own."""
+    earlier, asked = {claim.name for claim in ledger.claims()}, whole_files(plan, out).values()
+    for name in (format.file for format in FORMATS.values() if format.fragment):
+        if name in earlier and out / name not in asked:
+            (out / name).unlink(missing_ok=True)
+
+
 def forget(state: Path, ledger: Ledger) -> None:
-    """Drop all that an earlier run in this folder has left of its state (its output files stay until replaced)."""
+    """Drop all that an earlier run in this folder has left of its state (output files that it will replace stay until then)."""
     remove_tiles(state.parent)
     ledger.forget()
     (state / REDO).unlink(missing_ok=True)
