@@ -90,7 +90,7 @@ def test_a_page_instead_of_points_gets_one_sentence(served, name):
 @pytest.mark.parametrize("name", ["missing.laz", "missing.ply", "missing.xyz"])
 def test_an_address_that_answers_with_nothing_gets_one_sentence(served, name):
     _, address, _ = served
-    with pytest.raises(InputError, match=name):
+    with pytest.raises(InputError, match=rf"{name}, got: 404, message='File not found'"):
         read_points(f"{address}/{name}")
 
 

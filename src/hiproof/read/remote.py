@@ -38,7 +38,10 @@ def open_address(url: str) -> BinaryIO:
     except ImportError as error:
         raise InputError(f"expected what fsspec needs to open {url}, got: {error}; install it") from error
     except Exception as error:  # each of fsspec's file systems raises errors of its own
-        raise InputError(f"expected a point cloud at {url}, got: {error or type(error).__name__}; check it") from error
+        told = error.__cause__ or error  # of what it cannot reach fsspec itself tells the address alone
+        raise InputError(
+            f"expected a point cloud at {url}, got: {str(told) or type(told).__name__}; check it"
+        ) from error
 
 
 def import_fsspec() -> Any:
