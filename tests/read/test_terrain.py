@@ -88,6 +88,15 @@ def test_outside_and_without_data_is_unknown(tmp_path):
     assert np.allclose(model.height_at(edge), plane(edge), atol=0.03)
 
 
+@pytest.mark.parametrize("nothing", [3.4028234663852886e38, -3.4e38, np.inf, np.nan])
+def test_heights_that_no_ground_has_are_unknown_although_the_raster_does_not_say_so(tmp_path, nothing):
+    heights = np.full((80, 120), 2.0)
+    heights[:, :60] = nothing
+    model = read_terrain(write_raster(tmp_path / "dtm.tif", heights=heights))
+    found = model.height_at(np.array([[WEST + 10, NORTH - 20], [WEST + 29.8, NORTH - 20], [WEST + 50, NORTH - 20]]))
+    assert np.isnan(found[0]) and found[1:].tolist() == [2.0, 2.0]
+
+
 def test_thinning_depends_neither_on_order_nor_on_tiles():
     points = ground(3000)
     shuffled = points[np.random.default_rng(4).permutation(len(points))]

@@ -20,6 +20,7 @@ from ..extras import needed
 from ..frames import Units
 from ..masking import masked
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
+from .plausible import MOST_HEIGHT
 
 TILE_PX = 512  # pixels, side of what is read at once: GeoTIFFs are often stored in such tiles
 TILES_KEPT = 8  # tiles in memory, 8 MB; buildings come in order of place
@@ -167,7 +168,8 @@ class RasterTerrain:
                 raise InputError(
                     f"expected a complete raster at {self.path}, got: {error}; copy or download it again"
                 ) from error
-            self.tiles[key] = np.where(np.isfinite(pixels), pixels, np.nan)
+            # 3.4e38 and its like say "no data" in rasters that do not declare it
+            self.tiles[key] = np.where(np.abs(pixels) <= MOST_HEIGHT, pixels, np.nan)
         self.tiles.move_to_end(key)
         if len(self.tiles) > TILES_KEPT:
             self.tiles.popitem(last=False)
