@@ -10,7 +10,7 @@ import shapely
 import typer
 
 from hiproof.cli.evaluate import evaluate
-from hiproof.errors import HiproofError
+from hiproof.errors import HiproofError, InputWarning
 from hiproof.evaluate.evaluation import (
     compare,
     evaluate_building,
@@ -55,6 +55,15 @@ def test_a_model_equals_itself(run):
     own = run.figures[0].comparison
     assert own.reference_id == "house-1" and own.plan_iou == pytest.approx(1)
     assert (own.ridge_height_m, own.slope_deg, own.azimuth_deg, own.volume_m3) == (0, 0, 0, 0)
+
+
+def test_a_reference_from_elsewhere_is_told_of(run_folder, tmp_path):
+    text = (run_folder / "buildings.city.jsonl").read_text().replace('"house-1"', '"a"').replace('"block 2"', '"b"')
+    (tmp_path / "other.city.jsonl").write_text(
+        text.replace(str(ORIGIN[0]), str(ORIGIN[0] + 5000)).replace('"bare"', '"c"')
+    )
+    with pytest.warns(InputWarning, match="no building of it stands where one of the run does"):
+        evaluate_run(run_folder, reference=str(tmp_path / "other.city.jsonl"))
 
 
 def test_differences_have_the_sign_of_ours_minus_theirs():

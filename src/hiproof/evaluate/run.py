@@ -182,11 +182,13 @@ def run_out_crs(record: dict[str, Any]) -> str:
 
 
 def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:
-    """The building of the reference file that stands for each model."""
+    """The building of the reference file that stands for each model; one line where none does for any."""
     if path is None:
         return [None] * len(models)
     others = [(model, outline) for model in read_models(path) if (outline := own_outline(model)) is not None]
     matches = match_by_id_or_overlap(models, [(other.id, outline) for other, outline in others])
+    if models and not any(match is not None for match in matches):
+        warnings.warn(f"{path}: no building of it stands where one of the run does; check its CRS", InputWarning)
     return [None if match is None else others[match][0] for match in matches]
 
 
