@@ -22,6 +22,15 @@ def enclosed(polygons: Any) -> Any:
     return shapely.make_valid(polygons, method="structure", keep_collapsed=False)
 
 
+def clockwise(polygon: shapely.Polygon) -> shapely.Polygon:
+    """The polygon with its outer ring clockwise and its holes the other way round.
+
+    >>> clockwise(shapely.Polygon([(0, 0), (1, 0), (1, 1)])).exterior.is_ccw
+    False
+    """
+    return shapely.orient_polygons(polygon, exterior_cw=True)
+
+
 def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
     """Coordinates (n + 1, 2) of a ring in plan, its first corner last again, with what it encloses to the left.
 

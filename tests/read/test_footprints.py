@@ -19,7 +19,7 @@ from hiproof.read.polygons import simple_polygons
 from hiproof.settings import Settings
 
 pytestmark = pytest.mark.filterwarnings("ignore:'crs' was not provided", "ignore:invalid value encountered")
-SQUARE = shapely.box(85000, 446000, 85010, 446010)
+SQUARE = shapely.box(85000, 446000, 85010, 446010, ccw=False)
 RD, UTM31, UTM32, WGS84 = (CRS.from_epsg(code) for code in (28992, 25831, 25832, 4326))
 HOLED = shapely.Polygon(SQUARE.exterior, [[(85002, 446002), (85004, 446002), (85004, 446004), (85002, 446004)]])
 
@@ -64,6 +64,14 @@ def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
     assert built.startswith("1931-05-17") and first.attributes == {"name": "A", "floors": 2, "height": 7.5}
     assert "height" not in second.attributes
     json.dumps(second.attributes)
+
+
+@pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb", "shp"])
+def test_which_way_rings_go_round_depends_on_no_format(tmp_path, ending):
+    """A fit that begins at an edge sees a roof from the other side where its outline goes round the other way."""
+    path = write(tmp_path / f"a.{ending}", [SQUARE, shapely.reverse(SQUARE), shifted(HOLED, 20)])
+    for footprint in read_footprints(path):
+        assert not footprint.polygon.exterior.is_ccw and all(hole.is_ccw for hole in footprint.polygon.interiors)
 
 
 def write_with_gaps(path, **fields):

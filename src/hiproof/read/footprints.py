@@ -17,6 +17,7 @@ from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..log import counted
 from ..model import Footprint
+from ..rings import clockwise
 from ..settings import Settings
 from .attribute_columns import as_declared, where_known
 from .crs import described, parse_crs, same_horizontal, units_of
@@ -44,7 +45,7 @@ def read_footprints(
     """Footprints of a file, URL or data source name in world metres, in `target_crs` (the cloud's) where one is given.
 
     `layer` names one of a file's layers, which may be left out where only one holds geometries. Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the feature's id; polygons
-    without area stay, with an empty polygon. `where` is an SQL condition on their attributes; of those, only the ones that
+    without area stay, with an empty polygon. Rings are clockwise, holes counter-clockwise, as in a Shapefile and whatever the file's are. `where` is an SQL condition on their attributes; of those, only the ones that
     meet `bbox` (xmin, ymin, xmax, ymax), in the coordinates of `target_crs`, are given. Ids come from `id_attribute`, else from the first usual column without
     gaps or repeats, else they are the feature's number. `settings.read.crs` stands in for a `target_crs` that is None,
     `settings.read.unit` for the unit where there is no CRS. Raises InputError for what cannot be read, holds no features
@@ -278,7 +279,7 @@ def split_features(
     footprints, mended, empty, split = [], 0, 0, []
     invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries))
     for id, geometry, row, was_invalid in zip(ids, geometries, attributes, invalid, strict=True):
-        polygons = simple_polygons(geometry)
+        polygons = [clockwise(polygon) for polygon in simple_polygons(geometry)]
         mended += bool(was_invalid and not polygons[0].is_empty)
         empty += polygons[0].is_empty
         if len(polygons) == 1:
