@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pyogrio
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -126,6 +127,13 @@ def test_polygons_are_the_solid(tmp_path):
         assert len(rings) == len(face.rings) == len(found(polygon, "gml:exterior|gml:interior"))
         for ring, indices in zip(rings, face.rings, strict=True):
             np.testing.assert_allclose(ring, solid.vertices[[*indices, indices[0]]] + RD_ORIGIN, atol=1e-9)
+
+
+@pytest.mark.parametrize("crs", ["EPSG:2193+7839", "EPSG:2193", "EPSG:3035", "EPSG:2154+5720", "EPSG:25832"])
+def test_gdal_reads_the_place_also_where_the_crs_counts_north_first(tmp_path, crs):
+    written(tmp_path, [modelled(box(), terrain_intersection=())], crs)
+    west, south, east, north = pyogrio.read_info(tmp_path / "a.gml")["total_bounds"]
+    assert (west, south, east, north) == (85000.0, 446000.0, 85004.0, 446005.0)
 
 
 def test_envelope_holds_everything(tmp_path):

@@ -43,22 +43,28 @@ class UniqueNames:
 def srs_name(crs: Any) -> str | None:
     """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN; None when `crs` is unknown or has no code.
 
+    A URN promises the order of axes that EPSG gives, and coordinates here are east, north: a CRS that counts north first goes by
+    its bare codes, which promise none and are read as east, north.
+
     >>> srs_name("EPSG:7415")
     'urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709'
-    >>> srs_name("EPSG:26918")
-    'urn:ogc:def:crs:EPSG::26918'
+    >>> srs_name("EPSG:26918"), srs_name("EPSG:2193+7839")
+    ('urn:ogc:def:crs:EPSG::26918', 'EPSG:2193+7839')
     """
     from ..read.crs import epsg_code, horizontal_crs, parse_crs, vertical_crs
 
     crs = parse_crs(crs)
     if crs is None:
         return None
-    height = vertical_crs(crs)
-    codes = (None, None) if height is None else (epsg_code(horizontal_crs(crs)), epsg_code(height))
-    if None not in codes:
-        return "urn:ogc:def:crs," + ",".join(f"crs:EPSG::{code}" for code in codes)
-    code = epsg_code(crs) or epsg_code(horizontal_crs(crs))
-    return None if code is None else f"urn:ogc:def:crs:EPSG::{code}"
+    plan, height = horizontal_crs(crs), vertical_crs(crs)
+    both = () if height is None else (epsg_code(plan), epsg_code(height))
+    codes = both if both and None not in both else (epsg_code(crs) or epsg_code(plan),)
+    if None in codes:
+        return None
+    if plan.axis_info[0].direction == "north":
+        return "EPSG:" + "+".join(map(str, codes))
+    named = [f"crs:EPSG::{code}" for code in codes]
+    return f"urn:ogc:def:{named[0]}" if len(named) == 1 else f"urn:ogc:def:crs,{','.join(named)}"
 
 
 def reference_system(crs: Any) -> str | None:
