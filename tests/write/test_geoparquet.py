@@ -39,6 +39,15 @@ def test_the_same_rows_as_the_geopackage(tmp_path, layer):
         assert got is None or shapely.from_wkb(got).equals(shapely.from_wkb(expected))
 
 
+def test_an_attribute_called_geometry_stands_beside_the_outline(tmp_path):
+    pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
+    with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415") as writer:
+        writer.add(modelled(gable_house(), attributes={"geometry": "poly", "Geometry": 1}))
+    (row,) = pq.read_table(tmp_path / "b.parquet").to_pylist()
+    assert (row["geometry_2"], row["Geometry_3"]) == ("poly", 1)
+    assert shapely.from_wkb(row["geometry"]).area == pytest.approx(96.0)
+
+
 def test_the_file_describes_its_geometry(tmp_path):
     pq = pytest.importorskip("pyarrow.parquet", reason="needs pyarrow, part of the extra `city`")
     with GeoParquetWriter(tmp_path / "b.parquet", "EPSG:7415"):

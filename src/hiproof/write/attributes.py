@@ -36,7 +36,6 @@ LAYERS = {BUILDINGS: "MultiPolygon", "parts": "MultiPolygon", "roof_surfaces": "
 
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
 ROWS_AT_ONCE = 1000  # rows handed to GDAL at once: its overhead is a call's, its memory a row's
-RESERVED = ("fid", "geom")
 GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
@@ -91,6 +90,7 @@ class AttributesWriter(BuildingWriter):
     """Incremental form of `write_attributes`; `layers` are those written."""
 
     layers: tuple[str, ...] = tuple(LAYERS)
+    reserved: tuple[str, ...] = ("fid", "geom")  # names of columns that the format has itself
 
     def __init__(
         self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, write: WriteSettings | None = None
@@ -159,7 +159,7 @@ class AttributesWriter(BuildingWriter):
                     self.hidden,
                     geometry,
                     [values for values, _ in columns],
-                    column_names(kinds),
+                    column_names(kinds, self.reserved),
                     [mask for _, mask in columns],
                     layer=layer,
                     driver="GPKG",
@@ -228,13 +228,13 @@ def objects(values: list[Any]) -> np.ndarray:
     return array
 
 
-def column_names(names: Iterable[str]) -> list[str]:
-    """Names that SQLite, which does not tell upper from lower case, can hold beside its own columns.
+def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str]:
+    """Names that SQLite, which does not tell upper from lower case, can hold beside the `reserved` ones.
 
-    >>> column_names(["id", "Year", "year", "fid"])
+    >>> column_names(["id", "Year", "year", "fid"], ["fid"])
     ['id', 'Year', 'year_2', 'fid_2']
     """
-    taken, unique = set(RESERVED), []
+    taken, unique = set(reserved), []
     for name in names:
         candidate, number = name, 1
         while candidate.lower() in taken:

@@ -22,6 +22,8 @@ GEOMETRY_TYPES = {BUILDINGS: PLAN, "parts": PLAN, "roof_surfaces": ["Polygon Z"]
 class GeoParquetWriter(AttributesWriter):
     """Incremental writer of the same rows as the GeoPackage's `layer`; raises InputError where pyarrow is missing."""
 
+    reserved = (*AttributesWriter.reserved, GEOMETRY)
+
     def __init__(
         self,
         path: str | os.PathLike,
@@ -50,9 +52,8 @@ class GeoParquetWriter(AttributesWriter):
         from pyproj import CRS
 
         types = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
-        fields = [
-            pyarrow.field(name, types[kind]) for name, kind in zip(column_names(kinds), kinds.values(), strict=True)
-        ]
+        names = column_names(kinds, self.reserved)
+        fields = [pyarrow.field(name, types[kind]) for name, kind in zip(names, kinds.values(), strict=True)]
         crs = None if self.plan_wkt is None else CRS.from_wkt(self.plan_wkt).to_json_dict()
         geometry = {"encoding": "WKB", "geometry_types": GEOMETRY_TYPES[self.layers[0]], "crs": crs}
         geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
