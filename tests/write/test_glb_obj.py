@@ -52,6 +52,13 @@ def test_glb_holds_every_building_with_its_properties(tmp_path):
         assert volume(glb_positions(document, binary, mesh)) == pytest.approx(expected, rel=1e-5)
 
 
+def test_attributes_of_the_input_do_not_take_the_place_of_id_and_type(tmp_path):
+    told = {"id": "a", "roof_type": "thatch", "type": "church"}
+    write_glb(tmp_path / "a.glb", [ViewedModel("a", "gable", gable_solid(), told, {0: "gable"})])
+    (node,) = parse_glb(tmp_path / "a.glb")[0]["nodes"]
+    assert node["extras"] == {"id": "a", "roof_type": "gable", "roof_type_input": "thatch", "type": "church"}
+
+
 def test_obj_holds_every_building_closed(tmp_path):
     assert write_obj(tmp_path / "a.obj", BUILDINGS) == 2
     lines = (tmp_path / "a.obj").read_text().splitlines()

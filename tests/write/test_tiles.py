@@ -335,6 +335,15 @@ def test_the_command_tells_id_type_and_parameters(tmp_path, capsys):
     assert rows[0]["rf_volume_lod22"] == 1.0 and rows[0]["note"] == ""
 
 
+def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters(tmp_path, globe):
+    told = {"id": 7, "type": "church", "year": 1905}
+    model = ViewedModel("a", "gable", gable_solid().moved(ORIGIN), told, {0: "gable"})
+    write_models(tmp_path / "a.3dtiles", [model], "EPSG:7415", GEOID_M)
+    tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
+    (row,) = content_of(tmp_path / "a.3dtiles", tileset["root"])[2]
+    assert row == {"id": "a", "type": "gable", "id_input": 7.0, "type_input": "church", "year": 1905.0}
+
+
 def test_parameters_of_another_run_are_refused(tmp_path):
     write_sample_run(tmp_path)
     write_sample_parameters(tmp_path, ("someone", "else", "bare"))

@@ -16,7 +16,7 @@ from ..parametric.file import opened_parameters
 from ..read.cityjson import documents, reference_system
 from ..write.parameters import crs_text
 from ..write.reprojected import crs_of_files
-from ..write.viewed import ViewedModel
+from ..write.viewed import ViewedModel, told_beside
 
 TOLD = ("type", "parameters", "position", "rotation")
 
@@ -41,7 +41,8 @@ def run_buildings(folder: Path) -> Iterator[ViewedModel]:
         for model in read_models(run_models(folder), run_units(run_record(folder))):
             attributes = model.attributes
             if records is not None:  # a line a building, in the order of the models
-                attributes = {"parameters": parameters_text(next(records, {}), model.id, path), **attributes}
+                text = parameters_text(next(records, {}), model.id, path)
+                attributes = told_beside({"parameters": text}, attributes)
             if model.solid is not None:
                 yield ViewedModel(model.id, model.roof_type, model.solid, attributes, model.part_types)
 

@@ -16,7 +16,7 @@ from ..model import Face
 from .colours import linear_rgb
 from .glb import GlbDocument, y_up
 from .triangles import face_normals, faces_triangles
-from .viewed import Look, ViewedModel
+from .viewed import Look, ViewedModel, told_beside
 
 
 def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None = None) -> int:
@@ -56,7 +56,7 @@ class GlbContent:
             places = {"POSITION": self.document.positions(corners), "NORMAL": normal}
             material = self.materials.setdefault(look, len(self.materials))
             primitives.append({"attributes": places, "material": material})
-        extras = {"id": model.id, "roof_type": model.roof_type, **model.attributes}
+        extras = told_beside({"id": model.id, "roof_type": model.roof_type}, model.attributes)
         self.nodes.append({"name": model.id, "mesh": len(self.meshes), "extras": extras})
         self.meshes.append({"name": model.id, "primitives": primitives})
 

@@ -35,6 +35,16 @@ class ViewedModel(NamedTuple):
         return found
 
 
+def told_beside(own: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
+    """`own` values by name, then the `attributes`, of which one that has such a name and says something else is called NAME_input.
+
+    >>> told_beside({"id": "a", "type": "gable"}, {"id": "a", "type": "church", "year": 1905})
+    {'id': 'a', 'type': 'gable', 'type_input': 'church', 'year': 1905}
+    """
+    others = {name: value for name, value in attributes.items() if name not in own or str(value) != str(own[name])}
+    return own | {f"{name}_input" if name in own else name: value for name, value in others.items()}
+
+
 def look_of(face: Face, part_types: Mapping[int, str]) -> Look:
     """The look of a face: a roof's is that of its part's type.
 

@@ -19,7 +19,7 @@ import numpy as np
 from ... import __version__
 from ...errors import InputError, InputWarning, OutputError
 from ..files import hidden_name, output_error, scratch
-from ..viewed import ViewedModel
+from ..viewed import ViewedModel, told_beside
 from .content import tile_glb
 from .globe import Globe, east_north_up
 from .meshes import Mesh, mesh_of
@@ -86,7 +86,8 @@ class WaitingCity:
     def add(self, model: ViewedModel) -> None:
         """Keep a building: its mesh, and a row of the table that tells of it."""
         local = self.local(model.solid.vertices)
-        mesh, row = mesh_of(model, local), {"id": model.id, "type": model.roof_type, **model.attributes}
+        row = told_beside({"id": model.id, "type": model.roof_type}, model.attributes)
+        mesh = mesh_of(model, local)
         self.found.add(row)
         self.offsets.append(self.file.tell())
         self.triangles.append(mesh.triangles)
