@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import shapely
 import typer
+from pyogrio import raw
 
 from hiproof.cli.evaluate import evaluate
 from hiproof.errors import HiproofError, InputWarning
@@ -22,7 +23,7 @@ from hiproof.evaluate.evaluation import (
 )
 from hiproof.evaluate.metrics import plan_outline
 from hiproof.evaluate.models import BuildingModel
-from hiproof.evaluate.run import evaluate_run
+from hiproof.evaluate.run import evaluate_run, own_outline
 from sample_models import ORIGIN, courtyard_solid, gable_solid, sample_points, write_sample_run
 
 
@@ -107,6 +108,23 @@ def test_where_nothing_lies_nearby_the_id_tells():
     far = shapely.box(900, 900, 910, 910)
     assert match_by_id_or_overlap([block("a", 0.0), BuildingModel("b")], [("b", far), ("a", far)]) == [1, 0]
     assert match_by_id_or_overlap([block("a", 0.0)], []) == [None]
+
+
+@pytest.mark.parametrize("is_told", [True, False], ids=["the run tells the column of ids", "ids of another column"])
+def test_footprints_are_found_by_the_column_that_named_the_buildings(tmp_path, is_told):
+    solids = write_sample_run(tmp_path)
+    areas = [own_outline(BuildingModel(id, {}, solid)) for id, solid in solids.items()]
+    areas.append(shapely.transform(areas[0], lambda xy: xy + 200.0))
+    names = np.array([*solids, "bare"], dtype=object)
+    columns = [np.roll(names, 1), names]  # the usual column holds the names of others
+    raw.write(
+        tmp_path / "a.gpkg", shapely.to_wkb(areas), columns, ["id", "nr"], geometry_type="Polygon", crs="EPSG:28992"
+    )
+    inputs = {"footprints": str(tmp_path / "a.gpkg"), "id_attribute": "nr" if is_told else None}
+    (tmp_path / "run.json").write_text(json.dumps({"inputs": inputs, "crs": "EPSG:7415"}))
+    found = evaluate_run(tmp_path).footprints
+    assert all(shapely.equals(one, area) for one, area in zip(found[:2], areas, strict=False))
+    assert not is_told or shapely.equals(found[2], areas[2])
 
 
 def test_points_go_to_every_outline_that_holds_them():
