@@ -15,6 +15,7 @@ from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid, volume
 from hiproof.errors import CompositionError, HiproofError, InputError
+from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.file import opened_parameters
 from hiproof.parametric.run import build_file
 from hiproof.parametric.schema import schema, schema_text
@@ -253,3 +254,16 @@ def test_the_head_keeps_feet(tmp_path):
         for name in ("feet", "metres")
     ]
     assert low[0] == pytest.approx(np.array(low[1]) / 0.3048)
+
+
+@pytest.mark.parametrize(
+    ("head", "out_crs"),
+    [({"crs": "EPSG:7415"}, "EPSG:3857"), ({"crs": None, "unit": "us-survey-foot"}, "")],
+    ids=["another CRS", "feet without a CRS"],
+)
+def test_what_is_built_of_a_file_alone_is_read_in_its_place(tmp_path, head, out_crs):
+    path = write_lines(tmp_path / "parameters.jsonl", house(), head={"hiproof_parameters": 1} | head)
+    build_file(path, tmp_path / "out", changes={"write": {"out_crs": out_crs}})
+    model = evaluate_run(tmp_path / "out").models[0]
+    solid = hiproof.build(house()).solid
+    np.testing.assert_allclose(model.solid.vertices.mean(axis=0), solid.vertices.mean(axis=0), atol=1e-3)

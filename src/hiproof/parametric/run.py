@@ -187,11 +187,13 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
 
 
 def earlier_record(path: Path, head: FileHead) -> dict[str, Any]:
-    """Settings, inputs and units of the run whose record lies at `path`, written as `head` says; nothing where there is none."""
+    """Settings and inputs of the run whose record lies at `path`, as far as there is one; how and in which units coordinates are written
+    is as `head` says, with which whoever reads the models finds their place."""
     try:
         record = json.loads(path.read_text(encoding="utf-8"))
-        record["settings"] = {**record["settings"], "write": dataclasses.asdict(head.write)}
-        record["units"] = head.units.told()
-        return {name: record[name] for name in ("settings", "inputs", "units") if name in record}
-    except (OSError, ValueError, TypeError, KeyError):
-        return {}
+        known = {name: record[name] for name in ("settings", "inputs") if name in record}
+        settings = dict(known.get("settings", {}))
+    except (OSError, ValueError, TypeError):
+        known, settings = {}, {}
+    told = {"read": {"unit": head.unit}, **settings, "write": dataclasses.asdict(head.write)}
+    return {**known, "settings": told, "units": head.units.told()}
