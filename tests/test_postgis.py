@@ -5,15 +5,18 @@ import re
 from pathlib import Path
 
 import numpy as np
+import pyogrio
 import pytest
 import shapely
 from shapely import affinity
 
 import hiproof
 from handmade import courtyard, gable_house, modelled, unmodelled
+from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
+from hiproof.parametric.run import build_file
 from hiproof.read.footprints import footprint_crs, read_footprints
-from hiproof.write import write_all, write_attributes, write_cityjson
+from hiproof.write import write_all, write_attributes, write_cityjson, write_parameters
 from hiproof.write.postgis import lie_of, load_postgis
 from hiproof.write.roof_figures import roof_figures
 from postgis_server import running, why_not
@@ -146,6 +149,15 @@ def reconstructed_gable(rotation=0.0):
     return hiproof.build({"id": "south", **place, "parts": [part]})
 
 
+def nearly_level():
+    """A shallow roof, which drains but does not slope to the eye."""
+    ring = [[0, 0], [9, 0], [9, 6], [0, 6], [0, 0]]
+    part = {"type": "monopitch", "parameters": {"width": 6, "length": 9, "height": 0.2}, "position": [4.5, 3, 5]}
+    return hiproof.build(
+        {"id": "level", "origin": [85050, 446000, 0], "outline": [ring], "z_ground": 0, "parts": [part]}
+    )
+
+
 @pytest.fixture
 def run_of_two(tmp_path):
     """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without model."""
@@ -168,6 +180,19 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
         assert told.fetchall() == [("house", 0, "gable", 8.0, None), ("yard", 0, "flat", 8.0, None)]
         sql = "select GeometryType(geom), ST_Area(geom), area_m2 from told_parts where building_id = 'house'"
         assert connection.execute(sql).fetchone() == ("MULTIPOLYGON", 96.0, 96.0)
+
+
+def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
+    """Also where models are written in a map that stretches them, and of faces too level to have an azimuth."""
+    write_parameters(tmp_path / "parameters.jsonl", [reconstructed_gable(30.0), nearly_level()], "EPSG:7415")
+    build_file(tmp_path / "parameters.jsonl", tmp_path / "run", changes={"write": {"out_crs": "EPSG:3857"}})
+    load(tmp_path / "run", database, "map")
+    names = ["slope_deg", "azimuth_deg", "area_m2"]
+    meta, _, _, columns = pyogrio.raw.read(tmp_path / "run" / "buildings.gpkg", layer="roof_surfaces", columns=names)
+    with psycopg.connect(database) as connection:
+        sql = f"select {', '.join(meta['fields'])} from map_roofs order by building_id desc, number"
+        found = np.array(connection.execute(sql).fetchall(), float)
+    np.testing.assert_allclose(found, np.array(columns).T, rtol=1e-4)
 
 
 def documented(number, prefix):

@@ -25,6 +25,7 @@ from ..read.crs import units_named
 from ..read.database import import_psycopg, refuse_half_a_password
 from ..rings import ring_normal
 from .attribute_list import OWN, PARTS_LAYER
+from .roof_figures import FLAT_SLOPE_DEG
 from .triangles import faces_triangles
 
 PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
@@ -60,10 +61,11 @@ class Row:
     units: Units = METRES
 
 
-def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 500) -> int:
+def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 500, known: Units | None = None) -> int:
     """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn` by the models of `folder`.
 
-    Returns the number of buildings loaded. Raises InputError for a folder without models, OutputError for a database
+    `known` are the units of models of which more is known than their CRS tells: slopes and areas are measured where the run was
+    made. Returns the number of buildings loaded. Raises InputError for a folder without models, OutputError for a database
     that cannot be written.
     """
     path = Path(folder) / "buildings.city.jsonl"
@@ -82,7 +84,8 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
             header, features = open_sequence(path)
             srid = srid_of(header)
             empty_tables(cursor, names, srid)
-            units = units_named(header.get("metadata", {}).get("referenceSystem"), units_of_run(path.parent))
+            named = header.get("metadata", {}).get("referenceSystem")
+            units = known or units_named(named, units_of_run(path.parent))
             rows = (building_row(header["transform"], feature, units) for feature in features)
             count = sum(insert(cursor, some, names, srid) for some in batched(rows, batch))
             insert_parts(cursor, path.with_name("buildings.gpkg"), names["parts"], srid)
@@ -222,7 +225,7 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
     normal = np.sum([ring_normal(ring) for ring in rings], axis=0)
     area = float(np.linalg.norm(normal))
     slope = float(np.degrees(np.arctan2(np.hypot(*normal[:2]), abs(normal[2]))))
-    azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360) if slope > 0.01 else None
+    azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360) if slope >= FLAT_SLOPE_DEG else None
     return slope, azimuth, area
 
 
