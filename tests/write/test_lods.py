@@ -2,6 +2,7 @@
 
 import json
 import sqlite3
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -75,6 +76,13 @@ def test_all_that_is_written_is_valid(tmp_path, write):
     for name in ("a.gml", "a.city.jsonl", "a.city.json"):
         solids = list(read_solids(tmp_path / name))
         assert len(solids) >= 2 and all(check_solid(solid, 0.01) == () for _, solid in solids)
+
+
+@pytest.mark.parametrize(("shift", "low", "high"), [((0, 0), (0, 0), (10, 8)), ((1.5, -0.5), (-1.5, 0), (10, 8.5))])
+def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, low, high):
+    root = gml(tmp_path, [replace(terrace(), shift=shift)], WHOLE)
+    corners = [np.array(text.split(), float)[:2] for text in found(root, "//gml:Envelope/*/text()")]
+    np.testing.assert_allclose(corners, RD_ORIGIN[:2] + np.array([low, high]))
 
 
 @pytest.mark.parametrize("write", [WHOLE, IN_PARTS], ids=["whole", "parts"])

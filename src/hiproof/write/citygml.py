@@ -137,7 +137,8 @@ def fragment(sheet: Sheet) -> Fragment:
     text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
     lines = terrain_lines(sheet)
     if sheet.figures is not None:
-        lines = [*lines, sheet.head.units.gml.from_metres(sheet.building.solid.vertices)]
+        lines = [*lines, in_file(sheet, sheet.building.solid)]
+        lines += [unmoved(sheet)] if sheet.shapes.outline is not None else []
     if not lines:
         return Fragment(text)
     xyz = np.concatenate(lines)
@@ -199,10 +200,14 @@ def level_surfaces(sheet: Sheet) -> str:
     if shapes.outline is None:
         return ""
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
-    unmoved = solid.vertices - np.array([*sheet.building.shift, 0.0])
-    low = multi_surface(rings_of_faces((upward,), sheet.head.units.gml.from_metres(unmoved)))
+    low = multi_surface(rings_of_faces((upward,), unmoved(sheet)))
     edge = multi_surface(rings_of_faces((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid))))
     return f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint><bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
+
+
+def unmoved(sheet: Sheet) -> np.ndarray:
+    """The vertices (n, 3) of the solid in the file's unit as they would be where the footprint lay before it was moved."""
+    return sheet.head.units.gml.from_metres(sheet.building.solid.vertices - np.array([*sheet.building.shift, 0.0]))
 
 
 def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
