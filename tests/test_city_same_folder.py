@@ -84,6 +84,35 @@ def test_every_setting_is_in_the_mark(section):
         assert inputs_of(dataclasses.replace(REQUEST, settings=settings)) != inputs_of(REQUEST), declared.name
 
 
+def leaves(value, name=""):
+    """(name, declaration, value) of all that is declared in a dataclass and those in it."""
+    for declared in dataclasses.fields(value):
+        inner, found = f"{name}{declared.name}", getattr(value, declared.name)
+        if dataclasses.is_dataclass(found):
+            yield from leaves(found, f"{inner}.")
+        else:
+            yield inner, declared, found
+
+
+def test_every_text_is_known_to_name_files_or_not():
+    texts = {name: d for name, d, _ in leaves(REQUEST) if "str" in str(d.type) and not d.metadata.get("choices")}
+    files = {name for name, declared in texts.items() if declared.metadata.get("names") == "files"}
+    assert files == {"clouds", "footprints", "terrain", "settings.segment.weights"}
+    named = {"settings.read.crs", "settings.read.override_columns", "settings.fit.types", "settings.write.out_crs"}
+    assert set(texts) - files - NO_MATTER - WHICH == named
+
+
+def test_a_folder_called_like_a_setting_is_none_of_the_inputs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    settings = Settings.from_dict({"fit": {"types": ["gable"]}})
+    request = dataclasses.replace(REQUEST, layer="pand", id_attribute="id", settings=settings)
+    before = mark(request)
+    for name in ("full", "auto", "one", "merged", "2.2", "gable", "pand", "id"):
+        Path(name).mkdir()
+        (Path(name) / "file").write_text("anything")
+    assert mark(request) == before
+
+
 @pytest.mark.parametrize("beside", ["a.shp", "a.dbf", "a.prj"])
 def test_the_mark_sees_the_files_that_make_up_an_input(tmp_path, beside):
     for name in ("a.shp", "a.dbf", "a.prj", "b.dbf"):

@@ -23,14 +23,16 @@ def setting(
     choices: tuple = (),
     fewest: int = 0,
     option: str = "",
+    names: str = "",
 ) -> Any:
     """Declare one setting of a section; `low` and `high` are inclusive bounds, `choices` the allowed values.
 
     Of a setting of several values they hold for each, and there are at least `fewest`. With an `option` (such as
-    "--roofs") the command line has it, its help and default made of this; settings that share one are set together.
+    "--roofs") the command line has it, its help and default made of this; settings that share one are set together. One that
+    `names` "files" is another where other bytes stand in them.
     """
     metadata = {"help": help, "unit": unit, "low": low, "high": high, "choices": choices, "fewest": fewest}
-    return field(default=default, metadata=metadata | {"option": option})
+    return field(default=default, metadata=metadata | {"option": option, "names": names})
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ class SegmentSettings:
         "ask it of every building and write its answer, though a fit of several does without (extra `network`)",
         option="--network",
     )
-    weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones")
+    weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones", names="files")
     device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
 
 

@@ -34,15 +34,18 @@ def choice_of(request: Request) -> dict[str, Any]:
 
 
 def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any]]:
-    """(name, JSON value) of each leaf of `value` whose declaration says that it `decides` so; the names of a dataclass's
-    fields are joined by dots."""
-    if dataclasses.is_dataclass(value):
-        for declared in dataclasses.fields(value):
-            if declared.metadata.get("decides", "the result") == decides:
-                inner = f"{name}.{declared.name}" if name else declared.name
-                yield from named_values(inner, getattr(value, declared.name), decides)
-    else:
-        yield name, with_files(value)
+    """(name, JSON value) of each leaf of the dataclass `value` whose declaration says that it `decides` so; the names of fields in
+    fields are joined by dots.
+
+    What stands at a path counts of leaves that are declared to name files alone: any word may be the name of a folder, too.
+    """
+    for declared in dataclasses.fields(value):
+        if declared.metadata.get("decides", "the result") == decides:
+            inner, found = f"{name}.{declared.name}" if name else declared.name, getattr(value, declared.name)
+            if dataclasses.is_dataclass(found):
+                yield from named_values(inner, found, decides)
+            else:
+                yield inner, with_files(found) if declared.metadata.get("names") == "files" else found
 
 
 def with_files(value: Any) -> Any:

@@ -10,6 +10,7 @@ from ..settings import Settings
 Box = tuple[float, float, float, float]
 NO_MATTER = {"decides": "nothing"}
 WHICH = {"decides": "which buildings"}
+FILES = {"names": "files"}
 
 
 @dataclass(frozen=True)
@@ -26,10 +27,10 @@ class Request:
     'likelihood'
     """
 
-    clouds: tuple[str, ...]
+    clouds: tuple[str, ...] = field(metadata=FILES)
     out: Path = field(metadata=NO_MATTER)
-    footprints: str | None = field(default=None, metadata=WHICH)
-    terrain: str | None = None
+    footprints: str | None = field(default=None, metadata=WHICH | FILES)
+    terrain: str | None = field(default=None, metadata=FILES)
     id_attribute: str | None = field(default=None, metadata=WHICH)
     layer: str | None = field(default=None, metadata=WHICH)
     settings: Settings = field(default_factory=Settings)
