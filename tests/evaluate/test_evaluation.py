@@ -199,6 +199,16 @@ def test_no_cloud_to_measure_against_is_refused(tmp_path):
         evaluate(tmp_path)
 
 
+def test_buildings_of_which_no_place_is_known_have_no_points(run_folder, tmp_path):
+    lines = (run_folder / "buildings.city.jsonl").read_text().splitlines(keepends=True)
+    for name, kept in (("none", []), ("bare", lines[-1:])):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "buildings.city.jsonl").write_text("".join([lines[0], *kept]))
+        evaluate(tmp_path / name, [str(run_folder / "points.xyz")])
+        rows = json.loads((tmp_path / name / "evaluation.json").read_text())["buildings"]
+        assert [row["points"] for row in rows] == [0] * len(kept)
+
+
 def test_a_folder_that_is_no_run_is_refused(tmp_path):
     with pytest.raises(HiproofError, match="hiproof reconstruct"):
         evaluate_run(tmp_path)

@@ -91,7 +91,7 @@ def evaluate_run(
     models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record)))
     outlines = footprint_of_each(models, footprints, layer, record, asked)
     areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
-    if clouds:
+    if clouds and any(area is not None for area in areas):
         points = points_by_outline(building_points(clouds, record, areas), areas)
     else:
         points = [np.empty((0, 3))] * len(models)
