@@ -113,6 +113,18 @@ def test_unknown_figures_stay_numbers(tmp_path):
     )
 
 
+def test_counts_are_counts_where_all_are_unknown(tmp_path):
+    table(tmp_path, [unmodelled()])
+    for layer, names in (
+        ("buildings", ["rf_roof_n_surfaces"]),
+        ("parts", ["part"]),
+        ("roof_surfaces", ["number", "part"]),
+    ):
+        info = pyogrio.read_info(tmp_path / "a.gpkg", layer=layer)
+        kinds = dict(zip(info["fields"], info["ogr_types"], strict=True))
+        assert {kinds[name] for name in names} == {"OFTInteger64"}
+
+
 def test_names_that_clash(tmp_path):
     clashing = {"fid": 7, "geom": "x", "ID": 3, "Name": 1, "name": 2, "hiproof_status": "theirs"}
     columns, _, _ = table(tmp_path, [modelled(box(), attributes=clashing)])

@@ -203,10 +203,10 @@ def kind_of(value: Any) -> type:
 
 
 def column_kind(found: set[type], declared: str) -> type:
-    """The one type that holds all values found; a figure that is always unknown stays a decimal if it is `declared` one."""
+    """The one type that holds all values found; a figure that is always unknown stays what it is `declared`."""
     known = found - {type(None)}
     if not known:
-        return str if declared == "text" else float
+        return {"text": str, "count": int}.get(declared, float)
     if len(known) == 1:
         return known.pop()
     return str if str in known else float if float in known else int
