@@ -1,5 +1,6 @@
 """Overrides: the fit obeys them and fits the rest; a run with others redoes those buildings alone."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -286,6 +287,15 @@ def test_columns_of_the_footprints_override_too(town_files, tmp_path):
     rows = by_id(tmp_path / "out")
     assert rows["house-0"]["type"] == "hip" and "overridden: type hip" in rows["house-0"]["detail"]
     assert "overridden" not in rows["house-1"]["detail"]
+
+
+@pytest.mark.parametrize("said", [{"leave_out": True}, {"block_height": 5.0}, {"types": ["gable"]}])
+def test_where_a_file_says_something_else_than_columns_the_file_counts(town_files, tmp_path, said):
+    (tmp_path / "o.jsonl").write_text(json.dumps({"id": "house-0", "type": "", **said}))
+    request = columns_request(town_files, tmp_path, "daktype=type")
+    city_run.reconstruct_area(dataclasses.replace(request, overrides=str(tmp_path / "o.jsonl")))
+    house = by_id(tmp_path / "out")["house-0"]
+    assert house["type"] != "hip" and "overridden: " in house["detail"] and "hip" not in house["detail"]
 
 
 @pytest.mark.parametrize(

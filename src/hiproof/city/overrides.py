@@ -132,7 +132,7 @@ def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dic
     """The overrides by the number of their building, with those that columns of the footprints hold; unknown ones are told."""
     names, found, left = columns_of(plan), {}, dict(records)
     for job in plan.jobs:
-        own = column_override(job, names) | left.pop(job.id, {})
+        own = beside(column_override(job, names), left.pop(job.id, {}), job.id)
         if own:
             found[job.index] = {**own, "id": job.id}
     if left:
@@ -141,6 +141,30 @@ def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dic
             f"no building of this run for {len(left)} of {counted(len(records), 'override')}: {some}", InputWarning
         )
     return found
+
+
+def beside(of_columns: dict[str, Any], of_file: dict[str, Any], id: str) -> dict[str, Any]:
+    """What a file says of building `id`, and of what columns say that which can be beside it. Raises InputError where columns contradict
+    themselves.
+
+    >>> beside({"type": "hip", "z_ground": 2.5}, {"leave_out": True}, "a")
+    {'leave_out': True, 'z_ground': 2.5}
+    """
+    if of_columns:
+        override_of({**of_columns, "id": id})
+    both = dict(of_file)
+    for key, value in of_columns.items():
+        if of_file.get(key) in (None, "") and is_override({**both, key: value, "id": id}):
+            both[key] = value
+    return both
+
+
+def is_override(record: dict[str, Any]) -> bool:
+    try:
+        override_of(record)
+    except InputError:
+        return False
+    return True
 
 
 def columns_of(plan: WorkPlan) -> list[tuple[str, str]]:
