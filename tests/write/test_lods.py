@@ -15,15 +15,17 @@ from handmade import RD_ORIGIN, gable_house, modelled, unmodelled
 from hiproof.compose import check_solid, compose, volume
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
-from hiproof.model import ROOF, Building, Model, Part, Piece, Quality, Roof
+from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Quality, Roof
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
 from hiproof.rings import ring_normal
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
-from hiproof.write.citygml import NAMESPACES
+from hiproof.write.citygml import NAMESPACES, CityGMLWriter
+from hiproof.write.citygml3 import CityGML3Writer
 from hiproof.write.colours import type_colours
+from hiproof.write.postgis import building_row, polyhedral_wkt
 from hiproof.write.roof_codes import CODE_SPACES
 from hiproof.write.styles import TABLE, TYPE_COLUMN
 
@@ -207,3 +209,19 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
         renderer = etree.fromstring(qml.encode()).find("renderer-v2")
         assert renderer.get("attr") in pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"]
         assert len(renderer.findall("symbols/symbol")) == len(type_colours())
+
+
+@pytest.mark.parametrize(("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)])
+def test_a_database_gets_one_shell_of_a_building_in_parts_at_every_level(tmp_path, lods, grounds):
+    write_cityjson(tmp_path / "a.city.jsonl", [terrace()], "EPSG:7415", write=replace(IN_PARTS, lods=lods))
+    head, feature = map(json.loads, (tmp_path / "a.city.jsonl").read_text().splitlines())
+    row = building_row(head["transform"], feature)
+    assert sum(face.kind == GROUND for face in row.faces) == grounds
+    assert (polyhedral_wkt(row) is not None) == bool(grounds)
+
+
+@pytest.mark.parametrize("kind", [CityGMLWriter, CityGML3Writer])
+def test_footprints_and_roof_edges_are_no_solids_to_be_checked(tmp_path, kind):
+    with kind(tmp_path / "a.gml", "EPSG:7415", write=WriteSettings(lods=("0",))) as writer:
+        writer.add(terrace())
+    assert list(read_solids(tmp_path / "a.gml")) == []

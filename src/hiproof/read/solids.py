@@ -186,13 +186,16 @@ def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
             if local_name(element) == "Solid":
                 solids += gml_shells(element, polygons, path)
         if not solids:
-            loose = [
-                polygon
-                for polygon in own_descendants(owner)
-                if local_name(polygon) == "Polygon" and surface_kind(polygon, None) is not None
-            ]
+            loose = [element for element in own_descendants(owner) if is_loose(element)]
             solids = [polygons_solid(loose, path)] if loose else []
         yield from numbered(gml_id(owner) or "unnamed", solids)
+
+
+def is_loose(element: Any) -> bool:
+    """Whether an element is a polygon of a boundary surface, not of one that is a footprint or a roof's edge (LoD 0)."""
+    if local_name(element) != "Polygon" or surface_kind(element, None) is None:
+        return False
+    return not any(local_name(ancestor).startswith("lod0") for ancestor in element.iterancestors())
 
 
 def own_descendants(owner: Any) -> Iterator[Any]:

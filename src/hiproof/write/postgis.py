@@ -19,7 +19,7 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
-from ..model import ROOF, Face, Solid
+from ..model import GROUND, ROOF, Face, Solid
 from ..read.cityjson import documents
 from ..read.crs import units_named
 from ..read.database import import_psycopg, refuse_half_a_password
@@ -144,7 +144,7 @@ def building_row(transform: dict, feature: dict, units: Units = METRES) -> Row:
         for rings, index in zip(geometry["boundaries"][0], values, strict=True):
             semantics.append(surfaces[index])
             faces.append(Face(tuple(map(tuple, rings)), surfaces[index]["type"]))
-    if len(feature["CityObjects"]) > 1:
+    if sum(face.kind == GROUND for face in faces) > 1:
         vertices, faces, semantics = in_one_shell(vertices, faces, semantics, units)
     return Row(feature["id"], city_object.get("attributes", {}), vertices, tuple(faces), tuple(semantics), units)
 
