@@ -258,8 +258,12 @@ def test_the_head_keeps_feet(tmp_path):
 
 @pytest.mark.parametrize(
     ("head", "out_crs"),
-    [({"crs": "EPSG:7415"}, "EPSG:3857"), ({"crs": None, "unit": "us-survey-foot"}, "")],
-    ids=["another CRS", "feet without a CRS"],
+    [
+        ({"crs": "EPSG:7415"}, "EPSG:3857"),
+        ({"crs": "EPSG:7415"}, "+proj=tmerc +lat_0=52 +lon_0=5 +x_0=100000 +datum=WGS84"),
+        ({"crs": None, "unit": "us-survey-foot"}, ""),
+    ],
+    ids=["another CRS", "one without a code", "feet without a CRS"],
 )
 def test_what_is_built_of_a_file_alone_is_read_in_its_place(tmp_path, head, out_crs):
     path = write_lines(tmp_path / "parameters.jsonl", house(), head={"hiproof_parameters": 1} | head)

@@ -30,10 +30,10 @@ class Feature(NamedTuple):
 def features(path: Path, otherwise: Units = METRES, known: Units | None = None) -> Iterator[Feature]:
     """Every document of a file, each by the transform and the CRS of the line before it that has them.
 
-    `otherwise` are the units where no CRS is named, `known` those of a CRS of which more is known than its name tells. Raises
+    `otherwise` are the units where no CRS is named, `known` those of one of which more is known than a name tells, if there is one. Raises
     InputError as `documents` does, and for vertices that are none.
     """
-    transform, units = None, otherwise
+    transform, units = None, known or otherwise
     for document, place in documents(path):
         transform = document.get("transform", transform)
         if name := reference_system(document):
