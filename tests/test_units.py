@@ -119,27 +119,27 @@ def test_feet_give_the_same_buildings_as_metres(in_metres, tmp_path, units, clou
 
 
 def extents(out):
-    """Low and high corner (2, 3) of the coordinates as they stand in the CityJSON and in the CityGML, and plan in the table."""
+    """Low and high corner (2, 3) of the coordinates as they stand in the CityJSON, in the CityGML and in the table of roof surfaces."""
     header = json.loads((out / "buildings.city.jsonl").read_text().splitlines()[0])
     corners = [
         node.text.split() for node in etree.parse(out / "buildings.gml").iter("{*}lowerCorner", "{*}upperCorner")
     ]
-    _, _, outlines, _ = pyogrio.raw.read(out / "buildings.gpkg", layer="buildings")
-    plan = shapely.total_bounds(shapely.from_wkb(outlines))
+    _, _, roofs, _ = pyogrio.raw.read(out / "buildings.gpkg", layer="roof_surfaces")
+    places = shapely.get_coordinates(shapely.from_wkb(roofs), include_z=True)
     return (
         np.reshape(header["metadata"]["geographicalExtent"], (2, 3)),
         np.array(corners, float),
-        np.reshape(plan, (2, 2)),
+        np.array([places.min(axis=0), places.max(axis=0)]),
     )
 
 
 def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_metres, tmp_path):
-    """A compound without a code of its own is named by its plan alone in CityJSON: heights are then in the plan's unit."""
+    """A compound without a code of its own is named by its plan alone in CityJSON, any in tables: heights are then in the plan's unit."""
     json_m, gml_m, table_m = extents(in_metres)
     json_ft, gml_ft, table_ft = extents(run(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263"))
     assert np.allclose(FEET.to_metres(json_ft), json_m, atol=0.02)
     assert np.allclose(MIXED.to_metres(gml_ft), gml_m, atol=0.02)
-    assert np.allclose(FEET.to_metres(table_ft), table_m, atol=0.001)
+    assert np.allclose(FEET.to_metres(table_ft), table_m, atol=0.02)
 
 
 def areas_to_load(out):

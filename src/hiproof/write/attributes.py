@@ -98,7 +98,7 @@ class AttributesWriter(BuildingWriter):
         super().__init__(path)
         head = FileHead(crs, write=write or WriteSettings())
         self.osm_tags = head.write.osm_tags
-        self.plan_wkt, self.prefix, self.units = plan_wkt(head.crs_of_files), prefix, head.units.gml
+        self.plan_wkt, self.prefix, self.units = plan_wkt(head.crs_of_files), prefix, head.units
 
     def open(self, stack: ExitStack) -> None:
         self.hidden = stack.enter_context(atomic(self.path))
@@ -106,8 +106,8 @@ class AttributesWriter(BuildingWriter):
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        attributes = building_attributes(building, figures, self.prefix, self.units, self.osm_tags)
-        self.put(Fragment(table_rows(building, figures, attributes, self.units).to_text()))
+        attributes = building_attributes(building, figures, self.prefix, self.units.gml, self.osm_tags)
+        self.put(Fragment(table_rows(building, figures, attributes, self.units.table).to_text()))
 
     def put(self, fragment: Fragment) -> None:
         lines = lines_of(fragment.text)
@@ -179,7 +179,7 @@ def writer(path: str | os.PathLike, head: FileHead) -> AttributesWriter:
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's rows in the tables of a run, as text."""
-    return Fragment(table_rows(sheet.building, sheet.figures, sheet.attributes, sheet.head.units.gml).to_text())
+    return Fragment(table_rows(sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table).to_text())
 
 
 @contextmanager

@@ -93,11 +93,12 @@ class FileUnits:
     """Units in which the files of a run hold coordinates; attributes and parameters are in metres in all of them.
 
     They are those of the CRS that a file names, so that a reader who knows only the file is right: where CityJSON can
-    name the plan's CRS alone, heights are in the plan's unit.
+    name the plan's CRS alone, and in tables, which always do, heights are in the plan's unit.
     """
 
     gml: Units = METRES
     cityjson: Units = METRES
+    table: Units = METRES
 
     @classmethod
     def of(cls, crs: Any, own: Units | None = None, out_crs: str = "") -> FileUnits:
@@ -105,18 +106,18 @@ class FileUnits:
         without a name for it.
 
         >>> files = FileUnits.of("EPSG:2263+5703")
-        >>> str(files.gml), str(files.cityjson)
-        ('US survey foot, heights in metre', 'US survey foot')
+        >>> str(files.gml), str(files.cityjson), str(files.table)
+        ('US survey foot, heights in metre', 'US survey foot', 'US survey foot')
         """
-        from ..read.crs import parse_crs, units_named, units_of
+        from ..read.crs import horizontal_crs, parse_crs, units_named, units_of
         from .reprojected import crs_of_files, reprojected
 
         own = own or units_of(parse_crs(crs))
-        if not out_crs:
-            return cls(units_named(srs_name(crs), own), units_named(reference_system(crs), own))
-        out = crs_of_files(crs, out_crs)
-        named = (units_named(name, units_of(out)) for name in (srs_name(out), reference_system(out)))
-        return cls(*(reprojected(crs, out, own, units) for units in named))
+        there = parse_crs(crs_of_files(crs, out_crs) if out_crs else crs)
+        plan = own if there is None else units_of(horizontal_crs(there))
+        other = units_of(there) if out_crs else own
+        named = (units_named(name, other) for name in (srs_name(there), reference_system(there)))
+        return cls(*(reprojected(crs, there, own, units) if out_crs else units for units in (*named, plan)))
 
     def told(self) -> dict[str, Any]:
         """What the record of a run says of units."""
