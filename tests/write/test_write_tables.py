@@ -12,6 +12,7 @@ import shapely
 from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
 from hiproof import read_parameters
 from hiproof.errors import InputError
+from hiproof.parametric.run import build_file
 from hiproof.write import attributes, write_attributes, write_parameters
 
 
@@ -83,6 +84,15 @@ def test_the_table_has_every_building(tmp_path):
     assert outlines[0] is None
     assert [outline.area for outline in outlines[1:]] == [1.0, 96.0, 100.0]
     assert (meta["crs"], meta["geometry_type"]) == ("EPSG:28992", "MultiPolygon")
+
+
+def test_a_footprint_without_area_is_no_geometry_as_in_what_is_built_of_its_parameters(tmp_path):
+    void = unmodelled("void", footprint=shapely.Polygon())
+    write_attributes(tmp_path / "a.gpkg", [void], "EPSG:7415")
+    write_parameters(tmp_path / "p.jsonl", [void], "EPSG:7415")
+    build_file(tmp_path / "p.jsonl", tmp_path / "built")
+    assert (tmp_path / "built/buildings.gpkg").read_bytes() == (tmp_path / "a.gpkg").read_bytes()
+    assert table(tmp_path, [void])[1].tolist() == [None]
 
 
 @pytest.mark.parametrize(

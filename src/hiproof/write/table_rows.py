@@ -77,7 +77,7 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     rows = []
     for number, shown in enumerate(shown_areas(building)):
         values = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
-        rows.append((wkb_of(None if shown.is_empty else shown, units), values))
+        rows.append((wkb_of(shown, units), values))
     return tuple(rows)
 
 
@@ -150,7 +150,7 @@ def polygons_of(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
 
 
 def wkb_of(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
-    """A plan geometry (world metres) in `units` as WKB."""
-    if geometry is None:
+    """A plan geometry (world metres) in `units` as WKB, None of one that holds nothing."""
+    if geometry is None or geometry.is_empty:
         return None
     return shapely.to_wkb(geometry if units == METRES else shapely.transform(geometry, units.from_metres))
