@@ -18,7 +18,10 @@ def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
     0.4
     """
     cell = CELL_SPACINGS * spacing
-    index = np.floor(xy / cell).astype(int)
+    west, south, east, north = shape.bounds
+    # a stray far away would make cells without end
+    around = shapely.box(west - cell, south - cell, east + cell, north + cell)
+    index = np.floor(xy[shapely.intersects_xy(around, xy)] / cell).astype(int)
     low = index.min(axis=0)
     columns, rows = index.max(axis=0) - low + 1
     counts = np.bincount((index - low) @ (rows, 1), minlength=columns * rows).reshape(columns, rows).astype(float)
