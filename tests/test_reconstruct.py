@@ -166,6 +166,19 @@ def test_not_finite_points_are_left_out():
     assert np.array_equal(one.solid.vertices, other.solid.vertices)
 
 
+@pytest.mark.parametrize("nowhere", [(6.0, 4.0, -3.4e38), (1e300, 4.0, 5.0), (1.7e308, 1.7e308, 5.0)])
+@pytest.mark.parametrize("footprint", [FOOTPRINT, None])
+def test_points_that_are_nowhere_on_earth_are_left_out(nowhere, footprint):
+    points = gable_points()
+    one, other = (hiproof.reconstruct(p, footprint, settings=PLAIN) for p in (points, np.vstack([points, nowhere])))
+    assert np.array_equal(one.solid.vertices, other.solid.vertices)
+
+
+def test_a_stray_point_far_away_makes_no_cells_up_to_it():
+    points = np.vstack([gable_points(), [(-1e6, -1e6, 5.0)]])  # a hundred thousand million cells
+    assert hiproof.reconstruct(points, settings=PLAIN).type == "gable"
+
+
 def test_a_roof_that_cannot_be_composed_falls_back_to_a_flat_block_and_says_so(monkeypatch):
     from hiproof.compose import compose
     from hiproof.errors import CompositionError

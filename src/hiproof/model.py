@@ -201,8 +201,8 @@ class Fit:
     """One primitive fitted to points: the outcome of `fit_roof`.
 
     `parameters` theta_p by name in metres, `kappa` rad, `translation` T_L (3,) relative to `global_translation`
-    T_G (3,), `sigma` standard deviations by name (parameters, "kappa", "t_x", "t_y", "t_z"), `bic` of the chosen type
-    and `bics` of every type tried (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and
+    T_G (3,), `sigma` standard deviations by name (parameters, "kappa", "t_x", "t_y", "t_z") where points tell them, `bic`
+    of the chosen type and `bics` of every type tried (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and
     `faces` (vertex indices, counter-clockwise from above) are the roof surfaces in the frame of the points given.
     """
 

@@ -27,8 +27,8 @@ def reconstruct(
 ) -> Building:
     """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits).
 
-    points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; non-finite and repeated
-    ones are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
+    points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; repeated ones
+    and those that are nowhere on Earth (not finite, 3.4e38) are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
     beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
     `hiproof.Terrain`; without one the ground is assumed below the lowest point, or at the foot of walls that are seen.
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError

@@ -14,6 +14,7 @@ from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
 from .log import counted
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
+from .read.plausible import is_plausible
 from .rings import enclosed
 from .settings import Settings
 from .status import Doubt, Status
@@ -172,9 +173,9 @@ def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
 
 
 def finite(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 2 or 3) whose coordinates are numbers."""
-    known = np.isfinite(points)
-    return points if known.all() else points[known.all(axis=1)]
+    """Those of the points (n, 2 or 3) whose coordinates are numbers, and of this Earth: what stands for no value may be 3.4e38."""
+    known = is_plausible(points)
+    return points if known.all() else points[known]
 
 
 def distinct(points: np.ndarray) -> np.ndarray:

@@ -112,6 +112,15 @@ def test_outline_gives_the_plan_and_only_heights_are_fitted():
     assert fit.points_used < len(points) + 60
 
 
+def test_what_points_do_not_tell_has_no_deviation(gable_points):
+    level = np.column_stack([gable_points[:, :2], np.full(len(gable_points), 5.0)])
+    flat = fit_roof(level, settings=only("flat"))
+    assert "kappa" not in flat.sigma and 0.0 < flat.sigma["width"] < 0.5
+    plan = shapely.box(*gable_points[:, :2].min(axis=0), *gable_points[:, :2].max(axis=0))
+    gambrel = fit_roof(gable_points, plan, only("gambrel"))  # a gable has no break
+    assert max(gambrel.sigma.values()) < 100.0
+
+
 def test_height_at_and_vertices_agree(gable_points):
     fit = fit_roof(gable_points)
     inside = fit.vertices.mean(axis=0) + 0.98 * (fit.vertices - fit.vertices.mean(axis=0))
@@ -183,6 +192,17 @@ def test_wrong_shapes_names_and_weights_are_refused(gable_points):
         fit_roof(gable_points, settings=only("onion"))
     with pytest.raises(SettingsError, match="one of likelihood, paper"):
         fit_roof(gable_points, settings=Settings.from_dict({"fit": {"objective": "magic"}}))
+
+
+def test_points_none_of_which_may_be_roof_are_refused(gable_points):
+    with pytest.raises(FitError, match="got 0 of"):
+        fit_roof(gable_points, weights=np.zeros(len(gable_points)))
+
+
+@pytest.mark.parametrize("outline", [shapely.MultiPolygon([shapely.box(-6, -4, 6, 4)]), "POLYGON EMPTY"])
+def test_an_outline_that_is_no_polygon_is_refused(gable_points, outline):
+    with pytest.raises(FitError, match="expected a polygon of shapely as outline"):
+        fit_roof(gable_points, outline)
 
 
 def test_an_outline_without_points_is_refused(gable_points):

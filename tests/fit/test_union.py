@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.errors import FitError
+from hiproof.errors import FitError, InputError
 from hiproof.evaluate.metrics import iou
 from hiproof.fit import fit_roof
 from hiproof.fit.union import fit_building
@@ -149,6 +149,21 @@ def test_one_unseen_side_of_a_gable_grows_no_spike():
 def test_no_points_inside_the_outline_is_an_error_with_a_sentence():
     with pytest.raises(FitError, match="roof points inside the outline"):
         fit_building(np.array([[100.0, 100.0, 3.0]]), HOUSE)
+
+
+@pytest.mark.parametrize("columns", [[0, 1], [0, 1, 2, 2]])
+def test_points_of_another_shape_are_not_taken_for_others(columns):
+    points = sampled(gable_with_shed, HOUSE)[:, columns]
+    with pytest.raises(InputError, match=r"shape \(n, 3\)"):
+        fit_building(points, HOUSE)
+
+
+@pytest.mark.parametrize(
+    "outline", [shapely.Polygon(), shapely.LineString([(0, 0), (9, 9)]), shapely.box(0, 0, np.inf, 7)]
+)
+def test_an_outline_without_area_is_an_error_with_a_sentence(outline):
+    with pytest.raises(FitError, match="expected an outline with an area"):
+        fit_building(sampled(gable_with_shed, HOUSE), outline)
 
 
 def test_points_that_are_not_finite_are_left_out():

@@ -13,11 +13,13 @@ from ..log import counted
 from ..model import Fit
 from ..primitives import CATALOGUE, get
 from ..primitives.contract import HALF_WIDTH, KAPPA, placed
+from ..read.plausible import is_plausible
 from ..settings import Settings
 from .likelihood import Estimate, fit_likelihood, plan_extents
 
 FEWEST_POINTS = 4  # points; a plane and one to contradict it
 THINNEST = 1e-6  # smallest ratio of extents in plan that is not a line
+UNTOLD = 100.0  # m, rad; a deviation as large is none: heights tell no direction of a level roof
 
 
 def fit_roof(
@@ -29,7 +31,7 @@ def fit_roof(
 ) -> Fit:
     """The roof primitive that stands best for `points`.
 
-    points          (n, 3) metres in any frame; points that are not finite are dropped, and their order does not matter
+    points          (n, 3) metres in any frame; points that are not finite, or not on Earth, are dropped, and their order does not matter
     outline         a given plan, in the frame of `points`: the roof covers its rectangle in the roof's own direction, and
                     only heights, slopes and ridge are fitted, to the points inside it
     settings        `fit.types` are the names of the catalogue to choose among, all by default; `fit.objective` is the likelihood
@@ -37,7 +39,8 @@ def fit_roof(
     weights         (n,) probability of each point of being roof, 1 by default
     type_log_prior  natural logarithm of each type's probability before its points are seen, 0 by default
 
-    Raises FitError where no roof can be determined: no or fewer than four finite points, all in one place or on a line.
+    Raises FitError where no roof can be determined: no or fewer than four such points that may be roof, all in one place or on a
+    line, an outline that is no polygon.
     SettingsError for types that the catalogue does not hold.
 
     >>> import numpy as np
@@ -75,18 +78,21 @@ def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shape
     points = np.asarray(points, float)
     if points.ndim != 2 or points.shape[1] < 3:
         raise FitError(f"expected points of shape (n, 3), got {points.shape}; give x, y and z in metres")
+    if outline is not None and not isinstance(outline, shapely.Polygon):
+        raise FitError(f"expected a polygon of shapely as outline, got {type(outline).__name__}; give one polygon")
     weights = np.ones(len(points)) if weights is None else np.asarray(weights, float)
     if weights.shape != (len(points),) or not np.all((weights >= 0) & (weights <= 1)):
         raise FitError(f"expected {len(points)} weights between 0 and 1, got shape {weights.shape}; give one a point")
-    finite = np.isfinite(points[:, :3]).all(axis=1)
+    finite = is_plausible(points[:, :3])
     cloud = np.column_stack([points[finite, :3], weights[finite]])
     where = "finite points"
     if outline is not None:
         cloud = cloud[shapely.intersects_xy(outline, cloud[:, 0], cloud[:, 1])]
         where = "finite points inside the outline"
-    if len(cloud) < FEWEST_POINTS:
+    count = np.count_nonzero(cloud[:, 3])
+    if count < FEWEST_POINTS:
         raise FitError(
-            f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {len(cloud)} of {len(points)} given; "
+            f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {count} of {len(points)} given; "
             "a flat roof at their median height is all that can be said"
         )
     cloud = in_order(cloud)
@@ -135,7 +141,10 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
 
 
 def standard_deviations(estimate: Estimate) -> dict[str, float]:
-    """Standard deviation by name, by the delta method: gradients of the named formulas through theta's covariance."""
+    """Standard deviation by name, by the delta method: gradients of the named formulas through theta's covariance.
+
+    What the points do not tell has none, as in a fit of several parts; what a given outline tells is exact, 0.
+    """
     shape, covariance = estimate.primitive, estimate.covariance
     values = estimate.theta[HALF_WIDTH:]
     named = {**shape.measures, "t_z": shape.eave}
@@ -146,4 +155,4 @@ def standard_deviations(estimate: Estimate) -> dict[str, float]:
     sigma = {name: math.sqrt(max(variance, 0.0)) for name, variance in zip(named, variances, strict=True)}
     for name, k in (("kappa", KAPPA), ("t_x", 0), ("t_y", 1)):
         sigma[name] = math.sqrt(max(covariance[k, k], 0.0))
-    return sigma
+    return {name: deviation for name, deviation in sigma.items() if deviation < UNTOLD}

@@ -46,8 +46,9 @@ import numpy as np
 import shapely
 
 from ...errors import FitError
-from ...model import Part, Piece
+from ...model import Part, Piece, as_xyz
 from ...primitives.family import name_among
+from ...read.plausible import is_plausible
 from ...settings import Settings
 from .agree import agreed
 from .apart import told_apart
@@ -76,8 +77,8 @@ def fit_building(
     """Fit the roof of one building to `points_local` (n, 3), in metres of a local frame, over `outline` (same frame).
 
     Without an outline it is estimated from the points; with one, points outside it do not count. Where `settings.fit.types`
-    names types, parts have these only, or are flat. Raises FitError where nothing can be fitted: no points inside the outline, or
-    none given and points that span no area.
+    names types, parts have these only, or are flat. Raises FitError where nothing can be fitted: no points inside the outline, one
+    without area, or none given and points that span no area; InputError for points of another shape.
 
     >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4)))
     >>> roof = np.column_stack([x, y, np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)])
@@ -86,11 +87,10 @@ def fit_building(
     (['flat', 'gable'], 0.0)
     """
     settings = settings or Settings()
-    points_local = np.asarray(points_local, float).reshape(-1, 3)
-    points_local = points_local[np.isfinite(points_local).all(axis=1)]
-    if outline is None:
-        outline = outline_of_points(points_local)
-    outline = max(polygons_of(shapely.make_valid(outline)), key=lambda polygon: polygon.area, default=outline)
+    points_local = as_xyz(points_local)
+    points_local = points_local[is_plausible(points_local)]
+    outline = outline_of_points(points_local) if outline is None else outline
+    outline = largest_polygon(outline)
     plan = lay_out_plan(points_local, outline)
     if len(plan.cloud.u) == 0:
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
@@ -116,6 +116,15 @@ def fit_building(
         parts = that_show(parts, plan, scene, widest_m2=0.0)
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, far)
+
+
+def largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:
+    """The largest polygon of an outline, made valid. Raises FitError for one without area."""
+    known = math.isfinite(outline.area)
+    polygons = polygons_of(shapely.make_valid(outline)) if known else []
+    if not polygons:
+        raise FitError(f"expected an outline with an area, got a {outline.geom_type} without; give a polygon")
+    return max(polygons, key=lambda polygon: polygon.area)
 
 
 def unexplained_share(parts: list[Part], plan: Plan, tolerance_m: float) -> float:
