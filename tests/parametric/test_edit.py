@@ -85,11 +85,27 @@ def test_a_moved_part_roofs_what_its_rectangle_covers(gable):
     assert len(two.without_part(1).parts) == 1
 
 
+def test_arrays_tuples_and_numbers_of_numpy_are_what_lists_and_numbers_are(gable):
+    place = gable.parts[0].translation + (1.0, 0.0, 0.5)
+    sizes = {"width": 3.0, "length": 4.0, "type": "gable"}
+    asked = [
+        sizes | {"position": place.tolist()},
+        sizes | {"position": tuple(place)},
+        sizes | {"position": place, "width": np.float32(3.0), "length": np.int64(4)},
+    ]
+    for index in (0, 1):
+        one, *others = (gable.with_part(index, **change) for change in asked)
+        assert all(np.array_equal(one.solid.vertices, other.solid.vertices) for other in others)
+
+
 def test_what_cannot_be_is_one_sentence(gable):
     for change, message in [
         ({"width": -1.0}, "positive width"),
         ({"type": "onion"}, "roof type"),
         ({"ridge_height": 3.0}, "ridge above the eave"),
+        ({"ridge_height": "12"}, "number as ridge_height, got '12'"),
+        ({"eave_height": np.nan}, "number as eave_height, got nan"),
+        ({"type": ["hip"]}, "roof type"),
         ({"position": [99.0, 0.0, 5.0]}, "outside"),
         ({"colour": 3.0}, "got also colour"),
     ]:

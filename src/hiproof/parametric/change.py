@@ -16,6 +16,7 @@ from ..errors import InputError
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import Member, member_of
 from ..rings import enclosed
+from .record import measure
 from .shape import SIDED
 
 PLAN = ("width", "length")
@@ -35,7 +36,9 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     kind = change.pop("type", part["type"])
     if kind != part["type"]:
         part = of_type(with_sizes(part), kind)
-    ridge, eave = change.pop("ridge_height", None), change.pop("eave_height", None)
+    ridge, eave = (
+        measure(change.pop(name), name) if name in change else None for name in ("ridge_height", "eave_height")
+    )
     placed: dict[str, Any] = {name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change}
     if SIDED & change.keys():
         part = side_by_side(part)
@@ -75,7 +78,7 @@ def polygon_of(rings: list) -> shapely.Geometry:
 
 def of_type(part: dict[str, Any], kind: str) -> dict[str, Any]:
     """The part as another roof type over the same rectangle, with the same lowest eave and the same rise."""
-    if kind not in CATALOGUE:
+    if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
     width, length = (part["parameters"][name] for name in PLAN)
     rise = rise_of(part) or 0.5 * USUAL_PITCH * width

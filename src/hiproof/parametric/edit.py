@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
+import numpy as np
+
 from ..errors import InputError
 from ..model import Building, Quality
 from ..status import Status
@@ -19,7 +21,7 @@ BY_HAND = "changed by hand"
 def with_part(building: Building, index: int, **change: Any) -> Building:
     """The building with part `index` changed, or with one more where `index` is their number; see `Building.with_part`."""
     z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
-    parts = record["parts"]
+    parts, change = record["parts"], {name: as_written(value) for name, value in change.items()}
     if not 0 <= index <= len(parts):
         raise InputError(f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one")
     if index == len(parts):
@@ -27,6 +29,17 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
     else:
         parts = placed(parts, index, changed_part(parts[index], change, z_origin))
     return built(building, {**record, "parts": parts})
+
+
+def as_written(value: Any) -> Any:
+    """A value as a file of parameters holds it: arrays and tuples as lists, NumPy's numbers as Python's.
+
+    >>> as_written((np.int64(1), np.array([2.5, 3.0])))
+    [1, [2.5, 3.0]]
+    """
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    return [as_written(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
 def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
@@ -37,7 +50,7 @@ def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
             f"expected type, position, width and length of a new part, got none for {', '.join(missing)}; give them too"
         )
     sizes = {name: change[name] for name in ("width", "length")}
-    flat = {"type": "flat", "parameters": sizes, "position": list(change["position"]), "rotation": 0.0}
+    flat = {"type": "flat", "parameters": sizes, "position": change["position"], "rotation": 0.0}
     return changed_part(flat, change, z_origin)
 
 
