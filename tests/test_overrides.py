@@ -105,6 +105,13 @@ def test_ground_block_and_leaving_out(scanned):
     assert left.status is Status.LEFT_OUT and left.built is None and "torn down" in left.detail
 
 
+def test_a_block_around_a_courtyard_needs_no_points(scanned):
+    court = shapely.box(4.0, 3.0, 8.0, 5.0)
+    footprint = scanned[1].difference(court)
+    block = obeyed((np.zeros((0, 3)), footprint), block_height=6.0, z_ground=1.0)
+    assert block.volume == pytest.approx(6.0 * footprint.area)
+
+
 def test_parts_given_are_the_parts(scanned):
     part = {
         "type": "hip",
@@ -113,7 +120,7 @@ def test_parts_given_are_the_parts(scanned):
     }
     house = obeyed(scanned, parts=[part], origin=[6, 4, 0])
     assert house.type == "hip" and house.parts[0].parameters["ridge_length"] == 5.0
-    assert house.quality.points > 500 and house.attributes == {}
+    assert house.quality.points > 500 and house.attributes == {} and "fitted" not in house.detail
     empty = overridden(
         override_of({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}), np.zeros((0, 3)), scanned[1]
     )

@@ -16,7 +16,7 @@ from ..parametric.change import changed_part
 from ..parametric.edit import BY_HAND
 from ..parametric.recess import placed, with_recess
 from ..parametric.record import building_of, list_at, mapping, number, place
-from ..parametric.refit import measured, refitted_parts, within
+from ..parametric.refit import fitted_again, measured, refitted_parts, within
 from ..settings import Settings
 from ..status import Status
 
@@ -42,6 +42,7 @@ def edited(record: Record, asked: Any, points: np.ndarray, settings: Settings, i
     parts = ACTIONS[action](record, list_at(record, "parts"), asked, points)
     found = build(by_hand(record) | {"parts": parts}, settings.compose)
     found = dataclasses.replace(found, quality=Quality())  # no figure of the earlier model stays
+    found = fitted_again(found) if action == "refit" else found
     local = found.roof.frame.to_local(points)
     return measured(found, local, settings) if is_measured and len(local) else found
 

@@ -224,9 +224,8 @@ def frame_of(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
         return LocalFrame.around(points)
     if outline is None:
         raise InputError("expected points or a footprint of a block, got neither; give a footprint")
-    return LocalFrame.around(
-        np.column_stack([shapely.get_coordinates(outline), np.zeros(len(outline.exterior.coords))])
-    )
+    corners = shapely.get_coordinates(outline)  # those of courtyards too
+    return LocalFrame.around(np.column_stack([corners, np.zeros(len(corners))]))
 
 
 def given_ground(

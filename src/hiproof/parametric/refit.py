@@ -57,7 +57,12 @@ def refit(
     """The building with its parts fitted to `points` again; see `Building.refit`."""
     record, local = building_record(building), within(building.roof, points)
     parts = refitted_parts(building.roof, record["parts"], local, fixed or {})
-    return measured(built(building, {**record, "parts": parts}), local, settings or Settings())
+    return measured(fitted_again(built(building, {**record, "parts": parts})), local, settings or Settings())
+
+
+def fitted_again(building: Building) -> Building:
+    """The building with its detail saying that its parts were fitted."""
+    return dataclasses.replace(building, detail=f"{building.detail}, fitted to its points")
 
 
 def within(roof: Roof, points: np.ndarray) -> np.ndarray:
@@ -286,5 +291,5 @@ def measured(building: Building, points_local: np.ndarray, settings: Settings) -
     if math.isfinite(share) and share < settings.reconstruct.poor_share:
         status, detail = Status.POOR_FIT, f"only {100 * share:.0f} % of its points lie within 0.2 m of the roof given"
     else:
-        status, detail = Status.MODELLED, f"{building.detail}, fitted to its points"
+        status, detail = Status.MODELLED, building.detail
     return settled_building(dataclasses.replace(building, quality=found, status=status, detail=detail))
