@@ -41,6 +41,15 @@ def test_a_pit_of_noise_is_no_ground():
     np.testing.assert_allclose(ground_grid(pit).height_at(xyz), rise(xyz), atol=0.01)
 
 
+@pytest.mark.parametrize("z", [-9999.0, -1e5])
+def test_a_height_that_stands_for_none_tilts_no_ground(z):
+    house, on = with_house(land(0.1)[0])
+    pit = np.concatenate([house, [[*(house[:, :2].min(axis=0) + 5.0), z]]])
+    np.testing.assert_allclose(
+        ground_grid(pit).height_at(house[on]), ground_grid(house).height_at(house[on]), atol=0.01
+    )
+
+
 def test_bare_points_are_those_of_the_ground():
     xyz, _ = with_house(land()[0])
     cells = np.unique(np.floor(xyz[:, :2]), axis=0, return_index=True)[1]

@@ -19,6 +19,7 @@ CELL_M = 1.0  # m; a car or a bush covers a few cells, a street is some wide
 WINDOWS_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0)  # half sides of the openings' windows
 SLOPE = 0.15  # a rise above the opened surface of more than this much of the half side is no ground
 PIT_M = 2.0  # a cell that lies so far below all around it is noise
+ABYSS_M = 500.0  # m below the middle of all heights, which no ground falls within a square: -9999 would tilt the plane under all
 PLANES = 3  # rounds of fitting the plane under all cells, each to the lower half of the last
 SMOOTHINGS = 30  # passes of a mean over neighbours that smooth what fills a gap
 
@@ -77,6 +78,7 @@ def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np
 
 def bare_ground(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
     """The lowest heights of cells (c, r), NaN where no point is, with NaN also where they are not the ground's."""
+    lowest = np.where(lowest < np.nanmedian(lowest) - ABYSS_M, np.nan, lowest)
     level = lowest - plane_through(lowest, cell_m)
     pit = -opened(-level, 1) - level > PIT_M
     level = np.where(pit, np.nan, level)
