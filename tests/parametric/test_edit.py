@@ -77,6 +77,20 @@ def test_sides_move_one_by_one(gable):
     assert slopes == [30.0, 36.87]
 
 
+@pytest.mark.parametrize("eave", [0.4, -0.4])
+def test_heights_count_from_the_lowest_eave_whichever_it_becomes(gable, eave):
+    shed = gable.with_part(0, type="monopitch")
+    raised = shed.with_part(0, eave_front=eave)
+    assert raised.parts[0].parameters["eave_front"] == 0.0
+    assert raised.parts[0].translation[2] == pytest.approx(shed.parts[0].translation[2] + eave)
+    top = raised.with_part(0, ridge_height=14.0)
+    assert top.solid.vertices[:, 2].max() == pytest.approx(14.0, abs=1e-3)
+    low = raised.with_part(0, eave_height=6.0).roof
+    assert low.height_at(low.parts[0].pieces[0].outline.exterior.coords).min() == pytest.approx(
+        6.0 - low.frame.origin[2]
+    )
+
+
 def test_a_moved_part_roofs_what_its_rectangle_covers(gable):
     two = gable.with_part(1, type="flat", position=[0, 0, 9.0], width=2.0, length=2.0)
     assert two.parts[1].area == pytest.approx(4.0) and two.solid.vertices[:, 2].max() == pytest.approx(11.0)

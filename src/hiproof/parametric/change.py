@@ -16,7 +16,7 @@ from ..errors import InputError
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import Member, member_of
 from ..rings import enclosed
-from .record import measure
+from .record import measure, place
 from .shape import SIDED
 
 PLAN = ("width", "length")
@@ -45,10 +45,22 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN)
     if moves and "outlines" not in placed:
         part = {key: value for key, value in with_sizes(part).items() if key != "outlines"}
-    part = {**part, **placed, "parameters": {**part["parameters"], **change}}
+    part = from_lowest_eave({**part, **placed, "parameters": {**part["parameters"], **change}})
     if eave is not None:
         part["position"] = [*part["position"][:2], eave - z_origin]
     return part if ridge is None else with_ridge(part, ridge - z_origin)
+
+
+def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
+    """The part with its position at its lowest eave, where sides have their own: all its heights count from there."""
+    parameters = part["parameters"]
+    eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
+    low = min((measure(parameters[name], name) for name in eaves), default=0.0)
+    if low == 0.0:
+        return part
+    x, y, z = place(part["position"], "position").tolist()
+    from_low = {name: parameters[name] - low for name in (*eaves, "height") if name in parameters}
+    return {**part, "parameters": {**parameters, **from_low}, "position": [x, y, z + low]}
 
 
 def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
