@@ -229,6 +229,9 @@ def test_parts_that_became_flat_although_not_asked_for_are_told():
     building = hiproof.reconstruct(points, FOOTPRINT, settings=asked)
     assert {part.type for part in building.parts} <= {"flat", "hip"}
     assert building.detail == "1 of 1 part made flat: none of the types asked for (hip) explains the points there"
+    poor = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=asked)
+    assert poor.status is Status.POOR_FIT
+    assert poor.detail.startswith("only ") and poor.detail.endswith("(hip) explains the points there")
     assert hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).detail == ""
 
 

@@ -410,10 +410,8 @@ def judge(
     status, detail = fitted.status, fitted.detail
     if status is Status.MODELLED and measured.share_within_20cm < settings.reconstruct.poor_share:
         share = 100 * measured.share_within_20cm
-        status, detail = (
-            Status.POOR_FIT,
-            f"only {share:.0f} % of its points inside the outline lie within 0.2 m of the roof",
-        )
+        poor = f"only {share:.0f} % of its points inside the outline lie within 0.2 m of the roof"
+        status, detail = Status.POOR_FIT, f"{poor}; {detail}" if detail else poor
     judged = dataclasses.replace(
         building,
         status=status,
