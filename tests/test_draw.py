@@ -60,5 +60,9 @@ def test_a_plot_tells_near_points_from_far_ones(house):
     axes = hiproof.plot(house, house.roof.frame.to_world(local))
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["within 0.2 m: 30 points", "further: 10 points"]
+    unknown = np.vstack([house.roof.frame.to_world(local), [[np.nan, 0.0, 0.0]]])  # `reconstruct` leaves it out
+    assert hiproof.plot(house, unknown).get_xlim() == axes.get_xlim()
+    with pytest.raises(InputError, match=r"shape \(n, 3\), got \(40, 2\)"):
+        hiproof.plot(house, xy)
     with pytest.raises(InputError, match="with a model"):
         hiproof.plot(hiproof.Building("b", Status.NO_POINTS))

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..extras import needed
 from ..log import counted
-from ..model import Building
+from ..model import Building, as_xyz
 from .view import TILT_DEG, colours_of, lightness, shaded, turn_of
 
 NEAR_M = 0.2  # m; within it a point counts as explained, as in share_within_20cm
@@ -19,7 +19,8 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     """Draw the building's solid, and `points` (n, 3) world metres coloured by their height over its roof, into matplotlib axes.
 
     ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the roof are blue, others red.
-    Raises NoModelError for a building without a model, InputError where matplotlib (extra `report`) is missing.
+    Raises NoModelError for a building without a model, InputError for points of another shape and where matplotlib (extra
+    `report`) is missing.
     """
     model = building.model
     ax = ax if ax is not None else new_axes(turn_of(building))
@@ -35,7 +36,9 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     )
     shown = vertices
     if points is not None and len(points):
-        local = np.asarray(points, float).reshape(-1, 3)[:: max(1, len(points) // MOST_POINTS)] - origin
+        points = as_xyz(points)
+        points = points[np.isfinite(points).all(axis=1)]  # others are in no place
+        local = points[:: max(1, len(points) // MOST_POINTS)] - origin
         gap = local[:, 2] - model.roof.height_at(local[:, :2])
         near = np.abs(gap) <= NEAR_M
         for chosen, colour, label in ((near, "#1f5fbf", "within 0.2 m"), (~near, "#c8321e", "further")):
