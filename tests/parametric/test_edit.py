@@ -77,6 +77,14 @@ def test_sides_move_one_by_one(gable):
     assert slopes == [30.0, 36.87]
 
 
+@pytest.mark.parametrize("kind", [name for name in CATALOGUE if name != "flat"])
+def test_another_type_of_another_size_is_one_of_that_size(gable, kind):
+    at_once = gable.with_part(0, type=kind, width=3.0, length=4.0)
+    sized = gable.with_part(0, width=3.0, length=4.0)
+    one_by_one = sized.with_part(0, type=kind)
+    assert at_once.parts[0].parameters == pytest.approx(one_by_one.parts[0].parameters)
+
+
 @pytest.mark.parametrize("eave", [0.4, -0.4])
 def test_heights_count_from_the_lowest_eave_whichever_it_becomes(gable, eave):
     shed = gable.with_part(0, type="monopitch")

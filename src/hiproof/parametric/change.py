@@ -35,7 +35,7 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     part = {key: value for key, value in part.items() if key != "sigma"}
     kind = change.pop("type", part["type"])
     if kind != part["type"]:
-        part = of_type(with_sizes(part), kind)
+        part = of_type(with_sizes(part), kind, sizes_of(change))
     ridge, eave = (
         measure(change.pop(name), name) if name in change else None for name in ("ridge_height", "eave_height")
     )
@@ -88,11 +88,17 @@ def polygon_of(rings: list) -> shapely.Geometry:
     return enclosed(shapely.Polygon(rings[0], rings[1:]))
 
 
-def of_type(part: dict[str, Any], kind: str) -> dict[str, Any]:
-    """The part as another roof type over the same rectangle, with the same lowest eave and the same rise."""
+def sizes_of(change: dict[str, Any]) -> dict[str, float]:
+    """The width and length that a change gives, those that make no rectangle left to be refused with the whole part."""
+    sizes = {name: measure(change[name], name) for name in PLAN if name in change}
+    return {name: size for name, size in sizes.items() if size > 0.0}
+
+
+def of_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
+    """The part as another roof type over the same rectangle, or one of other `sizes`, with the same lowest eave and the same rise."""
     if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
-    width, length = (part["parameters"][name] for name in PLAN)
+    width, length = (sizes.get(name, part["parameters"][name]) for name in PLAN)
     rise = rise_of(part) or 0.5 * USUAL_PITCH * width
     return {**part, "type": kind, "parameters": CATALOGUE[kind].typical(width, length, rise)}
 
@@ -134,7 +140,7 @@ def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
     if part["type"] == "flat":
         return {**part, "position": [*part["position"][:2], z_ridge]}
     if not rise_of(part) > 0.0:  # a roof without any slope has none that could be made steeper
-        part = of_type(with_sizes(part), part["type"])
+        part = of_type(with_sizes(part), part["type"], {})
     parameters, rise = part["parameters"], z_ridge - part["position"][2]
     if not rise > 0.0:
         raise InputError(
