@@ -59,7 +59,7 @@ CONFIGURATIONS = {
     "text of a number": ("[read]\ncrs = 28992", [], "to be text, got 28992"),
     "unknown section": ("[reading]\na = 1", [], "[reading]"),
     "unknown setting": ("[read]\nclasses = [6]", [], "got 'classes'"),
-    "a section that is none": ("read = 3", [], "[read]"),
+    "a section that is none": ("read = 3", [], "got read = 3;"),
     "no TOML": ("read = [", [], "expected a TOML settings file"),
     "unknown choice": ('[fit]\nobjective = "pretty"', [], "likelihood, paper, got 'pretty'"),
     "unknown choice of an option": ("", ["--detail", "most"], "fine, full, main, got 'most'"),

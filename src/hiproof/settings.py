@@ -247,7 +247,7 @@ class Settings:
     def from_toml(cls, path: str | Path) -> Settings:
         """Settings from a TOML file with one table a section. Raises SettingsError when it cannot be read."""
         try:
-            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            values = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         except (OSError, ValueError, RecursionError) as error:  # undecodable, no TOML, or a number of 5,000 digits
             raise SettingsError(
                 f"expected a TOML settings file at {path}, got: {error}; `hiproof settings` prints one"
@@ -259,10 +259,11 @@ class Settings:
         sections: dict[str, Any] = {}
         for section_name, changes in values.items():
             section: Any = getattr(self, section_name, None)
-            if section_name not in {f.name for f in fields(self)} or not isinstance(changes, dict):
-                names = ", ".join(f.name for f in fields(self))
+            names = [f.name for f in fields(self)]
+            if section_name not in names or not isinstance(changes, dict):
+                got = f"[{section_name}]" if isinstance(changes, dict) else f"{section_name} = {shown(changes)}"
                 raise SettingsError(
-                    f"expected a settings section (one of {names}), got [{section_name}]; `hiproof settings` lists them"
+                    f"expected a settings section (one of {', '.join(names)}), got {got}; `hiproof settings` lists them"
                 )
             known = {f.name: f for f in fields(section)}
             for name in changes:

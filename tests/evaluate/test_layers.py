@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import shapely
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import hiproof
@@ -74,6 +74,7 @@ def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, 
     roof, points = compound(seed, density)
     assert unseen_share(points, roof.outline) == 0.0
     seen = points[points[:, 0] > np.quantile(points[:, 0], cut)]
+    assume(len(seen) >= 30)  # fewer may be near all of a small roof
     assert 0.2 < unseen_share(seen, roof.outline) < cut + 0.2
 
 

@@ -11,6 +11,7 @@ from jsonschema import Draft202012Validator
 from typer.testing import CliRunner
 
 import hiproof
+from hiproof.city.overrides import override_records
 from hiproof.cli import main
 from hiproof.cli.app import app
 from hiproof.compose import check_solid, volume
@@ -66,6 +67,14 @@ def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
     assert built.exit_code == 0 and built.buildings == len(hiproof.read_parameters(demo_run / "parameters.jsonl"))
     for name in (*FILES, *PARQUET):
         assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name
+
+
+def test_a_file_that_an_editor_began_with_a_mark_of_its_encoding_is_read(demo_run, tmp_path):
+    text = (demo_run / "parameters.jsonl").read_text(encoding="utf-8")
+    (tmp_path / "saved.jsonl").write_text(text, encoding="utf-8-sig")
+    assert hiproof.read_parameters(tmp_path / "saved.jsonl") == hiproof.read_parameters(demo_run / "parameters.jsonl")
+    (tmp_path / "overrides.jsonl").write_text('{"id": "a", "type": "hip"}\n', encoding="utf-8-sig")
+    assert [record["id"] for _, record in override_records(str(tmp_path / "overrides.jsonl"))] == ["a"]
 
 
 def test_all_lines_are_as_the_published_schema_says(demo_run):

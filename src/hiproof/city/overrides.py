@@ -84,7 +84,7 @@ def override_records(path: str) -> Iterator[tuple[str, dict[str, Any]]]:
         yield from ((f"row {n} of {path}", record) for n, record in enumerate(table_records(path), 1))
         return
     try:
-        with Path(path).open(encoding="utf-8") as file:
+        with Path(path).open(encoding="utf-8-sig") as file:  # editors may begin it with a mark of the encoding
             for number, record in objects(file, path):
                 if not is_other_line(record):
                     yield f"line {number} of {path}", record

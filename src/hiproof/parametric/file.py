@@ -32,7 +32,7 @@ def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
 def opened_parameters(path: str | os.PathLike) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
     """The head of the parameters.jsonl at `path`, and its buildings one by one; raises InputError as they are read."""
     try:
-        with Path(path).open(encoding="utf-8") as file:
+        with Path(path).open(encoding="utf-8-sig") as file:  # editors may begin it with a mark of the encoding
             lines = objects(file, path)
             yield head_of(next(lines, None), path), records(lines, path)
     except (OSError, UnicodeDecodeError) as error:
