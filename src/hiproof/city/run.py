@@ -204,7 +204,7 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
         LOGGER.info("%s is done: %s", name, counted(len(result), "building") if kind == "solve" else result)
     elif kind == "sort" and isinstance(error, InputError):
         ledger.finish(name, "failed", str(error))
-        LOGGER.error("%s could not be read: %s", name, error)
+        LOGGER.error("a point file could not be read: %s", error)
     else:
         raise error
 

@@ -71,7 +71,8 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 5
     path = Path(folder) / "buildings.city.jsonl"
     if not path.is_file():
         raise InputError(
-            f"expected the output folder of a run, got {folder} without buildings.city.jsonl; check the path"
+            f"expected the output folder of a run, got {folder} without buildings.city.jsonl; check the path, or have "
+            "`hiproof build` make that file of a run's parameters.jsonl"
         )
     if not prefix.isidentifier():
         raise InputError(
