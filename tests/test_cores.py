@@ -44,6 +44,18 @@ def test_processes_never_outnumber_cores_tiles_or_what_the_buildings_pay_for(mon
     assert as_many_as_pay(BUILDINGS_A_PROCESS, 9, footprints=False) > 1
 
 
+@pytest.mark.parametrize("error", [ImportError, PermissionError])
+def test_where_there_are_no_semaphores_one_process_does_all(monkeypatch, error):
+    class Context:
+        def Semaphore(self):
+            raise error
+
+    monkeypatch.setattr(cores, "cores", lambda: 4)
+    assert as_many_as_pay(10**4, 100) == 4
+    monkeypatch.setattr(cores, "get_context", lambda kind: Context())
+    assert as_many_as_pay(10**4, 100) == 1
+
+
 def test_linear_algebra_of_workers_takes_one_thread_unless_the_user_said_otherwise(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "3")
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)

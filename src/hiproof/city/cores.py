@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
+from multiprocessing import get_context
 from pathlib import Path
 
 # A process takes a second to start, as long as 50 buildings with footprints or five of those that a cloud is split into, where blocks of
@@ -32,7 +33,17 @@ def as_many_as_pay(buildings: int, tiles: int, footprints: bool = True) -> int:
     >>> as_many_as_pay(40, 3)
     1
     """
-    return max(1, min(cores(), tiles, buildings // (BUILDINGS_A_PROCESS if footprints else SPLIT_A_PROCESS)))
+    count = min(cores(), tiles, buildings // (BUILDINGS_A_PROCESS if footprints else SPLIT_A_PROCESS))
+    return count if count > 1 and has_semaphores() else 1
+
+
+def has_semaphores() -> bool:
+    """Whether processes can be handed work here: sandboxes without shared memory have none of what that takes."""
+    try:
+        get_context("spawn").Semaphore()
+        return True
+    except (ImportError, OSError):
+        return False
 
 
 @contextmanager
