@@ -37,6 +37,15 @@ class CompositionError(HiproofError):
     """A roof that cannot become a valid solid; the caller falls back to a simpler roof."""
 
 
+def is_interrupt(error: BaseException) -> bool:
+    """Whether `error` is a Ctrl-C in disguise: of one that comes while compiled code runs Python makes a SystemError, or several one
+    of the other, which what catches an `Exception` would take for a failure."""
+    cause: BaseException | None = error
+    while isinstance(cause, SystemError):
+        cause = cause.__cause__
+    return isinstance(cause, KeyboardInterrupt)
+
+
 class HiproofWarning(UserWarning):
     """Base of the warnings: what was put right on the way, in one sentence."""
 

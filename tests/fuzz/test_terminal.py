@@ -56,6 +56,30 @@ def test_an_interrupted_run_says_what_is_kept_and_goes_on(hiproof, town, tmp_pat
     assert "solve 0.0 s" in capsys.readouterr().out
 
 
+def interrupted_in_compiled_code(*_, **__):
+    """What a call of compiled code does when Ctrl-C comes meanwhile."""
+    inner = SystemError("returned a result with an exception set")
+    inner.__cause__ = KeyboardInterrupt()
+    raise SystemError("returned a result with an exception set") from inner
+
+
+@pytest.mark.parametrize("place", ["sort.mask_at", "solve.Surroundings", "solve.fragments", "run.merge"])
+def test_an_interrupt_within_compiled_code_is_no_failure(hiproof, town, tmp_path, monkeypatch, capsys, place):
+    command = ("reconstruct", town[0], "--footprints", town[1], "--out", tmp_path / "out")
+    with monkeypatch.context() as patch:
+        patch.setattr(f"hiproof.city.{place}", interrupted_in_compiled_code)
+        assert hiproof(*command) == 130
+    assert "the same command goes on from there" in capsys.readouterr().err
+    assert hiproof(*command) == 0
+
+
+def test_an_interrupt_ends_a_build_from_parameters(hiproof, town, tmp_path, monkeypatch):
+    out = tmp_path / "out"
+    assert hiproof("reconstruct", town[0], "--footprints", town[1], "--out", out) == 0
+    monkeypatch.setattr("hiproof.parametric.run.build", interrupted_in_compiled_code)
+    assert hiproof("build", out / "parameters.jsonl", "--out", tmp_path / "built") == 130
+
+
 def interrupted_worker():
     os.kill(os.getpid(), signal.SIGINT)
     return "finished"

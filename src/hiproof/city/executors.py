@@ -26,7 +26,7 @@ from urllib.parse import urlsplit
 from .. import log
 from ..compiled import news
 from ..compiled.stamp import count_compiled
-from ..errors import InputError, NotKeptWarning, OutputError
+from ..errors import InputError, NotKeptWarning, OutputError, is_interrupt
 from ..extras import needed
 from .cores import one_thread_each
 from .tasks import make_ready
@@ -51,6 +51,8 @@ class InProcess:
             try:
                 yield task, function(*task), None
             except Exception as error:
+                if is_interrupt(error):
+                    raise KeyboardInterrupt from error
                 yield task, None, error
 
     def isolated(self) -> Processes:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import shapely
 
+from ..errors import is_interrupt
 from ..frames import Units
 from ..masking import masked
 from ..model import Building
@@ -196,6 +197,8 @@ def solve_one(
     except MemoryError:
         raise
     except Exception as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
         place = traceback.extract_tb(error.__traceback__)[-1]
         return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
 

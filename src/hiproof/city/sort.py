@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import OutputError
+from ..errors import OutputError, is_interrupt
 from ..frames import Units
 from ..model import PointCloud
 from ..read.assign import PointGrid
@@ -193,6 +193,8 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
         raise
     except Exception as error:
         gatherer.discard()
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
         raise as_input_error(error, address) from error
     gatherer.flush()
     if found:

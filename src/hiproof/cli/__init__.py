@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 INTERRUPTED = 130  # exit code, as shells know it: 128 and the signal's number
+KEPT = "interrupted; no file is left half written. What a run had finished is kept: the same command goes on from there"
 
 
 def main() -> None:
@@ -14,7 +15,7 @@ def main() -> None:
     """
     from .. import log
     from ..compiled import news
-    from ..errors import HiproofError
+    from ..errors import HiproofError, is_interrupt
     from .app import app
 
     log.start()
@@ -26,11 +27,11 @@ def main() -> None:
         sys.exit(2)
     except SystemExit as end:
         if end.code == INTERRUPTED:  # Ctrl-C, of which typer says nothing
-            log.LOGGER.error(
-                "interrupted; no file is left half written. What a run had finished is kept: the same command goes on "
-                "from there"
-            )
+            log.LOGGER.error(KEPT)
         raise
-    except Exception:
+    except Exception as error:
+        if is_interrupt(error):
+            log.LOGGER.error(KEPT)
+            sys.exit(INTERRUPTED)
         log.LOGGER.error("failed; please report this:", exc_info=True)
         sys.exit(1)

@@ -16,7 +16,7 @@ import numpy as np
 import shapely
 
 from .. import __version__
-from ..errors import HiproofError, InputError, OutputError
+from ..errors import HiproofError, InputError, OutputError, is_interrupt
 from ..formats import asked_files, places_of_models
 from ..masking import masked, masked_values
 from ..model import Building
@@ -139,6 +139,8 @@ class Maker:
         except MemoryError:
             raise
         except Exception as error:
+            if is_interrupt(error):
+                raise KeyboardInterrupt from error
             place = traceback.extract_tb(error.__traceback__)[-1]
             why = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
             status = Status.INTERNAL_ERROR
