@@ -214,10 +214,13 @@ def write_wheel(folder, factor):
     return wheel
 
 
-def test_a_damaged_file_is_compiled_again(town):
+@pytest.mark.parametrize(
+    "damage", [lambda whole: whole[:100], lambda whole: b"\x8c\x02\xff\xff" + whole], ids=["cut off", "no text"]
+)
+def test_a_damaged_file_is_compiled_again(town, damage):
     ask()
     for path in town.rglob("outer.*.nbc"):
-        path.write_bytes(path.read_bytes()[:100])
+        path.write_bytes(damage(path.read_bytes()))
     assert ask() == (61, False, 0)
     assert ask() == (61, True, 0)
 
@@ -233,11 +236,12 @@ def test_where_nothing_can_be_kept_every_process_compiles_and_says_so_once(town,
 
 def test_a_full_disk_costs_time_only(town, monkeypatch):
     def full(path, data):
+        path.touch()
         raise OSError(errno.ENOSPC, "no space left on device")
 
     monkeypatch.setattr(Path, "write_bytes", full)
     assert ask() == (61, False, 1)
-    assert files_in(town) == []
+    assert not list(town.rglob("*.nbc*"))
 
 
 def test_code_kept_in_an_install_that_became_read_only_is_loaded(town, monkeypatch):
@@ -315,6 +319,24 @@ def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypa
     warm.make_ready(["solid", "single"])
     assert runs == ["solid", "solid", "single"]
     assert len(files_in(tmp_path)) == 2
+
+
+def test_a_mark_that_cannot_be_kept_or_read_ends_no_run(tmp_path, monkeypatch):
+    def full(path, text, encoding):
+        path.touch()
+        raise OSError(errno.ENOSPC, "no space left on device")
+
+    monkeypatch.setattr(warm, "compiled_pieces", lambda left: left)
+    monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path,))
+    kept.warn_not_kept.cache_clear()
+    with monkeypatch.context() as patch, pytest.warns(NotKeptWarning):
+        patch.setattr(Path, "write_text", full)
+        warm.make_ready(["solid"])
+    assert files_in(tmp_path) == []
+    warm.make_ready(["solid"])
+    (made,) = tmp_path.glob("*.nbc")
+    made.write_bytes(b"\xff\xfe damaged")
+    warm.make_ready(["solid"])
 
 
 @pytest.mark.parametrize("runs, compiles", [(True, []), (False, ["solid"])])

@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,7 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     for piece in pieces:
         marks = [place / mark(piece, stamp, processor) for processor in processors for place in places]
         if made := next(filter(Path.exists, marks), None):
-            news.ready.update(made.read_text(encoding="utf-8").split())
+            news.ready.update(made.read_text(encoding="utf-8", errors="replace").split())
         else:
             missing.append(piece)
     folder = kept.place_to_write(places) if missing else None
@@ -46,13 +47,22 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
 
     def work_off() -> None:
         for piece in compiled_pieces(left):
-            ready = "\n".join(sorted(news.ready.copy()))
-            (folder / mark(piece, stamp, own_processor())).write_text(ready, encoding="utf-8")
+            keep_mark(folder / mark(piece, stamp, own_processor()))
 
     with ThreadPoolExecutor(news.processes) as pool:
         for done in [pool.submit(work_off) for _ in range(news.processes)]:
             done.result()
     news.processes = 1
+
+
+def keep_mark(file: Path) -> None:
+    """Write the mark `file`: the functions that are ready. Where it cannot be written, the next run compiles the piece again."""
+    try:
+        file.write_text("\n".join(sorted(news.ready.copy())), encoding="utf-8")
+    except OSError:  # a full disk, most of all
+        with suppress(OSError):
+            file.unlink()
+        kept.warn_not_kept()
 
 
 def compiled_pieces(left: Iterator[str]) -> Iterator[str]:

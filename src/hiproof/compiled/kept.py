@@ -16,6 +16,7 @@ import tempfile
 import uuid
 import warnings
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -28,8 +29,6 @@ from ..errors import NotKeptWarning
 from . import linking, news
 from .kinds import KIND, runs_kind
 from .stamp import PYTHON, stamp_of
-
-DAMAGED = (EOFError, pickle.UnpicklingError)
 
 
 class Kept:
@@ -54,7 +53,7 @@ class Kept:
         for file in self.places(signature, context.codegen().magic_tuple()):
             try:
                 kept, *code = pickle.loads(file.read_bytes())
-            except (OSError, *DAMAGED):
+            except Exception:  # not there, or damaged, of which pickle makes errors of any kind
                 continue
             if kept == signature:
                 news.ready.add(self.name)
@@ -83,6 +82,8 @@ class Kept:
             beside.replace(file)
         except OSError:  # a full disk, a folder that went away
             warn_not_kept()
+            with suppress(OSError):
+                beside.unlink()
             return
         remove_outdated(folder, self.module, self.stamp)
 
