@@ -71,6 +71,30 @@ def test_losses_with_the_main_process_lead_to_quarantine(town_files, undisturbed
     assert records(tmp_path) == records(undisturbed)
 
 
+def test_points_that_somebody_removed_are_sorted_again(town_files, undisturbed, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    request = Request((town_files[0],), tmp_path, town_files[1])
+
+    def killed(step, done, total):
+        if step == "solve" and done == 1:
+            raise SystemExit
+
+    with pytest.raises(SystemExit):
+        reconstruct_area(request, killed)
+    shutil.rmtree(tmp_path / ".hiproof" / "points")
+    reconstruct_area(request)
+    assert records(tmp_path) == records(undisturbed)
+
+
+def test_a_damaged_list_of_what_to_redo_ends_in_one_sentence(town_files, tmp_path, monkeypatch):
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    request = Request((town_files[0],), tmp_path, town_files[1], processes=None)
+    reconstruct_area(request)
+    (tmp_path / ".hiproof" / "redo.json").write_text("{")
+    with pytest.raises(OutputError, match=r"redo\.json, got: .*--restart"):
+        reconstruct_area(request)
+
+
 def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(town_files, undisturbed, tmp_path, monkeypatch):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])

@@ -167,6 +167,10 @@ class Ledger:
         """The main process ends in order: what was running is open again, and no loss."""
         self.database.execute("update task set state = 'open' where state = 'running'")
 
+    def sort_again(self) -> None:
+        """Open the reading of the point files that were read."""
+        self.database.execute("update task set state = 'open' where kind = 'sort' and state = 'done'")
+
     def losses(self, name: str) -> int:
         return self.database.execute("select losses from task where name = ?", (name,)).fetchone()[0]
 

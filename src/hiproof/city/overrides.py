@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, InputWarning
+from ..errors import InputError, InputWarning, OutputError
 from ..log import LOGGER, counted
 from ..parametric.file import HEAD, objects
 from ..parametric.override import KEYS, Override, override_of
@@ -199,11 +199,15 @@ def digest_of(record: dict[str, Any]) -> str:
 
 
 def load_redo(state: Path) -> dict[str, list[int]]:
-    """The buildings to redo by tile, empty where whole tiles are to be solved."""
+    """The buildings to redo by tile, empty where whole tiles are to be solved. Raises OutputError for a damaged file."""
     try:
-        return json.loads((state / REDO).read_text())
+        return json.loads((state / REDO).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
+    except ValueError as error:
+        raise OutputError(
+            f"expected the buildings to redo in {state / REDO}, got: {error}; begin anew with --restart"
+        ) from error
 
 
 def load_overrides(state: Path) -> dict[int, Override]:

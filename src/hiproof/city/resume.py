@@ -79,6 +79,8 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
             begin(plan, request, state, ledger)
         enter(request, ledger)
     settle_overrides(request.overrides, plan, state, ledger, fresh=fresh)
+    if ledger.open_tasks("solve") and not any((state / "points").iterdir()):
+        ledger.sort_again()  # somebody made room: without points, the buildings that are left would come out as ones that have none
     LOGGER.info(
         "version %s %s in %s: %s in %s",
         __version__,
