@@ -8,6 +8,7 @@ A roof is a max of mins of planes: over the plan,
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -125,16 +126,6 @@ class Roof:
     frame: LocalFrame
 
     @property
-    def largest(self) -> Part:
-        """The part with the largest area: whose type is the building's, and along whose rectangle it is looked at."""
-        return max(self.parts, key=lambda part: part.area)
-
-    @property
-    def type(self) -> str:
-        """Type of the part with the largest area."""
-        return self.largest.type
-
-    @property
     def pieces(self) -> tuple[Piece, ...]:
         return tuple(piece for part in self.parts for piece in part.pieces)
 
@@ -242,6 +233,18 @@ class Model:
     solid: Solid
     compose: ComposeSettings | None = None
 
+    @cached_property
+    def shown_m2(self) -> tuple[float, ...]:
+        """Plan area that each part of the roof shows from above, 0 of one that others hide."""
+        from .write.shown import shown_m2
+
+        return shown_m2(self)
+
+    @property
+    def main(self) -> int:
+        """Index of the main part: the one that shows the largest area. Its type is the building's."""
+        return self.shown_m2.index(max(self.shown_m2))
+
 
 @dataclass(frozen=True)
 class Building:
@@ -297,8 +300,8 @@ the footprint; add a cloud that covers it); `built` is None there
 
     @property
     def type(self) -> str | None:
-        """Roof type of the largest part, None without a model."""
-        return None if self.built is None else self.built.roof.type
+        """Roof type of the part that shows the largest area, None without a model."""
+        return None if self.built is None else self.parts[self.built.main].type
 
     @property
     def parts(self) -> tuple[Part, ...]:

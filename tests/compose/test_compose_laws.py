@@ -220,7 +220,7 @@ def test_ground_gives_way_to_a_roof_below_it():
     roof, solid = roof_zoo.flat_block(HOUSE, 3.0, 5.0)
     assert check_solid(solid) == ()
     assert solid.vertices[:, 2].max() == 3.0 and solid.vertices[:, 2].min() == pytest.approx(2.9)
-    assert roof.type == "flat"
+    assert [part.type for part in roof.parts] == ["flat"]
 
 
 def test_terrain_intersection_follows_the_terrain_around_every_ring():

@@ -1,5 +1,6 @@
 """Where parts show: areas that share nothing, are the outline together, and lie where no other part is higher."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -8,10 +9,15 @@ import shapely
 from shapely import affinity
 
 from handmade import RD_ORIGIN, courtyard, modelled, unmodelled
+from hiproof.city.solve import outcome_of
 from hiproof.compose import compose
+from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
 from hiproof.model import Building, Model, Part, Piece, Roof
 from hiproof.status import Status
+from hiproof.write import write_all
+from hiproof.write.osm_tags import osm_tags
+from hiproof.write.roof_figures import roof_figures
 from hiproof.write.shown import shared_out, shown_areas
 from hiproof.write.table_rows import table_rows
 from roof_zoo import FRAME, KINDS, generated
@@ -62,6 +68,32 @@ def test_parts_in_one_plane_share_a_surface_by_their_outlines():
     building = composed(roof)
     assert len(building.solid.of_kind("RoofSurface")) == 1
     assert [area.area for area in shown_areas(building)] == pytest.approx([30.0, 20.0, 0.0])
+
+
+def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
+    """The flat part is drawn over 60 m2, of which the gable hides 45; the gable is drawn over, and shows, 45."""
+    slopes = np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])
+    gable = Part("gable", (Piece(shapely.box(0, 0, 9, 5), slopes),), {"width": 5.0, "length": 9.0, "height": 1.0})
+    hidden = flat(3.0, 2, 1, 8, 4)
+    roof = Roof((flat(2.5, 0, 0, 12, 5), gable, hidden), shapely.box(0, 0, 12, 5), FRAME)
+    building = replace(composed(roof), z_ground=0.0)
+    assert building.type == "gable" and building.model.shown_m2 == pytest.approx((15.0, 45.0, 0.0))
+    write_all(tmp_path, [building])
+    (model,) = read_models(tmp_path / "buildings.city.jsonl")
+    assert model.roof_type == "gable"
+    assert osm_tags(building, roof_figures(building.solid))["roof:shape"] == "gabled"
+    record = json.loads((tmp_path / "parameters.jsonl").read_text().splitlines()[1])
+    assert record["type"] == "gable"
+    gml = (tmp_path / "buildings.gml").read_text()
+    assert "1130</bldg:roofType>" in gml  # two types show
+    assert outcome_of(0, building, 0.0).type == "gable"
+
+
+def test_hidden_parts_do_not_make_a_roof_a_mixed_one(tmp_path):
+    gable = Part("gable", (Piece(shapely.box(0, 0, 9, 5), np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])),))
+    building = composed(Roof((flat(3.0, 2, 1, 8, 4), gable), shapely.box(0, 0, 9, 5), FRAME))
+    write_all(tmp_path, [replace(building, z_ground=0.0)])
+    assert "1030</bldg:roofType>" in (tmp_path / "buildings.gml").read_text()
 
 
 def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one():

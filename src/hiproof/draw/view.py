@@ -33,8 +33,8 @@ def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
 
 
 def turn_of(building: Building) -> float:
-    """Degrees to turn a building by, so that it is seen from a corner whichever way its largest part stands."""
-    return TURN_DEG - math.degrees(building.roof.largest.kappa)
+    """Degrees to turn a building by, so that it is seen from a corner whichever way its main part stands."""
+    return TURN_DEG - math.degrees(building.parts[building.model.main].kappa)
 
 
 def colours_of(building: Building) -> list[str]:

@@ -2,10 +2,10 @@
 
 An override is an object with the building's `id` and any of
 
-    type, types       the type of the largest part; types that parts may have
+    type, types       the type of the part that shows the largest area; types that parts may have
     parts             how many parts at most, or the parts themselves as in parameters.jsonl (with `origin`, perhaps `outline`)
-    ridge_height, eave_height     of the largest part, world metres
-    fixed             further parameters of the largest part by name
+    ridge_height, eave_height     of that part, world metres
+    fixed             further parameters of that part by name
     z_ground          height of the ground, world metres
     block_height      a flat block so high above its ground
     leave_out         true: no model
@@ -260,9 +260,9 @@ def fitted_within(
         return building
     changed = False
     while override.most_parts is not None and len(building.parts) > override.most_parts:
-        least = min(range(len(building.parts)), key=lambda k: building.parts[k].area)
-        building, changed = building.without_part(least), True
-    main = max(range(len(building.parts)), key=lambda k: building.parts[k].area)
+        shown_m2 = building.model.shown_m2
+        building, changed = building.without_part(shown_m2.index(min(shown_m2))), True
+    main = building.model.main
     if override.type and building.parts[main].type != override.type:
         building, changed = building.with_part(main, type=override.type), True
     if changed:

@@ -35,13 +35,18 @@ class SimBuilding:
         return self.roof.outline
 
     @property
+    def largest(self) -> Part:
+        """The part of the largest outline."""
+        return largest_of(self.roof)
+
+    @property
     def parameters(self) -> dict[str, float]:
         """theta_p of the largest part, metres."""
-        return self.roof.largest.parameters
+        return self.largest.parameters
 
     @property
     def kappa(self) -> float:
-        return self.roof.largest.kappa
+        return self.largest.kappa
 
     @property
     def footprint(self) -> shapely.Polygon:
@@ -92,7 +97,12 @@ def random_building(
 def assemble(parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[float, float, float]) -> SimBuilding:
     """`parts` as a building on the ground at `origin`; the outline is the union of their pieces."""
     roof = Roof(parts, united_outline(parts), LocalFrame(np.asarray(origin, float)))
-    return SimBuilding(roof.type, kind, roof, float(origin[2]))
+    return SimBuilding(largest_of(roof).type, kind, roof, float(origin[2]))
+
+
+def largest_of(roof: Roof) -> Part:
+    """The part of the largest outline, what others hide of it included."""
+    return max(roof.parts, key=lambda part: part.area)
 
 
 def building_of(truth: dict) -> SimBuilding:

@@ -201,7 +201,7 @@ def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
 
 def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
     """A building beside this one, wall to wall or some metres off; its points are clutter here."""
-    part = building.roof.largest
+    part = building.largest
     type = ROOF_TYPES[rng.choice((0, 1, 2, 3))]
     parameters = random_parameters(rng, type)
     gap = 0.0 if rng.random() < 0.4 else rng.uniform(0.5, 4.0)

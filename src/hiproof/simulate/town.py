@@ -17,7 +17,7 @@ from ..frames import LocalFrame
 from ..model import Roof
 from .compounds import COMPOUND_KINDS, random_compound
 from .relief import Relief
-from .roofs import SimBuilding, random_building, turned, turned_building
+from .roofs import SimBuilding, largest_of, random_building, turned, turned_building
 from .scene import Body, Defects, Scene, building_bodies, scene_of, superstructures, trees
 
 TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, antenna=0.1)
@@ -61,7 +61,7 @@ def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBu
 def houses_of(row: SimBuilding) -> list[SimBuilding]:
     """A row of houses as single buildings with common walls, all in the row's frame."""
     roofs = [Roof((part,), part.pieces[0].outline, row.roof.frame) for part in row.roof.parts]
-    return [SimBuilding(roof.type, "terraced", roof, row.z_ground) for roof in roofs]
+    return [SimBuilding(largest_of(roof).type, "terraced", roof, row.z_ground) for roof in roofs]
 
 
 def furnished(rng: np.random.Generator, id: str, building: SimBuilding) -> Lot:

@@ -69,7 +69,9 @@ OF_PARTS = (
 HIPROOF = (
     Attribute("status", "text", "", "what came of the building: modelled, poor_fit, simplified, ..."),
     Attribute("detail", "text", "", "the status as a sentence about this building"),
-    Attribute("roof_type", "text", "", "type of the largest part: a name of the catalogue, or free"),
+    Attribute(
+        "roof_type", "text", "", "type of the part that shows the largest area: a name of the catalogue, or free"
+    ),
     Attribute("roof_type_probability", "number", "", "probability of that type after the fits"),
     Attribute("network_type", "text", "", "type that the network names, where it was asked"),
     Attribute("network_type_probability", "number", "", "probability that the network gives it"),
@@ -98,7 +100,7 @@ HIPROOF = (
 )
 
 OSM = (
-    Attribute("roof:shape", "text", "", "of the largest part, as OpenStreetMap names it"),
+    Attribute("roof:shape", "text", "", "of the part that shows the largest area, as OpenStreetMap names it"),
     Attribute("roof:height", "number", "m", "from the lowest edge of that part's roof to the top of the building"),
     Attribute(
         "roof:direction", "number", "deg", "compass direction that its largest face, or its hipped end, looks in"
@@ -133,7 +135,9 @@ PARAMETERS = (
     Attribute("id", "text", "", "the building's id"),
     Attribute("status", "text", "", "as hiproof_status"),
     Attribute("detail", "text", "", "as hiproof_detail"),
-    Attribute("type", "text", "", "type of the largest part; `hiproof build` reads those of the parts"),
+    Attribute(
+        "type", "text", "", "type of the part that shows the largest area; `hiproof build` reads those of the parts"
+    ),
     Attribute("origin", "list", "m", "origin x, y, z of the building's frame in the world; null without a model"),
     Attribute("parts", "list", "", "every part of the roof, as below"),
     Attribute(

@@ -153,9 +153,8 @@ def building_element(sheet: Sheet) -> str:
         text.append(f"<core:creationDate>{sheet.head.creation_date.isoformat()}</core:creationDate>")
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
-        text.append(
-            roof_and_height([part.type for part in building.parts], figures, ground_height(building, figures), write)
-        )
+        types = types_that_show(building)
+        text.append(roof_and_height(types, figures, ground_height(building, figures), write))
         text.append(level_surfaces(sheet))
         text.append(lod1_solid(sheet.shapes.lod13 or sheet.shapes.lod12, sheet.head.units.gml))
     if figures is None or (solid := own_solid(sheet)) is None:
@@ -184,6 +183,11 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
         text += [lod2_surfaces(rings)] if sheet.head.write.gml_surfaces else []
         text += boundary_surfaces(part.solid, part.figures, ids, rings)
     return "".join([*text, "</bldg:BuildingPart></bldg:consistsOfBuildingPart>"])
+
+
+def types_that_show(building: Building) -> list[str]:
+    """Roof types of the parts that are seen from above."""
+    return [part.type for part, area in zip(building.parts, building.model.shown_m2, strict=True) if area > 0.0]
 
 
 def roof_and_height(types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings) -> str:

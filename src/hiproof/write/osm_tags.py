@@ -1,4 +1,4 @@
-"""A building's roof as OpenStreetMap's Simple 3D Buildings tags it, by its largest part."""
+"""A building's roof as OpenStreetMap's Simple 3D Buildings tags it, by its main part."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     """
     if figures is None or not building.parts:
         return {tag.name: None for tag in OSM}
-    main = max(range(len(building.parts)), key=lambda k: building.parts[k].area)
+    main = building.model.main
     roof = [i for i, face in enumerate(building.solid.faces) if face.kind == ROOF]
     shown = [i for i in roof if building.solid.faces[i].part == main] or roof
     largest = max(shown, key=lambda i: figures.face_area_m2[i])

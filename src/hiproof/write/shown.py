@@ -11,11 +11,12 @@ from itertools import accumulate, chain
 import numpy as np
 import shapely
 
-from ..model import ROOF, Building, Face, Part, Roof
+from ..model import ROOF, Building, Face, Model, Part, Roof
 from ..rings import enclosed
 
 SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
 GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
+AREA_DIGITS = 4  # of areas in square metres, as the tables of parts round them
 LEAST_M2 = 0.05  # of what one part has of a common surface; less is a sliver between outlines that miss one another
 
 
@@ -32,7 +33,18 @@ def shown_areas(building: Building) -> list[shapely.Geometry]:
     """
     if building.built is None:
         return []
-    roof, solid = building.roof, building.solid.moved(-building.roof.frame.origin)
+    united = [shapely.union_all(areas, grid_size=GRID_M) for areas in shown_pieces(building.built)]
+    return shapely.transform(np.array(united, object), building.roof.frame.to_world).tolist()
+
+
+def shown_m2(model: Model) -> tuple[float, ...]:
+    """Plan area that each part shows, rounded, so that parts which show the same are equal."""
+    return tuple(round(float(shapely.area(pieces).sum()), AREA_DIGITS) for pieces in shown_pieces(model))
+
+
+def shown_pieces(model: Model) -> list[list[shapely.Geometry]]:
+    """Where each part shows, in the roof's local frame, as pieces that share no area."""
+    roof, solid = model.roof, model.solid.moved(-model.roof.frame.origin)
     shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
     faces = solid.of_kind(ROOF)
     for face, others in zip(faces, parts_in_plane(faces, solid.vertices, planes_of(roof)), strict=True):
@@ -41,8 +53,7 @@ def shown_areas(building: Building) -> list[shapely.Geometry]:
             left, others_own = shared_out(left, drawn(roof.parts[face.part]), drawn(roof.parts[other]))
             shown[other].append(others_own)
         shown[face.part].append(left)
-    united = np.array([shapely.union_all(areas, grid_size=GRID_M) for areas in shown], object)
-    return shapely.transform(united, roof.frame.to_world).tolist()
+    return shown
 
 
 def planes_of(roof: Roof) -> np.ndarray:

@@ -22,7 +22,7 @@ NO_NUMBER = -9999.0  # stands for what is not known, as GDAL's files use it; no 
 WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is told as text
 TOLD = {
     "id": "the building's id",
-    "type": "roof type of the largest part",
+    "type": "roof type of the part that shows the largest area",
     "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see docs/parameters.md)",
 } | {
     prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
