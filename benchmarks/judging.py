@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 import importlib.util
-import io
-import json
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from pathlib import Path
@@ -28,19 +26,13 @@ def fitted(points_local: np.ndarray, outline: shapely.Polygon | None, settings: 
 
 
 def tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
-    """The judge `name` (roof_residuals, wireframe) as a module."""
+    """Load the judge `name` (roof_residuals, wireframe, hand_drawn) as a module."""
+    if str(tools) not in sys.path:
+        sys.path.append(str(tools))  # judges import each other
     spec = importlib.util.spec_from_file_location(name, tools / f"{name}.py")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
-
-
-def wireframe_figures(models: Path, truth: Path, worst: int = 0) -> tuple[dict[str, float], list[str]]:
-    """What wireframe.py says of `models` against `truth`: its figures, and a line for each of the `worst` buildings."""
-    with contextlib.redirect_stdout(io.StringIO()) as printed:
-        tool("wireframe").main(models, truth, True, worst)
-    figures, *lines = printed.getvalue().splitlines()
-    return json.loads(figures), lines
 
 
 def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:

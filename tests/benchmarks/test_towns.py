@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import shapely
 from benchmarks.delft import asked_footprints
-from benchmarks.judging import SHARED, raster, wireframe_figures
+from benchmarks.judging import SHARED, raster
 from benchmarks.towns import TOWNS, all_modelled, chosen, composed, ground_of, read_town, touching, write_truth
+from benchmarks.wireframes import Score, WireframeCounts, count_wireframes, summed, table_by_size
 
 from handmade import box
 from hiproof.compose import compose
@@ -62,10 +63,12 @@ def test_true_models_are_right_in_everything(small_town, tmp_path):
     truth, models = tmp_path / "truth.city.json", tmp_path / "models.city.jsonl"
     write_truth(truth, small_town, buildings)
     write_cityjson(models, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))])
-    figures, lines = wireframe_figures(models, truth, worst=2)
-    assert figures["buildings"] == 3 and len(lines) == 2
-    assert figures["edge_f1"] == figures["corner_f1"] == 100.0
-    assert figures["faces_of_truth"] == figures["corners_of_truth"] == 1.0
+    counts = count_wireframes(models, truth)
+    assert counts.keys() == {building.id for building in buildings} and len(counts) == 3
+    for one in (*counts.values(), summed(counts.values())):
+        assert one.edge_f1 == one.corner_f1 == 100.0
+        assert (one.edges, one.corners, one.faces) == (one.true_edges, one.true_corners, one.true_faces)
+        assert one.height_rmse_m < 0.01
 
 
 def test_true_roofs_composed_anew_have_the_true_heights(small_town):
@@ -88,8 +91,10 @@ def test_a_missing_model_counts_as_missed(tmp_path):
         Building(b.id, Status.MODELLED, built=Model(flat_roof(b), s)) for b, s in zip(buildings, solids, strict=True)
     ]
     write_cityjson(tmp_path / "models.city.jsonl", models[1:])
-    figures, _ = wireframe_figures(tmp_path / "models.city.jsonl", tmp_path / "truth.city.json")
-    assert figures["edge_precision"] == 100.0 and 0 < figures["edge_recall"] < 100.0
+    counts = count_wireframes(tmp_path / "models.city.jsonl", tmp_path / "truth.city.json")
+    assert [counts[b.id].edge_f1 for b in buildings] == [0.0, *[100.0] * (len(buildings) - 1)]
+    total = summed(counts.values())
+    assert total.right_edges == total.edges == total.true_edges - counts[buildings[0].id].true_edges
 
 
 def flat_roof(building) -> Roof:
@@ -118,6 +123,25 @@ def test_draws_are_parts_of_the_whole_and_always_the_same():
     drawn = chosen(every, most=12)
     assert len(drawn) == 12 and drawn == sorted(set(drawn)) and drawn == chosen(every, most=12)
     assert chosen(every, most=500) == every
+
+
+def test_a_table_has_a_row_for_every_size_there_is_pooled_and_by_building():
+    small = Score("small", WireframeCounts(8, 8, 8, 6, 6, 6, 6), 100.0, 0.01, 1, 1.0)
+    large = Score("large", WireframeCounts(10, 30, 30, 12, 24, 24, 12), 900.0, 0.18, 4, 0.5)
+    head, *rows = (line.split("  ") for line in table_by_size([small, large]))
+    cells = [[cell.strip() for cell in row if cell.strip()] for row in (head, *rows)]
+    assert [row[0] for row in cells] == ["footprint", "all", "< 200 m2", "> 800 m2"]
+    every = dict(zip(*cells[:2], strict=True))
+    assert every["F1 pooled, mean"] == "47.4, 66.7"  # 18 of 38 edges; (100 + 33.3) / 2
+    assert every["ms per 100 m2"] == "19.0, 15.0"  # 190 ms on 1,000 m2; (10 + 20) / 2
+    assert every["in 0.2 m"] == "0.7500" and every["parts"] == "2.50"
+
+
+@needs_judge
+@needs_towns
+@pytest.mark.parametrize(("town", "n"), [("vienna", 143), ("rotterdam", 715), ("delft_5907", 303)])
+def test_towns_have_the_buildings_that_are_known(town, n):
+    assert len(read_town(TOWNS[town])) == n
 
 
 @needs_delft

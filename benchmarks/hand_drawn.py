@@ -1,0 +1,83 @@
+"""Compare roofs with those that people drew by hand over the same points: edges and corners.
+
+usage: python -m benchmarks.hand_drawn [--mode points|footprints|both] [--parity even|odd]
+           [--worst N]
+
+Reconstructs the 23 clouds of ../shared/data/hand_drawn from points only and under the outline of the
+drawn roof, and compares them by the rule of ../shared/tools/hand_drawn.py: an edge is right within a
+tenth of the cloud's radius. `--parity` takes the roofs with an even or an odd number: choose by the
+even ones, report the odd ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import re
+import time
+from types import ModuleType
+
+import numpy as np
+
+from hiproof import reconstruct
+from hiproof.model import Building
+
+from .judging import tool
+from .wireframes import Score, WireframeCounts, figures_of, table_by_size, worst_of
+
+MODES = {"points": "points only", "footprints": "with footprints"}
+SHORT_M = 1.0
+
+
+def scores_of(judge: ModuleType, with_footprint: bool, parity: str | None) -> tuple[list[Score], list[int]]:
+    """Return the score of every roof, and the numbers of short edges and of right ones among them.
+
+    `parity` takes roofs with an even or an odd number. A short edge has less than a metre.
+    """
+    scores, short = [], np.zeros(2, int)
+    for name, points, corners, edges, footprint in judge.reference():
+        if parity is None or int(re.sub(r"\D", "", name)) % 2 == (parity == "odd"):
+            outline = footprint if with_footprint else None
+            if not scores:
+                reconstruct(points, outline, id=name)  # loads what is compiled
+            started = time.process_time()
+            building = reconstruct(points, outline, id=name)
+            seconds = time.process_time() - started
+            counts, short_edges = compared(judge, building, points, corners, edges)
+            share = building.quality.share_within_20cm if building.solid is not None else 0.0
+            scores.append(Score(name, counts, footprint.area, seconds, len(building.parts), share))
+            short += short_edges
+    return scores, short.tolist()
+
+
+def compared(
+    judge: ModuleType, building: Building, points: np.ndarray, true_corners: np.ndarray, true_edges: np.ndarray
+) -> tuple[WireframeCounts, tuple[int, int]]:
+    """Return a building's counts against the drawn roof, and the numbers of short edges and right ones."""
+    corners, edges = judge.model_wireframe(building)
+    near = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()
+    right, right_corners, found = judge.matched(corners, edges, true_corners, true_edges, near)
+    ends = corners[edges.ravel()].reshape(-1, 2, 3)
+    short = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1) < SHORT_M
+    right_edges = (int(right.sum()), len(edges), len(true_edges))
+    counts = WireframeCounts(*right_edges, right_corners, len(corners), len(true_corners), found)
+    return counts, (int(short.sum()), int(right[short].sum()))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--mode", choices=(*MODES, "both"), default="both")
+    parser.add_argument("--parity", choices=("even", "odd"), help="take the roofs with such a number")
+    parser.add_argument("--worst", type=int, default=0, help="name the roofs with the worst edges")
+    arguments = parser.parse_args()
+    judge = tool("hand_drawn")
+    for mode in MODES if arguments.mode == "both" else (arguments.mode,):
+        scores, (short, right) = scores_of(judge, mode == "footprints", arguments.parity)
+        print(f"{len(scores)} roofs drawn by hand, {MODES[mode]}")
+        rows = [*figures_of(scores), f"edges under {SHORT_M:g} m: {short}, of which right {right}"]
+        worst = [f"worst    {line}" for line in worst_of(scores, arguments.worst)]
+        rows += [*table_by_size(scores), *worst]
+        print("\n".join("  " + row for row in rows), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,193 @@
+"""Score drawn roofs against true ones, building by building, and by the size of the footprint.
+
+A score holds the counts that ../shared/tools/wireframe.py makes: edges and corners that are right,
+drawn and true. Pooled figures sum these counts over buildings, so that they hang on the largest
+ones. Means give every building the same weight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from .judging import tool
+
+SIZES_M2 = (0.0, 200.0, 400.0, 800.0, np.inf)
+COLUMNS = (
+    "footprint",
+    "n",
+    "edges P",
+    "R",
+    "F1 pooled, mean",
+    "  corners F1",
+    "number",
+    "faces",
+    "in 0.2 m",
+    "parts",
+    "ms per 100 m2",
+)
+NAN = float("nan")
+
+
+@dataclass(frozen=True)
+class WireframeCounts:
+    """Counts of one building; `found_corners` are true ones near a right corner."""
+
+    right_edges: int
+    edges: int
+    true_edges: int
+    right_corners: int
+    corners: int
+    true_corners: int
+    found_corners: int
+    faces: int = 0
+    true_faces: int = 0
+    offset_m: float = 0.0  # summed over right corners
+    height_rmse_m: float = NAN
+
+    @property
+    def edge_f1(self) -> float:
+        """F1 (%) of the edges."""
+        return f1(self.right_edges, self.edges, self.true_edges)
+
+    @property
+    def corner_f1(self) -> float:
+        """F1 (%) of the corners."""
+        return f1(self.right_corners, self.corners, self.true_corners, self.found_corners)
+
+
+@dataclass(frozen=True)
+class Score:
+    """One building: counts, footprint area, CPU time, parts, share of its points within 0.2 m."""
+
+    id: str
+    counts: WireframeCounts
+    area_m2: float
+    seconds: float = NAN
+    parts: int = 0
+    share: float = 0.0
+
+
+def f1(right: int, drawn: int, true: int, found: int | None = None) -> float:
+    """Return F1 (%) of `right` among `drawn` and of `found` (by default `right`) among `true`."""
+    precision, recall = right / max(drawn, 1), (right if found is None else found) / max(true, 1)
+    return 200.0 * precision * recall / (precision + recall) if precision + recall else 0.0
+
+
+def count_wireframes(models: Path, truth: Path) -> dict[str, WireframeCounts]:
+    """Compare each building of `truth` with its model; a missing one counts as all missed."""
+    judge = tool("wireframe")
+    drawn, counts = judge.solids(models), {}
+    for name, parts in judge.solids(truth).items():
+        reference, model = judge.wireframe(parts), drawn.get(name, [])
+        if len(reference[1]):
+            found = judge.compare(judge.wireframe(model), reference)
+            rmse = judge.height_rmse(model, parts) if model else NAN
+            numbers = (*found["edges"], *found["corners"], found["found"], *found["faces"])
+            counts[name] = WireframeCounts(*numbers, found["offset"], rmse)
+    return counts
+
+
+def summed(counts: Iterable[WireframeCounts]) -> WireframeCounts:
+    """Return the counts of all buildings together, with the mean of the known height errors."""
+    rows = np.array([list(vars(one).values()) for one in counts], float)
+    *numbers, offset, _ = rows.sum(axis=0)
+    rmse = known(np.mean, rows[:, -1])
+    return WireframeCounts(*(int(number) for number in numbers), offset, rmse)
+
+
+def known(figure, values: np.ndarray) -> float:
+    """Return `figure` of the values that are no NaN, or NaN where all are."""
+    values = values[np.isfinite(values)]
+    return float(figure(values)) if len(values) else NAN
+
+
+def figures_of(scores: list[Score]) -> list[str]:
+    """Return the sentences on all `scores` together: edges, corners, faces and heights."""
+    total, each = summed(score.counts for score in scores), [score.counts for score in scores]
+    rmse = known(np.median, np.array([one.height_rmse_m for one in each]))
+    same = np.mean([one.faces == one.true_faces for one in each])
+    precision, recall = shares_of(total)
+    offset = total.offset_m / max(total.right_corners, 1)
+    times = total.corners / total.true_corners
+    rows = [
+        f"edges    precision {precision:.1%}, recall {recall:.1%}, F1 {total.edge_f1:.1f} %;"
+        f" {total.edges / total.true_edges:.2f} times the truth's",
+        f"corners  F1 {total.corner_f1:.1f} %; {times:.2f} times the truth's"
+        + (f"; {offset:.3f} m off" if total.offset_m else ""),
+    ]
+    if total.true_faces:
+        rows += [
+            f"faces    {total.faces / total.true_faces:.2f} times the truth's;"
+            f" a share of {same:.3f} of the buildings has as many",
+            f"heights  RMSE {total.height_rmse_m:.3f} m in the mean, {rmse:.3f} in the median",
+        ]
+    return rows
+
+
+def table_by_size(scores: list[Score]) -> list[str]:
+    """Return a head, a row for all `scores` and one for each class of footprint area that has any.
+
+    Pairs are the pooled figure and the mean over buildings. Corners and faces are multiples of
+    the true number.
+    """
+    rows = [aligned(COLUMNS), row_of("all", scores)]
+    for low, high in pairwise(SIZES_M2):
+        found = [score for score in scores if low <= score.area_m2 < high]
+        rows += [row_of(name_of(low, high), found)] if found else []
+    return rows
+
+
+def shares_of(counts: WireframeCounts) -> tuple[float, float]:
+    """Return precision and recall of the edges."""
+    right = counts.right_edges
+    return right / max(counts.edges, 1), right / max(counts.true_edges, 1)
+
+
+def name_of(low_m2: float, high_m2: float) -> str:
+    if low_m2 == 0.0:
+        return f"< {high_m2:.0f} m2"
+    return f"> {low_m2:.0f} m2" if np.isinf(high_m2) else f"{low_m2:.0f}-{high_m2:.0f} m2"
+
+
+def row_of(name: str, scores: list[Score]) -> str:
+    """Return the row of one class of footprint area."""
+    total = summed(score.counts for score in scores)
+    edges = np.mean([score.counts.edge_f1 for score in scores])
+    corners = np.mean([score.counts.corner_f1 for score in scores])
+    precision, recall = shares_of(total)
+    areas, ms = np.array([s.area_m2 for s in scores]), 1e3 * np.array([s.seconds for s in scores])
+    cells = [
+        name,
+        f"{len(scores)}",
+        f"{100 * precision:.1f}",
+        f"{100 * recall:.1f}",
+        f"{total.edge_f1:.1f}, {edges:.1f}",
+        f"{total.corner_f1:.1f}, {corners:.1f}",
+        f"{total.corners / total.true_corners:.2f}",
+        f"{total.faces / total.true_faces:.2f}" if total.true_faces else "-",
+        f"{np.mean([s.share for s in scores]):.4f}",
+        f"{np.mean([s.parts for s in scores]):.2f}",
+        f"{100 * ms.sum() / areas.sum():.1f}, {np.mean(100 * ms / areas):.1f}",
+    ]
+    return aligned(cells)
+
+
+def aligned(cells: Iterable[str]) -> str:
+    """Return the cells of a row in columns, the first one to the left."""
+    first, *rest = zip(cells, COLUMNS, strict=True)
+    return first[0].ljust(12) + "".join(cell.rjust(max(len(head), 5) + 2) for cell, head in rest)
+
+
+def worst_of(scores: list[Score], most: int) -> list[str]:
+    """Return a line for each of the `most` buildings with the worst edges."""
+    worst = sorted(scores, key=lambda score: score.counts.edge_f1)[:most]
+    return [
+        f"{s.id}: edge F1 {s.counts.edge_f1:.0f}, {s.counts.right_edges} of {s.counts.edges} edges"
+        f" right, {s.counts.true_edges} true, {s.parts} parts, {s.area_m2:.0f} m2"
+        for s in worst
+    ]
