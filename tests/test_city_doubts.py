@@ -1,5 +1,7 @@
 """What a run says of inputs that fit one another badly: heights of two kinds, a terrain elsewhere, a CRS whose metres are none."""
 
+from pathlib import Path
+
 import numpy as np
 import pyproj
 import pytest
@@ -10,7 +12,7 @@ from hiproof import read_parameters
 from hiproof.city.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli.running import print_summary
-from hiproof.errors import InputWarning
+from hiproof.errors import InputError, InputWarning
 from hiproof.read.overlap import stretch
 from hiproof.status import Doubt
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints, write_town
@@ -19,21 +21,21 @@ TOWN = make_town(houses=1)
 
 
 def write_terrain(path, height, east=0.0):
-    """A level terrain model around the town, or so far east of it."""
+    """A terrain model of that height, or those heights (80, 80), around the town, or so far east of it."""
     options = {"driver": "GTiff", "width": 80, "height": 80, "count": 1, "dtype": "float32", "crs": "EPSG:28992"}
     transform = from_origin(ORIGIN[0] - 20 + east, ORIGIN[1] + 60, 1.0, 1.0)
     with rasterio.open(path, "w", transform=transform, **options) as file:
-        file.write(np.full((1, 80, 80), height, "float32"))
+        file.write(np.broadcast_to(np.asarray(height, "float32"), (1, 80, 80)))
     return str(path)
 
 
-def detail_over(folder, height):
-    """What is said of the only building over a terrain model of that height."""
+def row_over(folder, height):
+    """What the run writes of the only building over a terrain model of that height."""
     cloud, footprints = write_town(folder, TOWN)
     terrain = write_terrain(folder / "dtm.tif", height)
     reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), terrain))
     (row,) = read_parameters(folder / "out" / "parameters.jsonl")
-    return row["detail"]
+    return row
 
 
 @pytest.mark.parametrize(
@@ -44,19 +46,67 @@ def detail_over(folder, height):
             ORIGIN[2] - 43.0,
             (
                 "terrain model dtm.tif lies 43.",
-                "m below the ground points around it",
+                "m below the ground points around it, which are used instead",
             ),
         ),
-        (
-            ORIGIN[2] + 9.0,
-            ("m above the ground points around it", "the ground (terrain model dtm.tif) lies 3.9 m above its eaves"),
-        ),
+        (ORIGIN[2] + 9.0, ("m above the ground points around it, which are used instead",)),
+        (ORIGIN[2] + 3.0, ("lies 2.", "m above the ground points around it")),
     ],
 )
 def test_a_terrain_whose_heights_are_others_is_told_of(tmp_path, height, told):
-    detail = detail_over(tmp_path, height)
-    assert all(words in detail for words in told)
-    assert bool(told) == ("lies" in detail)
+    row = row_over(tmp_path, height)
+    assert all(words in row["detail"] for words in told)
+    assert bool(told) == ("lies" in row["detail"])
+    is_used = abs(height - ORIGIN[2]) < 5.0
+    assert row["z_ground"] == pytest.approx(height if is_used else ORIGIN[2] + 0.08, abs=0.05)
+
+
+def row_over_half(folder, code, with_ground=True):
+    """What the run writes of a building of whose terrain model the western half holds `code`, the rest the true ground."""
+    height = 40.0
+    xyz = TOWN.xyz + [0, 0, height - ORIGIN[2]]
+    kept = slice(None) if with_ground else TOWN.classification == 6
+    cloud = write_cloud(folder / "cloud.laz", xyz[kept], TOWN.classification[kept])
+    footprints = write_footprints(folder / "footprints.geojson", TOWN.footprints)
+    heights = np.full((80, 80), height, "float32")
+    heights[:, :34] = code
+    terrain = write_terrain(folder / "dtm.tif", heights)
+    reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), terrain))
+    (row,) = read_parameters(folder / "out" / "parameters.jsonl")
+    return row
+
+
+@pytest.mark.parametrize("code", [-9999.0, 9999.0, -32767.0, 3.4e38, 0.0, 255.0])
+def test_undeclared_codes_under_part_of_a_building_are_no_ground(tmp_path, code):
+    row = row_over_half(tmp_path, code)
+    assert row["z_ground"] == pytest.approx(40.0, abs=0.1)
+    assert "holds values that are no heights under part of the building; the ground points are used" in row["detail"]
+
+
+@pytest.mark.parametrize("code", [-9999.0, 0.0])
+def test_without_ground_points_the_rest_of_the_terrain_model_decides(tmp_path, code):
+    row = row_over_half(tmp_path, code, with_ground=False)
+    assert row["z_ground"] == pytest.approx(40.0, abs=0.01) and "it is not used there" in row["detail"]
+
+
+@pytest.mark.parametrize("nothing", [np.nan, -9999.0])
+def test_a_terrain_model_without_any_height_is_told_of_once(tmp_path, nothing):
+    with pytest.warns(
+        InputWarning, match=r"dtm\.tif: has no height under any building, so the ground is taken"
+    ) as told:
+        row = row_over(tmp_path, nothing)
+    assert len([w for w in told if issubclass(w.category, InputWarning)]) == 1
+    assert row["z_ground"] == pytest.approx(ORIGIN[2] + 0.08, abs=0.05) and row["ground_source"] == "ground points"
+
+
+@pytest.mark.parametrize("has_footprints", [True, False])
+def test_a_terrain_model_cut_off_in_its_pixels_ends_the_run_before_points_are_sorted(tmp_path, has_footprints):
+    cloud, footprints = write_town(tmp_path, TOWN)
+    terrain = write_terrain(tmp_path / "dtm.tif", ORIGIN[2])
+    whole = Path(terrain).read_bytes()
+    Path(terrain).write_bytes(whole[: len(whole) // 2])
+    with pytest.raises(InputError, match=r"expected a complete raster at .*dtm\.tif"):
+        make_plan(Request((str(cloud),), tmp_path / "out", str(footprints) if has_footprints else None, terrain))
 
 
 def test_a_terrain_on_which_no_building_stands_is_told_of(tmp_path, recwarn):

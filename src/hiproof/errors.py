@@ -17,6 +17,10 @@ class InputError(HiproofError):
     """A file or an array that cannot be used: unreadable, empty, of the wrong kind, without the classes asked for."""
 
 
+class DamagedRaster(InputError):
+    """A terrain model of which a part cannot be read: every building on it needs it, so the run ends."""
+
+
 class NoModelError(InputError):
     """A model asked for of a building that got none; `Building.built` is None there, and the status says why."""
 

@@ -34,6 +34,7 @@ class Doubt(Enum):
     PLACES_WITHOUT_POINTS = "of its outline hold no points"
     GROUND_ABOVE_EAVES = "m above its eaves"
     TERRAIN_UNLIKE_GROUND_POINTS = "the ground points around it"
+    TERRAIN_WITHOUT_HEIGHTS = "holds values that are no heights"
     ASSUMED_GROUND = "its ground is assumed"
     POINTS_OF_OTHER_CLASSES = "points of other classes lie high above the ground"
     BARE_GROUND = "its ground lies bare"

@@ -11,7 +11,7 @@ from rasterio.transform import from_origin
 
 import hiproof.read.thin
 from hiproof.errors import InputError
-from hiproof.read import terrain
+from hiproof.read import raster
 from hiproof.read.terrain import TerrainChain, read_terrain
 from hiproof.read.thin import thin_to_grid
 
@@ -60,10 +60,10 @@ def test_tiles_change_nothing(tmp_path, monkeypatch):
     rough = np.random.default_rng(0).normal(size=(80, 120))
     path = write_raster(tmp_path / "dtm.tif", heights=rough)
     whole = read_terrain(path).height_at(inside(2000, margin=0))
-    monkeypatch.setattr(terrain, "TILE_PX", 16)
+    monkeypatch.setattr(raster, "TILE_PX", 16)
     tiled = read_terrain(path)
     assert np.array_equal(tiled.height_at(inside(2000, margin=0)), whole)
-    assert len(tiled.tiles) <= terrain.TILES_KEPT
+    assert len(tiled.tiles) <= raster.TILES_KEPT
 
 
 def test_a_raster_in_another_crs_is_asked_there(tmp_path):

@@ -41,7 +41,7 @@ def refuse_missing_packages(request: Any) -> None:
     if is_database(request.footprints):
         import_psycopg()
     if request.terrain:
-        from ..read.terrain import import_rasterio
+        from ..read.raster import import_rasterio
 
         import_rasterio()
     if request.settings.write.parquet:

@@ -22,7 +22,7 @@ from .plan import Job, WorkPlan, cut_into_tiles, jobs_of_footprints, offset_of_j
 from .request import Box, Request
 
 if TYPE_CHECKING:
-    from ..read.terrain import RasterTerrain
+    from ..read.raster import RasterTerrain
 
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
 MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
@@ -38,6 +38,8 @@ def make_plan(request: Request) -> WorkPlan:
     refuse_box_elsewhere(request.bbox, plan_bounds(headers))
     # opened only to be told now if it cannot be read, and not after all points are sorted
     terrain = read_terrain(request.terrain, frame.crs, frame.units) if request.terrain else None
+    if terrain is not None and not request.footprints:
+        terrain.knows_any(places_over(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
     settings = settle_classes(request.clouds, request.settings)
     if request.footprints:
         jobs = jobs_from_footprints(request, headers, frame)
@@ -45,7 +47,7 @@ def make_plan(request: Request) -> WorkPlan:
         jobs, settings = jobs_from_cloud(request.clouds, settings)
         jobs = jobs_in_box(jobs, request, frame.units)
     if terrain is not None:
-        say_if_terrain_lies_elsewhere(terrain, jobs)
+        check_terrain(terrain, jobs)
     units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
     if settings.write.out_crs:
         say_where_files_lie(jobs, crs_of_files(frame.crs, settings.write.out_crs), units)
@@ -72,15 +74,23 @@ def say_where_files_lie(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> No
         )
 
 
-def say_if_terrain_lies_elsewhere(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
-    """One line where no building stands on the terrain model: what stands in for it would else be taken in silence."""
-    boxes = shapely.bounds([job.area for job in jobs])
-    middles = (boxes[:, :2] + boxes[:, 2:])[np.isfinite(boxes).all(axis=1)] / 2
-    if len(middles) and not terrain.pixels_at(middles)[2].any():
-        warnings.warn(
-            f"{masked(terrain.path)}: no building stands on it, so the ground is taken from the points; check its CRS",
-            InputWarning,
-        )
+def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
+    """Read what lies under the buildings, so that damage ends the run before work is spent, and warn in one line where no
+    building has a height there: the ground points that stand in for it would else be taken in silence."""
+    corners = shapely.get_coordinates([job.area for job in jobs])
+    if not len(corners) or terrain.knows_any(corners):
+        return
+    lies = "has no height under any building" if terrain.pixels_at(corners)[2].any() else "no building stands on it"
+    advice = "its values" if "height" in lies else "its CRS"
+    warnings.warn(
+        f"{masked(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}", InputWarning
+    )
+
+
+def places_over(corners: np.ndarray) -> np.ndarray:
+    """Places (k, 2), 8 by 8 of them over the box of `corners` (n, 2): where buildings are to be looked for first."""
+    x, y = (np.linspace(low, high, 8) for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True))
+    return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
 
 
 def most_buildings_a_tile(settings: Settings) -> int:

@@ -12,12 +12,13 @@ from pathlib import Path
 import numpy as np
 import shapely
 
-from ..errors import is_interrupt
+from ..errors import DamagedRaster, is_interrupt
 from ..frames import Units
 from ..masking import masked
 from ..model import Building
 from ..parametric.override import Override, overridden
 from ..read.assign import PointGrid
+from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
 from ..reconstruct import reconstruct
@@ -34,19 +35,17 @@ from .other_classes import OtherPoints, ground_under_roof, roof_of_other_classes
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, load_plan, neighbourhood
 from .sort import load_points
+from .terrain_check import WhereLikeGround, doubt_of_terrain
 
 NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
 
 BESIDE_ALL_M = 10.0  # m around a building that show whether there is ground between roofs; yards are as wide
 
-# m between a terrain model and ground points: other heights (a geoid's are 10 to 100 m) or another date
-FAR_GROUND_M = 2.0
-
 
 class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
 
-    def __init__(self, points: dict[str, np.ndarray], model: Terrain | None, plan: WorkPlan):
+    def __init__(self, points: dict[str, np.ndarray], model: RasterTerrain | None, plan: WorkPlan):
         self.roof, self.model, self.plan = points["roof"], model, plan
         self.grid = PointGrid(self.roof)
         self.ground = ground_cells(points["ground"])
@@ -85,7 +84,8 @@ class Surroundings:
         """The terrain model, the ground points in the whole-metre box around the building, and the ground found there."""
         box = neighbourhood(job, self.plan.terrain_reach_m)
         found = WhereSeen(BareAround(self.low, box), lambda: self.is_seen_around(job, box))
-        return [self.model, GroundAround(self.ground, box), found]
+        points = GroundAround(self.ground, box)
+        return [self.model and WhereLikeGround(self.model, points), points, found]
 
     def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
         """Whether anything beside the building is known: else the lowest points are the roof's own."""
@@ -102,17 +102,11 @@ class Surroundings:
         return TerrainChain([*self.grounds_of(job), lowest])
 
     def doubt_of_terrain(self, job: Job) -> str:
-        """A remark where the terrain model lies far above or below the ground points around a building; empty otherwise."""
+        """A remark where the terrain model contradicts the ground points around a building; empty otherwise."""
         if self.model is None or job.area.is_empty:
             return ""
-        xy = shapely.get_coordinates(job.area)
-        model, points = self.model, GroundAround(self.ground, neighbourhood(job, self.plan.terrain_reach_m))
-        apart = model.height_at(xy) - points.height_at(xy)
-        above = float(np.median(apart[np.isfinite(apart)])) if np.isfinite(apart).any() else 0.0
-        if abs(above) <= FAR_GROUND_M:
-            return ""
-        way = "above" if above > 0 else "below"
-        return f"the {model.source} lies {abs(above):.1f} m {way} {Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}"
+        box = neighbourhood(job, self.plan.terrain_reach_m)
+        return doubt_of_terrain(self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area))
 
     def looked_at(self, building: Building, job: Job, roof: np.ndarray) -> Building:
         """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
@@ -167,7 +161,7 @@ def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
 
 
 @functools.lru_cache(maxsize=32)
-def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: int) -> Terrain | None:
+def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: int) -> RasterTerrain | None:
     """The terrain model, opened once a thread: GDAL's data sets are not to be shared."""
     from pyproj import CRS
 
@@ -179,7 +173,8 @@ def solve_one(
 ) -> tuple[Building, Fragments]:
     """One building and its texts, whatever happens: an exception becomes its status.
 
-    Only MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone.
+    MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone. So is
+    DamagedRaster, for the terrain model is the run's and not the building's.
     """
     try:
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
@@ -194,7 +189,7 @@ def solve_one(
         building = remarked(remarked(building, found.remark), surroundings.doubt_of_terrain(job))
         building = remarked(surroundings.looked_at(building, job, points), doubt_of_ground(building))
         return fragments(building, plan.names_of(job), plan.head)
-    except MemoryError:
+    except (MemoryError, DamagedRaster):
         raise
     except Exception as error:
         if is_interrupt(error):

@@ -18,7 +18,7 @@ from ..city.sort import Gatherer, Reaches, load_points, wanted_points
 from ..errors import HiproofError, InputError
 from ..evaluate.inputs import found_inputs
 from ..evaluate.run import run_record
-from ..read.terrain import import_rasterio
+from ..read.raster import import_rasterio
 from ..read.thin import thin_to_count
 
 # work tiles and buildings whose points stay in memory: those a person goes back and forth between

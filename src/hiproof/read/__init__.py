@@ -22,6 +22,8 @@ overlap       whether footprints lie where the cloud does
 assign        which points belong to which footprint
 cell_kernel   points and cells; compiled
 terrain       how high the ground is
+raster        terrain models
+raster_checks whether a raster can be one, and in which unit it counts
 cityjson      documents of CityJSON with their vertices in place
 solids        solids of CityJSON and CityGML as they stand
 roofn3d       the RoofN3D data set

@@ -64,7 +64,7 @@ def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> fl
 def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     """Write the neighbourhood's FILES to `folder`; counts of buildings and points. Made by
     `python -m hiproof.simulate neighbourhood FOLDER`. Raises InputError without rasterio (the extra `terrain`)."""
-    from ..read.terrain import import_rasterio
+    from ..read.raster import import_rasterio
 
     import_rasterio()
     lots, terrain = neighbourhood(seed)

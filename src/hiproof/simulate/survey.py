@@ -156,7 +156,7 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
 
 def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 1.0) -> None:
     """Terrain heights at the pixel centres as a GeoTIFF."""
-    from ..read.terrain import import_rasterio
+    from ..read.raster import import_rasterio
 
     rasterio = import_rasterio()
     from rasterio.transform import from_origin
