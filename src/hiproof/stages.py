@@ -111,6 +111,8 @@ def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Buildin
     """The outcome to start from: the building's name, its footprint and the attributes it came with."""
     if isinstance(footprint, Footprint):
         return Building(footprint.id, Status.MODELLED, footprint=footprint.polygon, attributes=footprint.attributes)
+    if footprint is not None and footprint.geom_type != "Polygon":
+        footprint = largest_polygon(footprint)  # of several a building has one, and files hold one
     return Building(id, Status.MODELLED, footprint=footprint)
 
 

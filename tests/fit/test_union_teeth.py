@@ -1,6 +1,7 @@
 """Laws of saw-teeth: their planes tell how wide they are, what a scanner saw of their walls does not, and nothing is left bare."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,6 +61,25 @@ def test_a_strip_between_teeth_is_no_roof_of_its_own(kappa):
     (shed,) = put_together([before, strip, behind])
     assert shed.type == "shed"
     assert shed.area == pytest.approx(2.0 * WIDTH * LENGTH, abs=1e-3)
+
+
+@pytest.mark.parametrize("kappa", [0.0, 0.7, -2.5])
+def test_a_row_with_slanted_ends_and_nothing_beside_it_is_one_saw_tooth(kappa):
+    """Its ends are no walls across it: what lies beyond the teeth's own width belongs to the outermost teeth."""
+    c, s, u = math.cos(kappa), math.sin(kappa), 0.5 * LENGTH
+    rings = (
+        [(-u, -0.3), (u, 0.1), (u, WIDTH), (-u, WIDTH)],
+        [(-u, WIDTH), (u, WIDTH), (u, 2 * WIDTH + 0.7), (-u, 2 * WIDTH + 0.3)],
+    )
+    row = []
+    for k, ring in enumerate(rings):
+        tooth = seen_tooth(k, k * WIDTH, (k + 1) * WIDTH, kappa)
+        outline = shapely.Polygon(np.array(ring) @ np.array([[c, s], [-s, c]]) + [40.0, -7.0])
+        row.append(replace(tooth, pieces=(Piece(outline, tooth.pieces[0].planes),)))
+    (shed,) = put_together(row)
+    assert shed.type == "shed"
+    assert shed.area == pytest.approx(area_of(row).area, abs=1e-3)
+    assert shed.parameters["width"] == pytest.approx(2.0 * WIDTH, abs=1e-6)
 
 
 def test_wings_beside_a_yard_or_in_a_row_are_two_and_what_crosses_a_roof_is_one():

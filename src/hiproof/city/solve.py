@@ -22,7 +22,7 @@ from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
 from ..reconstruct import reconstruct
-from ..stages import remarked
+from ..stages import largest_polygon, remarked
 from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
@@ -214,15 +214,30 @@ def doubt_of_ground(building: Building) -> str:
 
 def not_seen(job: Job, detail: str) -> Building:
     """A building whose outline holds no roof, as far as its points tell."""
+    return with_input(Building(job.id, Status.NO_ROOF, detail), job)
+
+
+def with_input(building: Building, job: Job) -> Building:
+    """Add the outline and the attributes that the input has for a building without a model."""
     attributes = job.footprint.attributes if job.footprint else {}
-    return Building(job.id, Status.NO_ROOF, detail, footprint=job.area, attributes=attributes)
+    return dataclasses.replace(building, footprint=largest_polygon(job.area), attributes=attributes)
 
 
 def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
-    """A building that hiproof failed on, with what the input said of it."""
-    attributes = job.footprint.attributes if job.footprint else {}
-    building = Building(job.id, Status.INTERNAL_ERROR, masked(detail), footprint=job.area, attributes=attributes)
-    return fragments(building, plan.names_of(job), plan.head)
+    """Record a building that hiproof failed on.
+
+    The outline and attributes may be the cause of the failure. If writing them fails as well, the
+    record consists of the id and the message.
+    """
+    building = Building(job.id, Status.INTERNAL_ERROR, masked(detail))
+    try:
+        return fragments(with_input(building, job), plan.names_of(job), plan.head)
+    except MemoryError:
+        raise
+    except Exception as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        return fragments(building, plan.names_of(job), plan.head)
 
 
 def outcome_of(position: int, building: Building, seconds: float) -> Outcome:

@@ -71,6 +71,8 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
         return None
     for sliver in bare:
         near, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
+        if not (pieces and pieces[k]):
+            return None  # nothing lies beside the sliver
         outline = pieces[k][q].outline
         seam = polygons_of(shapely.intersection(near, own, grid_size=GRID_M))
         beside = shapely.snap(sliver, outline, SEAM_M)

@@ -208,8 +208,11 @@ def saw_tooth(row: list[Part], others: list[Part]) -> list[Part] | None:
     shed = replace(whole, pieces=cut(whole.pieces, breaks, ground))
     rest = shapely.difference(ground.covered, ground.strip(breaks[0], breaks[-1]), grid_size=GRID_M)
     left_over = replace(shed, pieces=tuple(Piece(polygon, shed.pieces[0].planes) for polygon in polygons_of(rest)))
-    beside = with_slivers(others, left_over, math.inf) if left_over.pieces else others
-    return None if beside is None else [*beside, shed]
+    if not left_over.pieces:
+        return [*others, shed]
+    beside = with_slivers(others, left_over, math.inf)
+    # where no other part lies beside it, the outermost teeth reach as far as the row did
+    return [*beside, shed] if beside is not None else with_slivers([*others, shed], left_over, math.inf)
 
 
 def without_splinters(row: list[Part], others: list[Part]) -> tuple[list[Part], list[Part]]:

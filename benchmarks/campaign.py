@@ -1,0 +1,319 @@
+"""Search for internal errors, invalid solids and records that do not rebuild.
+
+usage: python -m benchmarks.campaign [--count 20000] [--first-seed 0] [--processes 1]
+                                     [--only simulated real roofs] [--work FOLDER]
+                                     [--data ../shared/data]
+
+`--count` simulated buildings are reconstructed in scenes of 100 (campaign_scenes.py), scene after
+scene from the seed `--first-seed` on: all roof types, compounds and city blocks, with and without
+footprints, 0.5 to 30 points/m2, with clutter, holes, and damaged footprints. Then follow every
+cloud of the data folder, with and without its footprints, whole and thinned to 1/2, 1/4 and 1/8;
+real roofs without ground; and towns of known solids, scanned at 2 and 8 points/m2.
+
+Each is a whole run through files. The counts are
+
+    internal error     with its traceback; `--count 100 --first-seed SEED` repeats a scene
+    invalid solid      by our check after `hiproof.build`, and by `hiproof check` of the files
+    not rebuilt alike  `hiproof build` refuses a record, or gives other bytes in any file
+    run that ended     with an exception, before it wrote its files
+    flat fall-backs    buildings with the status flat_fallback or simplified
+
+The exit code is 0 if the first four are none.
+"""
+
+from __future__ import annotations
+
+import argparse
+import contextlib
+import io
+import json
+import re
+import shutil
+import sys
+import tempfile
+import traceback
+import warnings
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field
+from multiprocessing import get_context
+from pathlib import Path
+
+import laspy
+import numpy as np
+
+from hiproof.city import solve
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli.check import count_invalid
+from hiproof.compose import check_solid
+from hiproof.parametric.building import build
+from hiproof.parametric.file import opened_parameters, read_parameters
+from hiproof.parametric.run import build_file
+from hiproof.settings import Settings
+from hiproof.status import Status
+
+from .campaign_scenes import BUILDINGS_A_SCENE, write_cloud, write_scene
+from .judging import SHARED
+from .towns import TOWNS, read_town
+
+SHARES = (1.0, 0.5, 0.25, 0.125)  # Shares of the points of real clouds.
+TOWN_DENSITIES = (2.0, 8.0)  # points/m2
+MOST_TOLD = 5  # Tracebacks and other findings printed a run.
+OTHER_TOWNS = {name: SHARED / f"data/towns/{name}.city.json" for name in ("vienna", "rotterdam", "delft_5907")}
+
+
+@dataclass
+class Findings:
+    """What came of one or several runs: counts by kind, and a text for each finding."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    texts: list[str] = field(default_factory=list)
+
+    def add(self, kind: str, text: str) -> None:
+        self.counts[kind] += 1
+        self.texts.append(f"{kind}: {text}")
+
+    @property
+    def is_clean(self) -> bool:
+        """Whether all counts are zero that must be."""
+        return not any(self.counts[kind] for kind in MUST_BE_NONE)
+
+
+INTERNAL, INVALID, INVALID_WRITTEN = "internal error", "invalid solid", "invalid solid in a written file"
+NOT_ALIKE, ENDED = "not rebuilt alike", "run that ended"
+CHECKED = "solids in files"
+MUST_BE_NONE = (INTERNAL, INVALID, INVALID_WRITTEN, NOT_ALIKE, ENDED)
+
+
+def judge_run(name: str, request: Request) -> Findings:
+    """Run `request`, rebuild its parameters and count what is wrong."""
+    found = Findings()
+    shutil.rmtree(request.out, ignore_errors=True)
+    try:
+        with warnings.catch_warnings(), collect_tracebacks() as errors:
+            warnings.simplefilter("ignore")
+            summary = reconstruct_area(request)
+    except Exception:
+        found.add(ENDED, f"{name}\n{traceback.format_exc()}")
+        return found
+    for id, text in errors.items():
+        found.add(INTERNAL, f"{name}, building {id}\n{text}")
+    found.counts.update({"buildings": summary.buildings, **summary.by_status})
+    missed = summary.by_status.get(Status.INTERNAL_ERROR.code, 0) - len(errors)
+    if missed:
+        found.counts[INTERNAL] += missed
+    try:
+        judge_files(name, request.out, found)
+    except Exception:
+        found.add(NOT_ALIKE, f"{name}: the run's own file is refused\n{traceback.format_exc()}")
+    return found
+
+
+@contextlib.contextmanager
+def collect_tracebacks() -> Iterator[dict[str, str]]:
+    """Collect the tracebacks of internal errors inside the block, by building."""
+    original, errors = solve.failed, {}
+
+    def failed(plan, job, detail):
+        errors[job.id] = traceback.format_exc()
+        return original(plan, job, detail)
+
+    solve.failed = failed
+    try:
+        yield errors
+    finally:
+        solve.failed = original
+
+
+def judge_files(name: str, out: Path, found: Findings) -> None:
+    """Count invalid solids and buildings whose parameters give other bytes."""
+    again = out.with_name(f"{out.name}-again")
+    shutil.rmtree(again, ignore_errors=True)
+    build_file(out / "parameters.jsonl", again)
+    for id in find_refused(again / "parameters.jsonl"):
+        found.add(NOT_ALIKE, f"{name}, building {id}: its own record is refused")
+    for file in ("parameters.jsonl", "buildings.city.jsonl"):
+        for id in compare_lines(out / file, again / file):
+            found.add(NOT_ALIKE, f"{name}, building {id}: {file} differs")
+    for path in sorted([*out.glob("buildings*.gml"), out / "buildings.gpkg"]):
+        if path.read_bytes() != (again / path.name).read_bytes():
+            found.add(NOT_ALIKE, f"{name}: {path.name} differs")
+    with opened_parameters(out / "parameters.jsonl") as (head, records):
+        for record in records:
+            judge_solid(name, record, head.compose, found)
+    for path in (*sorted(out.glob("buildings*.gml")), out / "buildings.city.jsonl"):
+        with contextlib.redirect_stdout(io.StringIO()) as printed:
+            invalid = count_invalid([path], planarity_m=0.01)
+        found.counts[CHECKED] += int(re.findall(r": (\d+) solids?,", printed.getvalue())[-1])
+        if invalid:
+            found.counts[INVALID_WRITTEN] += invalid - 1
+            found.add(INVALID_WRITTEN, f"{name}\n{printed.getvalue()}")
+    shutil.rmtree(again)
+
+
+def find_refused(path: Path) -> list[str]:
+    """List the ids of buildings that `hiproof build` refused."""
+    return [row["id"] for row in read_parameters(path) if row["status"] == Status.NOT_BUILT.code]
+
+
+def judge_solid(name: str, record: dict, compose, found: Findings) -> None:
+    """Build one record and check its solid."""
+    if not record["parts"]:
+        return
+    try:
+        building = build(record, compose)
+    except Exception as error:
+        found.add(NOT_ALIKE, f"{name}, building {record['id']}: {error}")
+        return
+    findings = check_solid(building.solid, planarity_m=compose.planarity_m)
+    if findings:
+        found.add(INVALID, f"{name}, building {record['id']}: {findings[0].message}")
+
+
+def compare_lines(one: Path, other: Path) -> list[str]:
+    """List the ids of buildings whose lines differ between two files."""
+    differing = []
+    with one.open(encoding="utf-8") as first, other.open(encoding="utf-8") as second:
+        for number, (line, again) in enumerate(zip(first, second, strict=True)):
+            if line != again:
+                differing.append(str(json.loads(line).get("id", f"on line {number + 1}")))
+    return differing
+
+
+def judge_scene(task: tuple[int, int, Path]) -> Findings:
+    """Write and judge the first `count` buildings of the scene `seed`."""
+    seed, count, work = task
+    folder = work / f"scene-{seed}"
+    try:
+        return judge_run(f"seed {seed}", write_scene(seed, count, folder))
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+
+
+def judge_real(task: tuple[str, Request]) -> Findings:
+    """Judge one run over real data."""
+    return judge_run(*task)
+
+
+def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Request]]:
+    """Yield runs over every cloud of the data folder, by name."""
+    french = Settings.from_dict({"read": {"building_classes": [6, 67]}})
+    unnamed = Settings.from_dict({"read": {"crs": "EPSG:5490"}})
+    sets = (
+        ("delft", "delft", "delft/footprints.gpkg", Settings()),
+        ("amsterdam_west", "amsterdam_west", "amsterdam_west/footprints_bag.gpkg", Settings()),
+        ("two_epochs/2010", "two_epochs/2010", "two_epochs/footprints.gpkg", Settings()),
+        ("two_epochs/2014", "two_epochs/2014", "two_epochs/footprints.gpkg", Settings()),
+        ("ctview", "ctview", None, french),
+        ("stbarth", "stbarth", None, unnamed),
+    )
+    for name, folder, footprints, settings in sets:
+        paths = sorted((data / folder).glob("*.laz"))
+        for share in SHARES if paths else ():
+            clouds = [thin_file(path, share, work / "thinned" / folder) for path in paths]
+            for outlines in dict.fromkeys([footprints and str(data / footprints), None]):
+                told = f"{name}, {share:g} of the points, {'with' if outlines else 'without'} footprints"
+                out = work / f"{folder.replace('/', '-')}-{share:g}-{outlines is not None}"
+                yield told, Request(tuple(map(str, clouds)), out, outlines, settings=settings, restart=True)
+
+
+def thin_file(path: Path, share: float, folder: Path) -> Path:
+    """Copy a random share of the points of a file; return the path of the copy."""
+    if share == 1.0:
+        return path
+    thinned = folder / f"{share:g}" / path.name
+    thinned.parent.mkdir(parents=True, exist_ok=True)
+    cloud = laspy.read(path)
+    cloud.points = cloud.points[np.random.default_rng(0).random(len(cloud.points)) < share]
+    cloud.write(thinned)
+    return thinned
+
+
+def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Request]]:
+    """Yield runs over real roofs without ground and over scanned towns, by name."""
+    roofs = read_roofs(data)
+    if roofs:
+        yield "real roofs", lay_out(roofs, work / "real-roofs")
+    for town, path in (TOWNS | OTHER_TOWNS).items():
+        for density in TOWN_DENSITIES if path.exists() else ():
+            clouds = [building.scanned(density) for building in read_town(path)]
+            yield f"{town} at {density:g} points/m2", lay_out(clouds, work / f"{town}-{density:g}")
+
+
+def read_roofs(data: Path) -> list[np.ndarray]:
+    """Read the points (n, 3) of each roof of RoofN3D and of the hand-drawn wireframes."""
+    roofs = []
+    if (data / "roofn3d/nyc_roofs.npz").exists():
+        with np.load(data / "roofn3d/nyc_roofs.npz") as file:
+            roofs += np.split(file["points"].astype(float), file["offset"][1:-1])
+    if (data / "hand_drawn/points.npz").exists():
+        with np.load(data / "hand_drawn/points.npz") as file:
+            roofs += [file[name].astype(float) for name in file.files]
+    return [roof for roof in roofs if roof.ndim == 2 and roof.shape[1] == 3]
+
+
+def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
+    """Write clouds (n, 3) side by side, all of the building class; return the run over them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    extent = max(float(np.ptp(cloud[:, :2], axis=0).max()) for cloud in clouds) + 30.0
+    columns = int(np.ceil(np.sqrt(len(clouds))))
+    moved = []
+    for number, cloud in enumerate(clouds):
+        place = np.array([*np.multiply(divmod(number, columns), extent), 0.0]) + [100000.0, 450000.0, 10.0]
+        moved.append(cloud - [*cloud[:, :2].min(axis=0), cloud[:, 2].min()] + place)
+    points = np.concatenate(moved)
+    write_cloud(folder / "cloud.laz", points, np.full(len(points), 6, np.uint8))
+    return Request((str(folder / "cloud.laz"),), folder / "run", restart=True)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=20000)
+    parser.add_argument("--first-seed", type=int, default=0)
+    parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--only", nargs="*", choices=("simulated", "real", "roofs"), help="[default: all]")
+    parser.add_argument("--work", type=Path)
+    parser.add_argument("--data", type=Path, default=SHARED / "data")
+    asked = parser.parse_args()
+    work = asked.work or Path(tempfile.mkdtemp(prefix="hiproof-campaign-"))
+    wanted = asked.only or ("simulated", "real", "roofs")
+    total = Findings()
+    with ProcessPoolExecutor(asked.processes, mp_context=get_context("spawn")) as pool:
+        if "simulated" in wanted:
+            full, rest = divmod(asked.count, BUILDINGS_A_SCENE)
+            sizes = [BUILDINGS_A_SCENE] * full + [rest] * (rest > 0)
+            tasks = [(asked.first_seed + k, size, work) for k, size in enumerate(sizes)]
+            report("simulated", pool.map(judge_scene, tasks), total)
+        if "real" in wanted:
+            report("real clouds", pool.map(judge_real, list_real_runs(asked.data, work)), total)
+        if "roofs" in wanted:
+            report("real roofs and towns", pool.map(judge_real, list_roof_runs(asked.data, work)), total)
+    print_counts("all", total)
+    return 0 if total.is_clean else 1
+
+
+def report(name: str, several: Iterator[Findings], total: Findings) -> None:
+    """Print findings as they come and the counts at the end; add the counts to `total`."""
+    own = Findings()
+    for found in several:
+        for text in found.texts[:MOST_TOLD]:
+            print(text, flush=True)
+        own.counts.update(found.counts)
+    total.counts.update(own.counts)
+    print_counts(name, own)
+
+
+def print_counts(name: str, found: Findings) -> None:
+    """Print one line a count, first those that must be zero."""
+    print(f"{name}: {found.counts['buildings']} buildings, {found.counts[CHECKED]} solids in files")
+    for kind in (*MUST_BE_NONE, Status.FLAT_FALLBACK.code, Status.SIMPLIFIED.code):
+        print(f"  {kind:32} {found.counts[kind]}")
+    others = {k: n for k, n in found.counts.items() if k in {s.code for s in Status}}
+    print(
+        "  statuses: " + ", ".join(f"{n} {k}" for k, n in sorted(others.items(), key=lambda pair: -pair[1])), flush=True
+    )
+
+
+if __name__ == "__main__":
+    sys.exit(main())

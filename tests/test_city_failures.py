@@ -1,0 +1,116 @@
+"""A failure inside one building is that building's alone, whatever stage it happens in."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof import stages
+from hiproof.city import solve
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.model import Footprint
+from hiproof.status import Status
+from hiproof.write import citygml, cityjson, parameters, run_files
+from run_records import by_id
+from tiny_town import make_town, write_town
+
+HOUSES = 20
+STAGES = (
+    (solve.Surroundings, "roof_of"),
+    (solve.Surroundings, "terrain_of"),
+    (solve.Surroundings, "doubt_of_terrain"),
+    (solve.Surroundings, "looked_at"),
+    (solve, "without_repeats"),
+    (solve, "thin_to_count"),
+    (solve, "reconstruct"),
+    (stages, "aligned"),
+    (stages, "usable"),
+    (stages, "recognise"),
+    (stages, "fit"),
+    (stages, "find_ground"),
+    (stages, "solid_or_simpler"),
+    (stages, "judge"),
+)
+WRITERS = (
+    (run_files, "measured"),
+    (run_files, "building_attributes"),
+    *((module, "fragment") for module in (parameters, cityjson, citygml)),
+)
+
+
+@pytest.fixture(scope="module")
+def town(tmp_path_factory):
+    """Paths of the cloud and the footprints of twenty houses."""
+    return [str(path) for path in write_town(tmp_path_factory.mktemp("town"), make_town(HOUSES, density=3.0))]
+
+
+def run(town, out, with_footprints):
+    return reconstruct_area(Request((town[0],), out, town[1] if with_footprints else None, restart=True))
+
+
+def fail_in(stage, victim, patch):
+    """Let `stage` raise for the building `victim`; a writer raises unless its record is bare."""
+    owner, name = stage
+    original = getattr(owner, name)
+
+    def raising(*args, **keywords):
+        written = getattr(args[0], "building", args[0]) if stage in WRITERS else None
+        if current == [victim] and (written is None or written.footprint is not None or written.built is not None):
+            raise KeyError((False, 0, 0))
+        return original(*args, **keywords)
+
+    current = []
+    solve_one = solve.solve_one
+
+    def following(plan, job, *rest):
+        current[:] = [job.id]
+        return solve_one(plan, job, *rest)
+
+    patch.setattr(solve, "solve_one", following)
+    patch.setattr(owner, name, raising)
+
+
+@pytest.mark.parametrize("with_footprints", [True, False])
+def test_a_failure_in_any_stage_is_one_buildings_and_changes_no_other(town, with_footprints, tmp_path):
+    run(town, tmp_path / "undisturbed", with_footprints)
+    expected = by_id(tmp_path / "undisturbed")
+    assert len(expected) == HOUSES
+    failing = [*STAGES, *WRITERS]
+    victims = np.random.default_rng(7).permutation(list(expected))[: len(failing)].tolist()
+    with pytest.MonkeyPatch.context() as patch:
+        for stage, victim in zip(failing, victims, strict=True):
+            fail_in(stage, victim, patch)
+        summary = run(town, tmp_path / "disturbed", with_footprints)
+    found = by_id(tmp_path / "disturbed")
+    assert summary.exit_code == 1
+    assert summary.by_status["internal_error"] == len(victims)
+    assert list(found) == list(expected)
+    assert {id: row for id, row in found.items() if id not in victims} == {
+        id: row for id, row in expected.items() if id not in victims
+    }
+    for victim in victims:
+        assert found[victim]["status"] == "internal_error"
+        assert found[victim]["detail"].startswith("KeyError: (False, 0, 0)")
+
+
+def test_a_failed_building_keeps_the_largest_polygon_of_its_area():
+    """Without footprints the area of a building may have several polygons, and files hold one."""
+    small, large = shapely.box(0, 0, 1, 1), shapely.box(5, 0, 9, 4)
+    job = solve.Job(0, "a", shapely.MultiPolygon([small, large]), None)
+    plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
+    building, texts = solve.failed(plan, job, "KeyError: (False, 0, 0)")
+    assert building.status is Status.INTERNAL_ERROR
+    assert building.footprint.equals(large)
+    assert b"[9.0,4.0]" in texts["parameters"].text.replace(b" ", b"")
+
+
+def test_an_outline_that_cannot_be_written_leaves_the_id_and_the_message(monkeypatch):
+    def refuse(outline):
+        if outline is not None:
+            raise AttributeError("no attribute 'exterior'")
+
+    monkeypatch.setattr(parameters, "outline_record", refuse)
+    job = solve.Job(0, "a", shapely.box(0, 0, 4, 4), Footprint("a", shapely.box(0, 0, 4, 4), {"year": 1950}))
+    plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
+    building, texts = solve.failed(plan, job, "ValueError: first")
+    assert (building.id, building.detail, building.footprint) == ("a", "ValueError: first", None)
+    assert b"ValueError: first" in texts["parameters"].text
