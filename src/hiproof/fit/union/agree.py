@@ -19,9 +19,10 @@ import numpy as np
 from .corners import SPARED_UNITS, creases_at_corners
 from .finish import LEVEL_SLACK, ROUNDS, SIGN, Planes, cost_of, normal_equations, proper, weighted_moments
 from .members import Member, members_of, unknowns_of
+from .objective import misfits
 from .scene import Scene
 from .sides import Side
-from .volumes import PARAMETER_COST, SIDES
+from .volumes import DIRECTION, PARAMETER_COST, REPLACES, SIDES, U0, U1, V0, V1
 
 NEAR_M = 0.2  # heights further apart are not tried as one
 # m that a builder's level allows, and a swath's height too; what is further apart must be so by chance, in standard deviations
@@ -30,6 +31,9 @@ REACHED_M = 0.003  # m within which others have brought what is further apart: n
 RIDGE = 1e-9  # of the mean diagonal of the normal equations: what no point tells stays as it was
 LEVEL_FALL = 1e-9  # rise over run; numerically level
 HELD = 1e-6  # an equation that the others leave so little of holds by them
+# Share of the points that agreement may leave unexplained besides. Steep planes that agree below their neighbours may
+# rise above these, which only the whole roof's misfit shows: each volume's own points lie where it shows alone.
+MOST_WORSE_SHARE = 0.02
 
 
 @dataclass(frozen=True)
@@ -68,7 +72,22 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
     agreed_planes = list(planes)
     for k, member, rows in zip(members, known, found.rows, strict=True):
         agreed_planes[k] = replace(planes[k], rows=rows, design=member.own, covariance=found.covariance)
-    return agreed_planes
+    worse = roof_misfit(volumes, agreed_planes, scene) - roof_misfit(volumes, planes, scene)
+    return planes if worse > MOST_WORSE_SHARE * scene.n else agreed_planes
+
+
+def roof_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
+    """Sum up what all points cost (points) under `planes`, each volume within its rectangle."""
+    n = scene.n
+    heights = np.full(n, -np.inf)
+    for volume, own in zip(volumes, planes, strict=True):
+        u, v = scene.U[int(volume[DIRECTION]), :n], scene.V[int(volume[DIRECTION]), :n]
+        inside = (u >= volume[U0]) & (u <= volume[U1]) & (v >= volume[V0]) & (v <= volume[V1])
+        within = np.flatnonzero(inside)
+        rows = own.rows[np.isfinite(own.rows[:, 2])]
+        z = (rows @ np.array([u[within], v[within], np.ones(len(within))])).min(axis=0)
+        heights[within] = z if volume[REPLACES] else np.maximum(heights[within], z)
+    return float(misfits(scene.z[:n], heights, scene).sum())
 
 
 def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked], scene: Scene) -> Fit | None:
