@@ -105,9 +105,9 @@ def test_no_file_imports_itself_by_way_of_others():
     assert len(list(TopologicalSorter(graph).static_order())) >= len(graph)
 
 
-@pytest.mark.parametrize("package", re.findall(r"the only room that imports (\w+)", PAGE))
+@pytest.mark.parametrize("package", re.findall(r"the only package that imports (\w+)", PAGE))
 def test_only_one_room_imports(package):
-    (room,) = (name for name, says in table().items() if f"the only room that imports {package}" in says)
+    (room,) = (name for name, says in table().items() if f"the only package that imports {package}" in says)
     assert {name[0] for name in MODULES if package in foreign(name)} == {room}
 
 
