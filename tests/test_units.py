@@ -28,7 +28,7 @@ from hiproof.evaluate.run import evaluate_run
 from hiproof.frames import METRES, Units
 from hiproof.read import read_footprints, read_points, read_terrain
 from hiproof.read.crs import units_of
-from hiproof.read.las import las_crs
+from hiproof.read.pointcloud import read_header
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.write.postgis import building_row, open_sequence, roof_rows, units_of_run
@@ -224,13 +224,18 @@ def test_the_unit_of_heights_that_geotiff_keys_name_counts(tmp_path):
         entry = type(keys.geo_keys[0])(id=id, tiff_tag_location=0, count=1, value_offset=value)
         keys.geo_keys.append(entry)
     keys.geo_keys_header.number_of_keys = len(keys.geo_keys)
+    assert units_of(crs_of_header(header, tmp_path)).height == pytest.approx(US_FOOT)
+    keys.geo_keys.pop()
+    keys.geo_keys_header.number_of_keys -= 1
+    assert units_of(crs_of_header(header, tmp_path)).height == 1.0
+
+
+def crs_of_header(header, folder):
+    """The CRS that a file with this header names."""
     las = laspy.LasData(header)
     las.x, las.y, las.z = np.ones((3, 4))
-    las.write(tmp_path / "a.las")
-    with laspy.open(tmp_path / "a.las") as file:
-        assert units_of(las_crs(file.header, "a.las")).height == pytest.approx(US_FOOT)
-    keys.geo_keys.pop()
-    assert units_of(las_crs(header, "a.las")).height == 1.0
+    las.write(folder / "a.las")
+    return read_header(folder / "a.las").crs
 
 
 def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):

@@ -10,11 +10,12 @@ import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
-from ..read.crs import described, parse_crs, units_of
+from ..read.crs import combine, described, names_heights_alone, names_place, parse_crs, units_of, vertical_crs
 from ..read.footprints import footprint_crs
 from ..read.overlap import doubtful_place, refuse_degrees, stretch
 from ..read.pointcloud import PointFileHeader, common_crs, say_how_coarse
 
+SAME_UNIT = 1e-5  # of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
 MOST_STRETCH = 0.01  # of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
 
 
@@ -40,10 +41,11 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     for degrees.
     """
     read = request.settings.read
-    cloud = common_crs({header.path: header.crs for header in headers}, parse_crs(read.crs))
+    cloud = common_crs({header.path: header.crs for header in headers}, parse_crs(read.crs), read.unit)
     footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
-    if cloud is None:
+    if not names_place(cloud):
         refuse_degrees_of_either(request.footprints, footprints, headers)
+        cloud = placed(cloud, footprints, headers[0].path, read.unit)
     frame = AreaFrame(cloud, footprints, units_of(cloud or footprints, named=read.unit))
     if cloud is None and (footprints is not None or read.unit == "auto"):
         say_what_is_assumed(headers[0].path, frame)
@@ -51,6 +53,32 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     if frame.crs is not None:
         say_where_it_lies(headers, frame)
     return frame
+
+
+def placed(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
+    """The CRS of clouds that leave their place open: the footprints' with the clouds' heights, else the clouds' local one.
+
+    None where they name no plan at all. Raises InputError where the units of clouds and footprints differ.
+    """
+    if cloud is None:
+        return None
+    if not names_place(footprints):
+        units_of(cloud, named=unit)
+        if names_heights_alone(cloud):
+            return None
+        place = "which is no place on the Earth, and so are the models; say with --crs where it is"
+        warnings.warn(f"{path}: names a local CRS, {described(cloud)}, {place}", InputWarning)
+        return cloud
+    there = units_of(footprints, "the footprints")
+    if not names_heights_alone(cloud) and abs(units_of(cloud, named=unit).plan / there.plan - 1) > SAME_UNIT:
+        raise InputError(
+            f"expected clouds and footprints in one CRS, got {described(cloud)} in {units_of(cloud)} and "
+            f"{described(footprints)} in {there}; say with --crs in which the clouds are"
+        )
+    heights = cloud if names_heights_alone(cloud) else vertical_crs(cloud)
+    taken = f"taken to be in the footprints' {described(footprints)}; say otherwise with --crs"
+    warnings.warn(f"{path}: names {described(cloud)}, which is no place on the Earth; {taken}", InputWarning)
+    return combine(footprints, heights)
 
 
 def say_where_it_lies(headers: list[PointFileHeader], frame: AreaFrame) -> None:

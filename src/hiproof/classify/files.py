@@ -10,9 +10,10 @@ import numpy as np
 from ..errors import InputError, OutputError
 from ..frames import Units
 from ..read.crs import parse_crs, units_of
-from ..read.las import explained, las_crs, read_las_header
+from ..read.las import explained, facts_of, read_las_header
+from ..read.las_crs import las_crs
 from ..read.overlap import refuse_degrees
-from ..read.pointcloud import file_kind, refuse_implausible
+from ..read.pointcloud import common_crs, file_kind, refuse_implausible
 from ..settings import Settings
 from ..write.files import atomic
 from .buildings import BUILDING, GROUND, UNKNOWN, classify
@@ -51,7 +52,7 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
 
 def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
     """Units of the file's coordinates. Raises InputError for degrees, also where no CRS says that they are."""
-    crs = parse_crs(settings.read.crs) or las_crs(las.header, path)
+    crs = common_crs({str(path): las_crs(facts_of(path).projection)}, parse_crs(settings.read.crs), settings.read.unit)
     if crs is None:
         box = np.r_[las.header.mins[:2], las.header.maxs[:2]].reshape(1, 4)
         refuse_degrees(

@@ -4,7 +4,8 @@ pointcloud    points of any kind of file, in chunks; `read_points`
 remote        files by address
 las           LAS, LAZ and COPC: laspy's points
 las_header    whether what such a file says of itself is possible
-geokeys       the height system of its GeoTIFF keys
+geokeys       the reference system of its GeoTIFF keys
+las_crs       the one that its records define
 copc          nodes of a COPC file that meet a box
 runs          where the points of a file lie, run by run
 lax           LAStools' index beside a file
@@ -14,6 +15,7 @@ columns       which column of a table of points holds what
 plausible     what no input may say
 thin          one point a cell
 crs           reference systems and their units
+axes          what no roof can be built in is refused
 footprints    building polygons; `read_footprints`
 attribute_columns  their attributes as they are declared
 polygons      polygons put right

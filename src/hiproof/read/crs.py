@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import functools
 import warnings
+from dataclasses import dataclass
 from typing import Any
 
-from pyproj import CRS
-from pyproj.exceptions import CRSError
+import numpy as np
+from pyproj import CRS, Transformer
+from pyproj.exceptions import CRSError, ProjError
 
 from ..errors import InputError
 from ..frames import METRES, Units
+from .axes import check_height_axis, check_plan_axes
+
+WGS84 = CRS.from_epsg(4326)
+"""What places on the Earth are compared in."""
 
 NAMED_UNITS = {
     "auto": METRES,
@@ -19,6 +25,13 @@ NAMED_UNITS = {
     "us-survey-foot": Units(1200 / 3937, 1200 / 3937, "US survey foot", "US survey foot"),
 }
 """Units by the setting's name, for coordinates without a CRS."""
+
+
+@dataclass(frozen=True)
+class UnknownCRS:
+    """A CRS that a file defines, but that cannot be understood, and why."""
+
+    reason: str
 
 
 def parse_crs(value: Any) -> CRS | None:
@@ -34,9 +47,19 @@ def parse_crs(value: Any) -> CRS | None:
     except CRSError as error:
         text = str(value)[:60]
         raise InputError(
-            f'expected a coordinate reference system such as "EPSG:7415", got {text!r} ({error}); '
+            f'expected a coordinate reference system such as "EPSG:7415", got {text!r} ({reason_of(error)}); '
             "give its EPSG code or its WKT"
         ) from error
+
+
+def reason_of(error: CRSError) -> str:
+    """What PROJ says is wrong, without the definition, which pyproj repeats whole.
+
+    >>> reason_of(CRSError("Invalid projection: FOO[1]: (Internal Proj Error: proj_create: unrecognized format)"))
+    'unrecognized format'
+    """
+    reason = str(error).rpartition("Internal Proj Error: ")[2].removeprefix("proj_create: ")
+    return reason.partition("\n")[0][:120].rstrip(").")
 
 
 def horizontal_crs(crs: CRS) -> CRS:
@@ -45,13 +68,29 @@ def horizontal_crs(crs: CRS) -> CRS:
         return horizontal_crs(crs.sub_crs_list[0])
     if crs.is_bound and crs.source_crs is not None:
         return horizontal_crs(crs.source_crs)
-    return crs.to_2d() if len(crs.axis_info) == 3 else crs
+    return crs.to_2d() if len(crs.axis_info) == 3 and not crs.is_engineering else crs
 
 
 def vertical_crs(crs: CRS) -> CRS | None:
     """The height component of a compound CRS, None where there is none."""
+    if crs.is_bound and crs.source_crs is not None and not crs.is_vertical:
+        return vertical_crs(crs.source_crs)
     heights = [part for part in crs.sub_crs_list if part.is_vertical]
     return heights[0] if heights else None
+
+
+def names_place(crs: CRS | None) -> bool:
+    """Whether coordinates in `crs` lie anywhere on the Earth. A local CRS and one of heights alone leave that open.
+
+    >>> names_place(CRS("EPSG:28992")), names_place(CRS("EPSG:5709")), names_place(CRS.from_wkt('LOCAL_CS["site"]'))
+    (True, False, False)
+    """
+    return crs is not None and not names_heights_alone(crs) and not horizontal_crs(crs).is_engineering
+
+
+def names_heights_alone(crs: CRS) -> bool:
+    """Whether `crs` has no plan. pyproj calls a compound CRS vertical as well."""
+    return horizontal_crs(crs).is_vertical
 
 
 def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
@@ -99,24 +138,44 @@ def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "au
     """
     if crs is None:
         return NAMED_UNITS[named]
-    plan, height = horizontal_crs(crs), vertical_crs(crs)
+    plan = horizontal_crs(crs)
+    if plan.is_vertical:
+        return units_of_heights_alone(plan, source, named)
     if plan.is_geographic or plan.is_geocentric:
         raise InputError(
             f"expected {source} in a projected CRS, got {crs.name} in "
             f"{'degrees' if plan.is_geographic else 'geocentric coordinates'}; "
             "reproject it first, to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
         )
-    if plan.is_vertical:
-        raise InputError(
-            f"expected {source} in a CRS of the plan, got {crs.name}, which is one of heights alone; name both, such as EPSG:28992+5709"
-        )
+    check_plan_axes(plan, source)
     across = plan.axis_info[0]
-    up = height.axis_info[0] if height is not None else crs.axis_info[2] if len(crs.axis_info) == 3 else across
+    up = height_axis(crs) or across
+    check_height_axis(up, crs, source)
     units = Units(across.unit_conversion_factor, up.unit_conversion_factor, across.unit_name, up.unit_name)
     if named != "auto" and abs(NAMED_UNITS[named].plan / units.plan - 1) > 1e-9:
         raise InputError(
             f"expected {source} in {named}, as --unit says, got {crs.name} in {units}; leave --unit out, "
             "or say with --crs which CRS is right"
+        )
+    return units
+
+
+def height_axis(crs: CRS) -> Any:
+    """The axis (pyproj's) along which `crs` counts heights, None where it has no heights."""
+    height = vertical_crs(crs)
+    if height is not None:
+        return height.axis_info[0]
+    return crs.axis_info[2] if len(crs.axis_info) == 3 and not crs.is_compound else None
+
+
+def units_of_heights_alone(heights: CRS, source: str, named: str) -> Units:
+    """Units of coordinates whose CRS names heights alone: the plan's unit has to be that of the heights."""
+    units, up = NAMED_UNITS[named], heights.axis_info[0]
+    check_height_axis(up, heights, source)
+    if abs(up.unit_conversion_factor / units.plan - 1) > 1e-9:
+        raise InputError(
+            f"expected {source} in a CRS of the plan, got {heights.name}, which names heights alone, in {up.unit_name}; "
+            "name both with --crs, such as EPSG:28992+5709"
         )
     return units
 
@@ -154,11 +213,38 @@ def described(crs: CRS | None) -> str:
     return crs.name if code is None else f"EPSG:{code} ({crs.name})"
 
 
+def way_between(source: CRS, target: CRS) -> Transformer:
+    """The transformation of plans from `source` to `target`, x before y. Raises InputError where there is none."""
+    plans = horizontal_crs(source), horizontal_crs(target)
+    try:
+        if any(plan.is_geocentric or plan.is_vertical for plan in plans):
+            raise ProjError("coordinates of another kind")
+        return Transformer.from_crs(source, target, always_xy=True)
+    except ProjError as error:
+        raise InputError(
+            f"expected a way from {described(source)} to {described(target)}, got none that PROJ knows; "
+            "check which CRS each file names, or reproject one of them"
+        ) from error
+
+
+def degrees_of(crs: CRS, xy: np.ndarray) -> np.ndarray:
+    """Longitude and latitude (n, 2) of positions (n, 2) in the plan of `crs`, NaN where it leaves the place open."""
+    if not names_place(crs):
+        return np.full(xy.shape, np.nan)
+    try:
+        return np.column_stack(way_between(horizontal_crs(crs), WGS84).transform(*xy.T))
+    except InputError:
+        return np.full(xy.shape, np.nan)
+
+
 def best_of(crs: Any, target: Any, **options: Any) -> Any:
     """pyproj's best transformation from `crs` to `target` that can be carried out here, None where there is none."""
     from pyproj.transformer import TransformerGroup
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # of better ones whose grids are missing
-        group = TransformerGroup(crs, target, always_xy=True, **options)
+        try:
+            group = TransformerGroup(crs, target, always_xy=True, **options)
+        except ProjError:
+            return None
     return group.transformers[0] if group.transformers else None

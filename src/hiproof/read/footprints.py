@@ -11,7 +11,7 @@ import numpy as np
 import pyogrio
 import shapely
 from pyogrio.errors import DataLayerError, DataSourceError, FeatureError
-from pyproj import CRS, Transformer
+from pyproj import CRS
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
@@ -20,11 +20,14 @@ from ..model import Footprint
 from ..rings import clockwise
 from ..settings import Settings
 from .attribute_columns import as_declared, where_known
-from .crs import described, parse_crs, same_horizontal, units_of
+from .crs import described, names_heights_alone, names_place, parse_crs, same_horizontal, units_of, way_between
 from .database import is_database, read_table, table_crs
 from .overlap import refuse_degrees, told_box
 from .polygons import simple_polygons
 from .remote import is_url
+
+UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
+"""What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
 
 Box = tuple[float, float, float, float]
 ID_NAMES = (
@@ -56,7 +59,7 @@ def read_footprints(
     meta, numbers, geometries, columns = read_features(path, layer, where, bbox, target)
     attributes = attribute_rows(list(meta["fields"]), columns, len(geometries))
     ids = feature_ids(attributes, numbers, id_attribute, path)
-    source = parse_crs(meta["crs"])
+    source = plan_crs(meta["crs"])
     geometries = transformed(geometries, source, target, path)
     units = units_of(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
@@ -73,9 +76,15 @@ def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
     """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
     if is_database(path):
-        return parse_crs(table_crs(str(path)))
+        return plan_crs(table_crs(str(path)))
     layer = one_layer(path, layer)
-    return parse_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
+    return plan_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
+
+
+def plan_crs(text: str | None) -> CRS | None:
+    """The CRS that a vector file names, None for one of heights alone and for GeoPackage's "undefined"."""
+    crs = parse_crs(text)
+    return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
 
 def one_layer(path: str | Path, layer: str | int | None) -> str | int | None:
@@ -108,7 +117,7 @@ def read_features(
     refuse_missing(path)
     layer = one_layer(path, layer)
     info = reading(lambda: pyogrio.read_info(str(path), layer=layer), path)
-    chosen = {"where": where, "bbox": bbox and box_in(parse_crs(info["crs"]), bbox, bbox_crs)}
+    chosen = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
     meta, numbers, wkb, columns = reading(
         lambda: pyogrio.raw.read(str(path), layer=layer, return_fids=True, datetime_as_string=True, **chosen),
         path,
@@ -153,7 +162,9 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
     """A box in `crs` around all of `bbox` in `bbox_crs`; as it is where either is unknown."""
     if crs is None or bbox_crs is None or same_horizontal(crs, bbox_crs):
         return bbox
-    return Transformer.from_crs(bbox_crs, crs, always_xy=True).transform_bounds(*bbox)
+    if not names_place(crs):
+        return tuple(np.array(bbox) * times_between(bbox_crs, crs))
+    return way_between(bbox_crs, crs).transform_bounds(*bbox)
 
 
 def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None) -> Any:
@@ -248,7 +259,7 @@ def id_text(value: Any) -> str:
 def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path) -> np.ndarray:
     """Geometries in plan in the target CRS. Raises InputError where that is impossible or leads to no numbers."""
     geometries = shapely.force_2d(geometries)
-    if source is None or source.is_projected:
+    if source is None or not source.is_geographic:
         advice = "name their CRS in the file (`ogr2ogr -a_srs EPSG:4326`), or reproject them"
         named = "no CRS" if source is None else described(source)
         refuse_degrees(shapely.bounds(geometries), f"the footprints of {path}, which names {named},", advice)
@@ -256,7 +267,11 @@ def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, 
         warnings.warn(f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning)
     if source is None or target is None or same_horizontal(source, target):
         return geometries
-    transformer = Transformer.from_crs(source, target, always_xy=True)
+    if not names_place(source):
+        taken = f"names a local CRS, {described(source)}; taken to be in the cloud's, {described(target)}"
+        warnings.warn(f"{path}: {taken}", InputWarning)
+        return shapely.transform(geometries, lambda xy: xy * times_between(source, target))
+    transformer = way_between(source, target)
     moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1])))
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         raise InputError(
@@ -264,6 +279,11 @@ def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, 
             f"coordinates outside that system; {advice_on(source)}"
         )
     return moved
+
+
+def times_between(source: CRS, target: CRS) -> float:
+    """How many units of `target` one of `source` is in plan."""
+    return units_of(source, "the footprints").plan / units_of(target).plan
 
 
 def advice_on(source: CRS) -> str:

@@ -18,8 +18,6 @@ import numpy as np
 from ..errors import InputError, InputWarning
 from ..log import counted
 from .copc import check_nodes, copc_record
-from .crs import combine
-from .geokeys import heights_of_keys
 from .las_header import LasFacts, check_all_points, check_points, read_facts
 from .plausible import Implausible
 from .remote import is_url, opened
@@ -71,17 +69,6 @@ def facts_at(path: str, changed: int | None) -> LasFacts:
     """Found once a process for the file that was `changed` then: an indexed file is opened for each of its squares."""
     with opened(path) as file:
         return read_facts(file)
-
-
-def las_crs(header: laspy.LasHeader, path: str | Path):
-    """The header's pyproj CRS, None where it names none or none that pyproj understands (then with a warning)."""
-    try:
-        return combine(header.parse_crs(), heights_of_keys(header))
-    except Exception as error:  # laspy lets through whatever pyproj makes of the records
-        warnings.warn(
-            f"{path}: its coordinate reference system cannot be understood ({error}); taken as unknown", InputWarning
-        )
-        return None
 
 
 def las_chunks(

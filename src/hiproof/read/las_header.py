@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import BinaryIO, NamedTuple
 
 import lazrs
@@ -39,7 +39,7 @@ class LasFacts:
     """What the public header block says, and the file's `size` in bytes; the arrays are (3,): x, y, z.
 
     `points_end` is the first byte that no point may take: of waveforms, of extended records, or the end. `laszip` is the
-    record that tells how points are compressed; only COPC has an `octree`.
+    record that tells how points are compressed; only COPC has an `octree`; `projection` are the records of the CRS.
     """
 
     size: int
@@ -60,6 +60,7 @@ class LasFacts:
     far_records: tuple[int, int]
     laszip: bytes = b""
     octree: Octree | None = None
+    projection: dict[int, bytes] = field(default_factory=dict)
 
     @property
     def rounding(self) -> np.ndarray:
@@ -74,7 +75,8 @@ def read_facts(file: BinaryIO) -> LasFacts:
     facts = parse_header(file.read(max(HEADER_BYTES.values())), size)
     check_layout(facts)
     records = dict(records_of(file, facts))
-    facts = replace(facts, laszip=records.get(("laszip encoded", 22204), b""))
+    projection = {number: content for (user, number), content in records.items() if user == "LASF_Projection"}
+    facts = replace(facts, laszip=records.get(("laszip encoded", 22204), b""), projection=projection)
     points = compressed_points(file, facts) if facts.compressed else room_for_points(facts)
     if points != facts.count:
         raise Implausible(f"its header tells of {facts.count} points, its data of {points}; it is truncated or damaged")

@@ -13,7 +13,16 @@ from pyproj.exceptions import CRSError, ProjError
 from ..errors import InputError
 from ..frames import METRES, Units
 from ..model import Footprint
-from .crs import described, epsg_code, horizontal_crs, parse_crs, same_horizontal
+from .crs import (
+    degrees_of,
+    described,
+    epsg_code,
+    horizontal_crs,
+    names_place,
+    parse_crs,
+    same_horizontal,
+    way_between,
+)
 
 DEGREES_WIDE = 0.2  # no building is narrower in metres, hardly a tile wider in degrees
 AREA_MARGIN = 2.0  # degrees that a CRS is commonly used beyond its area: a zone is kept at the border of the next
@@ -109,8 +118,13 @@ def reprojected(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.nd
 
 @functools.lru_cache(maxsize=8)
 def transformer_between(source: CRS, target: CRS) -> Transformer | None:
-    """From `source` to `target`, None where they are the same; kept, for PROJ takes long to choose among its ways."""
-    return None if same_horizontal(source, target) else Transformer.from_crs(source, target, always_xy=True)
+    """From `source` to `target`, None where they are the same or PROJ knows no way; kept, for it takes long to choose one."""
+    if same_horizontal(source, target) or not (names_place(source) and names_place(target)):
+        return None
+    try:
+        return way_between(source, target)
+    except InputError:
+        return None
 
 
 def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
@@ -131,10 +145,10 @@ def refuse_degrees(boxes: np.ndarray, what: str, advice: str) -> None:
 
 def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
     """Where on Earth positions (n, 2) in `crs` lie, where that is far from the area it is made for; else None."""
-    area, degrees = horizontal_crs(crs).area_of_use, parse_crs("EPSG:4326")
-    lon, lat = np.median(reprojected(xy, horizontal_crs(crs), degrees), axis=0)
+    area = horizontal_crs(crs).area_of_use
     if area is None or area.west > area.east:
         return None
+    lon, lat = np.median(degrees_of(crs, xy), axis=0)
     if area.west - AREA_MARGIN <= lon <= area.east + AREA_MARGIN and (
         area.south - AREA_MARGIN <= lat <= area.north + AREA_MARGIN
     ):
@@ -147,7 +161,7 @@ def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
 def stretch(crs: CRS, xy: np.ndarray) -> float:
     """How many metres of `crs` a metre on the ground is at positions (n, 2), in the worse of its directions; 1 where unknown."""
     plan = horizontal_crs(crs)
-    lon, lat = np.median(reprojected(xy, plan, parse_crs("EPSG:4326")), axis=0)
+    lon, lat = np.median(degrees_of(crs, xy), axis=0)
     if not (plan.is_projected and np.isfinite((lon, lat)).all()):
         return 1.0
     try:

@@ -18,7 +18,17 @@ from ..log import counted
 from ..model import PointCloud
 from ..settings import Settings
 from . import las, ply, text
-from .crs import described, parse_crs, same_heights, same_horizontal, units_of, vertical_crs
+from .crs import (
+    UnknownCRS,
+    described,
+    names_place,
+    parse_crs,
+    same_heights,
+    same_horizontal,
+    units_of,
+    vertical_crs,
+)
+from .las_crs import las_crs
 from .plausible import MOST_HEIGHT, MOST_PLAN, bounds_of, is_plausible
 from .remote import is_url
 from .runs import RUN_POINTS
@@ -81,7 +91,8 @@ def read_points(*paths: str | Path, settings: Settings | None = None, box: Box |
     """
     files, read = expand_paths(paths), (settings or Settings()).read
     headers = {str(file): las_file_header(file) for file in files}
-    crs = common_crs({file: header and header.crs for file, header in headers.items()}, parse_crs(read.crs))
+    crs_of = {file: header and header.crs for file, header in headers.items()}
+    crs = common_crs(crs_of, parse_crs(read.crs), read.unit)
     units = units_of(crs, "the point cloud", read.unit)
     say_how_coarse([header for header in headers.values() if header], units)
     clouds = [chunk for file in files for chunk in iter_points(file, box=box, units=units)]
@@ -184,7 +195,7 @@ def las_file_header(path: str | Path) -> PointFileHeader | None:
     bounds = (*header.mins.tolist(), *header.maxs.tolist())
     steps = (float(max(header.scales[:2])), float(header.scales[2]))
     return PointFileHeader(
-        str(path), bounds, header.point_count, las.las_crs(header, path), header.point_format.id, steps
+        str(path), bounds, header.point_count, las_crs(las.facts_of(path).projection), header.point_format.id, steps
     )
 
 
@@ -300,18 +311,21 @@ def file_kind(path: str | Path) -> str:
 
 
 def file_crs(path: str | Path) -> Any:
-    """The CRS that a point file names, None where it names none: text and PLY never do."""
+    """The CRS that a point file names, None where it names none that can be understood: text and PLY never do."""
     header = las_file_header(path)
-    return header and header.crs
+    return None if header is None or isinstance(header.crs, UnknownCRS) else header.crs
 
 
-def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
+def common_crs(crs_of: dict[str, Any], given: Any = None, unit: str = "auto") -> Any:
     """The one CRS of point files, from what each names: `given` where that is a CRS, else the files' own.
 
     Files that name none go with those that do, and files overruled by `given` go with it, with an InputWarning each.
-    Raises InputError, naming both files, where two disagree.
+    Raises InputError, naming both files, where two disagree, and for a CRS that cannot be understood while neither
+    `given` nor a `unit` stands in for it.
     """
-    named = {path: crs for path, crs in crs_of.items() if crs is not None}
+    if given is None and unit == "auto":
+        refuse_unknown(crs_of)
+    named = {path: crs for path, crs in crs_of.items() if crs is not None and not isinstance(crs, UnknownCRS)}
     if given is not None:
         overruled = [path for path, crs in named.items() if not same_horizontal(crs, given)]
         if overruled:
@@ -333,17 +347,27 @@ def common_crs(crs_of: dict[str, Any], given: Any = None) -> Any:
     return max(named.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
 
 
+def refuse_unknown(crs_of: dict[str, Any]) -> None:
+    """Raise InputError where a file defines a CRS that cannot be understood: its unit might be any."""
+    for path, crs in crs_of.items():
+        if isinstance(crs, UnknownCRS):
+            raise InputError(
+                f"expected a coordinate reference system that PROJ understands in {path}, got {crs.reason}; "
+                "name the right one with --crs, or its unit alone with --unit"
+            )
+
+
 def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
     """Raise InputError where one of the files names another CRS than `crs`, that of `source`; unknown goes with any."""
     for file in files if crs is not None else ():
         own = file_crs(file)
-        if own is not None:
+        if names_place(own):
             refuse_two(crs, source, own, str(file))
 
 
 def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -> None:
     """Raise InputError where two CRSs differ in plan or in heights."""
-    if not (same_horizontal(first, second) and same_heights(first, second)):
+    if first != second and not (same_horizontal(first, second) and same_heights(first, second)):
         raise InputError(
             f"expected all clouds in one CRS, got {described(first)} in {first_source} and {described(second)} in "
             f"{second_source}; reproject one of them, or say with --crs which is right where a header is wrong"

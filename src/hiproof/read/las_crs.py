@@ -1,0 +1,47 @@
+"""The CRS that a LAS file's records define: WKT, or GeoTIFF keys where there is no WKT that can be understood."""
+
+from __future__ import annotations
+
+from pyproj import CRS
+from pyproj.exceptions import CRSError
+
+from .crs import UnknownCRS, combine, names_heights_alone, reason_of, vertical_crs
+from .geokeys import DIRECTORY, DOUBLES, TEXTS, crs_of_keys
+
+WKT = 2112
+"""Number of the record that holds a WKT."""
+
+
+def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
+    """The CRS of the records of user LASF_Projection by number, None where they define none.
+
+    Heights may come from the keys beside a WKT.
+    """
+    text = wkt_of(records.get(WKT, b""))
+    found, faults = [], []
+    for is_there, read in (
+        (bool(text), lambda: CRS.from_wkt(text)),
+        (DIRECTORY in records, lambda: crs_of_keys(*(records.get(id, b"") for id in (DIRECTORY, DOUBLES, TEXTS)))),
+    ):
+        try:
+            found.append(read() if is_there else None)
+        except CRSError as error:
+            found.append(None)
+            faults.append(reason_of(error))
+    by_text, by_keys = found
+    if by_text is None and by_keys is None:
+        return UnknownCRS(faults[0]) if faults else None
+    if by_text is None:
+        return by_keys
+    if by_keys is None:
+        return by_text
+    return combine(by_text, by_keys if names_heights_alone(by_keys) else vertical_crs(by_keys))
+
+
+def wkt_of(content: bytes) -> str:
+    """The text of a record of WKT: UTF-8 by the standard, Latin-1 where a writer did not know."""
+    try:
+        text = content.decode()
+    except UnicodeDecodeError:
+        text = content.decode("latin-1")
+    return text.split("\0")[0].strip()
