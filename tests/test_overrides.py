@@ -1,6 +1,7 @@
 """Overrides: the fit obeys them and fits the rest; a run with others redoes those buildings alone."""
 
 import dataclasses
+import doctest
 import json
 
 import numpy as np
@@ -10,7 +11,7 @@ import shapely
 
 import hiproof
 from hiproof.city import run as city_run
-from hiproof.city import solve
+from hiproof.city import solve, table_values
 from hiproof.city.ledger import Ledger
 from hiproof.city.noted import noted_file, save_noted
 from hiproof.city.overrides import table_records
@@ -37,6 +38,10 @@ def scanned():
 
 def obeyed(scanned, **said):
     return overridden(override_of({"id": "a", **said}), *scanned, settings=PLAIN, id="a")
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(table_values).failed == 0
 
 
 def test_a_type_is_obeyed_and_the_rest_fitted(scanned):
@@ -149,19 +154,16 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
         ({"id": "a", "leave_out": "false"}, "true or false as leave_out of the override of 'a', got 'false'"),
         ({"id": "a", "leave_out": ["no"]}, "true or false as leave_out"),
         ({"id": "a", "block_height": 3, "ridge_height": 3}, "block_height without"),
-        ({"id": "a", "block_height": -3}, "positive block_height"),
+        ({"id": "a", "block_height": -3}, "block_height from 0.1 to 1000 .* got -3"),
         ({"id": "a", "parts": 1.5}, "whole number"),
-        ({"id": "a", "parts": 0}, "whole number"),
+        ({"id": "a", "parts": 0}, "parts from 1 to"),
         ({"id": "a", "parts": []}, "the origin of its parts"),
         ({"id": "a", "parts": [], "origin": [0, 0, 0], "type": "hip", "ridge_height": 3}, "list of parts without"),
         ({"id": "a", "ridge_height": float("nan")}, "a number as ridge_height"),
         ({"id": "a", "fixed": {"height": "high"}}, "a number as height"),
-        (
-            {"id": "a", "ridge_height": 1e9},
-            "ridge_height of the override of 'a' within 100000, got 1e\\+09; check its unit",
-        ),
-        ({"id": "a", "z_ground": -1e6}, "z_ground of the override of 'a' within 100000"),
-        ({"id": "a", "block_height": 1e6}, "block_height of the override of 'a' within 100000"),
+        ({"id": "a", "ridge_height": 1e9}, "ridge_height from -600 to 10000 in the override of 'a', got 1e\\+09"),
+        ({"id": "a", "z_ground": -9999}, "z_ground from -600 to 10000 in the override of 'a'"),
+        ({"id": "a", "block_height": 1e6}, "block_height from 0.1 to 1000 in the override of 'a'"),
         ("hip", "an object as an override"),
     ],
 )
@@ -294,6 +296,50 @@ def test_columns_of_the_footprints_override_too(town_files, tmp_path):
     rows = by_id(tmp_path / "out")
     assert rows["house-0"]["type"] == "hip" and "overridden: type hip" in rows["house-0"]["detail"]
     assert "overridden" not in rows["house-1"]["detail"]
+
+
+def columns_run(folder, key, values, town):
+    """What a run writes, by id, of a town whose footprints have a column that holds `values` of the override's `key`."""
+    cloud = write_cloud(folder / "cloud.laz", town.xyz, town.classification)
+    outlines = shapely.to_wkb(np.array(list(town.footprints.values()), object))
+    columns, path = [np.array(list(town.footprints), object), np.array(values)], folder / "footprints.gpkg"
+    pyogrio.raw.write(path, outlines, columns, ["id", "known"], geometry_type="Polygon", crs="EPSG:28992")
+    settings = PLAIN.replace({"read": {"override_columns": [f"known={key}"]}})
+    city_run.reconstruct_area(hiproof.Request((str(cloud),), folder / "out", str(path), settings=settings))
+    return by_id(folder / "out")
+
+
+@pytest.mark.parametrize("kind", [float, str])
+def test_a_ground_of_0_counts_and_codes_are_left_out_and_told(tmp_path, kind):
+    town = make_town(houses=4)
+    values = [kind(value) for value in (0.0, -0.5, -9999.0, 3.4e38)]
+    with pytest.warns(InputWarning, match="z_ground from -600 to 10000, left out 2 of its values: -9999"):
+        rows = columns_run(tmp_path, "z_ground", values, town)
+    z = {id: row["z_ground"] for id, row in rows.items()}
+    assert z["house-0"] == 0.0 and z["house-1"] == -0.5 and rows["house-0"]["ground_source"] == "override"
+    assert z["house-2"] == pytest.approx(2.7, abs=0.1) and z["house-3"] == pytest.approx(3.0, abs=0.1)
+    assert "overridden" not in rows["house-2"]["detail"]
+
+
+def test_a_ridge_at_0_counts(tmp_path):
+    town = make_town(houses=1)
+    low = dataclasses.replace(town, xyz=town.xyz - [0, 0, 10.0])
+    (row,) = columns_run(tmp_path, "ridge_height", [0.0], low).values()
+    assert "overridden: ridge_height 0.0" in row["detail"]
+    (part,) = row["parts"]
+    assert part["position"][2] + row["origin"][2] + part["parameters"]["height"] == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("key, value", [("parts", 0), ("block_height", 0.0), ("block_height", -9999.0)])
+def test_sizes_of_0_in_a_column_are_left_out_and_told(tmp_path, key, value):
+    with pytest.warns(InputWarning, match=f"expected {key} from .*, left out 1 of its values: .* of house-0"):
+        (row,) = columns_run(tmp_path, key, [value], make_town(houses=1)).values()
+    assert row["status"] == "modelled" and "overridden" not in row["detail"]
+
+
+def test_a_ground_given_far_from_the_ground_points_is_obeyed_and_told(tmp_path):
+    (row,) = columns_run(tmp_path, "z_ground", [-99.0], make_town(houses=1)).values()
+    assert row["z_ground"] == -99.0 and "the ground given lies 101.1 m below the ground points" in row["detail"]
 
 
 @pytest.mark.parametrize("said", [{"leave_out": True}, {"block_height": 5.0}, {"types": ["gable"]}])

@@ -35,6 +35,7 @@ class Doubt(Enum):
     GROUND_ABOVE_EAVES = "m above its eaves"
     TERRAIN_UNLIKE_GROUND_POINTS = "the ground points around it"
     TERRAIN_WITHOUT_HEIGHTS = "holds values that are no heights"
+    GROUND_GIVEN_ELSEWHERE = "the ground given lies"
     ASSUMED_GROUND = "its ground is assumed"
     POINTS_OF_OTHER_CLASSES = "points of other classes lie high above the ground"
     BARE_GROUND = "its ground lies bare"

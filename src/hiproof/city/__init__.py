@@ -7,6 +7,7 @@ lock          one run a folder at a time
 marks         by what a folder knows whose run it holds
 resume        a folder held against the request: gone on from, or begun anew
 overrides     what is known better of some buildings, and which of them have to be made again
+table_values  values of columns as overrides want them
 changed       a run whose footprints changed: what is the same stays
 prepare       the plan made: which buildings there are, from footprints or the cloud
 frame         the CRS and units of an area

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..errors import InputError, InputWarning, OutputError
 from ..log import LOGGER, counted
+from ..masking import masked
 from ..parametric.file import HEAD, objects
 from ..parametric.override import KEYS, Override, override_of
 from ..read.attribute_columns import as_declared, where_known
@@ -22,6 +23,7 @@ from ..write.files import atomic
 from .ledger import Ledger
 from .merge import tile_parts
 from .plan import Job, WorkPlan
+from .table_values import LeftOut
 
 FILE, REDO = "overrides.jsonl", "redo.json"
 TABLES = (".csv", ".gpkg", ".geojson", ".shp", ".fgb", ".xlsx", ".ods")
@@ -108,33 +110,21 @@ def table_records(path: str) -> list[dict[str, Any]]:
     names, declared, columns = read()
     columns = as_declared(names, declared, columns, lambda name: read(where_known(name, None))[2][names.index(name)])
     rows = attribute_rows(names, columns, len(columns[0]) if columns else 0)
-    return [{name: typed(name, value) for name, value in row.items()} for row in rows]
-
-
-YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fromkeys(
-    ("0", "0.0", "false", "no", "f", "n", ""), False
-)
-
-
-def typed(name: str, value: Any) -> Any:
-    """A table's value as the override's key wants it."""
-    if name == "leave_out":
-        return YES_OR_NO.get(str(value).strip().lower(), value)
-    if name in ("parts", "ridge_height", "eave_height", "z_ground", "block_height") and isinstance(value, str):
-        try:
-            return float(value) if value.strip() else None
-        except ValueError:
-            return value
-    return str(value) if name == "id" else value
+    left_out = LeftOut(masked(path))
+    records = [left_out.possible(row, str(row.get("id", ""))) for row in rows]
+    left_out.warn()
+    return records
 
 
 def matched(records: dict[str, dict[str, Any]], plan: WorkPlan) -> dict[int, dict[str, Any]]:
     """The overrides by the number of their building, with those that columns of the footprints hold; unknown ones are told."""
     names, found, left = columns_of(plan), {}, dict(records)
+    impossible = LeftOut("columns of the footprints")
     for job in plan.jobs:
-        own = beside(column_override(job, names), left.pop(job.id, {}), job.id)
+        own = beside(column_override(job, names, impossible), left.pop(job.id, {}), job.id)
         if own:
             found[job.index] = {**own, "id": job.id}
+    impossible.warn()
     if left:
         some = ", ".join(list(left)[:SHOWN]) + (" and others" if len(left) > SHOWN else "")
         warnings.warn(
@@ -188,10 +178,11 @@ def refuse_others(told: list[str], known: Sequence[str], what: str) -> None:
         )
 
 
-def column_override(job: Job, names: list[tuple[str, str]]) -> dict[str, Any]:
-    """The override in the columns of a building's footprint, empty where they say nothing."""
+def column_override(job: Job, names: list[tuple[str, str]], impossible: LeftOut) -> dict[str, Any]:
+    """The override in the columns of a building's footprint, empty where they say nothing; what cannot be is noted."""
     attributes = job.footprint.attributes if job.footprint else {}
-    return {key: typed(key, attributes[name]) for name, key in names if attributes.get(name) not in (None, "", False)}
+    found = impossible.possible({key: attributes[name] for name, key in names if name in attributes}, job.id)
+    return {key: value for key, value in found.items() if (key, value) != ("leave_out", False)}
 
 
 def digest_of(record: dict[str, Any]) -> str:

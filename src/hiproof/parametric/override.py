@@ -27,18 +27,33 @@ from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
 from ..primitives.catalogue import CATALOGUE
+from ..read.plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from ..settings import Settings
 from ..status import Doubt, Status
 from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import built
-from .record import MOST_PARTS, mapping, measure, number, numbers_by_name, place, polygon, shown
+from .record import MOST_PARTS, mapping, number, numbers_by_name, place, polygon, shown
 from .refit import measured
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
 TOLD = ("note", "who", "when")
 KEYS = ("id", *SHAPING, "parts", "origin", "outline", "z_ground", "block_height", "leave_out", *TOLD)
+
+FAR_GROUND_M = 5.0
+"""Difference (m) between a ground given and the terrain from which on it is remarked: a code for "unknown", or another
+height system. Ground levels of registers differ less from the lowest terrain along the walls."""
+
+HIGHEST_M = 1000.0
+"""Highest building (m above its ground): the Burj Khalifa has 828."""
+
+RANGES = {
+    **dict.fromkeys(("z_ground", "ridge_height", "eave_height"), (LOWEST_LAND_M, HIGHEST_LAND_M + HIGHEST_M)),
+    "block_height": (0.1, HIGHEST_M),
+    "parts": (1.0, float(MOST_PARTS)),
+}
+"""Least and largest possible value of keys that are numbers. Codes such as -9999 lie beyond."""
 
 
 @dataclass(frozen=True)
@@ -79,11 +94,10 @@ def override_of(record: Mapping[str, Any]) -> Override:
         raise InputError(f"expected {', '.join(KEYS)} in {where}, got also {', '.join(other[:8])}; remove it")
     refuse_contradictions(record, has_list, where)
     fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {where}")
-    fixed |= {
-        name: measure(record[name], f"{name} of {where}") for name in ("ridge_height", "eave_height") if name in record
-    }
-    count = None if has_list or "parts" not in record else number(record["parts"], f"parts of {where}")
-    if count is not None and not (count == int(count) and 1 <= count <= MOST_PARTS):
+    heights = {name: possible(record, name, where) for name in ("ridge_height", "eave_height")}
+    fixed |= {name: height for name, height in heights.items() if height is not None}
+    count = None if has_list else possible(record, "parts", where)
+    if count is not None and count != int(count):
         raise InputError(f"expected a whole number of parts from 1 in {where}, got {count:g}; or give a list of parts")
     types = types_of(record, where)
     return Override(
@@ -97,11 +111,28 @@ def override_of(record: Mapping[str, Any]) -> Override:
         if "outline" in record and polygon(record["outline"], f"outline of {where}")
         else None,
         fixed=fixed,
-        z_ground=measure(record["z_ground"], f"z_ground of {where}") if "z_ground" in record else None,
-        block_height=measure(record["block_height"], f"block_height of {where}") if "block_height" in record else None,
+        z_ground=possible(record, "z_ground", where),
+        block_height=possible(record, "block_height", where),
         leave_out=bool(record.get("leave_out", False)),
         told=told_of(record, has_list),
     )
+
+
+def possible_range(key: str) -> tuple[float, float] | None:
+    """Least and largest value that a building can have of a key, None where it is no number."""
+    return RANGES.get(key)
+
+
+def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
+    """The number that `record` has of `key`, None without one. Raises InputError for one that no building can have."""
+    if key not in record:
+        return None
+    value, (low, high) = number(record[key], f"{key} of {where}"), RANGES[key]
+    if not low <= value <= high:
+        raise InputError(
+            f"expected {key} from {low:g} to {high:g} in {where}, got {value:g}; leave it out where unknown"
+        )
+    return value
 
 
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
@@ -119,9 +150,6 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
             raise InputError(f"expected {name} without {', '.join(others)} in {where}, got also {against[0]}; keep one")
     if has_list and "origin" not in record:
         raise InputError(f"expected the origin of its parts in {where}, got none; copy that of parameters.jsonl")
-    height = record.get("block_height")
-    if height is not None and not number(height, f"block_height of {where}") > 0.0:
-        raise InputError(f"expected a positive block_height in {where}, got {height:g}; give metres above the ground")
 
 
 def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
@@ -175,6 +203,7 @@ def overridden(
         found = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
     if lies_under(found, override.z_ground):
         found = stages.remarked(found, "the ground given lies above its lowest eave")
+    found = stages.remarked(found, unlike_ground(found, override.z_ground, terrain))
     return stages.remarked(found, override.told)
 
 
@@ -183,6 +212,18 @@ def lies_under(building: Building, z_ground: float | None) -> bool:
     if z_ground is None or building.built is None:
         return False
     return bool(building.solid.vertices[:, 2].min() < z_ground - 1e-3)
+
+
+def unlike_ground(building: Building, z_ground: float | None, terrain: Any) -> str:
+    """A remark where the ground given lies far from what the terrain says under the building's outline. Empty otherwise."""
+    if z_ground is None or terrain is None or building.built is None:
+        return ""
+    heights, source = stages.asked(
+        terrain, building.roof.frame.to_world(shapely.get_coordinates(building.roof.outline))
+    )
+    if not np.isfinite(heights).any() or abs(apart := z_ground - float(np.nanmin(heights))) < FAR_GROUND_M:
+        return ""
+    return f"{Doubt.GROUND_GIVEN_ELSEWHERE.value} {abs(apart):.1f} m {'above' if apart > 0 else 'below'} the {source}"
 
 
 def as_given(override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings) -> Building:

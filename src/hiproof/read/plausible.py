@@ -10,6 +10,10 @@ MOST_PLAN = 1e9
 MOST_HEIGHT = 1e6
 """Largest height, in the input's unit: Everest has 29,032 feet."""
 
+LOWEST_LAND_M, HIGHEST_LAND_M = -600.0, 9000.0
+"""Heights of land on Earth (m): the Dead Sea's shore lies at -430 and ellipsoidal heights up to 107 lower. Codes for
+"no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet."""
+
 
 class Implausible(ValueError):
     """What a file says cannot be so; the message is the reason, the caller adds the file's name."""

@@ -20,6 +20,7 @@ from ..extras import needed
 from ..frames import Units
 from ..masking import masked
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
+from .plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from .raster_checks import alpha_band, band_unit, height_band, refuse_without_position, scale_and_offset
 
 TILE_PX = 512
@@ -30,10 +31,6 @@ TILES_KEPT = 8
 
 MOST_TILES_CHECKED = 4000
 """Tiles read before work starts, to find damage: 1 GB of pixels, some 40 s of a run over hundreds of thousands of buildings."""
-
-LOWEST_M, HIGHEST_M = -600.0, 9000.0
-"""Heights of land on Earth (m): the Dead Sea's shore lies at -430 and ellipsoidal heights up to 107 lower. Codes for
-"no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet."""
 
 CODES = (
     0.0,
@@ -230,7 +227,7 @@ class RasterTerrain:
             ) from error
         with np.errstate(over="ignore"):
             heights = (stored * self.scale + self.offset) * self.metres_in_height
-        heights[(heights < LOWEST_M) | (heights > HIGHEST_M)] = np.inf
+        heights[(heights < LOWEST_LAND_M) | (heights > HIGHEST_LAND_M)] = np.inf
         return stored, heights
 
     @cached_property

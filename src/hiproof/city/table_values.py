@@ -1,0 +1,95 @@
+"""Values of a table's or the footprints' columns as the keys of an override want them.
+
+Columns are filled by people and programs: text stands where numbers should, and codes such as -9999, or a block height of
+0, stand for "unknown". What no building can have is left out and counted, so that one cell spoils neither its building nor
+the run.
+"""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..errors import InputWarning
+from ..parametric.override import possible_range
+
+SHOWN = 3  # values that a sentence shows
+
+YES_OR_NO = dict.fromkeys(("1", "1.0", "true", "yes", "t", "y"), True) | dict.fromkeys(
+    ("0", "0.0", "false", "no", "f", "n", ""), False
+)
+"""What tables say for true and false."""
+
+
+@dataclass
+class LeftOut:
+    """Values that no building can have, by key, as "VALUE of ID"."""
+
+    source: str
+    values: dict[str, list[str]] = field(default_factory=dict)
+
+    def possible(self, record: Mapping[str, Any], id: str) -> dict[str, Any]:
+        """The record without values that say nothing or cannot be; the latter are noted."""
+        found = {}
+        for key, value in record.items():
+            value = typed(key, value)
+            if says_nothing(value):
+                continue
+            if is_possible(key, value):
+                found[key] = value
+            else:
+                self.values.setdefault(key, []).append(f"{str(value)[:20]} of {id}")
+        return found
+
+    def warn(self) -> None:
+        """One line for each key of which values were left out."""
+        for key, told in self.values.items():
+            low, high = possible_range(key) or (0.0, 0.0)
+            some = ", ".join(told[:SHOWN]) + (", ..." if len(told) > SHOWN else "")
+            warnings.warn(
+                f"{self.source}: expected {key} from {low:g} to {high:g}, left out {len(told)} of its values: {some}",
+                InputWarning,
+            )
+
+
+def typed(key: str, value: Any) -> Any:
+    """A table's value as the override's key wants it.
+
+    >>> typed("z_ground", "0"), typed("leave_out", "0"), typed("id", 7)
+    (0.0, False, '7')
+    """
+    if key == "leave_out":
+        return YES_OR_NO.get(str(value).strip().lower(), value)
+    if possible_range(key) and isinstance(value, str):
+        try:
+            return float(value) if value.strip() else None
+        except ValueError:
+            return value
+    return str(value) if key == "id" else value
+
+
+def says_nothing(value: Any) -> bool:
+    """Whether a cell is empty. A 0 is a value.
+
+    >>> says_nothing(0.0), says_nothing(None), says_nothing(" ")
+    (False, True, True)
+    """
+    if value is None or (isinstance(value, float) and math.isnan(value)):
+        return True
+    return isinstance(value, str) and not value.strip()
+
+
+def is_possible(key: str, value: Any) -> bool:
+    """Whether a building can have the value: a number within the key's range; other keys have none.
+
+    >>> is_possible("z_ground", -9999), is_possible("parts", 0), is_possible("parts", [{}]), is_possible("note", -9999)
+    (False, False, True, True)
+    """
+    bounds = possible_range(key)
+    if bounds is None or (key == "parts" and isinstance(value, list)):
+        return True
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return is_number and bounds[0] <= value <= bounds[1]
