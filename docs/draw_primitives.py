@@ -13,12 +13,16 @@ FOLDER = Path(__file__).parent / "primitives"
 
 HEAD = """# Roof types and their parameters
 
-Drawn by `docs/draw_primitives.py` from the shapes themselves. Lengths are metres, pitches degrees; heights count from the lowest eave.
-The front is the side before a roof's length, its back behind it; left and right are the ends, seen from the front. An end that slopes
-at one side only is the right one, a single slope rises from the front; `end_height` is how high a corner's end would come at the left.
+`docs/draw_primitives.py` draws these figures from the shapes themselves.
 
-A gable whose ridge lies off the middle has a `ridge_offset` too (m, towards the back). A roof that is less regular than its type has
-each side's own: `pitch_front`, `eave_front` and so on in place of the lengths below, with `height` of a level top.
+- Lengths are in metres and pitches in degrees. Heights count from the lowest eave.
+- The front is the long side before a roof, and the back lies behind it. Left and right are the
+  ends, seen from the front.
+- If only one end slopes, it is the right one. A single slope rises from the front.
+- `end_height` is the height that a corner's end would reach at the left.
+- A gable with its ridge off the middle also has a `ridge_offset` (m, towards the back).
+- A roof that is less regular than its type gives each side's own values, such as `pitch_front` and
+  `eave_front`, and the `height` of a level top. See [the parameters](parameters.md#irregular-parts).
 """
 
 
