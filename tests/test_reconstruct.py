@@ -196,6 +196,45 @@ def test_a_roof_that_cannot_be_composed_falls_back_to_a_flat_block_and_says_so(m
     assert building.type == "flat"
 
 
+def two_level_points():
+    """A gable of 8 m by 8 m beside a flat annex of 4 m, both 3 m and more above the ground."""
+    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8, 0.4)))
+    return np.column_stack([x, y, np.where(x < 8, 9 - 0.6 * abs(y - 4), 4.0)])
+
+
+def refused(refuses):
+    """`compose` that refuses roofs of which `refuses` is true, as if its part 1 could not become valid."""
+    from hiproof.compose import solid
+    from hiproof.errors import CompositionError
+
+    real = solid.compose
+
+    def compose(roof, z_ground, settings=None):
+        if refuses(roof):
+            error = CompositionError("planted")
+            error.parts = tuple(k for k, part in enumerate(roof.parts) if part.type == "gable")
+            raise error
+        return real(roof, z_ground, settings)
+
+    return compose
+
+
+def test_a_part_that_cannot_be_composed_is_given_up_and_not_the_roof(monkeypatch):
+    def has_gable(roof):
+        return any(part.type == "gable" for part in roof.parts)
+
+    points = two_level_points()
+    monkeypatch.setattr("hiproof.compose.compose", refused(has_gable))
+    monkeypatch.setattr("hiproof.compose.simpler.compose", refused(has_gable))
+    building = hiproof.reconstruct(points, shapely.box(0, 0, 12, 8), settings=PLAIN)
+    assert building.status is Status.SIMPLIFIED
+    assert "(gable) was made level" in building.detail and "planted" in building.detail
+    assert check_solid(building.solid) == ()
+    heights = building.roof.height_at(np.array([[2.0, 4.0], [10.0, 4.0]]) - building.roof.frame.origin[:2])
+    gable, annex = heights + building.roof.frame.origin[2]
+    assert annex == pytest.approx(4.0, abs=0.02) and 6.6 < gable < 9.0
+
+
 def test_a_cloud_that_is_no_roof_is_called_poor():
     rng = np.random.default_rng(5)
     points = np.column_stack([rng.uniform((0, 0), (12, 8), (300, 2)), rng.uniform(0, 15, 300)])

@@ -38,7 +38,12 @@ class FitError(HiproofError):
 
 
 class CompositionError(HiproofError):
-    """A roof that cannot become a valid solid; the caller falls back to a simpler roof."""
+    """A roof that cannot become a valid solid; the caller falls back to a simpler roof.
+
+    `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not known.
+    """
+
+    parts: tuple[int, ...] = ()
 
 
 def is_interrupt(error: BaseException) -> bool:

@@ -374,15 +374,24 @@ def asked(terrain: Terrain, xy_world: np.ndarray) -> tuple[np.ndarray, str]:
 def solid_or_simpler(
     roof: Roof, points: np.ndarray, ground: Ground, fitted: Fitted, settings: Settings
 ) -> tuple[Roof, Solid | None, Fitted]:
-    """The roof as it is written and its checked solid, in the local frame; a flat block where it cannot become a valid one."""
-    from .compose import compose
+    """The roof as it is written and its checked solid, in the local frame.
+
+    Where it cannot become a valid one, parts that fail are given up, and in the end all are, for a flat block.
+    """
+    from .compose import compose, compose_simpler
     from .compose.settle import settled_roof
 
     roof, z_ground = settled_roof(roof), ground.z - roof.frame.origin[2]
     try:
         return roof, compose(roof, z_ground, settings), fitted
     except CompositionError as error:
-        why = f"{Status.SIMPLIFIED.value} ({error})"
+        failure = error
+    try:
+        simpler, solid, given_up = compose_simpler(roof, z_ground, points, failure, settings)
+        detail = f"{Status.SIMPLIFIED.value}: {given_up} ({failure})"
+        return simpler, solid, dataclasses.replace(fitted, parts=simpler.parts, status=Status.SIMPLIFIED, detail=detail)
+    except CompositionError as error:
+        why = f"{Status.SIMPLIFIED.value}: a flat block ({error})"
     fitted = flat(points, roof.outline, Status.SIMPLIFIED, why)
     roof = settled_roof(dataclasses.replace(roof, parts=fitted.parts))
     try:

@@ -8,7 +8,7 @@ class Status(Enum):
 
     MODELLED = "modelled: the roof follows its points"
     POOR_FIT = "modelled, but poorly: many of its points lie away from the roof; look at it before you use it"
-    SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a flat block stands in for it"
+    SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a simpler one stands in for it"
     FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
     BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"

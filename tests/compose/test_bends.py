@@ -69,3 +69,19 @@ def test_few_roofs_need_coarser_snapping():
         solid = composing.compose_at(problem, 0.0, options, options.snap_m, merge_walls=True)
         first += check_solid(solid, planarity_m=options.planarity_m) == ()
     assert first >= 97
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
+    """Turning in is for roofs that fail otherwise; of those that do not it changes no face and no height to speak of."""
+    options = Settings().compose
+    for seed in range(4):
+        problem = composing.plan_problem(generated(kind, seed))
+        plain, turned = (
+            composing.compose_at(problem, -2.0, options, options.snap_m, merge_walls=False, turn_in=turn)
+            for turn in (False, True)
+        )
+        assert [face.kind for face in plain.faces] == [face.kind for face in turned.faces]
+        if not check_solid(plain):
+            assert check_solid(turned) == ()
+        assert np.abs(plain.vertices - turned.vertices).max() < 2e-3

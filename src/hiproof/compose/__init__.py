@@ -1,12 +1,14 @@
 """From a fitted roof to a valid solid: plan cells -> levels -> closed shell, and the check every solid passes.
 
 settle            the roof made of exactly the numbers that are written of it
+simpler           parts given up one by one, where a roof cannot become a valid solid
 solid             `compose`: the steps below, one after the other; volume, terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid
 joined            sets that are joined, for it and for the check
 tidy              cells without steps a millimetre long
 levels            which heights meet over every vertex of the plan
+flat_corners      corners turned in where rounded heights would fold a face
 shell             roof, wall and ground faces that share them
 check             whether the result is valid by ISO 19107
 check_kernel      its compiled half
@@ -16,6 +18,7 @@ building_parts    a solid cut where its roofs meet, for formats that know buildi
 """
 
 from .check import Finding, check_solid
+from .simpler import compose_simpler
 from .solid import compose, terrain_intersection, volume
 
-__all__ = ["Finding", "check_solid", "compose", "terrain_intersection", "volume"]
+__all__ = ["Finding", "check_solid", "compose", "compose_simpler", "terrain_intersection", "volume"]

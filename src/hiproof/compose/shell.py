@@ -13,6 +13,7 @@ from ..errors import CompositionError
 from ..model import GROUND, ROOF, WALL, Face, Solid
 from .arrangement import COLLINEAR_UNITS, GRID_M, OUTSIDE
 from .cells import PlanCells, PlanProblem
+from .flat_corners import turn_flat_corners_in
 from .levels import first_saddle, split_at_crossings, stack_levels
 
 SETBACK_M = 0.01  # m that a crosswise corner is cut back by; ten times what makes two points one
@@ -44,14 +45,17 @@ def raise_shell(
     clearance_m: float,
     reach_m: float,
     merge_walls: bool = True,
+    turn_in: bool = False,
 ) -> Solid:
     """Solid over the plan cells. Raises Saddle where the problem needs a patch first, CompositionError when none helps.
 
     The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex. `merge_walls` makes one wall of
-    consecutive ones along a straight stretch of the outline.
+    consecutive ones along a straight stretch of the outline. `turn_in` moves flat corners into their cells.
     """
     planes = problem.planes
     xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reach_m / GRID_M)
+    if turn_in:
+        xy = turn_flat_corners_in(xy, edges, side, ties, reach_m / GRID_M)
     if len(edges) == 0:
         raise CompositionError(
             "expected an outline with an area, got one thinner than a millimetre; repair or remove the footprint"

@@ -12,12 +12,25 @@ from ..errors import CompositionError
 from ..model import Roof, Solid
 from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
-from .check import check_solid, flattened
+from .check import Finding, check_solid, flattened
 from .check_kernel import enclosed_volume
 from .shell import Saddle, raise_shell
 
-# factor on the snap distance and whether straight walls become one, tried in turn until the solid is valid
-ATTEMPTS = ((1.0, True), (1.0, False), (3.0, False), (10.0, False), (20.0, False), (30.0, False))
+# factor on the snap distance, whether straight walls become one and whether flat corners are turned in, tried in turn
+# until the solid is valid
+ATTEMPTS = (
+    (1.0, True, False),
+    (1.0, False, False),
+    (3.0, False, False),
+    (10.0, False, False),
+    (20.0, False, False),
+    (30.0, False, False),
+    (1.0, False, True),
+    (3.0, False, True),
+    (10.0, False, True),
+    (30.0, False, True),
+)
+LENIENT_M = 0.01  # val3dity's default planarity: steep planes cannot meet within less where vertices moved a centimetre
 MAX_PATCHES = 40  # crosswise corners mended in one building, so that it comes to an end
 
 
@@ -47,10 +60,12 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
             f"expected a finite ground height, got {z_ground_local}; take the lowest terrain under the outline"
         )
     problem = plan_problem(roof)
+    bent: list[Solid] = []
     failure = ""
-    for factor, merge_walls in ATTEMPTS:
+    parts: tuple[int, ...] = ()
+    for factor, merge_walls, turn_in in ATTEMPTS:
         try:
-            solid = compose_at(problem, z_ground_local, options, factor * options.snap_m, merge_walls)
+            solid = compose_at(problem, z_ground_local, options, factor * options.snap_m, merge_walls, turn_in)
         except CompositionError as error:
             failure = str(error)
             continue
@@ -58,18 +73,38 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
         if not findings:
             return solid
         failure = "; ".join(finding.message for finding in findings[:3])
-    raise CompositionError(f"expected the roof to become a valid solid, got: {failure}; fall back to a simpler roof")
+        parts = parts or parts_at_fault(solid, findings)
+        bent += [solid] if any(finding.code == 203 for finding in findings) else []
+    for solid in bent:
+        if not check_solid(solid, planarity_m=max(LENIENT_M, options.planarity_m)):
+            return solid
+    refusal = CompositionError(
+        f"expected the roof to become a valid solid, got: {failure}; fall back to a simpler roof"
+    )
+    refusal.parts = parts
+    raise refusal
+
+
+def parts_at_fault(solid: Solid, findings: tuple[Finding, ...]) -> tuple[int, ...]:
+    """The numbers of the roof parts whose faces have a finding, in ascending order."""
+    found = {solid.faces[finding.face].part for finding in findings if finding.face >= 0}
+    return tuple(sorted(found - {-1}))
 
 
 def compose_at(
-    problem: PlanProblem, z_ground: float, options: ComposeSettings, snap_m: float, merge_walls: bool
+    problem: PlanProblem,
+    z_ground: float,
+    options: ComposeSettings,
+    snap_m: float,
+    merge_walls: bool,
+    turn_in: bool = False,
 ) -> Solid:
     """One attempt at the given snap distance; corners where levels meet crosswise are set back one by one."""
     reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
     for _ in range(MAX_PATCHES):
         cells = arrange(problem, reach_m, options.min_face_area_m2, options.min_face_width_m)
         try:
-            return raise_shell(cells, problem, z_ground, options.ground_clearance_m, reach_m, merge_walls)
+            return raise_shell(cells, problem, z_ground, options.ground_clearance_m, reach_m, merge_walls, turn_in)
         except Saddle as saddle:
             problem = replace(problem, patches=[*problem.patches, saddle.patch])
     raise CompositionError("expected at most forty corners where roof levels meet crosswise, got more")

@@ -56,7 +56,8 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
     else:
         shape = shape_attributes(figures)
         roof_type = figures.roofer_type
-        mode = "lod11_fallback" if building.status in FALLBACKS else "standard"
+        is_block = building.status in FALLBACKS and len(building.parts) == 1
+        mode = "lod11_fallback" if is_block else "standard"
     return {
         "h_ground": metres(ground_height(building, figures)),
         **shape,

@@ -1,0 +1,66 @@
+"""Give up as little of a roof as possible where it cannot become a valid solid: one part after another, not the roof."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import CompositionError
+from ..model import Part, Piece, Roof, Solid
+from ..settings import Settings
+from .solid import compose
+
+NEAR_M = 0.2  # m; points so near a roof are on it, as in a building's quality
+
+
+def compose_simpler(
+    roof: Roof, z_ground_local: float, points: np.ndarray, failure: CompositionError, settings: Settings
+) -> tuple[Roof, Solid, str]:
+    """Compose the roof without the parts that fail, and say what was given up.
+
+    A part that fails is left out or made level, whichever leaves more of `points` (n, 3) on the roof and makes a valid
+    solid. Where that does not do, the next part follows. Raises CompositionError when only one part is left.
+    """
+    given_up: list[str] = []
+    while True:
+        options = sorted(simpler_roofs(roof, failure.parts, points), key=lambda option: -option[0])
+        if not options:
+            raise failure
+        for _, simpler, sentence in options:
+            try:
+                return simpler, compose(simpler, z_ground_local, settings), "; ".join([*given_up, sentence])
+            except CompositionError as error:
+                last = error
+        _, roof, sentence = options[0]
+        given_up, failure = [*given_up, sentence], last
+
+
+def simpler_roofs(roof: Roof, failing: tuple[int, ...], points: np.ndarray) -> Iterator[tuple[float, Roof, str]]:
+    """Yield (share of points on it, roof, what was given up) for each part that fails, or for all where none is known."""
+    if len(roof.parts) < 2:
+        return
+    for k in failing or range(len(roof.parts)):
+        part, others = roof.parts[k], (roof.parts[:k], roof.parts[k + 1 :])
+        name = f"part {k + 1} ({part.type})"
+        for stand_in, what in (((), "left out"), ((level_part(part, points),), "made level")):
+            if not (stand_in and part.type == "flat"):
+                simpler = replace(roof, parts=(*others[0], *stand_in, *others[1]))
+                yield share_near(simpler, points), simpler, f"{name} was {what}"
+
+
+def level_part(part: Part, points: np.ndarray) -> Part:
+    """Return a flat part in the place of `part`, at the median height of it over its points, or at its own height."""
+    z = part.height_at(points[:, :2])
+    z = points[np.isfinite(z) & (np.abs(z - points[:, 2]) < NEAR_M), 2]
+    height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)
+    pieces = tuple(Piece(piece.outline, np.array([[0.0, 0.0, height]])) for piece in part.pieces)
+    size: dict[str, float] = {name: part.parameters[name] for name in ("width", "length") if name in part.parameters}
+    return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], height]))
+
+
+def share_near(roof: Roof, points: np.ndarray) -> float:
+    """Return the share of points (n, 3) that lie on the roof; without any, the parts' number decides."""
+    off = np.abs(roof.height_at(points[:, :2]) - points[:, 2])
+    return float(np.mean(off < NEAR_M)) if len(points) else 0.0
