@@ -12,7 +12,7 @@ from hiproof.city import run as city_run
 from hiproof.city.executors import Processes
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
-from hiproof.errors import InputError, OutputError
+from hiproof.errors import InputError, InputWarning, OutputError
 
 
 def said(path):
@@ -43,9 +43,19 @@ def test_secrets_are_masked_in_messages_arguments_and_tracebacks(tmp_path, capsy
         raise ValueError("https://u:s3cret@host")
     except ValueError:
         log.LOGGER.error("at %s", "postgresql://u:s3cret@host", exc_info=True)
-    warnings.warn("https://u:s3cret@host/a.laz is odd")
+    warnings.warn("https://u:s3cret@host/a.laz is odd", InputWarning)
     told = capsys.readouterr().err + (tmp_path / "run.log").read_text()
     assert told.count("Traceback") == told.count("is odd") == 2 and "s3cret" not in told
+
+
+def test_what_other_packages_say_is_for_debugging_alone(tmp_path, capsys):
+    """NumPy's warnings and rasterio's remarks in their own words help nobody who did not write this."""
+    for level, shown in (("warning", 0), ("debug", 1)):
+        log.start(log.Level(level), tmp_path / f"{level}.log")
+        warnings.warn(f"invalid value encountered in {level}", RuntimeWarning)
+        logging.getLogger("rasterio._env").warning("CPLE_AppDefined in a.tif")
+        told = capsys.readouterr().err
+        assert told.count("invalid value encountered") == told.count("CPLE_AppDefined") == shown
 
 
 def test_starting_again_adds_to_the_file_and_repeats_nothing(tmp_path, capsys):
@@ -64,7 +74,7 @@ def test_a_file_that_cannot_be_written_gets_one_sentence(tmp_path):
 def test_workers_write_to_the_same_places(tmp_path, capfd):
     log.start(file=tmp_path / "run.log")
     executor = Processes(1)
-    list(executor.run(warnings.warn, [("3 points of https://u:s3cret@host were left out",)]))
+    list(executor.run(warnings.warn, [("3 points of https://u:s3cret@host were left out", InputWarning)]))
     executor.close()
     assert said(tmp_path / "run.log") == [("WARNING", "3 points of https://u:...@host were left out")]
     assert capfd.readouterr().err == "hiproof: 3 points of https://u:...@host were left out\n"
@@ -107,6 +117,6 @@ def test_the_library_itself_sets_nothing_up():
 def test_lines_of_several_workers_stay_whole(tmp_path):
     log.start(file=tmp_path / "run.log")
     executor = Processes(2)
-    list(executor.run(warnings.warn, [(f"task {i}",) for i in range(40)]))
+    list(executor.run(warnings.warn, [(f"task {i}", InputWarning) for i in range(40)]))
     executor.close()
     assert sorted(said(tmp_path / "run.log")) == sorted(("WARNING", f"task {i}") for i in range(40))

@@ -13,7 +13,7 @@ import warnings
 from enum import StrEnum
 from pathlib import Path
 
-from .errors import OutputError
+from .errors import HiproofWarning, OutputError
 from .masking import masked
 
 LOGGER = logging.getLogger("hiproof")
@@ -56,6 +56,14 @@ class Console(logging.Handler):
         print(self.format(record), file=sys.stderr, flush=True)
 
 
+class Elsewhere(logging.Handler):
+    """What other packages log, in their own words: for `debug` alone, and not straight to standard error."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not record.name.startswith(LOGGER.name):
+            LOGGER.debug("%s: %s", record.name, record.getMessage())
+
+
 def start(level: Level = Level.warning, file: Path | None = None) -> None:
     """Show the log of `level` and above on standard error, and keep that of `info` and above (`debug`, if that is the
     level) at the end of `file`. What was started before ends. Raises OutputError where the file cannot be written."""
@@ -75,6 +83,9 @@ def start(level: Level = Level.warning, file: Path | None = None) -> None:
     for handler in handlers:
         LOGGER.addHandler(handler)
     LOGGER.setLevel(min(handler.level for handler in handlers))
+    root = logging.getLogger()
+    if not any(isinstance(handler, Elsewhere) for handler in root.handlers):
+        root.addHandler(Elsewhere())
     warnings.showwarning = log_warning
 
 
@@ -96,5 +107,6 @@ def started() -> tuple:
 def log_warning(
     message: Warning | str, category: type, filename: str, lineno: int, file: object = None, line: str | None = None
 ) -> None:
-    """A warning as users read it: the sentence alone, without the place in the source."""
-    LOGGER.warning(" ".join(str(message).split()))
+    """A warning as users read it: the sentence alone, without the place in the source. Other packages' are for `debug`."""
+    level = logging.WARNING if issubclass(category, HiproofWarning) else logging.DEBUG
+    LOGGER.log(level, " ".join(str(message).split()))

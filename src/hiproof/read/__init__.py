@@ -18,6 +18,8 @@ crs           reference systems and their units
 axes          what no roof can be built in is refused
 footprints    building polygons; `read_footprints`
 attribute_columns  their attributes as they are declared
+layers        the layers of a vector file
+wkb           its geometries, surfaces in space among them
 polygons      polygons put right
 database      footprints from PostGIS
 overlap       whether footprints lie where the cloud does

@@ -19,6 +19,7 @@ import shapely
 from ..errors import InputError
 from ..extras import needed
 from ..masking import masked
+from .wkb import as_polygons, geometry_of
 
 SCHEMES = ("postgresql", "postgres")
 ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")  # whose user and password, where it has any, are whole
@@ -87,9 +88,11 @@ class Table:
 
     def rows(self) -> Iterator[tuple]:
         """(geometry or None, attributes) ordered by their own content, so that storage does not matter."""
-        self.query("select ST_AsEWKB({g}) as ewkb, to_jsonb(t) - {n} as attributes from {t} order by 2, 1")
+        self.query(
+            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, to_jsonb(t) - {n} as attributes from {t} order by 2, 1"
+        )
         for ewkb, attributes in self.cursor:
-            yield (shapely.from_wkb(bytes(ewkb)) if ewkb is not None else None), attributes
+            yield (geometry_of(as_polygons(bytes(ewkb))) if ewkb is not None else None), attributes
 
     def srids(self) -> set[int]:
         self.query("select distinct ST_SRID({g}) from {t}")

@@ -22,9 +22,11 @@ from ..settings import Settings
 from .attribute_columns import as_declared, where_known
 from .crs import described, names_heights_alone, names_place, parse_crs, same_horizontal, units_of, way_between
 from .database import is_database, read_table, table_crs
+from .layers import list_layers, source_of
 from .overlap import refuse_degrees, told_box
-from .polygons import simple_polygons
+from .polygons import is_surface, simple_polygons
 from .remote import is_url
+from .wkb import geometries_of
 
 UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefined SRS")
 """What GDAL calls the CRSs -1, 0 and 99999 of a GeoPackage, which has to name one."""
@@ -60,10 +62,11 @@ def read_footprints(
     attributes = attribute_rows(list(meta["fields"]), columns, len(geometries))
     ids = feature_ids(attributes, numbers, id_attribute, path)
     source = plan_crs(meta["crs"])
+    surfaces = np.array([is_surface(geometry) for geometry in geometries])
     geometries = transformed(geometries, source, target, path)
     units = units_of(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
-    footprints = tuple(unique_ids(split_features(ids, geometries, attributes, path), path))
+    footprints = tuple(unique_ids(split_features(ids, geometries, surfaces, attributes, path), path))
     say_which_overlie(footprints, path)
     return footprints if bbox is None else tuple(f for f in footprints if meets(f.polygon, bbox, units))
 
@@ -77,8 +80,8 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
     if is_database(path):
         return plan_crs(table_crs(str(path)))
-    layer = one_layer(path, layer)
-    return plan_crs(reading(lambda: pyogrio.read_info(str(path), layer=layer), path)["crs"])
+    source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
+    return plan_crs(reading(lambda: pyogrio.read_info(source, layer=layer), path)["crs"])
 
 
 def plan_crs(text: str | None) -> CRS | None:
@@ -91,7 +94,7 @@ def one_layer(path: str | Path, layer: str | int | None) -> str | int | None:
     """`layer`, or the only layer of a file that holds geometries. Raises InputError, listing them, where several do."""
     if layer is not None:
         return layer
-    named = reading(lambda: pyogrio.list_layers(str(path)), path)
+    named = reading(lambda: list_layers(str(path)), path)
     layers = [name for name, geometry in named if geometry is not None]
     if len(layers) > 1:
         raise InputError(
@@ -115,11 +118,11 @@ def read_features(
     if is_database(path):
         return read_table(str(path), where)
     refuse_missing(path)
-    layer = one_layer(path, layer)
-    info = reading(lambda: pyogrio.read_info(str(path), layer=layer), path)
+    source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
+    info = reading(lambda: pyogrio.read_info(source, layer=layer), path)
     chosen = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
     meta, numbers, wkb, columns = reading(
-        lambda: pyogrio.raw.read(str(path), layer=layer, return_fids=True, datetime_as_string=True, **chosen),
+        lambda: pyogrio.raw.read(source, layer=layer, return_fids=True, datetime_as_string=True, **chosen),
         path,
         info,
     )
@@ -132,7 +135,7 @@ def read_features(
         )
     if not len(wkb):
         raise InputError(f"expected footprints in {path}, got a layer without features; name another file or layer")
-    geometries = shapely.from_wkb(wkb, on_invalid="fix")
+    geometries = geometries_of(wkb)
     kinds = {g.geom_type for g in geometries if g is not None}
     if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
         raise InputError(
@@ -142,7 +145,7 @@ def read_features(
     def known_of(name: str) -> np.ndarray:
         # of all columns: in some formats those left out are empty to the condition as well
         known = {**chosen, "layer": layer, "where": where_known(name, where)}
-        told, _, _, values = reading(lambda: pyogrio.raw.read(str(path), read_geometry=False, **known), path, info)
+        told, _, _, values = reading(lambda: pyogrio.raw.read(source, read_geometry=False, **known), path, info)
         return values[list(told["fields"]).index(name)]
 
     return meta, numbers, geometries, as_declared(meta["fields"], meta["dtypes"], columns, known_of)
@@ -182,7 +185,7 @@ def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | No
             f"expected --where in SQL on the attributes of {path} ({names}), got: {told}; use these names"
         ) from error
     except DataLayerError as error:
-        layers = ", ".join(str(name) for name, _ in pyogrio.list_layers(str(path)))
+        layers = ", ".join(str(name) for name, _ in list_layers(str(path)))
         raise InputError(f"expected a layer of {path} (it has {layers}), got: {error}; use one of these") from error
     except (DataSourceError, OSError, RuntimeError) as error:
         raise unreadable(path, error) from error
@@ -294,12 +297,17 @@ def advice_on(source: CRS) -> str:
 
 
 def split_features(
-    ids: list[str], geometries: np.ndarray, attributes: list[dict[str, Any]], path: str | Path
+    ids: list[str],
+    geometries: np.ndarray,
+    surfaces: np.ndarray,
+    attributes: list[dict[str, Any]],
+    path: str | Path,
 ) -> list[Footprint]:
+    """Footprints of features, several of one whose polygons stand apart; `surfaces` (n,) are faces of one body each."""
     footprints, mended, empty, split = [], 0, 0, []
-    invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries))
-    for id, geometry, row, was_invalid in zip(ids, geometries, attributes, invalid, strict=True):
-        polygons = [clockwise(polygon) for polygon in simple_polygons(geometry)]
+    invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries) | surfaces)
+    for id, geometry, is_one, row, was_invalid in zip(ids, geometries, surfaces, attributes, invalid, strict=True):
+        polygons = [clockwise(polygon) for polygon in simple_polygons(geometry, is_one)]
         mended += bool(was_invalid and not polygons[0].is_empty)
         empty += polygons[0].is_empty
         if len(polygons) == 1:
@@ -311,6 +319,9 @@ def split_features(
     if split:
         many = counted(len(split), "feature") + " of several polygons"
         warnings.warn(f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...", InputWarning)
+    if surfaces.any():
+        bodies = counted(int(surfaces.sum()), "feature") + " of faces in space"
+        warnings.warn(f"{path}: {bodies}; the area that they cover from above is the outline", InputWarning)
     if mended:
         warnings.warn(f"{path}: {counted(mended, 'invalid footprint')} repaired", InputWarning)
     if empty:

@@ -10,16 +10,19 @@ from .plausible import is_plausible
 
 SLIVER_SHARE = 0.01  # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
 SLIVER_M2 = 0.5  # m2; what repairing a polygon leaves beside it, less than any building
+JOIN_M = 0.001  # m; faces of one body that are as far apart were one before they were rounded
+LEVEL = 0.01  # units of height that a flat outline's heights may differ by
 DEGENERATE_M2 = 1e-6  # m2; numerically nothing
 WIDEST_M = 4000.0  # beyond any building; what is kept of terrain around one grows with the square of it
 MOST_MEETINGS = 20_000  # of edges that follow not on one another: mending takes time for each
 EDGES_A_LOOK = 256  # edges looked up at once: memory stays small for outlines of any length
 
 
-def simple_polygons(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
+def simple_polygons(geometry: shapely.Geometry | None, is_body: bool = False) -> list[shapely.Polygon]:
     """The valid polygons of any geometry, heights left out; one empty polygon where it encloses no area.
 
     A self-intersecting polygon is repaired (its holes and loops kept as areas), and slivers of the repair dropped.
+    Polygons that overlap are one, and so are all that touch where they are faces of a body.
 
     >>> bow_tie = shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])
     >>> sorted(p.area for p in simple_polygons(bow_tie))
@@ -27,8 +30,43 @@ def simple_polygons(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
     >>> simple_polygons(shapely.Point(1, 1))
     [<POLYGON EMPTY>]
     """
-    flat = [polygon for member in polygons_in(geometry) for polygon in repaired(shapely.force_2d(member))]
+    members = [shapely.force_2d(member) for member in polygons_in(geometry)]
+    if is_body:  # walls stand on a line
+        members = [member for member in members if member.area > DEGENERATE_M2]
+    flat = [polygon for member in members for polygon in repaired(member)]
+    if is_body or overlap(flat):
+        flat = united(flat)
     return flat or [shapely.Polygon()]
+
+
+def is_surface(geometry: shapely.Geometry | None) -> bool:
+    """Whether the polygons of a geometry are faces in space: several, and not all at one height."""
+    if geometry is None or not shapely.has_z(geometry) or len(polygons := polygons_in(geometry)) < 2:
+        return False
+    z = shapely.get_coordinates(polygons, include_z=True)[:, 2]
+    z = z[np.isfinite(z)]
+    return len(z) > 0 and float(np.ptp(z)) > LEVEL
+
+
+def overlap(polygons: list[shapely.Polygon]) -> bool:
+    """Whether any two valid polygons share more than a border."""
+    if len(polygons) < 2:
+        return False
+    first, second = shapely.STRtree(polygons).query(polygons, predicate="intersects")
+    pairs = np.array(polygons)[np.stack([first, second])[:, first < second]]
+    return bool((shapely.area(shapely.intersection(*pairs)) > DEGENERATE_M2).any())
+
+
+def united(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
+    """What polygons cover together, without the hairline gaps that rounding leaves between faces."""
+    whole = shapely.simplify(shapely.union_all(polygons, grid_size=JOIN_M), JOIN_M)
+    parts = [part for part in polygons_in(whole) if part.area > SLIVER_M2]
+    return [shapely.Polygon(part.exterior, [hole for hole in part.interiors if is_hole(hole)]) for part in parts]
+
+
+def is_hole(ring: shapely.LinearRing) -> bool:
+    """Whether a hole is larger than what gaps between faces leave."""
+    return shapely.Polygon(ring).area > SLIVER_M2
 
 
 def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
