@@ -6,8 +6,8 @@ python docs/draw_primitives.py
 from pathlib import Path
 
 from hiproof.draw.primitives import primitive_svg
-from hiproof.parametric.shape import names_of
 from hiproof.primitives import CATALOGUE
+from hiproof.primitives.parameters import names_of
 
 FOLDER = Path(__file__).parent / "primitives"
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from hiproof.draw.primitives import measures, primitive_svg, typical_building, typical_parameters
-from hiproof.parametric.shape import names_of
 from hiproof.primitives import CATALOGUE
+from hiproof.primitives.parameters import names_of
 
 draw = importlib.import_module("docs.draw_primitives")
 LEVEL = 1e-9

@@ -376,14 +376,16 @@ def solid_or_simpler(
 ) -> tuple[Roof, Solid | None, Fitted]:
     """The roof as it is written and its checked solid, in the local frame.
 
-    Where it cannot become a valid one, parts that fail are given up, and in the end all are, for a flat block.
+    Where it cannot become a valid one that can be read again, parts that fail are given up, and in
+    the end all are, for a flat block.
     """
     from .compose import compose, compose_simpler
+    from .compose.readable import compose_readable
     from .compose.settle import settled_roof
 
     roof, z_ground = settled_roof(roof), ground.z - roof.frame.origin[2]
     try:
-        return roof, compose(roof, z_ground, settings), fitted
+        return roof, compose_readable(roof, z_ground, settings), fitted
     except CompositionError as error:
         failure = error
     try:

@@ -20,8 +20,8 @@ from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.file import opened_parameters
 from hiproof.parametric.run import build_file
 from hiproof.parametric.schema import schema, schema_text
-from hiproof.parametric.shape import names_of
 from hiproof.primitives import CATALOGUE
+from hiproof.primitives.parameters import names_of
 from hiproof.simulate import demo_files
 
 FILES = ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")

@@ -10,6 +10,7 @@ import shapely
 from hiproof.errors import FitError
 from hiproof.primitives import CATALOGUE, get
 from hiproof.primitives.family import KIN, SHAPES, Member, member_of, name_among, planes_of
+from hiproof.primitives.parameters import refuse_no_shape
 from union_scenes import lowest_of, member_of_shape, rectangle_of
 
 SHAPE_NAMES = [name for name, _ in SHAPES.values()]
@@ -74,6 +75,37 @@ def test_planes_follow_from_written_parameters_to_a_millimetre(shape):
         planes = planes_of(member.name, written, round(kappa, 6), np.round(translation, 6))
         xy = over_plan(member)
         assert lowest_of(planes, xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-3)
+
+
+def short_of_a_run():
+    """Members with a slope that runs over nothing: its rectangle ends where it begins."""
+    half, inf = np.array([6.0, 4.0]), np.inf
+    up_to_the_top = Member(
+        0.4, np.zeros(2), half, np.array([inf, inf, 5.0, inf]), np.array([0, 0, 0.3, 0]), 5.0 + 1e-11
+    )
+    for gap in (0.0, 1e-9, 1e-7, 1e-5):
+        yield replace(up_to_the_top, top=5.0 + gap)
+        yield replace(
+            up_to_the_top, eaves=np.array([inf, inf, 5.0, 5.0]), slopes=np.array([0, 0, 0.3, 0.3]), top=5.0 + gap
+        )
+        # the ridge lies on the eave in front, or just behind the other
+        yield Member(
+            -1.0, np.ones(2), half, np.array([inf, inf, 5.0, 5.0 - 8.0 * 0.5 + gap]), np.array([0, 0, 2.0, 0.5])
+        )
+        yield Member(
+            -1.0, np.ones(2), half, np.array([inf, inf, 5.0 - 8.0 * 0.5 + gap, 5.0]), np.array([0, 0, 0.5, 2.0])
+        )
+
+
+def test_what_runs_over_nothing_is_written_so_that_it_can_be_read():
+    """Slopes do not follow from lengths of nothing: such a member is given side by side."""
+    for member in short_of_a_run():
+        words, kappa, place = member.describe()
+        written = {name: round(value, 6) for name, value in words.items()}
+        refuse_no_shape(member.name, written, "part 0")
+        planes = planes_of(member.name, written, kappa, place)
+        at = np.column_stack([over_plan(member), np.ones(200)])
+        assert (at @ planes.T).min(axis=1) == pytest.approx((at @ member.planes().T).min(axis=1), abs=1e-3)
 
 
 @each_shape

@@ -8,9 +8,9 @@ from handmade import gable_house, modelled, unmodelled
 from hiproof.cli.attributes import attributes as print_attributes
 from hiproof.evaluate.evaluation import BuildingFigures, Comparison
 from hiproof.frames import METRES, Units
-from hiproof.parametric.shape import names_of, side_by_side_names
 from hiproof.primitives import CATALOGUE
 from hiproof.primitives.family import COMPONENTS
+from hiproof.primitives.parameters import names_of, side_by_side_names
 from hiproof.write import write_all
 from hiproof.write.attribute_list import (
     EVALUATION,

@@ -131,7 +131,7 @@ def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[sh
     surfaces = surfaces_of(xyz - origin)
     roofs, bonds = roofs_of(surfaces), bonds_of(surfaces)
     houses = [
-        shapely.intersection(house, block)
+        with_area(shapely.intersection(house, block))
         for block in without_necks(shapely.transform(area, lambda xy: xy - origin[:2]), gap_m, roofs)
         for house in houses_in(shapely.buffer(block, gap_m, join_style="mitre"), roofs, bonds)
     ]
@@ -382,4 +382,4 @@ def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geo
 
 def joined(areas: list[shapely.Geometry]) -> shapely.Geometry:
     """The union of polygons that share nothing but border."""
-    return shapely.union_all(areas, grid_size=GRID_M) if len(areas) > 1 else areas[0]
+    return with_area(shapely.union_all(areas, grid_size=GRID_M)) if len(areas) > 1 else areas[0]

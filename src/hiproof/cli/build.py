@@ -13,8 +13,8 @@ from .options import with_settings
 
 def print_shapes(wanted: bool) -> None:
     if wanted:
-        from ..parametric.shape import names_of
         from ..primitives.catalogue import CATALOGUE
+        from ..primitives.parameters import names_of
 
         for name in CATALOGUE:
             typer.echo(f"{name}: {', '.join(names_of(name))}")

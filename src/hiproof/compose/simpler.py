@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import CompositionError
 from ..model import Part, Piece, Roof, Solid
 from ..settings import Settings
-from .solid import compose
+from .readable import compose_readable
 
 NEAR_M = 0.2  # m; points so near a roof are on it, as in a building's quality
 
@@ -30,7 +30,7 @@ def compose_simpler(
             raise failure
         for _, simpler, sentence in options:
             try:
-                return simpler, compose(simpler, z_ground_local, settings), "; ".join([*given_up, sentence])
+                return simpler, compose_readable(simpler, z_ground_local, settings), "; ".join([*given_up, sentence])
             except CompositionError as error:
                 last = error
         _, roof, sentence = options[0]
@@ -56,7 +56,9 @@ def level_part(part: Part, points: np.ndarray) -> Part:
     z = points[np.isfinite(z) & (np.abs(z - points[:, 2]) < NEAR_M), 2]
     height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)
     pieces = tuple(Piece(piece.outline, np.array([[0.0, 0.0, height]])) for piece in part.pieces)
-    size: dict[str, float] = {name: part.parameters[name] for name in ("width", "length") if name in part.parameters}
+    size: dict[str, float] = {
+        name: part.parameters[name] for name in ("width", "length") if part.parameters.get(name, 0.0) > 0.0
+    }
     return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], height]))
 
 

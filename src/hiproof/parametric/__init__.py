@@ -3,7 +3,6 @@
 file        parameters.jsonl read line by line, its head and its errors by line and column
 schema      the JSON schema of that file
 record      the JSON object of one building checked, and its parts made
-shape       whether parameters make a shape
 building    the object built: composed, checked, measured, as a run does
 run         a file of parameters into the files of a run
 change      one part changed: another type, a height, a side

@@ -15,9 +15,9 @@ import shapely
 from ..errors import InputError
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import Member, member_of
+from ..primitives.parameters import SIDED
 from ..rings import enclosed
 from .record import measure, place
-from .shape import SIDED
 
 PLAN = ("width", "length")
 USUAL_PITCH = 0.5  # rise by run of a roof made of a flat one

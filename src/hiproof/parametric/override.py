@@ -23,6 +23,7 @@ import numpy as np
 import shapely
 
 from .. import stages
+from ..compose.readable import MOST_PARTS
 from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
@@ -34,7 +35,7 @@ from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import built
-from .record import MOST_PARTS, mapping, number, numbers_by_name, place, polygon, shown
+from .record import mapping, number, numbers_by_name, place, polygon, shown
 from .refit import measured
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")

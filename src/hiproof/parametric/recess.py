@@ -54,7 +54,7 @@ def moved_along(part: dict[str, Any], old: shapely.Geometry, new: shapely.Geomet
     shared = with_area(shapely.intersection(covered(with_sizes(part)), old, grid_size=GRID_M))
     if shared.area < LEAST_M2 or roofed_by(part).intersection(shared).area > CLEAR * shared.area:
         return part
-    whole = shapely.union(roofed_by(part), shared, grid_size=GRID_M)
+    whole = with_area(shapely.union(roofed_by(part), shared, grid_size=GRID_M))
     return leaving_out({**part, "outlines": rings_of(whole)}, new)
 
 

@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import shapely
 
+from ..compose.readable import refuse_many, refuse_wrong_parts
 from ..compose.settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, settled, settled_outline, settled_sigma
 from ..errors import InputError
 from ..frames import LocalFrame
 from ..model import Building, Part, Quality, Roof
+from ..primitives.parameters import refuse_no_shape
 from ..rings import enclosed
 from ..status import Status
 from ..write.attribute_list import PARAMETERS, PART
-from .shape import refuse_no_shape
 
-MOST_PARTS = 1000  # parts of a building; a cathedral has some hundred, a slip in a program any number
 WIDEST_M = 1e5  # of any number of a part, and of heights
 MOST = 1e15  # of any number
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
@@ -92,12 +92,12 @@ def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | N
     """The roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
         raise InputError("expected an outline and an origin of a building with parts, got null; give both")
-    if len(parts) > MOST_PARTS:
-        raise InputError(f"expected at most {MOST_PARTS} parts, got {len(parts)}; split the building")
+    refuse_many(parts)
     outline = on_grid(outline)
     made = [part_of(part, outline, f"part {index}") for index, part in enumerate(parts)]
-    refuse_alike(parts)
-    return Roof(tuple(made), outline, LocalFrame(rounded(origin, DIGITS)))
+    roof = Roof(tuple(made), outline, LocalFrame(rounded(origin, DIGITS)))
+    refuse_wrong_parts(roof)
+    return roof
 
 
 def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
@@ -114,8 +114,6 @@ def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
         outlines = by_teeth(outlines, parameters, position, kappa)
     outlines = [rounded_outline(o) for o in outlines]
     pieces = pieces_of(kind, parameters, kappa, position, outlines)
-    if not all(np.isfinite(piece.planes).all() for piece in pieces):
-        raise InputError(f"expected parameters that make finite planes, got others in {where}; check their sizes")
     sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {where}")
     sigma = {("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s) for n, s in sigma.items()}
     return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
@@ -131,12 +129,8 @@ def outlines_of(
 ) -> list[shapely.Polygon]:
     """Where a part roofs the building: the outlines given, else its rectangle's share of the building's outline."""
     if record.get("outlines") is None:
-        found = rectangle_within(parameters, position, kappa, outline, where)
-    else:
-        found = [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
-    if not any(shapely.intersects(piece, outline) for piece in found):
-        raise InputError(f"expected {where} to roof some of the building's outline, got one outside it; move it there")
-    return found
+        return rectangle_within(parameters, position, kappa, outline, where)
+    return [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
 
 
 def rectangle_within(
@@ -173,15 +167,6 @@ def by_teeth(
             found = shapely.get_parts(shapely.intersection(strip, enclosed(outline), grid_size=1e-4))
             cut += [g for g in found if g.geom_type == "Polygon"]
     return cut
-
-
-def refuse_alike(parts: list) -> None:
-    """Raise InputError where one part stands there twice."""
-    seen: dict[str, int] = {}
-    for index, part in enumerate(parts):
-        told = repr([part.get(key) for key in PART_KEYS if key != "sigma"])
-        if seen.setdefault(told, index) != index:
-            raise InputError(f"expected parts that differ, got part {index} the same as part {seen[told]}; remove one")
 
 
 def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:

@@ -18,11 +18,11 @@ import shapely
 from ..compose.settle import pieces_of
 from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
+from ..primitives.parameters import SIDED
 from ..settings import Settings
 from ..status import Status
 from ..write.parameters import building_record
 from .edit import built
-from .shape import SIDED
 
 HELD = ("width", "length", "teeth", "skew", "facing", "distance")  # parameters, or beginnings of their names
 STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian

@@ -30,6 +30,9 @@ from .drawing import drawn_slope
 # places in theta (9,): centre, rotation, half sizes, and four numbers of the shape
 CX, CY, KAPPA, HALF_WIDTH, HALF_LENGTH, Q0, Q1, Q2, Q3 = range(9)
 SLOPE_MIN, SLOPE_MAX = 0.04, 2.75  # 2 and 70 degrees: steeper planes swallow facade points
+LEAST_M = 1e-3  # Shortest length (m) of a parameter. Shorter ones are numerical noise.
+WRITTEN_DIGITS = 6  # Digits of a length (m) in files of parameters: micrometres.
+SLOPE_SHARE = 1e-3  # Largest error of a slope or a share that rounded parameters may cause.
 LEFT, RIGHT, FRONT, BACK, LEVEL = range(5)  # the side that a plane rises from: -u, +u, -v, +v, none
 
 Plane = tuple[Formula | float, Formula | float, Formula | float]
@@ -217,9 +220,19 @@ class Primitive:
         return [measure.at(shape) for measure in (*self.measures.values(), self.eave)]
 
     def is_proper(self, theta: np.ndarray) -> bool:
-        """Whether every length is positive: no ridge or top of negative length."""
+        """Whether all lengths are positive, and rounded parameters make the same slopes.
+
+        Slopes over a run of less than a millimetre do not follow from lengths in micrometres.
+        """
         theta_p, _, _ = self.from_theta(theta)
-        return all(value > 0 for name, value in theta_p.items() if name not in self.signed)
+        if any(value < LEAST_M for name, value in theta_p.items() if name not in self.signed):
+            return False
+        try:
+            again = self.shape({name: round(value, WRITTEN_DIGITS) for name, value in theta_p.items()})
+        except ZeroDivisionError:
+            return False
+        slopes = zip(again[Q1 - HALF_WIDTH :], theta[Q1 : self.theta_size].tolist(), strict=False)
+        return all(abs(after - before) <= SLOPE_SHARE * (1.0 + abs(before)) for after, before in slopes)
 
     def canonical_theta(self, theta: np.ndarray) -> np.ndarray:
         """The same surface's one theta: axes in their fixed roles, kappa in (-pi/2, pi/2] or (-pi, pi]."""

@@ -12,7 +12,7 @@ import numpy as np
 import shapely
 
 from ..model import ROOF, Building, Face, Model, Part, Roof
-from ..rings import enclosed
+from ..rings import enclosed, with_area
 
 SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
 GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
@@ -33,7 +33,7 @@ def shown_areas(building: Building) -> list[shapely.Geometry]:
     """
     if building.built is None:
         return []
-    united = [shapely.union_all(areas, grid_size=GRID_M) for areas in shown_pieces(building.built)]
+    united = [with_area(shapely.union_all(areas, grid_size=GRID_M)) for areas in shown_pieces(building.built)]
     return shapely.transform(np.array(united, object), building.roof.frame.to_world).tolist()
 
 

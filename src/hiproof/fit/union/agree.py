@@ -97,6 +97,9 @@ def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked]
     """
     held, told, basis = np.zeros((0, len(start))), np.zeros((0, len(start))), np.eye(len(start))
     best = free = fitted(members, basis, start, scene)
+    if not math.isfinite(free.cost):  # improper: members keep their planes until a proper fit is found
+        rows = [member.rows for member in members]
+        best = Fit(start, free.covariance, rows, cost_of_rows(members, rows, scene))
     while asked:
         later, before = [], len(held)
         for one in asked:
@@ -251,7 +254,13 @@ def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: S
         every = own @ unknowns
         every[absent] = np.nan
         rows = np.split(every, ends)
-    cost = sum(cost_of(own, member.points, scene.dead, scene.width) for member, own in zip(members, rows, strict=True))
+    cost = cost_of_rows(members, rows, scene)
     if not all(proper(own, member.walls) for member, own in zip(members, rows, strict=True)):
         cost = np.inf
     return Fit(unknowns, inverse * misfit / max(total, 1.0), rows, cost)
+
+
+def cost_of_rows(members: list[Member], rows: list[np.ndarray], scene: Scene) -> float:
+    """What the points of members cost under their planes `rows` (k, 3)."""
+    pairs = zip(members, rows, strict=True)
+    return float(sum(cost_of(own, member.points, scene.dead, scene.width) for member, own in pairs))

@@ -80,7 +80,10 @@ def registered(planes: Planes, rows: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def showing(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Which planes (k,) are not everywhere above some single other one over the regions' corners `at` (n, 3), u, v, 1."""
+    """Which planes (k,) are not everywhere above some single other one.
+
+    `at` (n, 3) are u, v, 1 of the regions' corners. Where only planes over walls show, the lowest other plane stays: a shape has one.
+    """
     there = np.isfinite(rows[:, 2])
     if there.sum() < 2:
         return there
@@ -88,6 +91,8 @@ def showing(rows: np.ndarray, at: np.ndarray) -> np.ndarray:
     above = (z[None] <= z[:, None] + 1e-9).all(axis=2).tolist()  # [k][j]: plane k nowhere below plane j
     for k in np.nonzero(there)[0].tolist():
         there[k] = not any(above[k][j] for j in np.nonzero(there)[0].tolist() if j != k)
+    if not there[: LEVEL + 1].any():
+        there[np.nanargmin(z[: LEVEL + 1].mean(axis=1))] = True
     return there
 
 

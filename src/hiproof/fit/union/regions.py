@@ -8,7 +8,7 @@ import numpy as np
 import shapely
 
 from ...model import Part
-from ...rings import GRID_M
+from ...rings import GRID_M, with_area
 from .apart import IN_LINE_M
 from .finish import Planes
 from .objective import misfits
@@ -70,7 +70,7 @@ def places_of(
 
 def runs_on(one: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polygon, plan: Plan) -> bool:
     """Whether a roof may run on from one place to another under what stands between: no yard, nor a house in a row with them."""
-    both = shapely.union(one, other, grid_size=GRID_M)
+    both = with_area(shapely.union(one, other, grid_size=GRID_M))
     between = shapely.difference(shapely.convex_hull(both), both)
     if shapely.intersection(between, outline).area <= ROOFED * between.area:
         return False
@@ -135,8 +135,8 @@ def cut_out(polygons: list[shapely.Polygon], hole: shapely.Polygon) -> list[shap
 
 
 def area_of(parts: Iterable[Part]) -> shapely.Geometry:
-    """What parts cover together."""
-    return shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M)
+    """What parts cover together, without the lines to which slivers shrink on the grid."""
+    return with_area(shapely.union_all([piece.outline for part in parts for piece in part.pieces], grid_size=GRID_M))
 
 
 def besides(parts: Iterable[Part], some: Iterable[Part]) -> list[Part]:
@@ -154,15 +154,12 @@ def gaps_filled(
     scene: Scene,
 ) -> list[list]:
     """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
-    rest = shapely.difference(outline, shapely.union_all(quads[1:], grid_size=GRID_M), grid_size=GRID_M)
+    rest = shapely.difference(outline, with_area(shapely.union_all(quads[1:], grid_size=GRID_M)), grid_size=GRID_M)
     for gap in polygons_of(rest):
         near, k, q = shares_most(gap, [[], *regions[1:]])
         if k > 0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], plan, scene)):
-            merged = polygons_of(
-                shapely.intersection(
-                    shapely.union_all([regions[k][q], near], grid_size=GRID_M), outline, grid_size=GRID_M
-                )
-            )
+            wider = with_area(shapely.union_all([regions[k][q], near], grid_size=GRID_M))
+            merged = polygons_of(shapely.intersection(wider, outline, grid_size=GRID_M))
             if len(merged) == 1:
                 regions[k][q] = merged[0]
                 regions[0] = cut_out(regions[0], near)

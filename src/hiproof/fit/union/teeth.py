@@ -247,8 +247,8 @@ def laid_out(feet: np.ndarray, ground: Ground) -> np.ndarray:
 def cut(pieces: tuple[Piece, ...], breaks: np.ndarray, ground: Ground) -> tuple[Piece, ...]:
     """The pieces of a saw-tooth, a tooth each, over what its row covers and reaches further."""
     further = [ground.strip(breaks[0], ground.first), ground.strip(ground.last, breaks[-1])]
-    more = shapely.union_all(further, grid_size=GRID_M)
-    over = shapely.union(ground.covered, with_area(shapely.intersection(ground.roof, more)), grid_size=GRID_M)
+    more = with_area(shapely.intersection(ground.roof, with_area(shapely.union_all(further, grid_size=GRID_M))))
+    over = with_area(shapely.union(ground.covered, more, grid_size=GRID_M))
     strips = [ground.strip(foot, top) for foot, top in pairwise(breaks.tolist())]
     return tuple(
         Piece(polygon, piece.planes)

@@ -1,4 +1,4 @@
-"""Whether parameters make a shape: those of its type, lengths that are lengths, planes that rise from their eaves."""
+"""The parameters of each roof type, and whether given ones make a shape of it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ..errors import FitError, InputError
-from ..primitives.cants import CANTED, MEASURES, cants_named
-from ..primitives.catalogue import CATALOGUE
-from ..primitives.contract import LEVEL
-from ..primitives.family import COMPONENTS, SIDES, eaves_of
+from .cants import CANTED, MEASURES, cants_named
+from .catalogue import CATALOGUE
+from .contract import LEVEL
+from .family import COMPONENTS, SIDES, eaves_of
 
 SIDED = CANTED | {f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew")}
 """Parameters of a member's sides and cants; a part that has one gives all of its shape side by side."""
