@@ -50,7 +50,6 @@ def reconstruct(
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = LocalFrame.around(points)
     points, outline = frame.to_local(points), stages.to_local(outline, frame)
-    outline, remark = stages.without_needless_vertices(outline)
     recognised = stages.recognise(points, settings)
     building = dataclasses.replace(building, recognised=recognised.types)
     fitted = stages.fit(points, outline, recognised, settings)
@@ -60,4 +59,4 @@ def reconstruct(
     ground = stages.find_ground(fitted.outline, points, frame, terrain, roof)
     roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
     building = stages.judge(building, roof, solid, points, fitted, ground, settings)
-    return stages.remarked(stages.remarked(building, of_footprint), remark)
+    return stages.remarked(building, of_footprint)

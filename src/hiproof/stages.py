@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import math
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -31,6 +32,9 @@ FEWEST_POINTS = 4
 
 MOST_OUTLINE_VERTICES = 500
 """Of an outline that roofs are fitted over; the time grows with the square of them, and a building has no more corners."""
+
+PIECE_VERTICES = 64
+"""Of an outline of thousands that are simplified at once: teeth take Douglas and Peucker the square of them."""
 
 SUNK_M = 0.2
 """Of ground above the lowest eave; less is how well both are known, where a roof comes down to the ground."""
@@ -119,21 +123,21 @@ def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Buildin
 def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple[Building, shapely.Polygon | None, str]:
     """The building with its footprint's shift onto its points, the footprint there, and a remark: on points in and around it.
 
-    It stays where it is unless the evidence is clear.
+    It stays where it is unless the evidence is clear. Of thousands of vertices it keeps those that matter.
     """
-    footprint = building.footprint
+    footprint, simplified = without_needless_vertices(building.footprint)
     if (
         footprint is None
         or settings.reconstruct.align == "off"
         or not (math.isfinite(footprint.area) and footprint.area)
     ):
-        return building, footprint, ""
+        return building, footprint, simplified
     from .fit.align import find_shift
 
     polygon = largest_polygon(footprint)
     origin = np.floor(polygon.bounds[:2])
     found = find_shift(finite(points[:, :2]) - origin, shapely.transform(polygon, lambda c: c - origin))
-    remarks = []
+    remarks = [simplified] if simplified else []
     if found.is_clear:
         shift = (round(float(found.xy[0]), 3), round(float(found.xy[1]), 3))
         building = dataclasses.replace(building, shift=shift)
@@ -207,13 +211,45 @@ def without_needless_vertices(outline: shapely.Polygon | None) -> tuple[shapely.
     courtyards narrower than that."""
     if outline is None or (count := shapely.get_num_coordinates(outline)) <= MOST_OUTLINE_VERTICES:
         return outline, ""
-    simple, tolerance_m = outline, 0.005
+    whole = largest_polygon(outline)
+    simple, tolerance_m = whole, 0.005
     while shapely.get_num_coordinates(simple) > MOST_OUTLINE_VERTICES:
         tolerance_m *= 2
-        courtyards = [ring for ring in outline.interiors if shapely.Polygon(ring).area > tolerance_m**2]
-        simple = largest_polygon(shapely.simplify(shapely.Polygon(outline.exterior, courtyards), tolerance_m))
+        courtyards = [ring for ring in whole.interiors if shapely.Polygon(ring).area > tolerance_m**2]
+        simple = largest_polygon(simplified_within(shapely.Polygon(whole.exterior, courtyards), tolerance_m))
     left = shapely.get_num_coordinates(simple)
-    return simple, f"its outline of {count} vertices was simplified to {left}, within {tolerance_m:g} m"
+    apart_m = shapely.distance(shapely.points(shapely.get_coordinates(whole.exterior)), simple.exterior).max()
+    if len(simple.interiors) < len(whole.interiors):
+        apart_m = max(apart_m, tolerance_m)
+    return simple, f"its outline of {count} vertices was simplified to {left}, within {apart_m:.2g} m"
+
+
+def simplified_within(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
+    """The polygon by Douglas and Peucker. Their time grows with the square of the vertices, so thousands go piece by piece."""
+    rings = []
+    for ring in (polygon.exterior, *polygon.interiors):
+        before, xy = math.inf, shapely.get_coordinates(ring)
+        while MOST_OUTLINE_VERTICES < len(xy) < 0.9 * before:
+            before, xy = len(xy), simplified_in_pieces(xy, tolerance_m)
+        rings.append(xy)
+    outer, *holes = [ring if len(ring) >= 4 else None for ring in rings]
+    if outer is None:
+        return polygon
+    rough = shapely.Polygon(outer, [hole for hole in holes if hole is not None])
+    if shapely.get_num_coordinates(rough) > 2 * MOST_OUTLINE_VERTICES:
+        return rough
+    return shapely.simplify(rough, tolerance_m, preserve_topology=False)
+
+
+def simplified_in_pieces(xy: np.ndarray, tolerance_m: float) -> np.ndarray:
+    """A ring's coordinates (n, 2) whose pieces of PIECE_VERTICES edges are simplified each by itself."""
+    ends = np.append(np.arange(0, len(xy) - 2, PIECE_VERTICES), len(xy) - 1)
+    vertices = np.concatenate([np.arange(first, last + 1) for first, last in itertools.pairwise(ends)])
+    pieces = shapely.linestrings(xy[vertices], indices=np.repeat(np.arange(len(ends) - 1), np.diff(ends) + 1))
+    simple, piece = shapely.get_coordinates(
+        shapely.simplify(pieces, tolerance_m, preserve_topology=False), return_index=True
+    )
+    return simple[np.append(piece[1:] == piece[:-1], True)]  # each piece begins where the one before it ends
 
 
 def remarked(building: Building, remark: str) -> Building:

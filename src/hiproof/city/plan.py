@@ -17,6 +17,7 @@ from ..frames import Units
 from ..model import Footprint
 from ..read.crs import parse_crs
 from ..settings import Settings
+from ..stages import without_needless_vertices
 from ..write.cityjson import offset_of
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
@@ -31,7 +32,10 @@ GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 
 @dataclass(frozen=True)
 class Job:
-    """One building asked for. `area` is the plan polygon whose points belong to it (world); `footprint` None: estimate."""
+    """One building asked for. `area` is the plan polygon whose points belong to it (world); `footprint` None: estimate.
+
+    Of a footprint of thousands of vertices the area is a simpler one.
+    """
 
     index: int
     id: str
@@ -95,7 +99,7 @@ class WorkPlan:
             "names": [[index, *pair] for index, pair in self.names.items()],
             "translate": self.translate.tolist(),
         }
-        areas = shapely.to_wkb([job.area for job in self.jobs], hex=True)
+        areas = shapely.to_wkb([job.footprint.polygon if job.footprint else job.area for job in self.jobs], hex=True)
         with path.open("w", encoding="utf-8") as file:
             file.write(json.dumps(whole) + "\n")
             for job, area in zip(self.jobs, areas, strict=True):
@@ -126,7 +130,12 @@ class WorkPlan:
 def job_of_row(index: int, row: list, area: shapely.Polygon) -> Job:
     """A building of the plan's file: [id, area, attributes], the last null where there is no footprint."""
     id, _, attributes = row
-    return Job(index, id, area, None if attributes is None else Footprint(id, area, attributes))
+    return Job(index, id, area, None) if attributes is None else job_of(index, Footprint(id, area, attributes))
+
+
+def job_of(index: int, footprint: Footprint) -> Job:
+    """The building of a footprint."""
+    return Job(index, footprint.id, without_needless_vertices(footprint.polygon)[0], footprint)
 
 
 def load_plan(folder: Path) -> WorkPlan:
@@ -176,7 +185,7 @@ def jobs_of_footprints(footprints: tuple[Footprint, ...]) -> tuple[Job, ...]:
     """One job a footprint, in the order of the file."""
     if not footprints:
         raise InputError("expected at least one polygon in the footprints, got none; check the file and its layer")
-    return tuple(Job(i, f.id, f.polygon, f) for i, f in enumerate(footprints))
+    return tuple(job_of(i, footprint) for i, footprint in enumerate(footprints))
 
 
 def neighbourhood(job: Job, reach_m: float) -> np.ndarray:

@@ -17,7 +17,7 @@ from ..frames import Units
 from ..masking import masked
 from ..model import Building
 from ..parametric.override import Override, overridden
-from ..read.assign import PointGrid
+from ..read.assign import PointGrid, grown
 from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
@@ -90,7 +90,7 @@ class Surroundings:
     def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
         """Whether anything beside the building is known: else the lowest points are the roof's own."""
         beside = self.low.inside(box)
-        outline = shapely.buffer(shapely.simplify(job.area, NEEDLESS_M), BESIDE_M)
+        outline = grown(shapely.simplify(job.area, NEEDLESS_M), BESIDE_M)
         return int((~shapely.intersects_xy(outline, beside[:, 0], beside[:, 1])).sum()) >= FEWEST_BESIDE
 
     def terrain_of(self, job: Job) -> TerrainChain | None:
