@@ -15,7 +15,8 @@ from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.regions import regions_of
 from hiproof.fit.union.scene import scene_of
-from hiproof.fit.union.sides import Side, corners_of, lines_of, sides_of
+from hiproof.fit.union.sides import Side, corners_of, sides_of
+from hiproof.fit.union.unite import ends_of
 from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, SLOPE, U0, V0, V1, base_only, roof_heights
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
@@ -54,7 +55,7 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     outline = OUTLINES[seed % len(OUTLINES)]
     volumes = level_volumes(rng, 1 + seed % 4)
     plan, scene = laid_out(rng, outline, volumes)
-    sides = sides_of(volumes, lines_of(outline, plan, scene), scene)
+    sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)
     regions = regions_of(
         volumes, finished(volumes, sides, walls_of(outline, plan), scene, {}), sides, plan, outline, scene, base
     )
@@ -73,7 +74,7 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     volumes[-1, U0 : V1 + 1] = -3.0, 1.0, -2.0, 2.0
     volumes[-1, REPLACES] = 1.0
     plan, scene = laid_out(rng, outline, volumes)
-    sides = sides_of(volumes, lines_of(outline, plan, scene), scene)
+    sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)
     regions = regions_of(
         volumes, finished(volumes, sides, walls_of(outline, plan), scene, {}), sides, plan, outline, scene, True
     )
@@ -94,7 +95,7 @@ def test_a_side_lies_on_the_line_of_the_outline_that_it_all_but_follows():
     plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
     corners = (shapely.get_coordinates(outline)[:-1] - plan.frame.origin[:2]) @ plan.frame.rotation.T
     volumes[1, U0 : V1 + 1] = corners[:, 0].min(), corners[:, 0].max(), corners[:, 1].min() + 0.3, corners[:, 1].max()
-    sides = sides_of(volumes, lines_of(outline, plan, scene), scene)[1]
+    sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)[1]
     assert all(side.anchored for side in sides)
     found = shapely.Polygon(plan.frame.xy_local(corners_of(sides)))
     assert found.symmetric_difference(outline).area < 1e-6
@@ -119,7 +120,7 @@ def test_a_side_away_from_all_lines_stays_where_the_search_left_it():
     volumes = np.vstack([base_only(-5.0), base_only(2.0)])
     volumes[1, U0 : V1 + 1] = -6.0, 1.3, -4.0, 4.0
     plan, scene = laid_out(np.random.default_rng(0), outline, volumes)
-    side = sides_of(volumes, lines_of(outline, plan, scene), scene)[1][1]
+    side = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)[1][1]
     assert side == Side(1.3, sigma=side.sigma)
     assert 0.0 < side.sigma < 0.2  # the gap between the points on either side
 

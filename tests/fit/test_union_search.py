@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from hiproof.fit.union.add import COME_BACK, ENOUGH, add_volumes, best_addition
-from hiproof.fit.union.candidates import best_rectangles, candidates_of, gains_at_places
+from hiproof.fit.union.candidates import HOUSE, best_rectangles, candidates_of, gains_at_places
 from hiproof.fit.union.edges import MIN_SIDE_M, move_edges
-from hiproof.fit.union.grow import MOST_PLANES, ground_of
+from hiproof.fit.union.grow import ground_of
 from hiproof.fit.union.improve import improve, simplify, surroundings
 from hiproof.fit.union.joins import join_neighbours, merge_volumes, take_in
 from hiproof.fit.union.moves import best_plane, refit_each, settled
@@ -528,7 +528,7 @@ def test_what_a_candidate_gains_in_a_cell_is_the_drop_of_its_points_cost(seed):
 
 
 def ground_beneath(scene):
-    candidates = candidates_of(scene, np.arange(scene.n), MOST_PLANES)
+    candidates = candidates_of(scene, np.arange(scene.n), HOUSE.planes)
     return ground_of(scene, candidates), candidates
 
 

@@ -46,11 +46,10 @@ def moves() -> None:
 
 def planes() -> None:
     """The planes and gables that the search begins with."""
-    from ..fit.union.candidates import candidates_of
-    from ..fit.union.grow import MOST_PLANES
+    from ..fit.union.candidates import HOUSE, candidates_of
 
     _, scene = scene_of_house()
-    candidates_of(scene, np.arange(scene.n), MOST_PLANES)
+    candidates_of(scene, np.arange(scene.n), HOUSE.planes)
 
 
 def scene_of_house() -> tuple:

@@ -18,7 +18,6 @@ from .evaluate import evaluate
 from .load import load
 from .reconstruct import reconstruct
 from .report import report
-from .repro import repro
 from .segment import segment
 from .settings import settings
 from .status import status
@@ -63,7 +62,6 @@ for command in (
     edit,
     evaluate,
     report,
-    repro,
     convert,
     view,
     classify,

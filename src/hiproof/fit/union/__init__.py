@@ -16,6 +16,10 @@ add, grow   volumes added one by one from a level base, all improved after each;
 trim        hidden edges drawn in
 run_on      ends that stand out of a neighbour by little drawn on until they lie hidden in it
 search      these in order, and the simplification that a draughtsman would make
+large       roofs of more than 200 m2, searched in windows of bounded size
+box, whole, window  boxes; what windows need of a whole roof; what a search sees of a box, and how its changes return
+blocks, block, seams, places  where a roof is cut, a block searched as a house, blocks sewn together, more grown where points are unexplained
+groups      passes after the search on some neighbouring volumes after others
 slivers     planes of which a narrow strip shows
 apart       volumes that show in several places
 sides       each side on the line of the outline that it all but follows
@@ -50,11 +54,11 @@ from ...model import Part, Piece, as_xyz
 from ...primitives.family import name_among
 from ...read.plausible import is_plausible
 from ...settings import Settings
-from .agree import agreed
 from .apart import told_apart
 from .bays import with_bays
 from .clamp import clamped
 from .fit import BuildingFit
+from .groups import draw_in_groups, run_in_groups
 from .hips import with_steps_at_hips
 from .larger import put_together
 from .names import part_of
@@ -63,10 +67,12 @@ from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
 from .regions import besides, places_of, polygons_of, regions_of
+from .scene import Scene
 from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
 from .shown import highest_of, that_show
 from .slivers import without_slivers, without_specks
-from .unite import united
+from .unite import Ends, ends_of, ends_within, united
+from .whole import Whole
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -96,11 +102,11 @@ def fit_building(
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    volumes = told_apart(without_slivers(without_specks(volumes, scene), scene), scene)
+    whole, ends = Whole(scene, plan, outline), ends_of(outline, plan, scene)
+    volumes = tidy_volumes(volumes, ends, whole)
     unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
-    roof = with_bays(united(volumes, plan, outline, scene), outline, plan, scene, unit)
-    volumes, sides = roof.volumes, roof.sides
-    planes = agreed(volumes, sides, roof.planes, scene)
+    roof = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, whole)
+    volumes, sides, planes = roof.volumes, roof.sides, roof.planes
     sides = with_steps_at_hips(volumes, planes, sides, scene)
     regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
     parts = [
@@ -116,6 +122,18 @@ def fit_building(
         parts = that_show(parts, plan, scene, widest_m2=0.0)
     far = unexplained_share(parts, plan, settings.compound.tolerance_m)
     return BuildingFit(tuple(parts), outline, value, scene.n, far)
+
+
+def tidy_volumes(volumes: np.ndarray, ends: Ends, whole: Whole) -> np.ndarray:
+    """The volumes without specks and slivers, those that show in several places split, those that are one united."""
+
+    def tidy(rows: np.ndarray, scene: Scene, _: list[int] | None) -> np.ndarray:
+        return told_apart(without_slivers(without_specks(rows, scene), scene), scene)
+
+    def unite(rows: np.ndarray, scene: Scene, own: list[int] | None) -> np.ndarray:
+        return united(rows, ends if own is None else ends_within(ends, scene), scene, own).volumes
+
+    return run_in_groups(unite, run_in_groups(tidy, volumes, whole), whole)
 
 
 def largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:

@@ -18,7 +18,6 @@ from .objective import base_shows, misfits
 from .plan import Plan
 from .regions import THICK_M
 from .scene import Scene
-from .unite import Drawn, drawn, ends_of
 from .volumes import COLUMNS, DIRECTION, LEVEL, OFFSET, PLANES, REPLACES, U0, U1, V0, V1, is_allowed, roof_heights
 
 # m2 of a bay, and its share of the outline at most: what is larger has points enough for the search; m of its narrower side
@@ -43,12 +42,12 @@ class Seen(NamedTuple):
     z: np.ndarray
 
 
-def with_bays(roof: Drawn, outline: shapely.Polygon, plan: Plan, scene: Scene, unit: float) -> Drawn:
-    """The roof with a level volume in each bay of `outline` where that explains more than a `unit` (points) costs."""
+def with_bays(volumes: np.ndarray, outline: shapely.Polygon, plan: Plan, scene: Scene, unit: float) -> np.ndarray:
+    """The volumes with a level one in each bay of `outline` where that explains more than a `unit` (points) costs."""
     left = rectangles_of(outline, plan, scene)
     if not left:
-        return roof
-    seen, volumes = all_points(plan, scene), roof.volumes
+        return volumes
+    seen = all_points(plan, scene)
     while left:
         gains, levels = zip(*(level_over(bay, volumes, seen, scene, unit) for bay in left), strict=True)
         best = int(np.argmax(gains))
@@ -56,7 +55,7 @@ def with_bays(roof: Drawn, outline: shapely.Polygon, plan: Plan, scene: Scene, u
             break
         volumes = np.vstack([volumes, levels[best]])
         del left[best]
-    return roof if volumes is roof.volumes else drawn(volumes, ends_of(outline, plan, scene), scene, {})
+    return volumes
 
 
 def all_points(plan: Plan, scene: Scene) -> Seen:

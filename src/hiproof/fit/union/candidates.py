@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from ...compiled import compiled
@@ -38,9 +40,6 @@ from .volumes import (
     volume_cost,
 )
 
-# points that candidates are found among; points planes are fitted around; pairs of points whose planes are tried
-POOL_POINTS, SEEDS, PAIRS = 500, 100, 200
-MOST_GABLES = 6  # gables kept of those that explain most
 ALONG_AXIS = 0.12  # a plane that leans so little off an axis or a wall is taken along it
 RIDGE_INSIDE_M = 0.4  # m that a ridge lies inside the rectangle; nearer to an edge it is a slope
 MOST_TOPS, MOST_PAIRS = 2, 3  # level tops and pairs of slopes, strongest first, that make hips and mansards
@@ -50,10 +49,31 @@ LEAST_ABOVE_M = 1e-9  # m by which a volume has to be the higher one: numericall
 NEW_EDGES = 0.5  # units: the least that the edges of a new volume cost
 
 
-def candidates_of(scene: Scene, members: np.ndarray, most_planes: int) -> np.ndarray:
+class Effort(NamedTuple):
+    """How many candidates are looked for: limits on time, beyond which structure that explains less stays unseen.
+
+    `pool_points` are those that candidates are found among, `seeds` those that planes are fitted around, `pairs` those
+    of points whose planes are tried. At most `planes` are kept of all points, `new_planes` of those that a roof leaves
+    unexplained, and `gables` of those that explain most.
+    """
+
+    pool_points: int
+    seeds: int
+    pairs: int
+    planes: int
+    new_planes: int
+    gables: int
+
+
+HOUSE = Effort(pool_points=500, seeds=100, pairs=200, planes=16, new_planes=10, gables=6)
+
+
+def candidates_of(scene: Scene, members: np.ndarray, most_planes: int, effort: Effort = HOUSE) -> np.ndarray:
     """Volumes (m, COLUMNS) without rectangles that the points `members` (k,) speak for, in every direction; of allowed shapes."""
     grids = enumerate(grids_of(scene))
-    return np.concatenate([candidates_in(scene, members, direction, grid, most_planes) for direction, grid in grids])
+    return np.concatenate(
+        [candidates_in(scene, members, direction, grid, most_planes, effort) for direction, grid in grids]
+    )
 
 
 def grids_of(scene: Scene) -> list[Grid]:
@@ -61,17 +81,20 @@ def grids_of(scene: Scene) -> list[Grid]:
     return [Grid(*(axis[np.isfinite(axis)] for axis in lines)) for lines in scene.lines]
 
 
-def candidates_in(scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int) -> np.ndarray:
+def candidates_in(
+    scene: Scene, members: np.ndarray, direction: int, grid: Grid, most_planes: int, effort: Effort
+) -> np.ndarray:
     """Those (m, COLUMNS) in one direction: of every plane of the pool, along an axis if need be, the gables, all pairs that form a
     ridge, and larger groups of these."""
-    every = members[np.arange(min(len(members), POOL_POINTS)) * len(members) // min(len(members), POOL_POINTS)]
+    count = min(len(members), effort.pool_points)
+    every = members[np.arange(count) * len(members) // count]
     u, v, z = (np.ascontiguousarray(x[every]) for x in (scene.U[direction], scene.V[direction], scene.z))
     few = Cloud(u, v, z, cells_of(grid.u, u), cells_of(grid.v, v))
     evidence, tolerance = scene.evidence * len(every) / len(members), scene.dead + scene.width
-    pool = plane_pool(few, grid, hypotheses(few, SEEDS, PAIRS), tolerance, evidence, most_planes)
+    pool = plane_pool(few, grid, hypotheses(few, effort.seeds, effort.pairs), tolerance, evidence, most_planes)
     if len(pool) == 0:
         return np.empty((0, COLUMNS))
-    gables, counts = gable_pool(few, grid, pool, tolerance, evidence, MOST_GABLES)
+    gables, counts = gable_pool(few, grid, pool, tolerance, evidence, effort.gables)
     middle = np.array([np.sort(u)[len(u) // 2], np.sort(v)[len(v) // 2]])
     along = facings(pool, middle, scene.leans[direction])
     groups, sizes = groups_of(along, gables, counts, grid)

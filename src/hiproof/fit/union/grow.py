@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from .add import COME_BACK, ENOUGH, FEWEST_UNEXPLAINED, REGROWN_UNITS, Ground, add_volumes, unexplained
-from .candidates import candidates_of, grids_of
+from .candidates import HOUSE, Effort, candidates_of, grids_of
 from .improve import improve
 from .moves import without
 from .objective import objective
@@ -14,7 +14,6 @@ from .scene import Scene
 from .volumes import OFFSET, SIDES, SLOPE, base_only
 
 MOST_ADDITIONS = 20  # tried for one building: a bound on time
-MOST_PLANES, MOST_NEW_PLANES = 16, 10  # candidate planes from all points at first, from unexplained ones later
 BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs but not below a stray point
 MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
 # of all moves: before a place is grown anew, where no candidate helps, at the end
@@ -22,14 +21,14 @@ STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = 2, 2, 3
 MOST_REGROWN = 3  # volumes, those that grew first: of 40 that were better anew none had grown later
 
 
-def grow(scene: Scene) -> tuple[np.ndarray, float]:
+def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
     """Volumes (k, COLUMNS) and their objective: grown from the base, then each taken out in turn and its place grown anew."""
     quantile = BASE_QUANTILE if scene.n >= MIN_STRUCTURE_POINTS else 0.5
     base = base_only(float(np.quantile(scene.z[: scene.n], quantile, method="lower")))
-    candidates = candidates_of(scene, np.arange(scene.n), MOST_PLANES)
+    candidates = candidates_of(scene, np.arange(scene.n), effort.planes, effort)
     ground = ground_of(scene, candidates)
-    volumes, value = grown(base, objective(base, scene, np.inf), ground, candidates)
-    return regrown(volumes, value, ground, candidates)
+    volumes, value = grown(base, objective(base, scene, np.inf), ground, candidates, effort)
+    return regrown(volumes, value, ground, candidates, effort)
 
 
 def ground_of(scene: Scene, candidates: np.ndarray) -> Ground:
@@ -40,7 +39,9 @@ def ground_of(scene: Scene, candidates: np.ndarray) -> Ground:
     return Ground(scene, cell_u, cell_v, typical_slopes(candidates))
 
 
-def regrown(volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray) -> tuple[np.ndarray, float]:
+def regrown(
+    volumes: np.ndarray, value: float, ground: Ground, candidates: np.ndarray, effort: Effort = HOUSE
+) -> tuple[np.ndarray, float]:
     """The volumes with each of the first in turn taken out and what is missing grown anew, where that is clearly better.
 
     The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
@@ -50,7 +51,7 @@ def regrown(volumes: np.ndarray, value: float, ground: Ground, candidates: np.nd
     while k > 0 and len(volumes) > 2:
         trial = without(volumes, k)
         trial, found = improve(trial, scene, objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS)
-        trial, found = grown(trial, found, ground, candidates, (len(volumes), value))
+        trial, found = grown(trial, found, ground, candidates, effort, (len(volumes), value))
         if found < value - REGROWN_UNITS * scene.evidence:
             volumes, value = trial, found
         k = min(k, len(volumes)) - 1
@@ -62,6 +63,7 @@ def grown(
     value: float,
     ground: Ground,
     candidates: np.ndarray,
+    effort: Effort,
     known: tuple[int, float] = (0, 0.0),
 ) -> tuple[np.ndarray, float]:
     """The volumes with more of them added, first of the `candidates`, then of what the points left unexplained speak for, as long as
@@ -78,7 +80,7 @@ def grown(
         far = unexplained(volumes, scene)
         if len(far) < FEWEST_UNEXPLAINED:
             break
-        candidates, fresh = candidates_of(scene, far, MOST_NEW_PLANES), True
+        candidates, fresh = candidates_of(scene, far, effort.new_planes, effort), True
     return improve(volumes, scene, value, ground.slopes, FINAL_ROUNDS)
 
 

@@ -67,20 +67,20 @@ def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
 
 
-def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float) -> np.ndarray:
-    """Lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`."""
+def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float, most_cells: int = MAX_CELLS) -> np.ndarray:
+    """Lay lines from `low` to `high` at the footprint's `vertices`, filled up to about `cell`, over `most_cells`."""
     kept, end = [float(low)], float(high)
     for x in sorted(vertices.tolist()):
         if abs(x - kept[-1]) > MERGE_LINES_M and abs(x - end) > MERGE_LINES_M:
             kept.append(x)
     kept.append(end)
-    while len(kept) > MAX_CELLS:  # an outline of hundreds of vertices: give up the line closest to its neighbours
+    while len(kept) > most_cells:  # an outline of hundreds of vertices: give up the line closest to its neighbours
         crowded = min(range(1, len(kept) - 1), key=lambda k: kept[k + 1] - kept[k - 1])
         del kept[crowded]
     gaps = [b - a for a, b in pairwise(kept)]
-    step = max(cell, (kept[-1] - kept[0]) / MAX_CELLS)
+    step = max(cell, (kept[-1] - kept[0]) / most_cells)
     fill = [max(1, round(gap / step)) for gap in gaps]
-    while sum(fill) > MAX_CELLS and max(fill) > 1:
+    while sum(fill) > most_cells and max(fill) > 1:
         step *= 1.1
         fill = [max(1, round(gap / step)) for gap in gaps]
     lines = [a + gap * q / count for a, gap, count in zip(kept, gaps, fill, strict=False) for q in range(count)]

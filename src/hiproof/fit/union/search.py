@@ -8,28 +8,38 @@ import numpy as np
 import shapely
 
 from .allowed import allowed_shapes
+from .groups import run_in_groups
 from .grow import grow
 from .improve import simplify
+from .large import find_in_windows
 from .moves import move_all_edges, refit_each
 from .objective import objective
 from .plan import Plan
 from .run_on import run_on
 from .scene import Scene, directions_of, scene_of, seen_through
 from .trim import trim
+from .whole import Whole
 
 SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
 SETTLE_REACH_M = 0.7  # m that edges may move when all points settle them
 # Price of structure by detail: the ends of the curve of share against parts that `benchmarks.curve` draws. Below a half every
 # chimney is a part, above four even wings go.
 DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
-COMMON_HOUSE_M2, LARGEST_FACTOR = 60.0, 16.0  # larger roofs ask more of each volume
+COMMON_HOUSE_M2 = 60.0  # up to LARGE_M2, larger roofs ask more of each volume
+LARGE_M2 = 200.0  # of outline: larger roofs are searched in windows, at a price that does not grow with their area
+# Points/m2 from which on structure of a large roof has a house's price, and how much dearer it is at most on sparser
+# clouds: Vienna, Rotterdam and Delft want 1.4 times a house's price at 5 points/m2 and once at 15.
+LARGE_DENSITY, LARGE_FACTOR = 10.0, 1.41
 # What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
 LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
 
 
 def evidence_per_unit(density: float, area_m2: float, settings) -> float:
     """Points that one unit of structure must explain: those of an area that grows with the roof's, and never too few."""
-    share = settings.evidence_area_m2 * math.sqrt(min(max(area_m2 / COMMON_HOUSE_M2, 1.0), LARGEST_FACTOR))
+    factor = math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
+    if area_m2 > LARGE_M2:
+        factor = min(max(math.sqrt(LARGE_DENSITY / density), 1.0), LARGE_FACTOR)
+    share = settings.evidence_area_m2 * factor
     return float(max(settings.evidence_points, share * density)) * DETAIL_FACTOR[settings.detail]
 
 
@@ -45,6 +55,10 @@ def find_volumes(
     evidence = [evidence_per_unit(plan.density * share, outline.area, settings) for share in (len(few) / count, 1.0)]
     angles = directions_of(outline, plan)
     every = scene_of(plan, outline, angles, evidence[1], settings.tolerance_m, allowed_shapes(types))
+    if outline.area > LARGE_M2:
+        whole = Whole(every, plan, outline)
+        volumes = run_in_groups(trim_and_run_on, find_in_windows(plan, outline, every), whole)
+        return volumes, objective(volumes, every, np.inf), every
     scene = seen_through(every, few, evidence[0])
     volumes, _ = grow(scene)
     volumes, value = settled_on_all(volumes, every)
@@ -54,6 +68,12 @@ def find_volumes(
     volumes, value = trim(volumes, every, value)
     volumes, value = run_on(volumes, every, value)
     return volumes, value, every
+
+
+def trim_and_run_on(volumes: np.ndarray, scene: Scene, _: object = None) -> np.ndarray:
+    """Draw hidden edges in, and let ends that stand out of a neighbour run on into it."""
+    volumes, value = trim(volumes, scene, objective(volumes, scene, np.inf))
+    return run_on(volumes, scene, value)[0]
 
 
 def settled_on_all(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float]:

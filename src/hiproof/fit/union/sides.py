@@ -63,11 +63,10 @@ class Side:
     sigma: float = 0.0
 
 
-def lines_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> list[list[Lines]]:
-    """The lines that sides across u and across v may take, by direction."""
-    edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
+def lines_among(edges: np.ndarray, chords: np.ndarray, turns: np.ndarray) -> list[list[Lines]]:
+    """The lines that sides across u and across v may take, by direction, of an outline's edges and chords (2, m, 2)."""
     ends = np.concatenate([edges, chords], axis=1)
-    return [lines_along(ends, edges.shape[1], turn) for turn in scene.turn]
+    return [lines_along(ends, edges.shape[1], turn) for turn in turns]
 
 
 def sides_of(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> list[list[Side]]:

@@ -6,7 +6,7 @@ beside each other then stand for one.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import NamedTuple
@@ -21,11 +21,13 @@ from .moves import refit_each, without
 from .objective import base_shows, costs, edges_cost, objective
 from .plan import Plan
 from .scene import Scene
-from .sides import Lines, Side, lines_of, sides_of
+from .sides import BESIDE_M as REACH_M
+from .sides import Lines, Side, lines_among, plan_chords, plan_edges, sides_of
 from .volumes import (
     DIRECTION,
     LEAN,
     LEVEL,
+    NUMBER,
     OFFSET,
     PLANES,
     REPLACES,
@@ -47,8 +49,11 @@ MOST_CUT = 2  # volumes drawn out over walls that cut corners off: a house has o
 
 
 class Ends(NamedTuple):
-    """What an outline ends volumes with: the lines that sides may take, by direction, and its walls (m, 2, 2)."""
+    """What an outline ends volumes with: its edges and chords (2, m, 2) in the first direction's axes, the lines that sides
+    may take of these, by direction, and its walls (m, 2, 2)."""
 
+    edges: np.ndarray
+    chords: np.ndarray
     lines: list[list[Lines]]
     walls: np.ndarray
 
@@ -63,15 +68,18 @@ class Drawn:
     cost: float
 
 
-def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Scene) -> Drawn:
-    """The volumes along their sides, without those that do not pay once planes face as these do."""
-    ends, value = ends_of(outline, plan, scene), objective(volumes, scene, np.inf)
+def united(volumes: np.ndarray, ends: Ends, scene: Scene, own: Collection[int] | None = None) -> Drawn:
+    """The volumes along their sides, without those that do not pay once planes face as these do.
+
+    Only volumes of the numbers `own` are made one with others, or go; all where it is None.
+    """
+    value = objective(volumes, scene, np.inf)
     known: Known = {}
     best = with_cut_corners(drawn(volumes, ends, scene, known), ends, scene, known)
     tried = True
     while tried:
         tried = False
-        for trial in fewer(best):
+        for trial in fewer(best, own):
             if bares_the_base(trial, best.volumes, scene):
                 continue
             trial, found = refit_each(trial, scene, objective(trial, scene, np.inf))
@@ -85,7 +93,23 @@ def united(volumes: np.ndarray, plan: Plan, outline: shapely.Polygon, scene: Sce
 
 
 def ends_of(outline: shapely.Polygon, plan: Plan, scene: Scene) -> Ends:
-    return Ends(lines_of(outline, plan, scene), walls_of(outline, plan))
+    edges, chords = plan_edges(outline, plan), plan_chords(outline, plan)
+    return Ends(edges, chords, lines_among(edges, chords, scene.turn), walls_of(outline, plan))
+
+
+def ends_within(ends: Ends, scene: Scene) -> Ends:
+    """Those of the ends that reach into what a scene shows, or nearly."""
+    low = np.array([scene.corner_u, scene.corner_v]) - REACH_M
+    high = low + np.multiply(scene.depth.shape, scene.pitch) + 2.0 * REACH_M
+    edges, chords, walls = (
+        lines[:, reaches(lines, low, high)] for lines in (ends.edges, ends.chords, ends.walls.swapaxes(0, 1))
+    )
+    return Ends(edges, chords, lines_among(edges, chords, scene.turn), walls.swapaxes(0, 1))
+
+
+def reaches(lines: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Which of the lines between ends (2, m, 2) reach into the box from `low` to `high` (2,)."""
+    return ((lines.min(axis=0) < high) & (lines.max(axis=0) > low)).all(axis=1)
 
 
 def with_cut_corners(roof: Drawn, ends: Ends, scene: Scene, known: Known) -> Drawn:
@@ -121,16 +145,18 @@ def structure_cost(volumes: np.ndarray, scene: Scene) -> float:
     return scene.evidence * sum(volume_cost(volume) for volume in volumes[1:]) + edges_cost(volumes, scene, np.inf)
 
 
-def fewer(roof: Drawn) -> Iterator[np.ndarray]:
+def fewer(roof: Drawn, own: Collection[int] | None) -> Iterator[np.ndarray]:
     """Volumes with two that are alike made one; and without one, where sides are not square to each other."""
+    mine = [own is None or number in own for number in roof.volumes[:, NUMBER].tolist()]
     for j, k in combinations(range(1, len(roof.volumes)), 2):
-        if alike(roof.volumes[j], roof.volumes[k]):
+        if (mine[j] or mine[k]) and alike(roof.volumes[j], roof.volumes[k]):
             trial = roof.volumes.copy()
             trial[j] = over_both(trial[j], trial[k])
             yield without(trial, k)
     if any(abs(side.lean) > SQUARE for own in roof.sides for side in own):
         for k in range(len(roof.volumes) - 1, 0, -1):
-            yield without(roof.volumes, k)
+            if mine[k]:
+                yield without(roof.volumes, k)
 
 
 def drawn(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known) -> Drawn:

@@ -25,7 +25,9 @@ SLOPE, OFFSET = 5, 9  # columns of the four slopes, and of the five planes' offs
 TIE, REPLACES = 14, 15  # columns: which slopes are equal, and whether it replaces what lies below
 LEAN = 16  # first column of how far each plane faces off its axis
 SETTLED = 20  # column: a digest of the surroundings in which no move was found for it
-COLUMNS = 21  # of a row
+# column: the number of a volume among the whole roof's while a window of it is searched, 0 for a new volume
+NUMBER = 21
+COLUMNS = 22  # of a row
 SIDES, PLANES, LEVEL = 4, 5, 4  # planes that slope, all planes, the level one's number
 
 FREE, OPPOSITE, ALL = 0.0, 1.0, 2.0  # which slopes are equal: none, those that face each other, all

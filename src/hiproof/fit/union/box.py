@@ -1,0 +1,73 @@
+"""Upright boxes in the plan's axes: what windows, blocks and the extents of volumes are."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+SLACK_M = 0.3  # m by which what lies inside a box may reach beyond it: what hides an edge is no nearer
+
+
+class Box(NamedTuple):
+    """From u0 to u1 and from v0 to v1 (m)."""
+
+    u0: float
+    u1: float
+    v0: float
+    v1: float
+
+    @property
+    def area(self) -> float:
+        return (self.u1 - self.u0) * (self.v1 - self.v0)
+
+    def widen(self, by_m: float) -> Box:
+        """Move every side out by so much."""
+        return Box(self.u0 - by_m, self.u1 + by_m, self.v0 - by_m, self.v1 + by_m)
+
+    def contains(self, other: Box) -> bool:
+        """Tell whether another box lies inside this one, but for SLACK_M."""
+        return (
+            other.u0 >= self.u0 - SLACK_M
+            and other.u1 <= self.u1 + SLACK_M
+            and other.v0 >= self.v0 - SLACK_M
+            and other.v1 <= self.v1 + SLACK_M
+        )
+
+    def overlaps(self, other: Box) -> bool:
+        return self.u0 < other.u1 and self.u1 > other.u0 and self.v0 < other.v1 and self.v1 > other.v0
+
+    def split(self, axis: int, at: float) -> tuple[Box, Box]:
+        """Cut the box in two across an axis (0 for u, 1 for v)."""
+        if axis == 0:
+            return self._replace(u1=at), self._replace(u0=at)
+        return self._replace(v1=at), self._replace(v0=at)
+
+
+NOWHERE = Box(np.inf, -np.inf, np.inf, -np.inf)  # the box of nothing
+
+
+def box_around(boxes: Iterable[Box]) -> Box:
+    """The smallest box around several."""
+    every = np.array(list(boxes))
+    return Box(
+        float(every[:, 0].min()),
+        float(every[:, 1].max()),
+        float(every[:, 2].min()),
+        float(every[:, 3].max()),
+    )
+
+
+def clip_to_box(geometry: shapely.Geometry, box: Box) -> shapely.Geometry:
+    """The part of a geometry inside a box."""
+    return shapely.clip_by_rect(geometry, box.u0, box.v0, box.u1, box.v1)
+
+
+def box_of(geometry: shapely.Geometry) -> Box:
+    """The box around a geometry; NOWHERE around an empty one."""
+    if geometry.is_empty:
+        return NOWHERE
+    u0, v0, u1, v1 = geometry.bounds
+    return Box(u0, u1, v0, v1)

@@ -1,0 +1,70 @@
+"""A large roof searched in windows: blocks as houses, sewn together, more grown where points are unexplained, all settled.
+
+The cost follows the roof's area. No limit depends on the whole roof; those that remain bound the time of one window,
+and beyond them finer structure stays unseen there.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import shapely
+
+from .block import SETTLE_POINTS, SETTLE_REACH_M, search_block
+from .blocks import BLOCK_M2, HeightRaster, cheapest_cut
+from .box import Box, clip_to_box
+from .edges import move_edges
+from .moves import refitted
+from .places import grow_at_places
+from .plan import Plan
+from .scene import Scene
+from .seams import AROUND_M, row_of, sew
+from .whole import PLACE, Whole
+from .window import change_in_window, forget_settled
+
+LEAST_HALF_M2 = 1.0  # of outline on either side of a cut
+
+
+def find_in_windows(plan: Plan, outline: shapely.Polygon, scene: Scene) -> np.ndarray:
+    """Find the volumes (k, COLUMNS) of a large roof, whose points and outline are those of `scene`."""
+    whole = Whole(scene, plan, outline)
+    search_box(whole, HeightRaster(whole), whole.box, whole.area)
+    if whole.area > BLOCK_M2:
+        grow_at_places(whole)
+        settle_each(whole)
+    return forget_settled(whole.volumes)
+
+
+def search_box(whole: Whole, raster: HeightRaster, box: Box, area_m2: float) -> None:
+    """Search a box that holds so much of the outline: as one block, or in halves sewn together along the cut."""
+    cut = cheapest_cut(raster, box) if area_m2 > BLOCK_M2 else None
+    halves = box.split(*cut) if cut else (box, box)
+    areas = [clip_to_box(whole.outline, half).area for half in halves]
+    if cut is None or min(areas) < LEAST_HALF_M2:
+        search_block(whole, box)
+        return
+    for half, area in zip(halves, areas, strict=True):
+        search_box(whole, raster, half, area)
+    sew(whole, box, *cut)
+
+
+def settle_each(whole: Whole) -> None:
+    """Refit every volume, and move its edges a little, on the points around it."""
+    for place in [row[PLACE].tobytes() for row in whole.volumes[1:]]:
+        k = whole.find(place)
+        if k is not None:
+            settle_one(whole, k)
+
+
+def settle_one(whole: Whole, k: int) -> None:
+    """Refit volume k, and move its edges a little, on the points around it."""
+    extent = Box(*whole.boxes[k])
+    if not extent.u0 <= extent.u1:
+        return
+
+    def settle_row(rows: np.ndarray, scene: Scene, value: float) -> tuple[np.ndarray, float]:
+        own = row_of(rows, k)
+        rows, value = refitted(rows, scene, value, own)
+        value = move_edges(rows, scene, own, value, SETTLE_REACH_M)
+        return refitted(rows, scene, value, own)
+
+    change_in_window(whole, extent.widen(AROUND_M), SETTLE_POINTS, settle_row, {k})

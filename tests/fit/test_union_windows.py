@@ -1,0 +1,90 @@
+"""Large roofs are searched in windows: what stands on them is found however large they are, and far parts do not matter."""
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof import reconstruct
+from hiproof.compose import check_solid
+from hiproof.fit.union import fit_building
+from hiproof.fit.union.allowed import allowed_shapes
+from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, cheapest_cut
+from hiproof.fit.union.plan import lay_out_plan
+from hiproof.fit.union.scene import directions_of, scene_of
+from hiproof.fit.union.whole import Whole
+from hiproof.status import Status
+from points_of_roofs import sampled
+
+HALL = shapely.box(0, 0, 35, 22)
+BOXES = [(x, y, x + 4.0, y + 3.0) for x in (3.0, 15.0, 27.0) for y in (3.0, 15.0)]
+
+
+def hall(x, y):
+    """A level roof of 770 m2 with six boxes of 12 m2 that stand 3 m above it."""
+    z = np.full(np.shape(x), 8.0)
+    for x0, y0, x1, y1 in BOXES:
+        z = np.where((x > x0) & (x < x1) & (y > y0) & (y < y1), 11.0, z)
+    return z
+
+
+def heights(fit, xy):
+    return np.max([part.height_at(xy) for part in fit.roof_parts], axis=0)
+
+
+def whole_of(height, outline, density=5.0):
+    plan = lay_out_plan(sampled(height, outline, density, 0.02), outline)
+    scene = scene_of(plan, outline, directions_of(outline, plan), 2.0, 0.2, allowed_shapes(()))
+    return Whole(scene, plan, outline)
+
+
+def test_boxes_on_a_large_level_roof_are_found():
+    fit = fit_building(sampled(hall, HALL, 5.0, 0.02), HALL)
+    xy = np.array([[0.5 * (x0 + x1), 0.5 * (y0 + y1)] for x0, y0, x1, y1 in BOXES])
+    assert heights(fit, xy) == pytest.approx(11.0, abs=0.03)
+    assert heights(fit, xy + [5.0, 0.0]) == pytest.approx(8.0, abs=0.03)
+    assert len(fit.roof_parts) == 7
+
+
+def test_the_roof_does_not_depend_on_the_order_of_its_points():
+    points = sampled(hall, HALL, 3.0, 0.02)
+    one = fit_building(points, HALL)
+    other = fit_building(points[np.random.default_rng(1).permutation(len(points))], HALL)
+    assert len(one.roof_parts) == len(other.roof_parts)
+    for mine, theirs in zip(one.roof_parts, other.roof_parts, strict=True):
+        for piece, same in zip(mine.pieces, theirs.pieces, strict=True):
+            assert piece.outline.equals(same.outline)
+            assert np.array_equal(piece.planes, same.planes)
+
+
+def test_halves_far_apart_have_the_roofs_that_each_has_alone():
+    left, right = shapely.box(0, 0, 26, 12), shapely.box(90, 0, 116, 12)
+    both = shapely.union_all([left, right, shapely.box(25, 5, 91, 7)])
+
+    def gables(x, y):
+        return np.where((x < 26) | (x > 90), 9.0 - 0.7 * np.abs(y - 6.0), 4.0) + np.where(x > 90, 1.0, 0.0)
+
+    together = fit_building(sampled(gables, both, 4.0, 0.02), both)
+    for half in (left, right):
+        alone = fit_building(sampled(gables, half, 4.0, 0.02), half)
+        inside = shapely.buffer(half, -0.5)
+        x, y = np.meshgrid(np.arange(0.5, 116.0), np.arange(0.5, 12.0))
+        xy = np.column_stack([x.ravel(), y.ravel()])
+        xy = xy[shapely.contains_xy(inside, xy[:, 0], xy[:, 1])]
+        assert heights(together, xy) == pytest.approx(heights(alone, xy), abs=0.03)
+    assert sorted(part.type for part in together.roof_parts) == ["flat", "gable", "gable"]
+
+
+def test_a_large_roof_is_a_valid_solid():
+    model = reconstruct(sampled(hall, HALL, 3.0, 0.02), HALL)
+    assert model.status is Status.MODELLED
+    assert not check_solid(model.built.solid)
+
+
+def test_a_cut_falls_on_a_step_and_blocks_are_small():
+    outline = shapely.box(-30, 0, 30, 15)
+    whole = whole_of(lambda x, y: np.where(x < 8.0, 6.0, 9.0), outline)
+    raster = HeightRaster(whole)
+    axis, at = cheapest_cut(raster, whole.box)
+    step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
+    assert whole.area > BLOCK_M2
+    assert at == pytest.approx(step[axis], abs=2 * raster.pitch)
