@@ -63,11 +63,15 @@ def as_xyz(points: Any) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Footprint:
-    """One building asked for: a plan polygon in world coordinates (empty if unusable) and what the user knew of it."""
+    """One building asked for: a plan polygon in world coordinates (empty if unusable) and what the user knew of it.
+
+    `shift` (x, y in m) is how far it lies beside its roof where that is known; (0, 0) where it is not.
+    """
 
     id: str
     polygon: shapely.Polygon
     attributes: dict[str, Any] = field(default_factory=dict)
+    shift: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True)

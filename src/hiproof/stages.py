@@ -22,6 +22,7 @@ from .status import Doubt, Status
 
 if TYPE_CHECKING:
     from .evaluate.metrics import Inner
+    from .fit.align import Shift
     from .read.terrain import Terrain
 
 LIKELY = 0.05
@@ -114,7 +115,8 @@ def refuse_without_network(settings: Settings) -> None:
 def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
     """The outcome to start from: the building's name, its footprint and the attributes it came with."""
     if isinstance(footprint, Footprint):
-        return Building(footprint.id, Status.MODELLED, footprint=footprint.polygon, attributes=footprint.attributes)
+        known = {"footprint": footprint.polygon, "attributes": footprint.attributes, "shift": footprint.shift}
+        return Building(footprint.id, Status.MODELLED, **known)
     if footprint is not None and footprint.geom_type != "Polygon":
         footprint = largest_polygon(footprint)  # of several a building has one, and files hold one
     return Building(id, Status.MODELLED, footprint=footprint)
@@ -123,33 +125,41 @@ def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Buildin
 def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple[Building, shapely.Polygon | None, str]:
     """The building with its footprint's shift onto its points, the footprint there, and a remark: on points in and around it.
 
-    It stays where it is unless the evidence is clear. Of thousands of vertices it keeps those that matter.
+    It stays where it is unless the evidence is clear, or its shift is known. Of thousands of vertices it keeps those that
+    matter.
     """
     footprint, simplified = without_needless_vertices(building.footprint)
-    if (
-        footprint is None
-        or settings.reconstruct.align == "off"
-        or not (math.isfinite(footprint.area) and footprint.area)
-    ):
+    if footprint is None or not (math.isfinite(footprint.area) and footprint.area):
+        return building, footprint, simplified
+    if any(building.shift):
+        return building, shapely.transform(footprint, lambda c: c + building.shift), simplified
+    if settings.reconstruct.align == "off":
         return building, footprint, simplified
     from .fit.align import find_shift
 
     polygon = largest_polygon(footprint)
     origin = np.floor(polygon.bounds[:2])
     found = find_shift(finite(points[:, :2]) - origin, shapely.transform(polygon, lambda c: c - origin))
-    remarks = [simplified] if simplified else []
     if found.is_clear:
         shift = (round(float(found.xy[0]), 3), round(float(found.xy[1]), 3))
         building = dataclasses.replace(building, shift=shift)
         footprint = shapely.transform(footprint, lambda c: c + shift)
-        error = float(np.hypot(*found.sigma))
+    return building, footprint, "; ".join(filter(None, (simplified, shift_remark(found))))
+
+
+def shift_remark(found: Shift, of_row: int = 1) -> str:
+    """What is said of a footprint that was moved, alone or with a row of so many, and of a roof of another size; empty
+    where there is neither."""
+    remarks = []
+    if found.is_clear:
+        error, row = float(np.hypot(*found.sigma)), f" with the {of_row} of its row" if of_row > 1 else ""
         remarks.append(
-            f"its footprint was moved by ({shift[0]:.2f}, {shift[1]:.2f}) m, within {error:.2f} m, onto its roof"
+            f"its footprint was moved{row} by ({found.xy[0]:.2f}, {found.xy[1]:.2f}) m, within {error:.2f} m, onto its roof"
         )
     if found.is_size_clear:
         reach = "reaches {:.1f} m beyond" if found.beyond > 0 else "stays {:.1f} m inside"
         remarks.append(f"its roof {reach.format(abs(found.beyond))} its footprint on every side that shows")
-    return building, footprint, "; ".join(remarks)
+    return "; ".join(remarks)
 
 
 def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.ndarray, shapely.Polygon | None, Status]:

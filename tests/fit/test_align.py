@@ -87,3 +87,13 @@ def test_align_off_leaves_it():
     house = shapely.box(0, 0, 12, 8)
     found = reconstruct(points_in(house), moved(house, (-1.0, 0.5)), settings=OFF)
     assert found.shift == (0.0, 0.0) and "moved" not in found.detail
+
+
+@pytest.mark.parametrize("overhang", [0.8, 1.0])
+@pytest.mark.parametrize("far", [0.0, 0.5, 2.0])
+def test_a_roof_that_overhangs_all_around_does_not_hide_the_shift(overhang, far):
+    shift = far * np.array([0.8, 0.6])
+    roof = points_in(L_SHAPE.buffer(overhang, join_style="mitre"))[:, :2]
+    found = find_shift(roof, moved(L_SHAPE, -shift))
+    assert np.hypot(*(found.xy - shift)) < 0.1 and found.is_clear == (far > 0)
+    assert found.is_size_clear and found.beyond == pytest.approx(overhang, abs=0.1)

@@ -12,6 +12,8 @@ changed       a run whose footprints changed: what is the same stays
 prepare       the plan made: which buildings there are, from footprints or the cloud
 frame         the CRS and units of an area
 classes       which classes of points may be roofs
+registration  the common shift of all footprints, before there are tiles
+outlines      those of all buildings around, and the rows that touching ones form
 from_cloud    buildings of a cloud without footprints
 plan          which buildings there are, which work tile owns each, which point files there are
 sort          each point file, read once in chunks, leaves the points each work tile needs

@@ -74,8 +74,13 @@ def digest_of(plan: WorkPlan, index: int) -> str:
     """What a building's texts depend on beside the points, as a digest."""
     job = plan.jobs[index]
     attributes = job.footprint.attributes if job.footprint else None
-    known = [job.id, job.area.wkb_hex, attributes, plan.names_of(job)]
+    known = [job.id, job.area.wkb_hex, attributes, plan.names_of(job), row_of(plan, index)]
     return hashlib.sha256(json.dumps(known, sort_keys=True, default=str).encode()).hexdigest()
+
+
+def row_of(plan: WorkPlan, index: int) -> list[str]:
+    """The outlines that a building's footprint is moved with."""
+    return [polygon.wkb_hex for polygon in plan.outlines.row(index)] if plan.moves_rows else []
 
 
 def known_places(plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, Place]:

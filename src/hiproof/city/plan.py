@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import functools
 import json
 import math
@@ -13,9 +14,11 @@ import numpy as np
 import shapely
 
 from ..errors import InputError, OutputError
+from ..fit.registration import Registration
 from ..frames import Units
 from ..model import Footprint
 from ..read.crs import parse_crs
+from ..read.operations import Operation
 from ..settings import Settings
 from ..stages import without_needless_vertices
 from ..write.cityjson import offset_of
@@ -23,9 +26,11 @@ from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
 from ..write.parameters import crs_text
 from ..write.values import plain_text
+from .outlines import Outlines
 
 PLAN_FILE = "plan.jsonl"
-AROUND_M = 4.0  # of roof points around a footprint that may be moved: as fit/align.py asks, without its compiler here
+AROUND_M = 4.0  # of roof points around a footprint: as fit/align.py asks, without its compiler here
+SHIFT_M = 3.0  # that a row may be moved, as in fit/align.py
 # m around a building in which its ground is looked for: where points have the class, a street's width; where it is found by shape, twice that
 GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 
@@ -34,7 +39,7 @@ GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 class Job:
     """One building asked for. `area` is the plan polygon whose points belong to it (world); `footprint` None: estimate.
 
-    Of a footprint of thousands of vertices the area is a simpler one.
+    A footprint stays as the file has it. Its area is moved by its `shift`, and is simpler where it has thousands of vertices.
     """
 
     index: int
@@ -50,6 +55,9 @@ class WorkPlan:
     What a task reads (its point file, the terrain model) comes with the task: an address may hold a password.
     `names` are the CityJSON id and the gml:id of those buildings whose own id will not do; `translate` is the offset of
     the CityJSON file. Both are settled here, so that a building's text does not depend on what is written before it.
+    `registration` is the common shift of the footprints, None where it was not looked for; `operations` are those by
+    which PROJ transforms what is read and written. `others` are outlines around the buildings that were not asked for,
+    moved as they are.
     """
 
     jobs: tuple[Job, ...]
@@ -58,6 +66,9 @@ class WorkPlan:
     settings: Settings
     names: dict[int, tuple[str, str]] = field(default_factory=dict)
     translate: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    registration: Registration | None = None
+    operations: tuple[Operation, ...] = ()
+    others: tuple[shapely.Polygon, ...] = ()
 
     def names_of(self, job: Job) -> tuple[str, str]:
         return self.names.get(job.index) or (job.id, gml_name(job.id))
@@ -69,10 +80,31 @@ class WorkPlan:
 
     @functools.cached_property
     def around_m(self) -> float:
-        """How far beyond its area a building sees roof points: as far as its footprint may have to be moved."""
-        moved = self.settings.reconstruct.align != "off" and self.settings.read.by_class
-        moved = moved and any(job.footprint is not None for job in self.jobs)
-        return AROUND_M if moved else 0.0
+        """How far beyond its area a building sees roof points: those of neighbours tell where its own roof ends."""
+        sees = self.settings.read.by_class and any(job.footprint is not None for job in self.jobs)
+        return AROUND_M if sees else 0.0
+
+    @functools.cached_property
+    def moves_rows(self) -> bool:
+        """Whether rows of footprints are moved onto their roofs."""
+        return self.around_m > 0 and self.settings.reconstruct.align != "off"
+
+    @functools.cached_property
+    def outlines(self) -> Outlines:
+        """The outlines of all buildings, by their number, and of the others around them."""
+        return Outlines([*(job.area for job in self.jobs), *self.others])
+
+    @functools.cached_property
+    def roof_boxes(self) -> np.ndarray:
+        """Whole-metre boxes (n, 4) in which buildings see roof points, upper sides excluded; NaN where an area is empty.
+
+        A border on a whole metre belongs to the area: one metre more on the upper sides.
+        """
+        if self.moves_rows:
+            boxes, reach_m = self.outlines.boxes[: len(self.jobs)], self.around_m + SHIFT_M
+        else:
+            boxes, reach_m = shapely.bounds([job.area for job in self.jobs]), self.around_m
+        return np.hstack([np.floor(boxes[:, :2] - reach_m), np.ceil(boxes[:, 2:] + reach_m) + 1.0])
 
     @functools.cached_property
     def units(self) -> Units:
@@ -98,6 +130,9 @@ class WorkPlan:
             "settings": self.settings.to_dict(),
             "names": [[index, *pair] for index, pair in self.names.items()],
             "translate": self.translate.tolist(),
+            "registration": self.registration and self.registration.to_dict(),
+            "operations": [operation.to_dict() for operation in self.operations],
+            "others": shapely.to_wkb(list(self.others), hex=True).tolist() if self.others else [],
         }
         areas = shapely.to_wkb([job.footprint.polygon if job.footprint else job.area for job in self.jobs], hex=True)
         with path.open("w", encoding="utf-8") as file:
@@ -113,13 +148,18 @@ class WorkPlan:
             with path.open(encoding="utf-8") as file:
                 whole, rows = json.loads(file.readline()), [json.loads(line) for line in file]
             areas = shapely.from_wkb([area for _, area, _ in rows])
+            registration = whole["registration"] and Registration.from_dict(whole["registration"])
+            shift = registration.shift if registration else (0.0, 0.0)
             return WorkPlan(
-                jobs=tuple(job_of_row(i, *row) for i, row in enumerate(zip(rows, areas, strict=True))),
+                jobs=tuple(job_of_row(i, *row, shift) for i, row in enumerate(zip(rows, areas, strict=True))),
                 tiles={name: tuple(members) for name, members in whole["tiles"].items()},
                 crs_wkt=whole["crs"],
                 settings=Settings.from_dict(whole["settings"]),
                 names={index: tuple(pair) for index, *pair in whole["names"]},
                 translate=np.array(whole["translate"]),
+                registration=registration,
+                operations=tuple(map(Operation.from_dict, whole["operations"])),
+                others=tuple(shapely.from_wkb(whole["others"])),
             )
         except (OSError, ValueError, KeyError, TypeError, shapely.errors.GEOSException) as error:
             raise OutputError(
@@ -127,15 +167,19 @@ class WorkPlan:
             ) from error
 
 
-def job_of_row(index: int, row: list, area: shapely.Polygon) -> Job:
+def job_of_row(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
     """A building of the plan's file: [id, area, attributes], the last null where there is no footprint."""
     id, _, attributes = row
-    return Job(index, id, area, None) if attributes is None else job_of(index, Footprint(id, area, attributes))
+    if attributes is None:
+        return Job(index, id, area, None)
+    return job_of_footprint(index, Footprint(id, area, attributes), shift)
 
 
-def job_of(index: int, footprint: Footprint) -> Job:
-    """The building of a footprint."""
-    return Job(index, footprint.id, without_needless_vertices(footprint.polygon)[0], footprint)
+def job_of_footprint(index: int, footprint: Footprint, shift: tuple[float, float]) -> Job:
+    """The building of a footprint that lies `shift` beside its roof."""
+    area = without_needless_vertices(footprint.polygon)[0]
+    area = shapely.transform(area, lambda xy: xy + shift) if any(shift) else area
+    return Job(index, footprint.id, area, dataclasses.replace(footprint, shift=shift))
 
 
 def load_plan(folder: Path) -> WorkPlan:
@@ -181,11 +225,11 @@ def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str,
     return tiles
 
 
-def jobs_of_footprints(footprints: tuple[Footprint, ...]) -> tuple[Job, ...]:
-    """One job a footprint, in the order of the file."""
+def jobs_of_footprints(footprints: tuple[Footprint, ...], shift: tuple[float, float] = (0.0, 0.0)) -> tuple[Job, ...]:
+    """One job a footprint, in the order of the file; all lie `shift` beside their roofs."""
     if not footprints:
         raise InputError("expected at least one polygon in the footprints, got none; check the file and its layer")
-    return tuple(job_of(i, footprint) for i, footprint in enumerate(footprints))
+    return tuple(job_of_footprint(i, f, shift) for i, f in enumerate(footprints))
 
 
 def neighbourhood(job: Job, reach_m: float) -> np.ndarray:

@@ -12,17 +12,22 @@ import shapely
 from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..masking import masked
+from ..model import Footprint
 from ..read.overlap import told_box
 from ..settings import Settings
 from ..write.naming import FileUnits
 from ..write.reprojected import crs_of_files
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
-from .plan import Job, WorkPlan, cut_into_tiles, jobs_of_footprints, offset_of_jobs, unusual_names
+from .outlines import MOST_ROW_M
+from .plan import Job, WorkPlan, cut_into_tiles, job_of_footprint, jobs_of_footprints, offset_of_jobs, unusual_names
 from .request import Box, Request
 
 if TYPE_CHECKING:
+    from ..fit.registration import Registration
+    from ..read.operations import Operation
     from ..read.raster import RasterTerrain
+    from .frame import AreaFrame
 
 TILE_M = 250.0  # m, side of a work tile: some dozens of houses, so that a core has minutes to do
 MOST_BUILDINGS_A_TILE = 100  # buildings; progress is told by tiles, and a killed worker loses one
@@ -41,16 +46,21 @@ def make_plan(request: Request) -> WorkPlan:
     if terrain is not None and not request.footprints:
         terrain.knows_any(places_over(frame.units.to_metres(plan_bounds(headers).reshape(-1, 2))))
     settings = settle_classes(request.clouds, request.settings)
+    registration, operations, others = None, [], ()
     if request.footprints:
-        jobs = jobs_from_footprints(request, headers, frame)
+        jobs, others, registration = jobs_from_footprints(request, headers, frame, settings)
+        operations += footprint_operations(request, frame, jobs)
     else:
         jobs, settings = jobs_from_cloud(request.clouds, settings)
         jobs = jobs_in_box(jobs, request, frame.units)
     if terrain is not None:
         check_terrain(terrain, jobs)
+        operations += terrain_operations(terrain, frame, jobs)
     units = FileUnits.of(frame.crs, frame.units, settings.write.out_crs)
     if settings.write.out_crs:
-        say_where_files_lie(jobs, crs_of_files(frame.crs, settings.write.out_crs), units)
+        out_crs = crs_of_files(frame.crs, settings.write.out_crs)
+        say_where_files_lie(jobs, out_crs, units)
+        operations += file_operations(frame, out_crs, jobs)
     return WorkPlan(
         jobs=jobs,
         tiles=cut_into_tiles(jobs, TILE_M, most_buildings_a_tile(request.settings)),
@@ -58,6 +68,9 @@ def make_plan(request: Request) -> WorkPlan:
         settings=settings,
         names=unusual_names(jobs),
         translate=offset_of_jobs(jobs, units.cityjson),
+        registration=registration,
+        operations=tuple(operations),
+        others=others,
     )
 
 
@@ -118,26 +131,119 @@ def read_headers(clouds: tuple[str, ...]) -> list:
     return [header for header in headers if header.count]
 
 
-def jobs_from_footprints(request, headers: list, frame) -> tuple[Job, ...]:
-    from ..read.footprints import read_footprints
+def jobs_from_footprints(
+    request: Request, headers: list, frame: AreaFrame, settings: Settings
+) -> tuple[tuple[Job, ...], tuple[shapely.Polygon, ...], Registration | None]:
+    """A job a footprint, the outlines around that were not asked for, and the common shift by which all are moved; None
+    where it is not looked for."""
     from ..read.overlap import check_overlap
     from .frame import plan_bounds
+    from .registration import find_registration, is_registered, warn_if_moved
 
-    footprints = read_footprints(
-        request.footprints,
-        request.layer,
-        request.id_attribute,
-        frame.cloud,
-        settings=request.settings,
-        where=request.where,
-        bbox=request.bbox,
-    )
+    footprints = footprints_of(request, frame, where=request.where, bbox=request.bbox)
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))
     bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     if len(bounds):
-        check_overlap(footprints, bounds, frame.footprints, frame.cloud, frame.units)
-    return jobs_of_footprints(footprints)
+        check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
+    is_part = settings.read.by_class and (request.where or request.bbox)
+    data_set = all_footprints(request, frame, headers) if is_part else footprints
+    registration = find_registration(data_set, headers, frame.units, settings) if is_registered(settings) else None
+    shift = (0.0, 0.0)
+    if registration is not None:
+        warn_if_moved(registration, str(request.footprints))
+        shift = registration.shift
+    others = [job_of_footprint(0, footprint, shift).area for footprint in around(footprints, data_set)]
+    return jobs_of_footprints(footprints, shift), tuple(others), registration
+
+
+def around(footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]) -> list[Footprint]:
+    """Those of the data set near the footprints that are asked for, and not these."""
+    if data_set is footprints:
+        return []
+    asked = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
+    known = set(shapely.to_wkb(asked).tolist())
+    others = [f for f in data_set if not f.polygon.is_empty and f.polygon.wkb not in known]
+    if not len(asked) or not others:
+        return []
+    polygons = np.array([f.polygon for f in others])
+    near = shapely.STRtree(asked).query(polygons, predicate="dwithin", distance=MOST_ROW_M)[0]
+    return [others[i] for i in np.unique(near)]
+
+
+def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[Footprint, ...]:
+    """The footprints within the clouds, whichever are asked for; of a database those that its own condition lets through.
+
+    What is odd about them has been said of those that are asked for.
+    """
+    from ..read.database import is_database
+    from .frame import plan_bounds
+
+    bounds, path = plan_bounds(headers), str(request.footprints)
+    box = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist()) if len(bounds) else None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InputWarning)
+        return footprints_of(request, frame, where=request.where if is_database(path) else None, bbox=box)
+
+
+def footprints_of(request: Request, frame: AreaFrame, where: str | None, bbox: Box | None) -> tuple[Footprint, ...]:
+    from ..read.footprints import read_footprints
+
+    return read_footprints(
+        str(request.footprints),
+        request.layer,
+        request.id_attribute,
+        frame.cloud,
+        settings=request.settings,
+        where=where,
+        bbox=bbox,
+    )
+
+
+def footprint_operations(request: Request, frame: AreaFrame, jobs: tuple[Job, ...]) -> list[Operation]:
+    """The operation by which footprints came to the clouds' CRS; said by a warning when they were read."""
+    if frame.cloud is None or frame.footprints is None:
+        return []
+    return operations_between(masked(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs)
+
+
+def terrain_operations(terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job, ...]) -> list[Operation]:
+    """The operation by which places come to the terrain model's CRS, with a warning where it is coarse."""
+    from ..read.operations import warn_if_coarse
+
+    if frame.crs is None or terrain.own_crs is None:
+        return []
+    found = operations_between(masked(terrain.path), frame.crs, terrain.own_crs, frame, jobs)
+    for operation in found:
+        warn_if_coarse(operation)
+    return found
+
+
+def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> list[Operation]:
+    """The operation by which coordinates come to the CRS of the files, with a warning where it is coarse."""
+    from ..read.operations import warn_if_coarse
+
+    found = operations_between("--out-crs", frame.crs, out_crs, frame, jobs)
+    for operation in found:
+        warn_if_coarse(operation)
+    return found
+
+
+def operations_between(
+    subject: str, source: Any, target: Any, frame: AreaFrame, jobs: tuple[Job, ...]
+) -> list[Operation]:
+    """The operation from `source` to `target` in plan where the buildings stand; none where both are the same."""
+    from ..read.crs import horizontal_crs, names_place, same_horizontal
+    from ..read.operations import find_operation
+    from ..read.overlap import reprojected
+
+    boxes = shapely.bounds([job.area for job in jobs])
+    boxes = boxes[np.isfinite(boxes).all(axis=1)]
+    if same_horizontal(source, target) or not len(boxes) or not (names_place(source) and names_place(target)):
+        return []
+    middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
+    x, y = reprojected(middle, frame.crs, source)[0]
+    return [find_operation(subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y)))]
 
 
 def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[Job, ...]:

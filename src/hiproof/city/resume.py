@@ -101,6 +101,7 @@ def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | N
     if not stands(request.out, ledger):
         return None
     plan = WorkPlan.load(state / PLAN_FILE)
+    refuse_other_operations(request.out, plan)
     return plan if ledger.get("merged") != "yes" or has_parts(plan, state) else None
 
 
@@ -146,6 +147,18 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
         f"expected {out} to be new or to hold a run of the same inputs, settings and version, got a run that differs in "
         f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or begin anew with --restart"
     )
+
+
+def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
+    """Raise OutputError where PROJ no longer transforms coordinates as it did when the run was planned."""
+    from ..read.operations import is_current
+
+    changed = [operation for operation in plan.operations if not is_current(operation)]
+    if changed:
+        raise OutputError(
+            f"expected PROJ to transform {changed[0].subject} in {out} as before ({changed[0].name}), got another operation: "
+            "a grid was installed or removed since; choose another --out, or begin anew with --restart"
+        )
 
 
 def stands(out: Path, ledger: Ledger) -> bool:

@@ -298,6 +298,8 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
             "started_in": str(Path.cwd()),  # what is not an address or absolute is meant from there
         },
         "crs": plan.crs_wkt,
+        "transformations": [operation.to_dict() for operation in plan.operations],
+        "registration": plan.registration and plan.registration.to_dict(),
         "units": plan.head.units.told(),
         "processes": request.processes,
         "buildings": summary.buildings,

@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from ..errors import DamagedRaster, is_interrupt
+from ..fit.align import Shift, find_shift
 from ..frames import Units
 from ..masking import masked
 from ..model import Building
@@ -22,7 +23,7 @@ from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
 from ..read.thin import thin_to_count, without_repeats
 from ..reconstruct import reconstruct
-from ..stages import largest_polygon, remarked
+from ..stages import distinct, largest_polygon, remarked, shift_remark
 from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
@@ -32,8 +33,9 @@ from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, gr
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
 from .other_classes import OtherPoints, ground_under_roof, roof_of_other_classes, why_no_points
+from .outlines import row_outline
 from .overrides import load_overrides, load_redo
-from .plan import Job, WorkPlan, load_plan, neighbourhood
+from .plan import Job, WorkPlan, job_of_footprint, load_plan, neighbourhood
 from .sort import load_points
 from .terrain_check import WhereLikeGround, doubt_of_terrain
 
@@ -50,6 +52,32 @@ class Surroundings:
         self.grid = PointGrid(self.roof)
         self.ground = ground_cells(points["ground"])
         self.low = Cells(lowest_in_cells(points["low"]))
+        self.shifts: dict[int, Shift] = {}
+
+    def shift_of(self, job: Job) -> Shift:
+        """How far the job's area lies beside its roof, as that of its whole row does."""
+        row = self.plan.outlines.row(job.index) if self.plan.moves_rows and not job.area.is_empty else []
+        if not row:
+            return Shift()
+        label = int(self.plan.outlines.labels[job.index])
+        if label not in self.shifts:
+            outline = row_outline(row)
+            origin = np.floor(outline.bounds[:2])
+            near = distinct(self.roof.take(self.grid.within(outline, self.plan.around_m), axis=0))
+            self.shifts[label] = find_shift(near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin))
+        return self.shifts[label]
+
+    def moved(self, job: Job) -> tuple[Job, str]:
+        """The job with its area on its roof, and a remark where its row was moved there."""
+        shift = self.shift_of(job)
+        if job.footprint is None:
+            return job, ""
+        remark = shift_remark(shift, len(self.plan.outlines.row(job.index)) if shift.is_clear else 1)
+        if not shift.is_clear:
+            return job, remark
+        x, y = (round(float(value), 3) for value in shift.xy)
+        whole = round(job.footprint.shift[0] + x, 3), round(job.footprint.shift[1] + y, 3)
+        return job_of_footprint(job.index, job.footprint, whole), remark
 
     def roof_of(self, job: Job) -> FoundRoof:
         """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be moved onto them.
@@ -177,16 +205,23 @@ def solve_one(
     DamagedRaster, for the terrain model is the run's and not the building's.
     """
     try:
+        job, moved = surroundings.moved(job)
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
         if not found.is_seen and override is None:
             return fragments(not_seen(job, found.remark), plan.names_of(job), plan.head)
         points = without_repeats(found.points)  # first of all: a footprint is put where points are many
         used = thin_to_count(points, most)
-        known = used, job.footprint, surroundings.terrain_of(job), plan.settings
+        known = (
+            used,
+            job.footprint,
+            surroundings.terrain_of(job),
+            plan.settings.replace({"reconstruct": {"align": "off"}}),
+        )
         building = reconstruct(*known, id=job.id) if override is None else overridden(override, *known, id=job.id)
         if len(used) < len(points):
             building = told_of_thinning(building, len(used), len(points))
-        building = remarked(remarked(building, found.remark), surroundings.doubt_of_terrain(job))
+        building = remarked(remarked(building, moved), found.remark)
+        building = remarked(building, surroundings.doubt_of_terrain(job))
         building = remarked(surroundings.looked_at(building, job, points), doubt_of_ground(building))
         return fragments(building, plan.names_of(job), plan.head)
     except (MemoryError, DamagedRaster):
@@ -219,8 +254,10 @@ def not_seen(job: Job, detail: str) -> Building:
 
 def with_input(building: Building, job: Job) -> Building:
     """Add the outline and the attributes that the input has for a building without a model."""
-    attributes = job.footprint.attributes if job.footprint else {}
-    return dataclasses.replace(building, footprint=largest_polygon(job.area), attributes=attributes)
+    if job.footprint is None:
+        return dataclasses.replace(building, footprint=largest_polygon(job.area))
+    footprint, attributes = largest_polygon(job.footprint.polygon), job.footprint.attributes
+    return dataclasses.replace(building, footprint=footprint, attributes=attributes, shift=job.footprint.shift)
 
 
 def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:

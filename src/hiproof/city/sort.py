@@ -52,7 +52,8 @@ class Reach:
     @cached_property
     def bounds(self) -> np.ndarray:
         """(xmin, ymin, xmax, ymax) of all boxes."""
-        return np.concatenate([self.terrain_boxes[:, :2].min(axis=0), self.terrain_boxes[:, 2:].max(axis=0)])
+        boxes = np.vstack([self.terrain_boxes, self.roof_boxes])
+        return np.concatenate([boxes[:, :2].min(axis=0), boxes[:, 2:].max(axis=0)])
 
     @cached_property
     def mask(self) -> np.ndarray:
@@ -78,9 +79,7 @@ class Reaches:
     def __init__(self, plan: WorkPlan, only: Mapping[str, Sequence[int]] | None = None):
         bounds = shapely.bounds([job.area for job in plan.jobs])  # NaN where an area is empty
         low, high = bounds[:, :2], bounds[:, 2:]
-        # a border on a whole metre belongs to the area: one metre more on the upper sides
-        self.roof_boxes = np.hstack([np.floor(low - plan.around_m), np.ceil(high + plan.around_m) + 1.0])
-        reach_m = plan.terrain_reach_m
+        self.roof_boxes, reach_m = plan.roof_boxes, plan.terrain_reach_m
         self.terrain_boxes = np.hstack([np.floor(low - reach_m), np.ceil(high + reach_m)])
         has_area = np.isfinite(bounds[:, 0])
         self.is_partial = only is not None
@@ -89,7 +88,7 @@ class Reaches:
         self.members = {tile: own for tile, own in members.items() if own}
         self.names = list(self.members)
         self.place = {tile: number for number, tile in enumerate(self.names)}
-        boxes = [self.terrain_boxes[own] for own in self.members.values()]
+        boxes = [np.vstack([self.terrain_boxes[own], self.roof_boxes[own]]) for own in self.members.values()]
         self.bounds = np.array([[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]).reshape(-1, 4)
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
 

@@ -73,7 +73,8 @@ class RunPoints:
     def read_job(self, index: int) -> np.ndarray:
         """Points (n, 3) in and around the area of a building, as many as the run would use."""
         job: Job = self.plan.jobs[index]
-        found = self.surroundings(self.tile_of[index]).roof_of(job).points
+        surroundings = self.surroundings(self.tile_of[index])
+        found = surroundings.roof_of(surroundings.moved(job)[0]).points
         most = self.plan.settings.city.max_points_a_building
         return found if len(found) <= most else thin_to_count(stages.distinct(found), most)
 

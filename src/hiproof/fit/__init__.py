@@ -11,6 +11,7 @@ alpha_shape    the outline that goes with it
 union          `fit_building`: a roof as a union of few volumes
 outline        the outline of a building that comes without one
 align          how far a footprint lies beside its roof
+registration   how far all footprints of a data set do
 
 `fit_roof` is imported on first use, because it brings the compiler along.
 """

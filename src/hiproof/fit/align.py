@@ -3,7 +3,8 @@
 First the footprint is slid to where it holds most points: its area is the same everywhere, so that is where an outline of its
 shape is most likely. Then each side that has free ground before it is put where the points across it put it
 (outline/settle.py), and all together tell the shift, and how far the roof reaches beyond the footprint on every side. A side
-that a neighbour's roof goes on beyond tells nothing, so a house in a row is not moved along the row.
+that a neighbour's roof goes on beyond tells nothing, so a house in a row is not moved along the row. A roof much larger
+than its footprint leaves no free ground before its walls: where the sides do not agree, the footprint is grown all around.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ SLID_POINTS = 600  # that are slid over the footprint: a bound on time, for all 
 # m over which a side is soft, as in fit/outline; density outside over that inside: points of walls and neighbours
 BLUR_M, STRAY = 0.25, math.exp(-4.0)
 STRAY_FROM_M = 4.0 * BLUR_M  # outside, from where on all points cost the same
+OVERHANGS_M = (0.0, 0.5, 1.0)  # that are tried all around the footprint; eaves reach no farther over walls
 LEAST_POINTS, LEAST_SIDE_M = 20, 1.5  # points; with fewer every shift holds as many; m: shorter sides tell no offset
 FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may be so many points of those behind it
 SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
@@ -39,6 +41,7 @@ PRIOR = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
 ROUNDS, NEAR_M = 3, 0.2  # of putting each side where its points are, from the last shift; m that counts as no shift
 # m; standard deviations; m that sides may disagree by; share of the border that must be free
 LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.5
+LEAST_FREE_OVERHUNG = 0.85  # share where an overhang all around is assumed: else it takes in the roofs of neighbours
 # free sides: two directions and one to check them; share of the points outside, below which the footprint fits
 LEAST_SIDES, LEAST_OUTSIDE = 3, 0.01
 FEW = 10  # one point in so many is asked first whether points lie outside
@@ -94,19 +97,38 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
         return Shift()
     xy, lines = np.ascontiguousarray(xy), lines_through(ring)
     density = len(xy) / max(shapely.Polygon(ring).area, 1.0)
-    shift = by_sides(xy, ring, lines, np.zeros(2), density)
+    shift = by_sides(xy, ring, lines, np.zeros(2), 0.0, density)
     if shift is not None and shift.is_none:
         return shift
     if are_cut_off(xy, footprint):
         return Shift()
-    shift = Shift(most_points(xy, footprint))
+    for overhang in OVERHANGS_M:
+        shift = settled_shift(xy, ring, lines, density, footprint, overhang)
+        if shift.disagreement < MOST_DISAGREEMENT_M:
+            return shift
+        if not overhang and not is_alone(xy, footprint):
+            break
+    return Shift()
+
+
+def is_alone(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
+    """Whether points cover no more square metres than the roof over the footprint may with the largest overhang."""
+    covered = len(np.unique(np.floor(xy), axis=0))
+    return bool(covered <= shapely.area(shapely.buffer(footprint, OVERHANGS_M[-1] + 0.5, join_style="mitre")))
+
+
+def settled_shift(
+    xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, density: float, footprint: shapely.Polygon, overhang: float
+) -> Shift:
+    """The shift by the sides of a footprint that is grown by `overhang` (m), from where it holds most points on."""
+    shift = Shift(most_points(xy, footprint, overhang))
     for _ in range(ROUNDS):
-        found = by_sides(xy, ring, lines, shift.xy, density)
+        found = by_sides(xy, ring, lines, shift.xy, overhang, density)
         if found is None:
             return Shift()
-        settled = np.abs(found.xy - shift.xy).max() < 0.02
+        is_settled = np.abs(found.xy - shift.xy).max() < 0.02
         shift = found
-        if settled:
+        if is_settled:
             break
     return shift
 
@@ -121,12 +143,13 @@ def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
     return True
 
 
-def most_points(xy: np.ndarray, footprint: shapely.Polygon) -> np.ndarray:
-    """The shift (2,) at which the footprint holds most of `xy`, the least of those that hold as many: coarse, then fine."""
-    low = np.array(footprint.bounds[:2]) - STRAY_FROM_M
-    count = np.ceil((np.array(footprint.bounds[2:]) + STRAY_FROM_M - low) / (2 * PITCH_M)).astype(int)
+def most_points(xy: np.ndarray, footprint: shapely.Polygon, overhang: float) -> np.ndarray:
+    """The shift (2,) at which the footprint, grown by `overhang` (m), holds most of `xy`, the least of those that hold as
+    many: coarse, then fine."""
+    low = np.array(footprint.bounds[:2]) - STRAY_FROM_M - overhang
+    count = np.ceil((np.array(footprint.bounds[2:]) + STRAY_FROM_M + overhang - low) / (2 * PITCH_M)).astype(int)
     x, y = (start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(low, count, strict=True))
-    depth = signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
+    depth = signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint)) + overhang
     costs = costs_at(depth / BLUR_M).reshape(count)
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
@@ -171,18 +194,23 @@ def slid_costs(xy, costs, low, pitch, moves):
     return found
 
 
-def by_sides(xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray, density: float) -> Shift | None:
-    """The shift and the reach beyond that all free sides of the footprint, slid by `start`, agree on best; None of too few."""
+def by_sides(
+    xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray, overhang: float, density: float
+) -> Shift | None:
+    """The shift and the reach beyond that all free sides of the footprint, slid by `start` and grown by `overhang` (m),
+    agree on best; None of too few."""
     ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
-    distances, ends = lines[:, 1] + normals @ start, ends + start
+    from_lines = normals @ start + overhang
+    distances, ends = lines[:, 1] + from_lines, ends + start
     free = free_sides(xy, normals, distances, ends) & (length >= LEAST_SIDE_M)
     told = length[free]
-    if len(told) < LEAST_SIDES or told.sum() <= LEAST_FREE * length.sum():
+    least = LEAST_FREE_OVERHUNG if overhang else LEAST_FREE
+    if len(told) < LEAST_SIDES or told.sum() <= least * length.sum():
         return None
     normals, sigma = normals[free], SIDE_M * np.sqrt(SIDE_LENGTH_M / told)
-    wanted = side_offsets(xy, normals, distances[free], ends[free], density) + normals @ start
+    wanted = side_offsets(xy, normals, distances[free], ends[free], density) + from_lines[free]
     design = np.column_stack([normals, np.ones(len(told))])
     weight = 1.0 / sigma**2
     inverse = np.linalg.inv((design.T * weight) @ design + PRIOR)

@@ -16,6 +16,7 @@ plausible     what no input may say
 thin          one point a cell
 crs           reference systems and their units
 axes          what no roof can be built in is refused
+operations    which operation of PROJ lies between two of them, and how accurate it is
 footprints    building polygons; `read_footprints`
 attribute_columns  their attributes as they are declared
 layers        the layers of a vector file

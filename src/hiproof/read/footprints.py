@@ -23,6 +23,7 @@ from .attribute_columns import as_declared, where_known
 from .crs import described, names_heights_alone, names_place, parse_crs, same_horizontal, units_of, way_between
 from .database import is_database, read_table, table_crs
 from .layers import list_layers, source_of
+from .operations import find_operation, warn_if_coarse
 from .overlap import refuse_degrees, told_box
 from .polygons import is_surface, simple_polygons
 from .remote import is_url
@@ -275,6 +276,7 @@ def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, 
         warnings.warn(f"{path}: {taken}", InputWarning)
         return shapely.transform(geometries, lambda xy: xy * times_between(source, target))
     transformer = way_between(source, target)
+    warn_if_coarse(find_operation(str(path), source, target, middle_of(geometries)))
     moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1])))
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         raise InputError(
@@ -287,6 +289,14 @@ def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, 
 def times_between(source: CRS, target: CRS) -> float:
     """How many units of `target` one of `source` is in plan."""
     return units_of(source, "the footprints").plan / units_of(target).plan
+
+
+def middle_of(geometries: np.ndarray) -> tuple[float, float]:
+    """The middle (x, y) of the geometries, by the medians of their boxes; (0, 0) where none has any."""
+    boxes = shapely.bounds(geometries)
+    boxes = boxes[np.isfinite(boxes).all(axis=1)]
+    x, y = np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0) if len(boxes) else (0.0, 0.0)
+    return float(x), float(y)
 
 
 def advice_on(source: CRS) -> str:

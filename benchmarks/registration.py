@@ -1,0 +1,129 @@
+"""Real footprints put beside their roofs: is the shift found, and do those that lie right stay?
+
+usage: python -m benchmarks.registration [--sets delft amsterdam_west two_epochs] [--parity even|odd]
+
+The footprints of each set are shifted by vectors of 0.3 to 3 m in directions drawn by chance. "all" shifts all of them and
+estimates their common shift, as a run does before there are work tiles. "row" shifts one row of touching footprints, "one"
+a single house: those that stand alone, and those within a row, which a run must leave where they are. "each" is how houses
+were moved before rows were: every house of a shifted data set by itself.
+
+Printed by distance: how many are found within 0.15 m of the known vector (moved, and to the right place), and how many
+are moved to a place more than 0.3 m beside it. At distance 0 every move is wrong. `--parity` takes every second row.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator
+
+import numpy as np
+import shapely
+
+from hiproof.city.outlines import Outlines, row_outline
+from hiproof.fit.align import AROUND_M, find_shift
+from hiproof.fit.registration import register
+from hiproof.read import read_footprints, read_points
+from hiproof.read.assign import PointGrid
+from hiproof.stages import distinct
+
+from .judging import SHARED
+
+SETS = {
+    "delft": ("delft/footprints.gpkg", "delft"),
+    "amsterdam_west": ("amsterdam_west/footprints_bag.gpkg", "amsterdam_west"),
+    "two_epochs": ("two_epochs/footprints.gpkg", "two_epochs/2014"),
+}
+BUILDING_CLASS = 6
+DISTANCES_M = (0.0, 0.3, 0.5, 1.0, 2.0, 3.0)
+FOUND_M, WRONG_M = 0.15, 0.3
+
+Polygons = list[shapely.Polygon]
+Trial = tuple[Polygons, np.ndarray]  # outlines where the shift puts them, and the shift (2,)
+
+
+def set_of(name: str) -> tuple[Polygons, np.ndarray]:
+    """Footprints of a set that lie within its cloud, and the cloud's roof points (n, 3)."""
+    footprints, folder = SETS[name]
+    clouds = [read_points(path) for path in sorted((SHARED / "data" / folder).glob("*.la[sz]"))]
+    points = np.concatenate([cloud.xyz[cloud.classification == BUILDING_CLASS] for cloud in clouds])
+    cloud = shapely.box(*points[:, :2].min(axis=0), *points[:, :2].max(axis=0))
+    polygons = [footprint.polygon for footprint in read_footprints(SHARED / "data" / footprints)]
+    return [polygon for polygon in polygons if cloud.buffer(1.0).contains(polygon)], points
+
+
+def vector(distance: float, number: int) -> np.ndarray:
+    """A shift (2,) of a length, its direction drawn by chance for each number."""
+    azimuth = np.random.default_rng([number, 7]).uniform(-math.pi, math.pi)
+    return distance * np.array([math.cos(azimuth), math.sin(azimuth)])
+
+
+def shifted(polygons: Polygons, off: np.ndarray) -> Polygons:
+    return list(shapely.transform(np.array(polygons), lambda xy: xy + off))
+
+
+def found_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarray:
+    """What a run moves a row by (2,): nothing where the evidence is not clear."""
+    outline = row_outline(row)
+    origin = np.floor(outline.bounds[:2])
+    near = distinct(points[grid.within(outline, AROUND_M)])
+    shift = find_shift(near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin))
+    return shift.xy if shift.is_clear else np.zeros(2)
+
+
+def trials_of(kind: str, polygons: Polygons, distance: float, parity: str | None) -> Iterator[Trial]:
+    """Rows as a run sees them, and the vector that the one asked of was shifted by."""
+    outlines = Outlines(polygons)
+    rows = [numbers.tolist() for numbers in outlines.members]
+    for number, members in enumerate(rows):
+        if parity is not None and number % 2 != (parity == "odd"):
+            continue
+        off = vector(distance, number)
+        if kind == "row":
+            yield shifted([polygons[i] for i in members], off), off
+        elif kind == "each":
+            yield from ((shifted([polygons[i]], off), off) for i in members)
+        elif kind in ("one alone", "one of a row") and (len(members) == 1) == (kind == "one alone"):
+            house = members[len(members) // 2]
+            beside = [shifted([p], off)[0] if i == house else p for i, p in enumerate(polygons)]
+            yield Outlines(beside).row(house), off
+
+
+def row_line(kind: str, outcomes: list[tuple[np.ndarray, np.ndarray]], distance: float) -> str:
+    """The figures of some trials: what was found (2,) and the vector (2,)."""
+    apart = np.array([np.hypot(*(found + off)) for found, off in outcomes])
+    moved = np.array([bool(found.any()) for found, _ in outcomes])
+    right, wrong = moved & (apart < FOUND_M), moved & (apart > WRONG_M)
+    return (
+        f"{kind:13} {distance:3g} m: {len(outcomes):3} trials, moved {moved.mean():4.0%}, "
+        f"within {FOUND_M:g} m {right.mean():4.0%}, moved wrongly {wrong.mean():4.0%}"
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sets", nargs="+", choices=list(SETS), default=list(SETS))
+    parser.add_argument("--parity", choices=("even", "odd"), help="every second row")
+    arguments = parser.parse_args()
+    for name in arguments.sets:
+        polygons, points = set_of(name)
+        grid = PointGrid(points)
+        print(f"{name}: {len(polygons)} footprints, {len(Outlines(polygons).members)} rows")
+        for number, distance in enumerate(DISTANCES_M):
+            off = vector(distance, 100 + number)
+            found = register([(points[:, :2], shifted(polygons, off))])
+            print(
+                f"{'all':13} {distance:3g} m: {np.hypot(*(found.xy + off)):.3f} m from the vector, "
+                f"sigma {max(found.sigma):.3f} m, {'moved' if found.is_clear else 'left'}",
+                flush=True,
+            )
+        for kind in ("row", "one alone", "one of a row", "each"):
+            for distance in DISTANCES_M:
+                trials = list(trials_of(kind, polygons, distance, arguments.parity))
+                if trials:
+                    outcomes = [(found_shift(row, grid, points) if row else np.zeros(2), off) for row, off in trials]
+                    print(row_line(kind, outcomes, distance), flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""Which operation PROJ uses between two CRSs, how accurate it is, and which missing grid would be more accurate.
+
+PROJ transforms between datums by the best operation whose grids are installed. Where the grid of a better one is
+missing it takes a coarser one without a word, and everything moves by metres. `find_operation` names both.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+import warnings
+from dataclasses import dataclass
+from typing import Any
+
+from pyproj import CRS, Transformer
+from pyproj.exceptions import ProjError
+from pyproj.transformer import AreaOfInterest, TransformerGroup
+
+from ..errors import InputWarning
+from .crs import described, parse_crs
+
+COARSE_M = 1.0
+"""Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their neighbours' roofs."""
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation of PROJ from the CRS `source` to `target` near `place` (x, y in `source`), used for `subject`.
+
+    `accuracy_m` is PROJ's, None where it states none. `missing_grids` are those of the best operation that cannot be
+    used because they are not installed, and `missing_accuracy_m` is its accuracy; empty and None where none is better.
+    """
+
+    subject: str
+    source: str
+    target: str
+    place: tuple[float, float]
+    name: str
+    accuracy_m: float | None
+    missing_grids: tuple[str, ...] = ()
+    missing_accuracy_m: float | None = None
+
+    @property
+    def is_coarse(self) -> bool:
+        """Whether the operation may put things COARSE_M or more beside their place."""
+        return self.accuracy_m is None or self.accuracy_m >= COARSE_M
+
+    @property
+    def remark(self) -> str:
+        """What a user should know of a coarse operation, with what to do about it; empty for an accurate one."""
+        if not self.is_coarse:
+            return ""
+        accuracy = "to an unknown accuracy" if self.accuracy_m is None else f"to {self.accuracy_m:g} m"
+        ways = f"{described(parse_crs(self.source))} to {described(parse_crs(self.target))}"
+        said = f"{self.subject}: transformed from {ways} {accuracy} ({self.name})"
+        if not self.missing_grids:
+            return f"{said}; PROJ knows no better way, so check that the models lie where they should"
+        files = " ".join(f"--file {grid}" for grid in self.missing_grids)
+        better = "" if self.missing_accuracy_m is None else f", accurate to {self.missing_accuracy_m:g} m,"
+        return (
+            f"{said}; a better way{better} needs {', '.join(self.missing_grids)}, which is not installed: "
+            f"run `projsync {files}`, or set PROJ_NETWORK=ON"
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        return dataclasses.asdict(self)
+
+    @staticmethod
+    def from_dict(values: dict[str, Any]) -> Operation:
+        lists = {name: tuple(values[name]) for name in ("place", "missing_grids")}
+        return Operation(**{**values, **lists})
+
+
+def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, float]) -> Operation:
+    """Find the operation that `Transformer.from_crs(source, target)` uses at `place` (x, y in `source`)."""
+    x, y = (float(value) for value in place)
+    return dataclasses.replace(operation_at(source.to_string(), target.to_string(), (x, y)), subject=subject)
+
+
+def is_current(operation: Operation) -> bool:
+    """Check whether PROJ still uses this operation: not where a grid has been installed or removed since."""
+    now = operation_at(operation.source, operation.target, operation.place)
+    return (now.name, now.accuracy_m) == (operation.name, operation.accuracy_m)
+
+
+def warn_if_coarse(operation: Operation) -> None:
+    """Warn (InputWarning) where an operation is coarse or its accuracy unknown."""
+    if operation.remark:
+        warnings.warn(operation.remark, InputWarning)
+
+
+@functools.lru_cache(maxsize=32)
+def operation_at(source: str, target: str, place: tuple[float, float]) -> Operation:
+    """The operation between CRSs given as text, for no subject."""
+    transformer = Transformer.from_crs(source, target, always_xy=True)
+    transformer.transform(*place)
+    try:
+        used = transformer.get_last_used_operation()
+    except ProjError:  # a single operation, which is the transformer itself
+        used = transformer
+    accuracy = used.accuracy if used.accuracy is not None and used.accuracy >= 0 else None
+    better = [way for way in missing_ways(source, target, place) if is_better(way.accuracy, accuracy)]
+    found = Operation("", source, target, place, used.description, accuracy)
+    if not better:
+        return found
+    grids = tuple(dict.fromkeys(grid.short_name for grid in better[0].grids if not grid.available))
+    missing_accuracy = better[0].accuracy if better[0].accuracy >= 0 else None
+    return dataclasses.replace(found, missing_grids=grids, missing_accuracy_m=missing_accuracy)
+
+
+def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:
+    """PROJ's operations near `place` whose grids are not installed, its best first."""
+    lon, lat = Transformer.from_crs(source, "EPSG:4326", always_xy=True).transform(*place)
+    area = AreaOfInterest(lon, lat, lon, lat) if math.isfinite(lon) and math.isfinite(lat) else None
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # of the missing grids, which are what is asked for
+        return TransformerGroup(source, target, always_xy=True, area_of_interest=area).unavailable_operations
+
+
+def is_better(accuracy: float, than: float | None) -> bool:
+    """Whether a stated accuracy (m) is finer than another, None and negative ones being unknown."""
+    return than is None or 0 <= accuracy < than

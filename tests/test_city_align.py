@@ -1,0 +1,148 @@
+"""Footprints beside their roofs: all of a data set are moved by one shift, a row of houses moves as one, or nothing moves."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from hiproof.city.plan import WorkPlan
+from hiproof.city.prepare import make_plan
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.errors import InputWarning
+from hiproof.settings import Settings
+from tiny_town import ORIGIN, Town, write_cloud, write_footprints
+
+OFF = Settings.from_dict({"reconstruct": {"align": "off"}})
+SHIFT = np.array([1.2, -0.8])
+
+
+def scattered_houses(rows: int = 5, columns: int = 5) -> Town:
+    """Flat houses of different sizes in a grid, every 50 m one, with ground around."""
+    rng = np.random.default_rng(3)
+    xy = rng.uniform(0, (50.0 * columns, 50.0 * rows), (int(2 * 2500 * rows * columns), 2))
+    classes, z, footprints = np.full(len(xy), 2, np.uint8), np.zeros(len(xy)), {}
+    for i in range(rows * columns):
+        corner = np.array([50.0 * (i % columns) + 15, 50.0 * (i // columns) + 15])
+        size = rng.uniform((8, 7), (16, 12))
+        inside = ((xy >= corner) & (xy <= corner + size)).all(axis=1)
+        classes[inside], z[inside] = 6, 6.0
+        footprints[f"house-{i}"] = shapely.box(*(corner + ORIGIN[:2]), *(corner + size + ORIGIN[:2]))
+    return Town(np.round(np.column_stack([xy, z]) + ORIGIN, 3), classes, footprints)
+
+
+def row_of_houses(houses: int = 4) -> Town:
+    """Gables that touch, with ground around."""
+    rng = np.random.default_rng(5)
+    xy = rng.uniform(0, (6.0 * houses + 24, 32.0), (int(8 * (6.0 * houses + 24) * 32), 2))
+    inside = ((xy >= 12) & (xy <= [12 + 6.0 * houses, 20])).all(axis=1)
+    z = np.where(inside, 9 - 0.6 * np.abs(xy[:, 1] - 16), 0.0)
+    places = [np.array([12 + 6.0 * i, 12.0]) + ORIGIN[:2] for i in range(houses)]
+    footprints = {f"house-{i}": shapely.box(x, y, x + 6, y + 8) for i, (x, y) in enumerate(places)}
+    return Town(np.round(np.column_stack([xy, z]) + ORIGIN, 3), np.where(inside, 6, 2).astype(np.uint8), footprints)
+
+
+def moved(town: Town, shift) -> Town:
+    polygons = {id: shapely.transform(polygon, lambda xy: xy + shift) for id, polygon in town.footprints.items()}
+    return replace(town, footprints=polygons)
+
+
+def request_of(folder, town: Town, pieces: int = 1, **options) -> Request:
+    """A run on the town, whose cloud is cut into so many files."""
+    folder.mkdir(exist_ok=True)
+    parts = np.array_split(np.random.default_rng(0).permutation(len(town.xyz)), pieces)
+    clouds = [write_cloud(folder / f"{n}.laz", town.xyz[p], town.classification[p]) for n, p in enumerate(parts)]
+    footprints = write_footprints(folder / "footprints.gpkg", town.footprints)
+    return Request(tuple(map(str, clouds)), folder / "out", str(footprints), **options)
+
+
+@pytest.fixture(scope="module")
+def shifted(tmp_path_factory):
+    return request_of(tmp_path_factory.mktemp("shifted"), moved(scattered_houses(), -SHIFT))
+
+
+def plan_of(request: Request) -> WorkPlan:
+    with pytest.warns(InputWarning, match="all footprints lie beside their roofs"):
+        return make_plan(request)
+
+
+def test_the_common_shift_is_found_and_areas_are_moved(shifted):
+    plan = plan_of(shifted)
+    assert plan.registration.is_clear
+    assert np.abs(plan.registration.xy - SHIFT).max() < 0.1
+    assert plan.registration.footprints == 25 and max(plan.registration.sigma) < 0.1
+    for job in plan.jobs:
+        apart = np.subtract(job.area.bounds, job.footprint.polygon.bounds)
+        assert np.allclose(apart, np.tile(plan.registration.xy, 2), atol=1e-6)
+
+
+def test_the_common_shift_depends_on_the_files_alone(shifted, tmp_path):
+    known = plan_of(shifted).registration
+    box = (*(ORIGIN[:2] + 40), *(ORIGIN[:2] + 120))
+    for other in (
+        replace(shifted, bbox=box),
+        replace(shifted, where="id = 'house-7'"),
+        request_of(tmp_path / "cut", moved(scattered_houses(), -SHIFT), pieces=3),
+    ):
+        plan = plan_of(other)
+        assert plan.registration == known
+    reordered = dict(reversed(list(moved(scattered_houses(), -SHIFT).footprints.items())))
+    town = replace(scattered_houses(), footprints=reordered)
+    assert plan_of(request_of(tmp_path / "reordered", town)).registration == known
+
+
+def test_the_plan_keeps_what_was_moved(shifted, tmp_path):
+    plan = plan_of(replace(shifted, where="id in ('house-7', 'house-8')"))
+    plan.save(tmp_path / "plan.jsonl")
+    again = WorkPlan.load(tmp_path / "plan.jsonl")
+    assert again.registration == plan.registration and len(again.others) == len(plan.others) > 0
+    for job, other in zip(plan.jobs, again.jobs, strict=True):
+        assert job.area.wkb == other.area.wkb and job.footprint.polygon.wkb == other.footprint.polygon.wkb
+        assert job.footprint.shift == other.footprint.shift == plan.registration.shift
+
+
+def test_footprints_in_place_stay_and_align_off_looks_for_nothing(tmp_path, shifted):
+    plan = make_plan(request_of(tmp_path, scattered_houses()))
+    assert not plan.registration.is_clear and plan.registration.length < 0.1
+    assert all(job.area.equals(job.footprint.polygon) for job in plan.jobs)
+    assert make_plan(replace(shifted, settings=OFF)).registration is None
+
+
+def records_of(out) -> dict[str, dict]:
+    lines = map(json.loads, (out / "parameters.jsonl").read_text().splitlines())
+    return {line["id"]: line for line in lines if "id" in line}
+
+
+def test_a_run_builds_on_the_roofs_and_says_so(shifted, tmp_path):
+    asked = replace(shifted, out=tmp_path / "out", where="id in ('house-7', 'house-8')")
+    with pytest.warns(InputWarning, match="all footprints lie beside their roofs"):
+        reconstruct_area(asked)
+    record = json.loads((asked.out / "run.json").read_text())
+    assert record["registration"]["applied"] and record["registration"]["squares"] >= 15
+    for id, building in records_of(asked.out).items():
+        assert building["shift"] == record["registration"]["shift_m"]
+        truth = scattered_houses().footprints[id]
+        outline = shapely.Polygon(np.array(building["outline"][0]) + building["origin"][:2])
+        assert outline.symmetric_difference(truth).area < 0.1 * truth.area
+
+
+def test_a_row_moves_as_one_whichever_of_its_houses_are_asked_for(tmp_path):
+    request = request_of(tmp_path, moved(row_of_houses(), (-0.7, 0.4)))
+    reconstruct_area(request)
+    whole = records_of(request.out)
+    shifts = {tuple(building["shift"]) for building in whole.values()}
+    assert len(shifts) == 1 and np.abs(np.subtract(shifts.pop(), (0.7, -0.4))).max() < 0.1
+    assert all("was moved with the 4 of its row by (0.7" in building["detail"] for building in whole.values())
+    one = replace(request, out=tmp_path / "one", where="id = 'house-2'")
+    reconstruct_area(one)
+    assert records_of(one.out)["house-2"] == whole["house-2"]
+
+
+def test_one_house_of_a_row_is_not_moved_away_from_the_others(tmp_path):
+    town = row_of_houses()
+    alone = {**town.footprints, "house-1": moved(town, (0.0, 1.0)).footprints["house-1"]}
+    request = request_of(tmp_path, replace(town, footprints=alone))
+    reconstruct_area(request)
+    assert {tuple(building["shift"]) for building in records_of(request.out).values()} == {(0.0, 0.0)}
