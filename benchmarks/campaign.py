@@ -12,7 +12,8 @@ real roofs without ground; and towns of known solids, scanned at 2 and 8 points/
 
 Each is a whole run through files. The counts are
 
-    internal error     with its traceback; `--count 100 --first-seed SEED` repeats a scene
+    internal error     with its traceback; `--count 100 --first-seed SEED` repeats a scene, and
+                       `hiproof repro` a building of FOLDER/failures/seed-SEED
     invalid solid      by our check after `hiproof.build`, and by `hiproof check` of the files
     not rebuilt alike  `hiproof build` refuses a record, or gives other bytes in any file
     run that ended     with an exception, before it wrote its files
@@ -34,9 +35,10 @@ import tempfile
 import traceback
 import warnings
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -186,36 +188,45 @@ def judge_scene(task: tuple[int, int, Path]) -> Findings:
     seed, count, work = task
     folder = work / f"scene-{seed}"
     try:
-        return judge_run(f"seed {seed}", write_scene(seed, count, folder))
+        found = judge_run(f"seed {seed}", write_scene(seed, count, folder))
+        if (folder / "run" / "failures").exists():  # `hiproof repro` runs them again
+            shutil.copytree(folder / "run" / "failures", work / "failures" / f"seed-{seed}", dirs_exist_ok=True)
+        return found
     finally:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-def judge_real(task: tuple[str, Request]) -> Findings:
+def judge_real(task: tuple[str, Callable[[], Request]]) -> Findings:
     """Judge one run over real data."""
-    return judge_run(*task)
+    name, make = task
+    return judge_run(name, make())
 
 
-def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Request]]:
-    """Yield runs over every cloud of the data folder, by name."""
+def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
+    """Yield runs over every cloud of the data folder, by name; their thinned files are made when called."""
     french = Settings.from_dict({"read": {"building_classes": [6, 67]}})
     unnamed = Settings.from_dict({"read": {"crs": "EPSG:5490"}})
     sets = (
-        ("delft", "delft", "delft/footprints.gpkg", Settings()),
-        ("amsterdam_west", "amsterdam_west", "amsterdam_west/footprints_bag.gpkg", Settings()),
-        ("two_epochs/2010", "two_epochs/2010", "two_epochs/footprints.gpkg", Settings()),
-        ("two_epochs/2014", "two_epochs/2014", "two_epochs/footprints.gpkg", Settings()),
-        ("ctview", "ctview", None, french),
-        ("stbarth", "stbarth", None, unnamed),
+        ("delft", "delft/footprints.gpkg", Settings()),
+        ("amsterdam_west", "amsterdam_west/footprints_bag.gpkg", Settings()),
+        ("two_epochs/2010", "two_epochs/footprints.gpkg", Settings()),
+        ("two_epochs/2014", "two_epochs/footprints.gpkg", Settings()),
+        ("ctview", None, french),
+        ("stbarth", None, unnamed),
     )
-    for name, folder, footprints, settings in sets:
-        paths = sorted((data / folder).glob("*.laz"))
-        for share in SHARES if paths else ():
-            clouds = [thin_file(path, share, work / "thinned" / folder) for path in paths]
+    for folder, footprints, settings in sets:
+        for share in SHARES if any((data / folder).glob("*.laz")) else ():
             for outlines in dict.fromkeys([footprints and str(data / footprints), None]):
-                told = f"{name}, {share:g} of the points, {'with' if outlines else 'without'} footprints"
-                out = work / f"{folder.replace('/', '-')}-{share:g}-{outlines is not None}"
-                yield told, Request(tuple(map(str, clouds)), out, outlines, settings=settings, restart=True)
+                told = "with" if outlines else "without"
+                name = f"{folder}, {share:g} of the points, {told} footprints"
+                yield name, partial(thinned_request, data / folder, share, outlines, settings, work / folder)
+
+
+def thinned_request(folder: Path, share: float, footprints: str | None, settings: Settings, work: Path) -> Request:
+    """The run over a share of the points of all files in `folder`."""
+    clouds = [str(thin_file(path, share, work / "thinned")) for path in sorted(folder.glob("*.laz"))]
+    out = work / f"{share:g}-{'with' if footprints else 'without'}-footprints"
+    return Request(tuple(clouds), out, footprints, settings=settings, restart=True)
 
 
 def thin_file(path: Path, share: float, folder: Path) -> Path:
@@ -230,15 +241,24 @@ def thin_file(path: Path, share: float, folder: Path) -> Path:
     return thinned
 
 
-def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Request]]:
-    """Yield runs over real roofs without ground and over scanned towns, by name."""
-    roofs = read_roofs(data)
-    if roofs:
-        yield "real roofs", lay_out(roofs, work / "real-roofs")
+def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
+    """Yield runs over real roofs without ground and over scanned towns, by name; made when called."""
+    if (data / "roofn3d").exists() or (data / "hand_drawn").exists():
+        yield "real roofs", partial(roofs_request, data, work / "real-roofs")
     for town, path in (TOWNS | OTHER_TOWNS).items():
         for density in TOWN_DENSITIES if path.exists() else ():
-            clouds = [building.scanned(density) for building in read_town(path)]
-            yield f"{town} at {density:g} points/m2", lay_out(clouds, work / f"{town}-{density:g}")
+            folder = work / f"{town}-{density:g}"
+            yield f"{town} at {density:g} points/m2", partial(town_request, path, density, folder)
+
+
+def roofs_request(data: Path, folder: Path) -> Request:
+    """The run over all real roofs."""
+    return lay_out(read_roofs(data), folder)
+
+
+def town_request(path: Path, density: float, folder: Path) -> Request:
+    """The run over all buildings of a town, scanned at `density` (points/m2)."""
+    return lay_out([building.scanned(density) for building in read_town(path)], folder)
 
 
 def read_roofs(data: Path) -> list[np.ndarray]:

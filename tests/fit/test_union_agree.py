@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.fit.union import fit_building
+from hiproof.fit.union import agree, fit_building
 from hiproof.model import Roof
 from points_of_roofs import sampled
 
@@ -41,6 +41,17 @@ def test_wings_of_one_height_have_one_ridge_height(seed):
 def test_wings_of_two_heights_keep_them(lower):
     low, high = tops(fit_building(sampled(two_wings(lower), L_SHAPE, 10.0, 0.02), L_SHAPE))
     assert high - low == pytest.approx(lower, abs=0.04)
+
+
+def test_planes_that_fall_from_their_eaves_are_never_taken(monkeypatch):
+    """Where no common fit is proper the wings keep their own planes; they took any, and pitches became negative."""
+    fit = fit_building(sampled(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE)
+    low, high = tops(fit)
+    assert high - low < 1e-4
+    monkeypatch.setattr(agree, "proper", lambda *_: False)
+    low, high = tops(fit_building(sampled(two_wings(0.0), L_SHAPE, 3.0, 0.05), L_SHAPE))
+    assert high - low > 1e-3
+    assert (low, high) == pytest.approx((8.0, 8.0), abs=0.15)
 
 
 def bent(angle_deg):

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from hiproof.fit.union.names import regular
+from hiproof.fit.union.names import regular, showing
 
 SLOPE, EAVE = 0.8, 3.0
 
@@ -32,3 +32,16 @@ def test_a_side_that_points_tell_stays_where_it_is(by):
     member = regular(hip_rows(6.0, 4.0), ends, 0.0).those(0)
     assert member.half[0] == pytest.approx(6.0 + 0.5 * by)
     assert member.eaves[1] == pytest.approx(EAVE - SLOPE * by) and math.isfinite(member.slopes[1])
+
+
+def test_where_only_planes_over_walls_show_one_of_the_shapes_own_stays():
+    """A shape without planes has no name, and the building failed on it."""
+    gable = hip_rows(6.0, 4.0)[:, :, 0]
+    gable[:2] = np.nan
+    over_wall = np.array([[-1.0, -1.0, 11.9]])
+    rows = np.concatenate([gable, over_wall])
+    corner = np.array([[5.9, 3.9, 1.0], [5.9, 3.0, 1.0], [5.0, 3.9, 1.0]])
+    assert (corner @ over_wall[0] < np.nanmin(corner @ gable.T, axis=1)).all()
+    there = showing(rows, corner)
+    assert there.tolist() == [False, False, False, True, False, True]
+    assert np.nanmin(corner @ rows[there].T, axis=1) == pytest.approx(np.nanmin(corner @ rows.T, axis=1))
