@@ -39,6 +39,17 @@ def test_parameters_come_back(tmp_path):
     assert [part["type"] for part in record["parts"]] == ["gable", "flat"]
 
 
+def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(tmp_path):
+    """SQLite has 2,000 columns at most: the table failed when all work was done, as if the disk were full."""
+    building = modelled(box())
+    many = {f"a{i}": i for i in range(2500)}
+    few, _, _ = table(tmp_path, [building])
+    columns, _, _ = table(tmp_path, [replace(building, attributes={**building.attributes, **many})])
+    assert set(few) < set(columns) and len(columns) == 1998
+    room = attributes.attributes_with_a_column()
+    assert all(columns[f"a{i}"][0] == i for i in range(room)) and "a2499" not in columns
+
+
 def test_outlines_come_back(tmp_path):
     building = modelled(courtyard())
     write_parameters(tmp_path / "p.jsonl", [building])

@@ -15,6 +15,7 @@ from ..masking import masked
 from ..model import Footprint
 from ..read.overlap import told_box
 from ..settings import Settings
+from ..write.attributes import attributes_with_a_column
 from ..write.naming import FileUnits
 from ..write.reprojected import crs_of_files
 from .classes import settle_classes
@@ -143,6 +144,7 @@ def jobs_from_footprints(
     footprints = footprints_of(request, frame, where=request.where, bbox=request.bbox)
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))
+    say_if_columns_run_out(request.footprints, footprints)
     bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     if len(bounds):
         check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
@@ -244,6 +246,17 @@ def operations_between(
     middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
     x, y = reprojected(middle, frame.crs, source)[0]
     return [find_operation(subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y)))]
+
+
+def say_if_columns_run_out(path: str, footprints: tuple[Footprint, ...]) -> None:
+    """One line, before any work, where footprints have more attributes than a GeoPackage has columns."""
+    count = len({name for footprint in footprints for name in footprint.attributes})
+    if count > (room := attributes_with_a_column()):
+        warnings.warn(
+            f"{masked(path)}: has {count:,} attributes; buildings.gpkg holds the first {room:,}, because its tables have at "
+            "most 2,000 columns, and the other files hold all",
+            InputWarning,
+        )
 
 
 def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[Job, ...]:

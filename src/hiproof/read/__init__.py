@@ -20,6 +20,7 @@ operations    which operation of PROJ lies between two of them, and how accurate
 footprints    building polygons; `read_footprints`
 attribute_columns  their attributes as they are declared
 layers        the layers of a vector file
+features      a layer's features, odd attributes as text
 wkb           its geometries, surfaces in space among them
 polygons      polygons put right
 database      footprints from PostGIS

@@ -22,6 +22,7 @@ from ..settings import Settings
 from .attribute_columns import as_declared, where_known
 from .crs import described, names_heights_alone, names_place, parse_crs, same_horizontal, units_of, way_between
 from .database import is_database, read_table, table_crs
+from .features import read_layer
 from .layers import list_layers, source_of
 from .operations import find_operation, warn_if_coarse
 from .overlap import refuse_degrees, told_box
@@ -122,11 +123,10 @@ def read_features(
     source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
     info = reading(lambda: pyogrio.read_info(source, layer=layer), path)
     chosen = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
-    meta, numbers, wkb, columns = reading(
-        lambda: pyogrio.raw.read(source, layer=layer, return_fids=True, datetime_as_string=True, **chosen),
-        path,
-        info,
-    )
+    meta, numbers, wkb, columns, as_text = reading(lambda: read_layer(source, layer, **chosen), path, info)
+    if as_text:
+        names = ", ".join(as_text)
+        warnings.warn(f"{path}: read as text, for a value does not fit the attribute's type: {names}", InputWarning)
     if wkb is None:
         raise InputError(f"expected polygons in {path}, got a table without geometry; name another file or layer")
     if not len(wkb) and (where or bbox):
@@ -145,8 +145,8 @@ def read_features(
 
     def known_of(name: str) -> np.ndarray:
         # of all columns: in some formats those left out are empty to the condition as well
-        known = {**chosen, "layer": layer, "where": where_known(name, where)}
-        told, _, _, values = reading(lambda: pyogrio.raw.read(source, read_geometry=False, **known), path, info)
+        known: dict[str, Any] = {**chosen, "layer": layer, "where": where_known(name, where)}
+        told, *_, values, _ = reading(lambda: read_layer(source, read_geometry=False, **known), path, info)
         return values[list(told["fields"]).index(name)]
 
     return meta, numbers, geometries, as_declared(meta["fields"], meta["dtypes"], columns, known_of)

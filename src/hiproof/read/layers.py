@@ -7,10 +7,11 @@ without that declaration, so its features can be read.
 from __future__ import annotations
 
 from pathlib import Path
-from xml.sax.saxutils import escape, quoteattr
+from xml.etree import ElementTree
 
 import pyogrio
 from pyogrio.errors import DataSourceError, GeometryError
+from pyogrio.util import vsi_path
 
 OF_GEOPACKAGE = "select table_name, geometry_type_name from gpkg_geometry_columns"
 
@@ -35,7 +36,23 @@ def source_of(path: str, layer: str | int | None) -> tuple[str, str | int | None
     except GeometryError:
         names = [name for name, _ in list_layers(path)]
         name = names[layer or 0] if not isinstance(layer, str) else layer
-        source = f"<SrcDataSource>{escape(path)}</SrcDataSource><GeometryType>wkbUnknown</GeometryType>"
-        layers = f"<OGRVRTLayer name={quoteattr(name)}>{source}</OGRVRTLayer>"
-        return f"<OGRVRTDataSource>{layers}</OGRVRTDataSource>", None
+        return virtual_layer(path, name, geometry="wkbUnknown"), None
     return path, layer
+
+
+def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> str:
+    """GDAL's virtual format of one layer, its `geometry` declared anew, or with one attribute alone, as text.
+
+    `path` may be what this function made.
+    """
+    if path.startswith("<"):
+        root = ElementTree.fromstring(path)
+        path = root.findtext(".//SrcDataSource", "")
+    root = ElementTree.Element("OGRVRTDataSource")
+    of_layer = ElementTree.SubElement(root, "OGRVRTLayer", name=layer)
+    ElementTree.SubElement(of_layer, "SrcDataSource").text = vsi_path(path)
+    if geometry:
+        ElementTree.SubElement(of_layer, "GeometryType").text = geometry
+    if text:
+        ElementTree.SubElement(of_layer, "Field", name=text, type="String")
+    return ElementTree.tostring(root, encoding="unicode")

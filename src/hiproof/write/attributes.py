@@ -37,6 +37,7 @@ LAYERS = {BUILDINGS: "MultiPolygon", "parts": "MultiPolygon", "roof_surfaces": "
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
 ROWS_AT_ONCE = 1000  # rows handed to GDAL at once: its overhead is a call's, its memory a row's
 GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more
+MOST_COLUMNS = 1998  # of a table in SQLite as GDAL's wheels come, less the number and the geometry of a row
 # GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
@@ -47,11 +48,17 @@ def write_attributes(
     """Write the GeoPackage `path`: layers of the outlines of `buildings` (world coordinates), their parts and roof surfaces.
 
     A building whose outline is unknown gets a row without geometry. Values of one column are brought to one type: whole
-    numbers and decimals to decimals, anything beside text to text. Geometries are in the unit of `crs`. Raises OutputError when the file cannot be written.
+    numbers and decimals to decimals, anything beside text to text. Geometries are in the unit of `crs`. Of thousands of attributes the last have no column
+    (MOST_COLUMNS). Raises OutputError when the file cannot be written.
     """
     with AttributesWriter(path, crs, prefix) as writer:
         for building in buildings:
             writer.add(building)
+
+
+def attributes_with_a_column() -> int:
+    """How many attributes of the input a table of buildings has room for beside hiproof's own."""
+    return MOST_COLUMNS - len(ROOFER) - len(HIPROOF) - len(OSM) - 1
 
 
 class WaitingRows:
@@ -68,13 +75,18 @@ class WaitingRows:
                 self.found.setdefault(name, set()).add(kind_of(value))
         self.file.write(line + b"\n")
 
-    def kinds(self, prefix: str) -> dict[str, type]:
-        """The one type of every column."""
+    def kinds(self, prefix: str, most: int | None = None) -> dict[str, type]:
+        """The one type of every column; of more than `most`, the last of the input's own are left out."""
         declared = {
             start + a.name: a.kind for start, table in ((prefix, ROOFER), (OWN, HIPROOF), ("", OSM)) for a in table
         }
         declared = {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
         kinds = {name: column_kind(found, declared.get(name, "text")) for name, found in self.found.items()}
+        beyond = len(kinds) - (most or len(kinds))
+        if beyond > 0:
+            own = [name for name in kinds if name not in declared and name != "id"]
+            left_out = set(own[-beyond:])
+            kinds = {name: kind for name, kind in kinds.items() if name not in left_out}
         return kinds or {"id": str}
 
     def batches(self) -> Iterator[list[Row]]:
@@ -116,7 +128,7 @@ class AttributesWriter(BuildingWriter):
 
     def finish(self) -> None:
         for waiting in self.waiting.values():
-            kinds = waiting.kinds(self.prefix)
+            kinds = waiting.kinds(self.prefix, MOST_COLUMNS)
             for number, rows in enumerate(waiting.batches()):
                 self.write_rows(waiting.layer, rows, kinds, append=number > 0)
         self.write_styles()

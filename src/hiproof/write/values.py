@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import json
 import math
 from typing import Any
 
@@ -24,8 +25,8 @@ def metres(value: float) -> float:
 def plain(value: Any) -> Any:
     """`value` as str, int, float, bool or None, which every format can hold.
 
-    >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2), b"x", [1, 2])]
-    [3, None, True, '2020-01-02', 'x', '[1, 2]']
+    >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2), b"x", [1, "a"])]
+    [3, None, True, '2020-01-02', 'x', '[1, "a"]']
     """
     if value is None or isinstance(value, (bool, int)):
         return value
@@ -41,6 +42,8 @@ def plain(value: Any) -> Any:
         return value.isoformat()
     if isinstance(value, bytes):
         return plain_text(value.decode("utf-8", "replace"))
+    if isinstance(value, (list, tuple, dict)):
+        return plain_text(json.dumps(value, ensure_ascii=False, default=str))
     return plain_text(value)
 
 

@@ -1,0 +1,115 @@
+"""Attributes that pyogrio cannot read pass through as text, in one remark, and refuse no file."""
+
+import doctest
+import json
+import sqlite3
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+
+import hiproof.read.features
+from hiproof.city.prepare import say_if_columns_run_out
+from hiproof.errors import InputError, InputWarning
+from hiproof.model import Footprint
+from hiproof.read.footprints import read_footprints
+from hiproof.write.attributes import attributes_with_a_column
+
+SQUARES = [shapely.box(500000 + 20 * i, 4649776, 500010 + 20 * i, 4649786) for i in range(4)]
+
+
+def write_geojson(path, **columns):
+    """Four squares with an id h0, h1, ... and these attributes."""
+    rows = [{"id": f"h{i}", **{name: values[i] for name, values in columns.items()}} for i in range(4)]
+    features = [
+        {"type": "Feature", "properties": row, "geometry": shapely.geometry.mapping(square)}
+        for row, square in zip(rows, SQUARES, strict=True)
+    ]
+    crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::32633"}}
+    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}))
+    return path
+
+
+def values_of(path, name, **options):
+    """The attribute of each footprint, and the remarks that reading them made."""
+    with pytest.warns(InputWarning) as told:
+        footprints = read_footprints(path, **options)
+    return [footprint.attributes.get(name) for footprint in footprints], [str(remark.message) for remark in told]
+
+
+def test_examples_in_the_docstrings_run():
+    assert doctest.testmod(hiproof.read.features).failed == 0
+
+
+ODD = {
+    "the 30th of February": ["1999-12-31", "2024-02-30", None, "1998-01-01"],
+    "the year nought": ["1999-12-31", "0000-01-01", None, "1998-01-01"],
+}
+
+
+@pytest.mark.parametrize("kind", ODD)
+def test_one_impossible_date_refuses_no_file(tmp_path, kind):
+    dates = ODD[kind]
+    path = write_geojson(tmp_path / "a.geojson", built=dates, year=[1999, 2024, 2001, None])
+    found, remarks = values_of(path, "built")
+    assert found == dates
+    assert len(remarks) == 1 and "read as text" in remarks[0] and remarks[0].endswith(": built")
+    years = [footprint.attributes.get("year") for footprint in read_footprints(path)]
+    assert years == [1999, 2024, 2001, None] and type(years[0]) is int
+
+
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
+def test_an_impossible_date_goes_with_conditions_and_boxes(tmp_path):
+    path = write_geojson(tmp_path / "a.geojson", built=ODD["the 30th of February"], year=[1999, 2024, 2001, 1998])
+    chosen = read_footprints(
+        path, where="year < 2010", target_crs="EPSG:32633", bbox=(500025, 4649776, 500080, 4649786)
+    )
+    assert [(footprint.id, footprint.attributes.get("built")) for footprint in chosen] == [
+        ("h2", None),
+        ("h3", "1998-01-01"),
+    ]
+    with pytest.raises(InputError, match="--where"):
+        read_footprints(path, where="nonsense < 2010")
+
+
+def test_a_date_of_a_shapefile_that_is_none_is_text(tmp_path):
+    path = tmp_path / "a.shp"
+    wkb = shapely.to_wkb(SQUARES).astype(object)
+    fields = [np.arange(4), np.array(["1999-12-31"] * 4, "datetime64[D]")]
+    pyogrio.raw.write(str(path), wkb, fields, ["id", "built"], geometry_type="Polygon", crs="EPSG:32633")
+    table = (tmp_path / "a.dbf").read_bytes()
+    (tmp_path / "a.dbf").write_bytes(table.replace(b"19991231", b"19500000", 1))
+    assert values_of(path, "built")[0] == ["1950-00-00", "1999-12-31", "1999-12-31", "1999-12-31"]
+
+
+def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
+    path = tmp_path / "a.gpkg"
+    wkb = shapely.to_wkb(SQUARES).astype(object)
+    names = np.array(["Straße", "b", "c", "d"], object)
+    pyogrio.raw.write(str(path), wkb, [names], ["name"], geometry_type="Polygon", crs="EPSG:32633", SPATIAL_INDEX="NO")
+    with sqlite3.connect(path) as base:
+        for (trigger,) in base.execute("select name from sqlite_master where type = 'trigger'").fetchall():
+            base.execute(f'drop trigger "{trigger}"')
+        base.execute("update a set name = cast(x'41ff42' as text) where name = 'b'")
+    found, remarks = values_of(path, "name")
+    assert found == ["Straße", "A\ufffdB", "c", "d"] and len(remarks) == 1
+
+
+def test_several_odd_attributes_are_named_in_one_remark(tmp_path):
+    lists = [[True, False], [True], [], None]
+    path = write_geojson(tmp_path / "a.geojson", built=ODD["the year nought"], flags=lists, name=list("abcd"))
+    found, remarks = values_of(path, "name")
+    assert found == list("abcd") and len(remarks) == 1 and remarks[0].endswith(": built, flags")
+
+
+def test_more_attributes_than_a_geopackage_has_columns_are_told_before_work(recwarn):
+    def with_attributes(count):
+        return (Footprint("a", SQUARES[0], {f"a{i}": i for i in range(count)}),)
+
+    room = attributes_with_a_column()
+    assert 1900 < room < 1998
+    say_if_columns_run_out("f.gpkg", with_attributes(room))
+    assert not recwarn
+    with pytest.warns(InputWarning, match=f"has 2,500 attributes; buildings.gpkg holds the first {room:,}"):
+        say_if_columns_run_out("f.gpkg", with_attributes(2500))
