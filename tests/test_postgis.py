@@ -2,6 +2,7 @@
 
 import json
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,9 @@ from hiproof.cli.load import load
 from hiproof.errors import InputError, OutputError
 from hiproof.parametric.run import build_file
 from hiproof.read.footprints import footprint_crs, read_footprints
+from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_attributes, write_cityjson, write_parameters
-from hiproof.write.postgis import lie_of, load_postgis
+from hiproof.write.postgis import lie_of
 from hiproof.write.roof_figures import roof_figures
 from postgis_server import running, why_not
 from sample_models import write_sample_run
@@ -268,3 +270,66 @@ def test_slope_and_azimuth_of_a_plane_falling_north_east():
     assert azimuth == pytest.approx(45)
     assert slope == pytest.approx(54.7356, abs=1e-3)
     assert area == pytest.approx(3**0.5)
+
+
+@pytest.fixture
+def empty_database(database):
+    """A database of its own without PostGIS, gone afterwards."""
+    with psycopg.connect(database, autocommit=True) as connection:
+        connection.execute("create database fresh")
+    yield database.replace("/postgres?", "/fresh?")
+    with psycopg.connect(database, autocommit=True) as connection:
+        connection.execute("drop database fresh with (force)")
+
+
+def test_first_loads_at_once_wait_for_each_other(empty_database, tmp_path):
+    """Into a database without PostGIS, half of them into the same tables."""
+    write_sample_run(tmp_path / "run")
+    prefixes = ["same", "same", "same", "Same", "one", "two"]
+    with ThreadPoolExecutor(len(prefixes)) as pool:
+        counts = list(pool.map(lambda prefix: load_postgis(tmp_path / "run", empty_database, prefix), prefixes))
+    assert counts == [3] * len(prefixes)
+    with psycopg.connect(empty_database) as connection:
+        for prefix in {prefix.lower() for prefix in prefixes}:
+            assert connection.execute(f"select count(*) from {prefix}_buildings").fetchone() == (3,)
+
+
+def test_the_longest_prefix_keeps_every_index_apart(database, tmp_path):
+    write_sample_run(tmp_path / "run")
+    longest = "p" * 48
+    load_postgis(tmp_path / "run", database, longest)
+    with psycopg.connect(database) as connection:
+        found = connection.execute(
+            "select count(*) from pg_indexes where indexname like %s and indexname not like '%%pkey'", (longest + "%",)
+        )
+        assert found.fetchone() == (4,)
+
+
+@pytest.mark.parametrize("prefix", ["p" * 49, "größe", "a-b", "1st", "", "a b", "a\n"])
+def test_other_prefixes_are_refused(database, tmp_path, prefix):
+    write_sample_run(tmp_path / "run")
+    with pytest.raises(InputError, match="at most 48 letters"):
+        load_postgis(tmp_path / "run", database, prefix)
+
+
+def test_a_damaged_building_is_left_out_of_the_tables(database, run_of_two):
+    folder, _ = run_of_two
+    path = folder / "buildings.city.jsonl"
+    head, *lines = (json.loads(line) for line in path.read_text().splitlines())
+    del lines[0]["CityObjects"]["house"]["geometry"][-1]["semantics"]  # which may be missing
+    lines[1]["vertices"][0][2] += 30_000
+    path.write_text("\n".join(map(json.dumps, [head, *lines])) + "\n")
+    told = []
+    assert load_postgis(folder, database, "damaged", told.append) == 2
+    assert len(told) == 1 and "building yard" in str(told[0]) and "not planar" in str(told[0])
+    with psycopg.connect(database) as connection:
+        ids = connection.execute("select id from damaged_buildings order by id").fetchall()
+        assert ids == [("house",), ("lost",)]
+        assert connection.execute("select distinct building_id from damaged_parts").fetchall() == [("house",)]
+
+
+def test_tables_that_are_none_are_named(database, run_of_two):
+    folder, _ = run_of_two
+    (folder / "buildings.gpkg").write_bytes(b"SQLite format 3\0" + bytes(3000))
+    with pytest.raises(InputError, match=r"tables that hiproof wrote at .*buildings\.gpkg"):
+        load_postgis(folder, database, "junk")

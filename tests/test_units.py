@@ -31,7 +31,8 @@ from hiproof.read.crs import units_of
 from hiproof.read.pointcloud import read_header
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
-from hiproof.write.postgis import building_row, open_sequence, roof_rows, units_of_run
+from hiproof.view.loading import database_rows
+from hiproof.write.postgis import roof_rows
 from read.test_lax import write_lax
 from read.test_pointcloud import write_copc
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints
@@ -144,8 +145,7 @@ def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_m
 
 def areas_to_load(out):
     """Areas in m2 of the roof surfaces as they would go into PostGIS."""
-    header, features = open_sequence(out / "buildings.city.jsonl")
-    rows = [building_row(header["transform"], feature, units_of_run(out)) for feature in features]
+    rows = list(database_rows(out))
     return [area for row in rows for *_, area, _ in roof_rows(row)]
 
 

@@ -173,7 +173,8 @@ def started(folder):
     raise AssertionError(f"the server ended with {process.wait()}")
 
 
-def test_a_kill_loses_no_accepted_edit(folder):
+def accept_until(folder, number):
+    """Start a server, accept one edit after the other, and send it a signal meanwhile; the process and what it confirmed."""
     process, address = started(folder)
     confirmed = {}
 
@@ -199,10 +200,22 @@ def test_a_kill_loses_no_accepted_edit(folder):
     while len(confirmed) < 3:
         thread.join(0.05)
         assert thread.is_alive()
-    process.send_signal(signal.SIGKILL)
+    process.send_signal(number)
     thread.join()
     process.wait()
     process.stdout.close()
+    return process, confirmed
+
+
+def test_ctrl_c_leaves_nothing_half_written(folder):
+    before = {path.name for path in folder.iterdir()}
+    process, _ = accept_until(folder, signal.SIGINT)
+    assert process.returncode == 0
+    assert {path.name for path in folder.iterdir()} - before == {FILE, f".{FILE}.lock"}
+
+
+def test_a_kill_loses_no_accepted_edit(folder):
+    _, confirmed = accept_until(folder, signal.SIGKILL)
     kept = dict(read_overrides(str(folder / FILE)))
     assert set(kept) == set(confirmed)
     for id, note in confirmed.items():  # one that was on its way may have come through as well

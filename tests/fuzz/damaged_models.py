@@ -30,39 +30,23 @@ def as_text(lines: list[dict]) -> bytes:
     return ("\n".join(map(json.dumps, lines)) + "\n").encode()
 
 
-def damaged_models(folder: Path) -> dict[str, bytes]:
-    """Contents of `buildings.city.jsonl` by what is wrong; none of them is a file that can be used."""
+def damaged_files(folder: Path) -> dict[str, bytes]:
+    """Contents of `buildings.city.jsonl` by what is wrong with the file as a whole, or with its header."""
     lines = sound_lines(folder)
-    return damaged_texts(as_text(lines)) | damaged_members(lines) | damaged_geometries(lines)
-
-
-def damaged_texts(sound: bytes) -> dict[str, bytes]:
-    """What is no JSON, or none of a model."""
-    nested = b"[" * DEEP + b"]" * DEEP
+    sound = as_text(lines)
     return {
         "empty": b"",
         "blank": b"\n \n",
         "not JSON": b"buildings\n",
         "binary": bytes(range(256)),
         "utf-16": sound.decode().encode("utf-16"),
-        "cut off": sound[: len(sound) // 2],
         "null": b"null\n",
         "a list": b"[]\n",
         "a number": b"3\n",
         "a text": b'"buildings"\n',
-        "nested a million deep": nested,
-        "nested after the header": sound.split(b"\n")[0] + b"\n" + nested,
+        "nested a million deep": b"[" * DEEP + b"]" * DEEP,
         "a number of 5000 digits": sound.replace(b"0.0001", b"9" * 5000, 1),
-    }
-
-
-def damaged_members(lines: list[dict]) -> dict[str, bytes]:
-    """Headers, vertices, objects and attributes that are something else than they should be."""
-    attributes = (1, "CityObjects", ..., "attributes")
-    return {
         "header is a list": changed(lines, 0, to=[]),
-        "feature is a list": changed(lines, 1, to=[]),
-        "feature is null": changed(lines, 1, to=None),
         "no header": as_text(lines[1:]),
         "transform is a text": changed(lines, 0, "transform", to="none"),
         "transform is a list": changed(lines, 0, "transform", to=[1]),
@@ -70,6 +54,24 @@ def damaged_members(lines: list[dict]) -> dict[str, bytes]:
         "scale of words": changed(lines, 0, "transform", "scale", to=["a", "b", "c"]),
         "huge scale": changed(lines, 0, "transform", "scale", to=[HUGE, 1, 1]),
         "infinite translation": changed(lines, 0, "transform", "translate", to=[float("inf"), 0, 0]),
+    }
+
+
+def damaged_models(folder: Path) -> dict[str, bytes]:
+    """Contents of `buildings.city.jsonl` by what is wrong with its first building; the others are sound."""
+    lines = sound_lines(folder)
+    return damaged_members(lines) | damaged_geometries(lines)
+
+
+def damaged_members(lines: list[dict]) -> dict[str, bytes]:
+    """Lines, vertices, objects and attributes that are something else than they should be."""
+    attributes = (1, "CityObjects", ..., "attributes")
+    head, first, *others = as_text(lines).splitlines(keepends=True)
+    return {
+        "cut off": head + b"".join(others) + first[: len(first) // 2],
+        "nested after the header": head + b"[" * DEEP + b"]" * DEEP + b"\n" + b"".join(others),
+        "feature is a list": changed(lines, 1, to=[]),
+        "feature is null": changed(lines, 1, to=None),
         "vertices of two": changed(lines, 1, "vertices", by=lambda v: [p[:2] for p in v]),
         "vertices of words": changed(lines, 1, "vertices", by=lambda v: [["a", "b", "c"] for _ in v]),
         "vertices null": changed(lines, 1, "vertices"),

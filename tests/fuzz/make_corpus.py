@@ -14,7 +14,7 @@ from pathlib import Path
 
 from fuzz.damaged_clouds import damaged_clouds
 from fuzz.damaged_footprints import ODD, write_beside_a_sound_one
-from fuzz.damaged_models import RECORDS, damaged_models, invalid_models
+from fuzz.damaged_models import RECORDS, damaged_files, damaged_models, invalid_models
 from tiny_town import make_town, write_town
 
 NAMED = "expected .* got"  # what every sentence about a file that cannot be used has in it
@@ -26,7 +26,10 @@ def make_corpus(folder: Path, seed: int = 0) -> dict[str, str]:
     write_town(folder, make_town(2, 3.0))  # sound, to run the damaged ones beside
     found = {str(case.path.relative_to(folder)): case.sentence for case in damaged_clouds(folder / "clouds", seed)}
     for kind, contents in (
-        ("models", damaged_models(folder / "sound") | invalid_models(folder / "sound")),
+        (
+            "models",
+            damaged_files(folder / "sound") | damaged_models(folder / "sound") | invalid_models(folder / "sound"),
+        ),
         ("records", RECORDS),
     ):
         (folder / kind).mkdir(exist_ok=True)

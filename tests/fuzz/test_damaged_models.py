@@ -1,10 +1,13 @@
 """What `check`, `convert` and `report` answer to damaged files of a run: a sentence, never a traceback or a wrong file."""
 
+import re
+
 import pytest
+import typer
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzz.damaged_models import RECORDS, damaged_models, invalid_models, odd_models, sound_lines
+from fuzz.damaged_models import RECORDS, damaged_files, damaged_models, invalid_models, odd_models, sound_lines
 from hiproof.cli import check
 from hiproof.cli.convert import Made, convert
 from hiproof.cli.report import report
@@ -19,6 +22,7 @@ COMMANDS = {
     "convert to obj": lambda folder: convert(folder, None, Made.obj),
     "report": lambda folder: report(folder, None, None, None, None),
 }
+WRITTEN = {"convert to glb": "buildings.glb", "convert to obj": "buildings.obj", "report": "report.html"}
 
 
 def answer(command, *arguments):
@@ -27,6 +31,8 @@ def answer(command, *arguments):
         return command(*arguments) or 0, ""
     except HiproofError as error:
         return 2, str(error)
+    except typer.Exit as end:
+        return end.exit_code, ""
 
 
 @pytest.fixture
@@ -40,20 +46,50 @@ def cases(make, tmp_path_factory):
 
 
 @pytest.mark.parametrize("command", COMMANDS)
-@pytest.mark.parametrize("make", [damaged_models, invalid_models])
-def test_damaged_models_are_answered_with_a_sentence(make, command, run_folder, tmp_path_factory):
-    for name, content in cases(make, tmp_path_factory).items():
+def test_damaged_files_are_refused_with_a_sentence(command, run_folder, tmp_path_factory):
+    for name, content in cases(damaged_files, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
         code, said = answer(COMMANDS[command], run_folder)
         assert code == 2 and said.startswith("expected") and "got" in said and str(run_folder) in said, name
     assert sorted(path.name for path in run_folder.iterdir() if path.suffix != ".mtl") == [MODELS, "run.json"]
 
 
-def test_damaged_models_cannot_be_checked(run_folder, tmp_path_factory):
-    for name, content in cases(damaged_models, tmp_path_factory).items():
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("make", [damaged_models, invalid_models])
+def test_a_damaged_building_is_named_and_the_others_are_used(make, command, run_folder, tmp_path_factory, caplog):
+    written = run_folder / WRITTEN[command]
+    for name, content in cases(make, tmp_path_factory).items():
+        (run_folder / MODELS).write_bytes(content)
+        written.unlink(missing_ok=True)
+        caplog.clear()
+        assert answer(COMMANDS[command], run_folder) == (2, ""), name
+        (said,) = caplog.messages
+        assert "left out: expected" in said and "got" in said and str(run_folder) in said, name
+        assert "house-1" in said or re.search(r"line \d", said), name
+        assert re.search(b"block[ _]2", written.read_bytes()), name
+
+
+def test_a_run_of_damaged_buildings_alone_is_refused(run_folder):
+    path = run_folder / MODELS
+    path.write_text(path.read_text().replace('"Solid"', '"Solid", "boundaries": 3'))
+    path.write_text(re.sub(r'"boundaries": \[\[.*?\]\]\]\]', '"boundaries": 3', path.read_text()))
+    for command in COMMANDS.values():
+        code, said = answer(command, run_folder)
+        assert code == 2, said
+
+
+def test_damaged_files_cannot_be_checked(run_folder, tmp_path_factory):
+    for name, content in cases(damaged_files, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
         code, said = answer(check.count_invalid, [run_folder / MODELS], 0.01)
         assert code == 2 and said.startswith("expected") and "got" in said, name
+
+
+def test_damaged_buildings_count_as_invalid(run_folder, tmp_path_factory, capsys):
+    for name, content in cases(damaged_models, tmp_path_factory).items():
+        (run_folder / MODELS).write_bytes(content)
+        assert answer(check.count_invalid, [run_folder / MODELS], 0.01)[0] == 1, name
+        assert "1 solid, 1 valid, 0 invalid, 1 damaged building left out" in capsys.readouterr().out, name
 
 
 def test_solids_that_are_none_are_found_invalid(run_folder, tmp_path_factory, capsys):

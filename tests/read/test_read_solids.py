@@ -155,7 +155,7 @@ BROKEN = {
     "cut.json": (FILES["a.city.json"][:500], "damaged or cut off"),
     "list.json": ("[1, 2]", "expected a JSON object"),
     "geo.json": ('{"type": "FeatureCollection"}', '"type": "CityJSON"'),
-    "index.json": (json.dumps({**city(), "vertices": [[0, 0, 0]]}), "vertices"),
+    "index.json": (json.dumps({**city(), "vertices": [[0, 0, 0]]}), "vertex 1 of 1"),
     "model.jsonl": (gml(), "got XML, such as CityGML; name a CityJSON file"),
     "headless.jsonl": (seq().split("\n")[1], "expected a CityJSON line"),
     "empty.jsonl": ("", "got an empty file"),

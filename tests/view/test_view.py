@@ -1,5 +1,6 @@
 """`hiproof view`: the page as headless Chromium shows it, and who is served what."""
 
+import errno
 import http.client
 import json
 import os
@@ -8,14 +9,19 @@ import shutil
 import subprocess
 import threading
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from hiproof.cli.convert import convert
+from hiproof.cli.evaluate import evaluate
+from hiproof.cli.report import report
 from hiproof.cli.view import tiles_of
-from hiproof.errors import HiproofError, InputError
+from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
 from hiproof.view.server import Handler, page_of, server_of
+from hiproof.write import files
 from hiproof.write.tiles import write_models
 from hiproof.write.viewed import ViewedModel
 from sample_models import ORIGIN, SOLIDS, two_parts, write_sample_run
@@ -163,14 +169,69 @@ def test_a_port_that_is_taken_is_told(tiles, serving):
 
 def test_tiles_of_a_run_are_made_once_and_again_when_it_changed(tmp_path, capsys):
     write_sample_run(tmp_path)
-    folder = tiles_of(tmp_path)
-    made = (folder / "tileset.json").stat().st_mtime_ns
-    assert tiles_of(tmp_path) == folder and (folder / "tileset.json").stat().st_mtime_ns == made
+    with tiles_of(tmp_path) as folder:
+        made = (folder / "tileset.json").stat().st_mtime_ns
+    with tiles_of(tmp_path) as again:
+        assert again == folder and (folder / "tileset.json").stat().st_mtime_ns == made
     os.utime(tmp_path / "buildings.city.jsonl", (made / 1e9 + 10, made / 1e9 + 10))
-    assert (tiles_of(tmp_path) / "tileset.json").stat().st_mtime_ns > made
-    assert tiles_of(folder) == folder
+    with tiles_of(tmp_path) as anew:
+        assert (anew / "tileset.json").stat().st_mtime_ns > made
+    with tiles_of(folder) as own:
+        assert own == folder
 
 
 def test_a_folder_of_neither_is_refused(tmp_path):
-    with pytest.raises(HiproofError, match="hiproof reconstruct"):
-        tiles_of(tmp_path)
+    with pytest.raises(HiproofError, match="hiproof reconstruct"), tiles_of(tmp_path):
+        pass
+
+
+def refuse_writing_below(folder, monkeypatch):
+    """Make `folder` part of a read-only file system, as far as our writers see."""
+    read_only = OSError(errno.EROFS, os.strerror(errno.EROFS))
+
+    def refusing(function):
+        def call(path, *args, **named):
+            if Path(path).is_relative_to(folder):
+                raise read_only
+            return function(path, *args, **named)
+
+        return call
+
+    for name in ("mkdir", "unlink", "rename"):
+        monkeypatch.setattr(Path, name, refusing(getattr(Path, name)))
+    opened = files.OutputFile.__init__
+    monkeypatch.setattr(
+        files.OutputFile, "__init__", lambda file, hidden, path: refusing(opened_at)(hidden, file, path)
+    )
+
+    def opened_at(hidden, file, path):
+        opened(file, hidden, path)
+
+
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
+def test_a_run_that_cannot_be_written_is_shown_all_the_same(tmp_path, monkeypatch, caplog):
+    write_sample_run(tmp_path / "run")
+    refuse_writing_below(tmp_path / "run", monkeypatch)
+    with tiles_of(tmp_path / "run") as tiles:
+        assert json.loads((tiles / "tileset.json").read_text())["asset"]["version"] == "1.1"
+        assert not tiles.is_relative_to(tmp_path)
+    assert not tiles.exists()
+    assert "read-only" in caplog.text and "temporary folder" in caplog.text
+
+
+@pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
+def test_other_commands_say_how_to_write_elsewhere(tmp_path, monkeypatch):
+    write_sample_run(tmp_path / "run")
+    cloud = tmp_path / "points.xyz"
+    cloud.write_text("85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n")
+    refuse_writing_below(tmp_path / "run", monkeypatch)
+    for call, told in (
+        (lambda: convert(tmp_path / "run"), "hiproof convert {} OUT"),
+        (lambda: report(tmp_path / "run"), "hiproof report {} --out FILE"),
+        (lambda: evaluate(tmp_path / "run", [str(cloud)]), "hiproof evaluate {} --out FOLDER"),
+    ):
+        with pytest.raises(OutputError, match="read-only") as caught:
+            call()
+        assert told.format(tmp_path / "run") in str(caught.value)
+    convert(tmp_path / "run", tmp_path / "a.glb")
+    assert (tmp_path / "a.glb").read_bytes()[:4] == b"glTF"

@@ -21,11 +21,12 @@ from hiproof.read.solids import read_solids
 from hiproof.rings import ring_normal
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
+from hiproof.view.loading import database_rows
 from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
 from hiproof.write.citygml import NAMESPACES, CityGMLWriter
 from hiproof.write.citygml3 import CityGML3Writer
 from hiproof.write.colours import type_colours
-from hiproof.write.postgis import building_row, polyhedral_wkt
+from hiproof.write.postgis import polyhedral_wkt
 from hiproof.write.roof_codes import CODE_SPACES
 from hiproof.write.styles import TABLE, TYPE_COLUMN
 
@@ -213,10 +214,9 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
 
 @pytest.mark.parametrize(("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)])
 def test_a_database_gets_one_shell_of_a_building_in_parts_at_every_level(tmp_path, lods, grounds):
-    write_cityjson(tmp_path / "a.city.jsonl", [terrace()], "EPSG:7415", write=replace(IN_PARTS, lods=lods))
-    head, feature = map(json.loads, (tmp_path / "a.city.jsonl").read_text().splitlines())
-    row = building_row(head["transform"], feature)
-    assert sum(face.kind == GROUND for face in row.faces) == grounds
+    write_cityjson(tmp_path / "buildings.city.jsonl", [terrace()], "EPSG:7415", write=replace(IN_PARTS, lods=lods))
+    (row,) = database_rows(tmp_path)
+    assert sum(face.kind == GROUND for face in (row.solid.faces if row.solid else ())) == grounds
     assert (polyhedral_wkt(row) is not None) == bool(grounds)
 
 

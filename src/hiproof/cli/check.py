@@ -9,6 +9,7 @@ from typing import Annotated
 import typer
 
 from ..log import counted
+from ..read.damage import LeftOut
 
 
 def check(
@@ -17,12 +18,12 @@ def check(
         float, typer.Option(min=0.0, help="largest distance of a vertex from its face's plane, m")
     ] = 0.01,
 ) -> None:
-    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid."""
+    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid or cannot be read."""
     raise typer.Exit(1 if count_invalid(files, planarity) else 0)
 
 
 def count_invalid(files: list[Path], planarity_m: float) -> int:
-    """How many solids of `files` are invalid; prints a line for each of them and a count a file."""
+    """How many solids of `files` are invalid or damaged; prints a line for each of them and a count a file."""
     from ..compose import check_solid
     from ..read.solids import read_solids
 
@@ -30,7 +31,8 @@ def count_invalid(files: list[Path], planarity_m: float) -> int:
     for path in files:
         codes: Counter[int] = Counter()
         total = bad = 0
-        for id, solid in read_solids(path):
+        left_out = LeftOut()
+        for id, solid in read_solids(path, left_out):
             total += 1
             findings = check_solid(solid, planarity_m=planarity_m)
             if findings:
@@ -38,6 +40,7 @@ def count_invalid(files: list[Path], planarity_m: float) -> int:
                 codes.update({finding.code for finding in findings})
                 typer.echo(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
         by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
+        by_code += left_out.told()
         typer.echo(f"{path}: {counted(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}")
-        invalid += bad
+        invalid += bad + left_out.count
     return invalid

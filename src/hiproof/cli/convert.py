@@ -8,9 +8,11 @@ from typing import Annotated
 
 import typer
 
-from ..errors import InputError
+from ..errors import InputError, OutputError
 from ..formats import OF_MODELS, module_of
 from ..log import counted
+from ..read.damage import LeftOut
+from ..write.files import elsewhere
 
 Made = StrEnum("Made", {name: name for name in OF_MODELS})  # type: ignore[misc]
 KINDS = ", ".join(f"{name} ({format.what})" for name, format in OF_MODELS.items())
@@ -30,17 +32,32 @@ def convert(
         typer.Option(help="height of the geoid above the ellipsoid, m, for 3dtiles [default: by pyproj's grid]"),
     ] = None,
 ) -> None:
-    """Convert the models of a run to a format of 3D viewers, with building ids, roof types and parameters as properties."""
-    from ..view.run_models import run_buildings, run_crs_text
+    """Convert the models of a run to a format of 3D viewers, with building ids, roof types and parameters as properties.
 
+    Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
+    """
     name = format.value if format else format_of(out)
     given = {} if geoid_height is None else {"geoid_height_m": geoid_height}
     if given and name != "3dtiles":
         raise InputError(f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out")
     path = out or Path(folder) / OF_MODELS[name].file
-    buildings = run_buildings(folder)
+    try:
+        left_out = convert_run(folder, path, name, crs, **given)
+    except OutputError as error:
+        raise elsewhere(error, f"hiproof convert {folder} OUT") if out is None else error from error
+    if left_out.exit_code:
+        raise typer.Exit(left_out.exit_code)
+
+
+def convert_run(folder: Path, path: Path, name: str, crs: str | None = None, **given: float) -> LeftOut:
+    """Write the models of the run in `folder` to `path` in the format `name`; returns what damage left out."""
+    from ..view.run_models import run_buildings, run_crs_text
+
+    left_out = LeftOut()
+    buildings = left_out.sound(run_buildings(folder, left_out))
     count = module_of(OF_MODELS[name].module).write_models(path, buildings, crs or run_crs_text(folder), **given)
-    typer.echo(f"{path}: {counted(count, 'building')}")
+    typer.echo(f"{path}: {counted(count, 'building')}{left_out.told()}")
+    return left_out
 
 
 def format_of(out: Path | None) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import getpass
-from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -38,8 +37,7 @@ def edit(
         if desk.points.missing:
             typer.echo(desk.points.missing, err=True)
         typer.echo(f"open {service.address}")
-        with suppress(KeyboardInterrupt):  # Ctrl-C is how it ends: all that was accepted is on disk
-            server.serve_forever()
+        server.serve_until_stopped()  # all that was accepted is on disk
 
 
 def user_name() -> str:

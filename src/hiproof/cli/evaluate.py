@@ -8,8 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from ..errors import InputError
+from ..errors import InputError, OutputError
 from ..log import counted
+from ..read.damage import LeftOut
+from ..write.files import elsewhere
 
 SHOWN = {
     "psd_mean": "PSD",
@@ -41,19 +43,28 @@ def evaluate(
     from ..evaluate.run import evaluate_run
     from ..write.files import atomic_file
 
-    run = evaluate_run(folder, clouds or (), footprints, reference, layer)
+    left_out = LeftOut()
+    run = evaluate_run(folder, clouds or (), footprints, reference, layer, left_out)
+    left_out.refuse_all(model.is_damaged for model in run.models)
     if not run.clouds:
         raise InputError(f"expected point files to measure {folder} against, got none; name them after it")
     place = Path(out or folder)
-    for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
-        with atomic_file(place / name) as file:
-            file.write(text.encode())
+    try:
+        for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
+            with atomic_file(place / name) as file:
+                file.write(text.encode())
+    except OutputError as error:
+        raise elsewhere(error, f"hiproof evaluate {folder} --out FOLDER") if out is None else error from error
     print_summary(summarise(run.figures), reference is not None)
-    typer.echo(f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {counted(len(run.figures), 'building')}")
+    typer.echo(
+        f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {counted(len(run.figures), 'building')}{left_out.told()}"
+    )
     unmeasured = sum(math.isnan(figures.quality.psd_mean) for figures in run.figures)
     if unmeasured:
         told = counted(unmeasured, "building")
         typer.echo(f"no distances of {told} (no model, or no points): their means are the others'")
+    if left_out.exit_code:
+        raise typer.Exit(left_out.exit_code)
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:

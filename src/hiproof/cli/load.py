@@ -8,16 +8,25 @@ from typing import Annotated
 import typer
 
 from ..log import counted
+from ..read.damage import LeftOut
 
 
 def load(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     database: Annotated[str, typer.Argument(help="postgresql://user@host/database")],
-    prefix: Annotated[str, typer.Option(help="first part of the table names")] = "hiproof",
+    prefix: Annotated[
+        str, typer.Option(help="first part of the table names, at most 48 letters, digits and underscores")
+    ] = "hiproof",
 ) -> None:
-    """Load the models of a run into PostGIS tables; loading again replaces them."""
-    from ..evaluate.run import run_record, way_to_models
-    from ..write.postgis import load_postgis
+    """Load the models of a run into PostGIS tables; loading again replaces them.
 
-    count = load_postgis(folder, database, prefix, known=way_to_models(run_record(folder)))
-    typer.echo(f"{counted(count, 'building')} loaded into {prefix}_buildings, {prefix}_roofs and {prefix}_parts")
+    Exit code: 0 all buildings were loaded, 2 damaged ones were left out, or unusable input.
+    """
+    from ..view.loading import load_postgis
+
+    left_out = LeftOut()
+    count = load_postgis(folder, database, prefix, left_out)
+    tables = f"{prefix}_buildings, {prefix}_roofs and {prefix}_parts"
+    typer.echo(f"{counted(count, 'building')} loaded into {tables}{left_out.told()}")
+    if left_out.exit_code:
+        raise typer.Exit(left_out.exit_code)

@@ -7,7 +7,10 @@ from typing import Annotated
 
 import typer
 
+from ..errors import OutputError
 from ..log import counted
+from ..read.damage import LeftOut
+from ..write.files import elsewhere
 
 
 def report(
@@ -19,11 +22,21 @@ def report(
     layer: Annotated[str | None, typer.Option(help="layer of the footprints")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write [default: report.html in the folder]")] = None,
 ) -> None:
-    """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings, settings."""
+    """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings, settings.
+
+    Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable input.
+    """
     from ..evaluate.report import write_report
     from ..evaluate.run import evaluate_run
 
-    path = out or Path(folder) / "report.html"
-    run = evaluate_run(folder, clouds or (), footprints, layer=layer)
-    write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
-    typer.echo(f"{path}: {counted(len(run.models), 'building')}, {path.stat().st_size / 1e6:.1f} MB")
+    path, left_out = out or Path(folder) / "report.html", LeftOut()
+    run = evaluate_run(folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True)
+    left_out.refuse_all(model.is_damaged for model in run.models)
+    try:
+        write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
+    except OutputError as error:
+        raise elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error from error
+    size = f"{path.stat().st_size / 1e6:.1f} MB"
+    typer.echo(f"{path}: {counted(len(run.models), 'building')}, {size}{left_out.told()}")
+    if left_out.exit_code:
+        raise typer.Exit(left_out.exit_code)

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from ..errors import OutputError
 from ..formats import FORMATS
+from ..log import LOGGER
+from .convert import convert_run
 
 
 def view(
@@ -23,25 +29,32 @@ def view(
 
     from ..view.server import server_of
 
-    with server_of(tiles_of(folder), f"hiproof: {folder.resolve().name}", port) as server:
+    with tiles_of(folder) as tiles, server_of(tiles, f"hiproof: {folder.resolve().name}", port) as server:
         typer.echo(f"{server.address} shows {folder}; Ctrl-C ends")
         if browser:
             webbrowser.open(server.address)
-        try:
-            server.serve_forever()
-        except KeyboardInterrupt:
-            return
+        server.serve_until_stopped()
 
 
-def tiles_of(folder: Path) -> Path:
-    """The folder's own tiles, or those of the run in it, made where they are missing or older than the models."""
+@contextmanager
+def tiles_of(folder: Path) -> Iterator[Path]:
+    """Yield the folder's own tiles, or those of the run in it, made where they are missing or older than the models.
+
+    Where the folder cannot be written, they are made in a temporary one, which goes when the block ends.
+    """
     from ..evaluate.models import run_models
     from ..write.tiles.tileset import TILESET
-    from .convert import convert
 
     if (folder / TILESET).is_file():
-        return folder
+        yield folder
+        return
     tiles, models = folder / FORMATS["3dtiles"].file, run_models(folder)
-    if not (tiles / TILESET).is_file() or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime:
-        convert(folder, tiles)
-    return tiles
+    with tempfile.TemporaryDirectory(prefix="hiproof-view-") as elsewhere:
+        if not (tiles / TILESET).is_file() or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime:
+            try:
+                convert_run(folder, tiles, "3dtiles")
+            except OutputError as error:
+                LOGGER.warning("%s. The tiles are made in a temporary folder instead", error)
+                tiles = Path(elsewhere) / tiles.name
+                convert_run(folder, tiles, "3dtiles")
+        yield tiles

@@ -19,6 +19,7 @@ from ..evaluate.run import run_record
 from ..parametric.building import build
 from ..parametric.record import list_at, number, outline_of, text_at
 from ..primitives.catalogue import CATALOGUE
+from ..read.damage import finite
 from ..write.page_mesh import packed
 from ..write.parameters import building_record
 from ..write.values import plain_text
@@ -71,7 +72,12 @@ class Desk:
         """A building as it is now: its mesh and parts, or a sentence why there are none."""
         record, override, version = self.record(id)
         told = {name: (override or {}).get(name) for name in ("who", "when", "note")}
-        found = {"id": id, "version": version, "accepted": told if override else None, "parts": record.get("parts")}
+        found = {
+            "id": id,
+            "version": version,
+            "accepted": told if override else None,
+            "parts": finite(record.get("parts")),
+        }
         found["said"] = {name: (override or {}).get(name) for name in SAID}
         found |= {"outcome": record.get("detail") or "", "reasons": self.run.by_id[id].doubt.reasons}
         if not record.get("parts"):

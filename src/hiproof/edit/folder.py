@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
 from ..evaluate.run import run_record
-from ..parametric.file import head_of, objects
+from ..parametric.file import DAMAGED, head_of, object_of, objects
+from ..parametric.record import refuse_other_kinds
+from ..read.damage import LeftOut, excerpt
 from ..settings import Settings
 from ..write.parameters import FileHead
 from .doubt import Doubt, doubt_of
 from .edits import stamp_of
 
 PARAMETERS = "parameters.jsonl"
+MOST_DOUBT = 100.0  # more than all reasons together
 
 
 @dataclass(frozen=True)
@@ -63,8 +65,8 @@ class RunFolder:
             file.seek(row.start)
             line = file.readline()
         try:
-            record = json.loads(line)
-        except ValueError:
+            record = object_of(line.decode(errors="replace").rstrip(), str(self.path))
+        except InputError:
             record = None
         if not isinstance(record, dict) or record.get("id") != id:
             raise InputError(f"expected {self.path} as it was, got another file; start `hiproof edit` again")
@@ -89,22 +91,25 @@ def read_rows(path: Path) -> tuple[FileHead, list[Row]]:
             place += len(line)
             yield line.decode()
 
+    left_out = LeftOut()
     try:
         with path.open("rb") as file:
-            found = objects(lines(file), path)
+            found = objects(lines(file), path, left_out)
             head = head_of(next(found, None), path)
-            rows = [row_of(number, record, starts[number - 1], path) for number, record in found]
+            known = ((number, record) for number, record in found if record is not DAMAGED)
+            rows = [row_of(number, record, starts[number - 1], path) for number, record in known]
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"expected parameters that hiproof wrote at {path}, got: {error}; check the file") from error
     return head, rows
 
 
 def row_of(number: int, record: Any, start: int, path: Path) -> Row:
-    """The row of a building's object."""
+    """The row of a building's object; one that cannot be read is the most doubtful."""
+    if not isinstance(record, dict) or not isinstance(record.get("id"), str):
+        raise InputError(f"expected a building in line {number} of {path}, got {excerpt(record)}; mend it there")
     try:
-        share = record["residuals"]["share_within_20cm"] if record.get("residuals") else None
-        return Row(record["id"], start, record.get("type"), record.get("status", ""), share, doubt_of(record))
-    except (KeyError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"expected a building in line {number} of {path}, got one whose {error} cannot be read; mend it there"
-        ) from error
+        refuse_other_kinds(record)
+    except InputError as error:
+        return Row(record["id"], start, None, "damaged", None, Doubt(MOST_DOUBT, (f"cannot be read: {error}",)))
+    share = (record.get("residuals") or {}).get("share_within_20cm")
+    return Row(record["id"], start, record.get("type"), record.get("status", ""), share, doubt_of(record))

@@ -10,9 +10,6 @@ from __future__ import annotations
 import json
 import secrets
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from email.message import Message
-from http.server import BaseHTTPRequestHandler
 from importlib.resources import files
 from typing import Any
 from urllib.parse import parse_qs, unquote, urlsplit
@@ -20,22 +17,18 @@ from urllib.parse import parse_qs, unquote, urlsplit
 from ..errors import HiproofError, InputError, OutputError
 from ..evaluate.report_pictures import RESIDUAL_STOPS
 from ..log import LOGGER
-from ..loopback import LOOPBACK, LoopbackServer, own_hosts
+from ..loopback import HTML, LOOPBACK, Answer, Headers, LoopbackHandler, LoopbackServer, refusal
 from ..primitives.catalogue import CATALOGUE
 from ..write.colours import WALL_COLOUR, type_colour
 from .desk import Desk, drawing
 from .edits import OtherVersion
 
-MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's parts take
-QUIET_S = 60  # until a connection that says nothing is closed
-JSON, HTML, SCRIPT, STYLE, SVG = (
+JSON, SCRIPT, STYLE, SVG = (
     "application/json",
-    "text/html; charset=utf-8",
     "text/javascript; charset=utf-8",
     "text/css; charset=utf-8",
     "image/svg+xml",
 )
-Headers = Mapping[str, str] | Message
 ASSETS = {
     "": ("hiproof.edit", "assets/edit.html", HTML),
     "edit.css": ("hiproof.edit", "assets/edit.css", STYLE),
@@ -43,23 +36,6 @@ ASSETS = {
     "handles.js": ("hiproof.edit", "assets/handles.js", SCRIPT),
     "viewer.js": ("hiproof.evaluate", "assets/viewer.js", SCRIPT),
 }
-SAFE = {
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
-    "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
-    "Referrer-Policy": "no-referrer",
-    "X-Content-Type-Options": "nosniff",
-    "Cache-Control": "no-store",
-    "Cross-Origin-Resource-Policy": "same-origin",
-}
-
-
-@dataclass(frozen=True)
-class Answer:
-    """An HTTP answer: its code, what kind of text it is, and its bytes."""
-
-    code: int
-    body: bytes
-    kind: str = JSON
 
 
 class Service:
@@ -106,14 +82,8 @@ class Service:
 
     def refusal(self, method: str, target: str, headers: Headers) -> Answer | None:
         """An answer to those who may not ask, None to those who may."""
-        own = own_hosts(self.port)
-        if headers.get("Host") not in own:
-            return said(403, f"expected a request to {LOOPBACK}, got another host; use the address that was printed")
-        origin = headers.get("Origin")
-        if origin is not None and origin not in {f"http://{name}" for name in own}:
-            return said(403, "expected a request of this page, got one of another origin")
-        if headers.get("Sec-Fetch-Site", "none") not in ("none", "same-origin"):
-            return said(403, "expected a request of this page, got one of another site")
+        if told := refusal(headers, self.port):
+            return said(403, told)
         first = urlsplit(target).path.split("/")[1:2]
         if not first or not secrets.compare_digest(first[0].encode(), self.token.encode()):
             return said(403, "expected the token in the address, got another; use the address that was printed")
@@ -160,43 +130,23 @@ def started(desk: Desk) -> dict[str, Any]:
 
 
 def as_json(value: Any, code: int = 200) -> Answer:
-    return Answer(code, json.dumps(value, separators=(",", ":"), allow_nan=False).encode())
+    return Answer(code, json.dumps(value, separators=(",", ":"), allow_nan=False).encode(), JSON)
 
 
 def said(code: int, sentence: str, **more: Any) -> Answer:
     return as_json({"error": sentence, **more}, code)
 
 
-class Handler(BaseHTTPRequestHandler):
+class Handler(LoopbackHandler):
     """A request and its answer; all that decides stands in `Service`."""
 
-    protocol_version, timeout = "HTTP/1.1", QUIET_S
-    disable_nagle_algorithm = True  # else the body waits until the browser has said that the head came
     server: Server
 
-    def do_GET(self) -> None:
-        self.send(self.server.service.answer("GET", self.path, self.headers))
+    def answer(self, method: str, body: bytes) -> Answer:
+        return self.server.service.answer(method, self.path, self.headers, body)
 
-    def do_POST(self) -> None:
-        length = self.headers.get("Content-Length", "")
-        if not length.isdigit() or int(length) > MOST_BYTES:
-            self.close_connection = True
-            return self.send(said(413, f"expected a body of at most {MOST_BYTES} bytes, got {length or 'none'}"))
-        body = self.rfile.read(int(length))
-        return self.send(self.server.service.answer("POST", self.path, self.headers, body))
-
-    def send(self, answer: Answer) -> None:
-        self.send_response(answer.code)
-        for name, value in {"Content-Type": answer.kind, "Content-Length": str(len(answer.body)), **SAFE}.items():
-            self.send_header(name, value)
-        self.end_headers()
-        self.wfile.write(answer.body)
-
-    def version_string(self) -> str:
-        return "hiproof"
-
-    def log_message(self, format: str, *arguments: Any) -> None:
-        LOGGER.debug("%s %s", self.command, arguments[1] if len(arguments) > 1 else "")  # the address holds the token
+    def refused(self, code: int, sentence: str) -> Answer:
+        return said(code, sentence)
 
 
 class Server(LoopbackServer):

@@ -2,35 +2,45 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import shapely
 
+from ..compose.building_parts import whole_of
+from ..compose.check import check_solid
 from ..errors import InputError
 from ..formats import FORMATS, TILE_FOLDER
 from ..frames import METRES, Units
-from ..model import GROUND, ROOF, WALL, Face, Solid
-from ..read.cityjson import UNUSABLE, features
+from ..model import GROUND, ROOF, Face, Solid
+from ..read.cityjson import UNUSABLE, Feature, features, unusable
+from ..read.damage import Damaged, excerpt, finite, refuse
 from ..read.plausible import is_plausible
+from ..read.shells import Surface, list_of, read_geometries, read_shell
 from ..write.attribute_list import OWN
+from ..write.triangles import faces_triangles
 
 RUN_MODELS = FORMATS["cityjson"].file
 PART, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
 """What hiproof tells of a roof surface: its part's number and type."""
 
+MOST_PARTS = 2**31  # of a building, so that their numbers fit the columns and tables of all formats
+
 
 @dataclass(frozen=True)
 class BuildingModel:
     """One building of a file: its `attributes`, its `solid` in world metres (None where the file has none), and the roof types of its
-    parts by number (`Face.part`)."""
+    parts by number (`Face.part`). `is_damaged` where the file's text of it cannot be read."""
 
     id: str
     attributes: dict[str, Any] = field(default_factory=dict)
     solid: Solid | None = None
     part_types: dict[int, str] = field(default_factory=dict)
+    is_damaged: bool = False
 
     @property
     def roof_type(self) -> str:
@@ -40,6 +50,8 @@ class BuildingModel:
     @property
     def status(self) -> str:
         """Code of what became of the building; of a foreign file, whether it has a solid."""
+        if self.is_damaged:
+            return "damaged"
         return self.text("hiproof_status") or ("modelled" if self.solid is not None else "no_model")
 
     def text(self, name: str) -> str:
@@ -64,34 +76,70 @@ def run_models(folder: Path) -> Path:
     return path
 
 
-def read_models(path: str | Path, otherwise: Units = METRES, known: Units | None = None) -> Iterator[BuildingModel]:
+def read_models(
+    path: str | Path,
+    otherwise: Units = METRES,
+    known: Units | None = None,
+    damaged: Damaged = refuse,
+    must_be_valid: bool = False,
+) -> Iterator[BuildingModel]:
     """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts joined, in metres.
 
     Solids of the highest level of detail count, and building parts that hiproof cut come as the whole that they were. `otherwise` are the units of a file
-    that names no CRS, `known` those of one of which more is known than it names. Raises InputError for files that cannot be read as CityJSON, or that are in degrees.
+    that names no CRS, `known` those of one of which more is known than it names. A building whose text or solid is of no use
+    is told to `damaged`, which refuses the file by default, and comes without a solid, so that the order stays; with
+    `must_be_valid` so does one whose solid is invalid by ISO 19107. Raises InputError for files that cannot be read as CityJSON,
+    or that are in degrees.
     """
-    for feature in features(Path(path), otherwise, known):
-        try:
-            yield from buildings_of(feature.objects, feature.vertices)
-        except UNUSABLE as error:
-            raise InputError(
-                f"expected CityJSON whose solids can be used in {feature.place}, got {error!r}; `hiproof check` may tell more"
-            ) from error
+    for feature in features(Path(path), otherwise, known, damaged):
+        if feature.is_damaged:
+            yield BuildingModel(feature.place, is_damaged=True)
+        for id, city_object in feature.objects.items():
+            try:
+                if isinstance(city_object, dict) and city_object.get("type") != "Building":
+                    continue
+                yield usable(building_of(id, city_object, feature), must_be_valid)
+            except (*UNUSABLE, shapely.GEOSException) as error:
+                damaged(unusable(id, feature, error))
+                yield BuildingModel(id, is_damaged=True)
 
 
-def buildings_of(objects: dict[str, Any], vertices: np.ndarray) -> Iterator[BuildingModel]:
-    for id, city_object in objects.items():
-        if city_object["type"] != "Building":
-            continue
-        family = [city_object, *(objects[child] for child in city_object.get("children", ()) if child in objects)]
-        level = max((level_of_detail(solid) for member in family for solid in solids_of(member)), default=0.0)
-        faces = tuple(face for member in family for face in faces_of(member, level))
-        attributes = city_object.get("attributes") or {}
-        if not isinstance(attributes, dict):
-            raise TypeError(f"attributes of {id!r} that are no object")
-        solid = compact(vertices, faces) if faces else None
-        model = BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
-        yield replace(model, part_types={0: model.roof_type} | part_types_of(family))
+def building_of(id: str, city_object: Any, feature: Feature) -> BuildingModel:
+    """Read a building with its parts. Raises one of UNUSABLE."""
+    own = read_geometries(city_object)
+    children = list_of(city_object.get("children") or [], "children")
+    family = [city_object, *(feature.objects[child] for child in children if child in feature.objects)]
+    solids = [solids_of(own), *(solids_of(read_geometries(child)) for child in family[1:])]
+    level = max((level_of_detail(solid) for own in solids for solid in own), default=0.0)
+    surfaces = [surface for own in solids for surface in surfaces_at(own, level, len(feature.vertices))]
+    attributes = plain_attributes(city_object.get("attributes"))
+    part_types = {part_of(s): str(s.semantics[PART_TYPE]) for s in surfaces if PART_TYPE in s.semantics}
+    faces = tuple(Face(s.rings, s.kind, part_of(s) if s.kind == ROOF else -1) for s in surfaces)
+    solid = compact(feature.vertices, faces) if faces else None
+    model = BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
+    return replace(model, part_types={0: model.roof_type} | part_types)
+
+
+def plain_attributes(attributes: Any) -> dict[str, Any]:
+    """Read attributes; a number beyond all bounds is none."""
+    if not isinstance(attributes or {}, dict):
+        raise ValueError(f"{excerpt(attributes)} as its attributes")
+    return finite(attributes or {})
+
+
+def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
+    """Return the model. Raises ValueError if its solid cannot be drawn, or must be valid and is not."""
+    if model.solid is None:
+        return model
+    findings = check_solid(model.solid) if must_be_valid else []
+    try:
+        if not findings:
+            faces_triangles(model.solid.vertices, model.solid.faces)
+            return model
+    except (shapely.GEOSException, KeyError):
+        findings = check_solid(model.solid)
+    told = findings[0].message if findings else "faces that cannot be cut into triangles"
+    raise ValueError(f"an invalid solid: {told}")
 
 
 def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
@@ -99,55 +147,49 @@ def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
     own = [member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})]
     if not own or len(solid.of_kind(GROUND)) < 2:
         return solid
-    from ..compose.building_parts import whole_of
-
     return whole_of(solid)
 
 
-def solids_of(city_object: dict[str, Any]) -> list[dict[str, Any]]:
-    return [geometry for geometry in city_object.get("geometry") or () if geometry["type"] == "Solid"]
+def solids_of(geometries: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    return [geometry for geometry in geometries if geometry.get("type") == "Solid"]
 
 
-def faces_of(city_object: dict[str, Any], level: float) -> Iterator[Face]:
-    solid = next((solid for solid in solids_of(city_object) if level_of_detail(solid) == level), None)
+def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> list[Surface]:
+    """Read the surfaces of the first of `solids` of the level of detail `level`."""
+    solid = next((solid for solid in solids if level_of_detail(solid) == level), None)
     if solid is None:
-        return
-    semantics = solid.get("semantics") or {"surfaces": [], "values": None}
-    kinds = semantics["values"][0] if semantics["values"] else [None] * len(solid["boundaries"][0])
-    for rings, kind in zip(solid["boundaries"][0], kinds, strict=True):
-        surface = {"type": WALL} if kind is None else semantics["surfaces"][kind]
-        part = part_of(surface) if surface["type"] == ROOF else -1
-        yield Face(tuple(tuple(ring) for ring in rings), surface["type"], part)
+        return []
+    semantics = solid.get("semantics") or {}
+    values = list_of(semantics.get("values") or [None], "semantic values")[0]
+    outer = list_of(list_of(solid.get("boundaries"), "the boundaries of a solid")[0], "its outer shell")
+    if not outer or (values is not None and len(list_of(values, "semantic values")) != len(outer)):
+        raise ValueError(f"a solid of {len(outer)} faces" + (f", and semantics of {len(values)}" if values else ""))
+    return read_shell(outer, values, semantics.get("surfaces") or [], vertices)
 
 
-def part_of(surface: dict[str, Any]) -> int:
+def part_of(surface: Surface) -> int:
     """The number of the part that a roof surface belongs to, 0 where the file does not tell."""
-    return int(np.int32(surface.get(PART, 0)))  # NumPy's own, for it refuses what is beyond all bounds
-
-
-def part_types_of(family: list[dict[str, Any]]) -> dict[int, str]:
-    """The roof type of each part that a roof surface belongs to, as far as the file tells."""
-    solids = (solid for member in family for solid in solids_of(member))
-    surfaces = (surface for solid in solids for surface in (solid.get("semantics") or {}).get("surfaces", ()))
-    return {part_of(surface): str(surface[PART_TYPE]) for surface in surfaces if PART_TYPE in surface}
+    number = surface.semantics.get(PART, 0)
+    if type(number) is not int or not 0 <= number < MOST_PARTS:
+        raise ValueError(f"{excerpt(number)} as the number of a part")
+    return number
 
 
 def level_of_detail(geometry: dict[str, Any]) -> float:
     try:
-        return float(geometry["lod"])
-    except (KeyError, TypeError, ValueError):
+        level = float(geometry["lod"])
+    except (KeyError, TypeError, ValueError, OverflowError):
         return 0.0
+    return level if math.isfinite(level) else 0.0
 
 
 def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
-    """A solid with only the vertices its faces use, each of which must be a place; ValueError or IndexError otherwise."""
+    """A solid with only the vertices its faces use, each of which must be a place; ValueError otherwise."""
     rings = [ring for face in faces for ring in (face.rings or ((),))]
     least = min(len(set(ring)) for ring in rings)
     if least < 3:
         raise ValueError(f"a ring of {least} points")
     used = sorted({index for ring in rings for index in ring})
-    if used[0] < 0 or used[-1] >= len(vertices):
-        raise IndexError(f"vertex {used[0] if used[0] < 0 else used[-1]} of {len(vertices)}")
     if not is_plausible(vertices[used]).all():
         raise ValueError("coordinates of no place on Earth")
     place = {index: i for i, index in enumerate(used)}

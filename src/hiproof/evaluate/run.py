@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,9 +12,11 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import InputError, InputWarning
+from ..errors import InputError, InputWarning, SettingsError
 from ..frames import Units
 from ..read.cityjson import parsed, read_text
+from ..read.crs import parse_crs, units_of
+from ..read.damage import Damaged, excerpt, refuse
 from ..settings import Settings
 from ..write.naming import FileUnits
 from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
@@ -21,13 +24,17 @@ from .inputs import found_inputs
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
 
+NUMBER = (int, float)
 RECORD: dict[tuple[str, ...], Any] = {
     ("settings",): dict,
     ("settings", "read"): dict,
     ("settings", "read", "building_classes"): list,
+    ("settings", "read", "crs"): str,
     ("settings", "read", "unit"): str,
     ("settings", "write"): dict,
     ("settings", "write", "out_crs"): str,
+    ("settings", "reconstruct"): dict,
+    ("settings", "reconstruct", "poor_share"): NUMBER,
     ("inputs",): dict,
     ("inputs", "clouds"): list,
     ("inputs", "footprints"): str,
@@ -71,12 +78,15 @@ def evaluate_run(
     footprints: str | None = None,
     reference: str | None = None,
     layer: str | int | None = None,
+    damaged: Damaged = refuse,
+    must_be_valid: bool = False,
 ) -> EvaluatedRun:
     """Read the models of `folder` and measure them against `clouds` and `footprints`; where none are named, against those that
     the run was made from, as far as they are there. Without any clouds no residual figures come out.
 
     The building classes, the CRS and the units are those the run was made with; `layer` is that of the footprints.
-    Raises InputError for what cannot be read.
+    A damaged building, with `must_be_valid` one with an invalid solid too, is told to `damaged`, which refuses the run by default,
+    and has no solid. Raises InputError for what cannot be read.
     """
     record = run_record(folder)
     known = found_inputs(record)
@@ -88,7 +98,7 @@ def evaluate_run(
     if footprints is None:
         footprints, layer = known.footprint_file, layer or known.layer
         asked = {"id_attribute": known.id_attribute, "where": known.where, "bbox": known.bbox}
-    models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record)))
+    models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record), damaged, must_be_valid))
     outlines = footprint_of_each(models, footprints, layer, record, asked)
     areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
     if clouds and any(area is not None for area in areas):
@@ -104,16 +114,33 @@ def run_record(folder: Path) -> dict[str, Any]:
     """Content of run.json, empty where the folder has none. Raises InputError where it is no record of a run."""
     path = Path(folder) / "run.json"
     record = parsed(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
+    try:
+        refuse_other_kinds(record)
+        run_settings(record)
+        run_crs(record)
+        parse_crs(run_out_crs(record))
+    except (InputError, SettingsError) as error:
+        raise InputError(f"{path}: {error!s:.400}; mend it there, or run `hiproof reconstruct` again") from error
+    return record
+
+
+def refuse_other_kinds(record: dict[str, Any]) -> None:
+    """Raise InputError where a value of the record is of another kind than RECORD has it."""
     for names, kind in RECORD.items():
         value: Any = record
         for name in names:
             value = value.get(name) if value is not None else None
-        if not (value is None or isinstance(value, kind)):
-            raise InputError(
-                f"expected the record of a run in {path}, got {'.'.join(names)} = {value!r:.40}; "
-                "run `hiproof reconstruct` again"
-            )
-    return record
+        is_odd = isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value))
+        if value is not None and (is_odd or not isinstance(value, kind)):
+            raise InputError(f"expected {words_of(kind)} as {'.'.join(names)}, got {excerpt(value)}")
+    bbox = (record.get("inputs") or {}).get("bbox")
+    if bbox and (len(bbox) != 4 or not all(type(side) in NUMBER for side in bbox)):
+        raise InputError(f"expected four numbers as inputs.bbox, got {excerpt(bbox)}")
+
+
+def words_of(kind: Any) -> str:
+    """Name a kind of JSON value."""
+    return {dict: "an object", list: "a list", NUMBER: "a finite number"}.get(kind, "text")
 
 
 def run_settings(record: dict[str, Any]) -> Settings:
@@ -125,8 +152,6 @@ def run_settings(record: dict[str, Any]) -> Settings:
 
 def run_crs(record: dict[str, Any]) -> Any:
     """The pyproj CRS of a run, None where it has none."""
-    from ..read.crs import parse_crs
-
     return parse_crs(record.get("crs"))
 
 
@@ -165,8 +190,6 @@ def footprint_of_each(
 
 def run_units(record: dict[str, Any]) -> Units:
     """Units of the coordinates a run was made from; metres where nothing is known of it."""
-    from ..read.crs import units_of
-
     return units_of(run_crs(record), "the run", run_settings(record).read.unit)
 
 

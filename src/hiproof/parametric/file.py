@@ -12,11 +12,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, SettingsError
+from ..read.cityjson import ESCAPED
 from ..read.crs import NAMED_UNITS, parse_crs
+from ..read.damage import Damaged, excerpt, readable, refuse
+from ..read.plausible import MOST_PLAN
 from ..settings import Settings
 from ..write.parameters import VERSION, FileHead
 
 HEAD = "hiproof_parameters"
+DAMAGED: dict[str, Any] = {"damaged": True}  # this very object stands for a line that cannot be read
 
 
 def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
@@ -29,12 +33,18 @@ def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
 
 
 @contextmanager
-def opened_parameters(path: str | os.PathLike) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
-    """The head of the parameters.jsonl at `path`, and its buildings one by one; raises InputError as they are read."""
+def opened_parameters(
+    path: str | os.PathLike, damaged: Damaged = refuse
+) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
+    """The head of the parameters.jsonl at `path`, and its buildings one by one.
+
+    A line that cannot be read is told to `damaged`, which refuses the file by default, and comes as DAMAGED. Raises
+    InputError for a file that is no parameters.jsonl.
+    """
     try:
         with Path(path).open(encoding="utf-8-sig") as file:  # editors may begin it with a mark of the encoding
-            lines = objects(file, path)
-            yield head_of(next(lines, None), path), records(lines, path)
+            lines = objects(file, path, damaged)
+            yield head_of(next(lines, None), path), records(lines, path, damaged)
     except (OSError, UnicodeDecodeError) as error:
         found = "none" if isinstance(error, FileNotFoundError) else f"something else: {error}"
         raise InputError(
@@ -42,23 +52,32 @@ def opened_parameters(path: str | os.PathLike) -> Iterator[tuple[FileHead, Itera
         ) from error
 
 
-def objects(file: Any, path: str | os.PathLike) -> Iterator[tuple[int, Any]]:
-    """(line, JSON value) of every line that is not blank."""
+def objects(file: Any, path: str | os.PathLike, damaged: Damaged = refuse) -> Iterator[tuple[int, Any]]:
+    """(line, JSON value) of every line that is not blank; DAMAGED in place of one that is told to `damaged`."""
     for number, line in enumerate(file, 1):
         if line.strip():
             try:
-                yield number, json.loads(line.rstrip())
-            except json.JSONDecodeError as error:
-                is_cut = error.pos >= len(line.rstrip())
-                raise InputError(
-                    f"expected a JSON object in line {number} of {os.fspath(path)}, got a syntax error at column "
-                    f"{error.colno} ({error.msg}), beside {around(line, error.pos)!r}; "
-                    + ("an object stands on one line" if is_cut else "mend it there")
-                ) from error
-            except (ValueError, RecursionError) as error:  # a number of 5,000 digits, nested without end
-                raise InputError(
-                    f"expected a JSON object in line {number} of {os.fspath(path)}, got one that cannot be read: {error}"
-                ) from error
+                value = object_of(line.rstrip(), f"line {number} of {os.fspath(path)}")
+            except InputError as error:
+                damaged(error)
+                value = DAMAGED
+            yield number, value
+
+
+def object_of(line: str, place: str) -> Any:
+    """The JSON value of a line. Raises InputError, one sentence, where it is none."""
+    try:
+        value = json.loads(line)
+    except json.JSONDecodeError as error:
+        is_cut = error.pos >= len(line)
+        raise InputError(
+            f"expected a JSON object in {place}, got a syntax error at column "
+            f"{error.colno} ({error.msg}), beside {around(line, error.pos)!r}; "
+            + ("an object stands on one line" if is_cut else "mend it there")
+        ) from error
+    except (ValueError, RecursionError) as error:  # a number of 5,000 digits, nested without end
+        raise InputError(f"expected a JSON object in {place}, got one that cannot be read: {error}") from error
+    return readable(value) if ESCAPED.search(line) else value
 
 
 def around(line: str, place: int) -> str:
@@ -76,34 +95,43 @@ def head_of(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
         )
     if record[HEAD] != VERSION:
         raise InputError(
-            f"expected parameters of version {VERSION} in {where}, got version {record[HEAD]!r}; "
+            f"expected parameters of version {VERSION} in {where}, got version {excerpt(record[HEAD])}; "
             "use the hiproof that wrote them, or reconstruct again"
         )
     unit, offset = record.get("unit", "auto"), record.get("cityjson_offset")
-    if unit not in NAMED_UNITS:
-        raise InputError(f"expected a unit ({', '.join(NAMED_UNITS)}) in the head of {where}, got {unit!r}; choose one")
+    if not isinstance(unit, str) or unit not in NAMED_UNITS:
+        raise InputError(
+            f"expected a unit ({', '.join(NAMED_UNITS)}) in the head of {where}, got {excerpt(unit)}; choose one"
+        )
     if offset is not None and not is_place(offset):
-        raise InputError(f"expected three numbers as cityjson_offset of {where}, got {offset!r}; write null for none")
+        raise InputError(
+            f"expected three numbers as cityjson_offset of {where}, got {excerpt(offset)}; write null for none"
+        )
     try:
         settings = Settings.from_dict({name: record.get(name) or {} for name in ("compose", "write")})
-    except SettingsError as error:
-        raise InputError(f"{where}, in its head: {error}") from error
-    offset = None if offset is None else np.array(offset)
-    return FileHead(parse_crs(record.get("crs")), unit, offset, settings.compose, settings.write)
+        crs = parse_crs(record.get("crs"))
+    except (InputError, SettingsError) as error:
+        raise InputError(f"{where}, in its head: {error!s:.400}") from error
+    return FileHead(crs, unit, None if offset is None else np.array(offset, float), settings.compose, settings.write)
 
 
 def is_place(value: Any) -> bool:
-    """Whether a value is three finite numbers."""
-    numbers = isinstance(value, list) and all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in value)
-    return numbers and len(value) == 3 and bool(np.isfinite(np.array(value, float)).all())
+    """Whether a value is three numbers that can be coordinates."""
+    is_three = isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
+    return is_three and all(abs(v) <= MOST_PLAN for v in value)
 
 
-def records(lines: Iterator[tuple[int, Any]], path: str | os.PathLike) -> Iterator[dict[str, Any]]:
+def records(
+    lines: Iterator[tuple[int, Any]], path: str | os.PathLike, damaged: Damaged = refuse
+) -> Iterator[dict[str, Any]]:
     """The buildings after the head."""
     for number, record in lines:
-        if not isinstance(record, dict) or not isinstance(record.get("id"), str):
-            raise InputError(
-                f"expected a JSON object with an id in line {number} of {os.fspath(path)}, got {str(record)[:40]!r}; "
-                "is it a parameters.jsonl that hiproof wrote?"
+        if record is not DAMAGED and not (isinstance(record, dict) and isinstance(record.get("id"), str)):
+            damaged(
+                InputError(
+                    f"expected a JSON object with an id in line {number} of {os.fspath(path)}, got {excerpt(record)}; "
+                    "is it a parameters.jsonl that hiproof wrote?"
+                )
             )
+            record = DAMAGED
         yield record

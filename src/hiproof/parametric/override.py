@@ -28,6 +28,7 @@ from ..errors import FitError, HiproofError, InputError
 from ..frames import LocalFrame
 from ..model import Building, Footprint, as_xyz
 from ..primitives.catalogue import CATALOGUE
+from ..read.damage import excerpt
 from ..read.plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from ..settings import Settings
 from ..status import Doubt, Status
@@ -35,7 +36,7 @@ from ..write.attribute_list import PARAMETERS
 from ..write.parameters import building_record, outline_record
 from .building import build
 from .edit import built
-from .record import mapping, number, numbers_by_name, place, polygon, shown
+from .record import mapping, number, numbers_by_name, place, polygon
 from .refit import measured
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
@@ -139,7 +140,9 @@ def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
     """Raise InputError where two things are said of which only one can be, or neither yes nor no."""
     if record.get("leave_out", False) not in (True, False):
-        raise InputError(f"expected true or false as leave_out of {where}, got {shown(record['leave_out'])}; say which")
+        raise InputError(
+            f"expected true or false as leave_out of {where}, got {excerpt(record['leave_out'])}; say which"
+        )
     alone = {
         "leave_out": (bool(record.get("leave_out")), (*SHAPING, "parts", "block_height")),
         "block_height": ("block_height" in record, (*SHAPING, "parts")),
@@ -158,12 +161,12 @@ def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
     told = record.get("types")
     names = told.split(",") if isinstance(told, str) else told
     if names is not None and not (isinstance(names, (list, tuple)) and names):
-        raise InputError(f"expected a list of roof types as types of {where}, got {shown(told)}; name one at least")
+        raise InputError(f"expected a list of roof types as types of {where}, got {excerpt(told)}; name one at least")
     types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
     for name in (*types, record.get("type", "flat")):
         if not isinstance(name, str) or name not in CATALOGUE:
             raise InputError(
-                f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {shown(name)}; choose among these"
+                f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {excerpt(name)}; choose among these"
             )
     if types and record.get("type", types[0]) not in types:
         raise InputError(f"expected the type among the types in {where}, got {record['type']!r}; keep one of them")

@@ -14,12 +14,15 @@ from ..compose.settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, se
 from ..errors import InputError
 from ..frames import LocalFrame
 from ..model import Building, Part, Quality, Roof
+from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
+from ..read.damage import excerpt
 from ..rings import enclosed
 from ..status import Status
 from ..write.attribute_list import PARAMETERS, PART
 
 WIDEST_M = 1e5  # of any number of a part, and of heights
+FARTHEST_M = 1e8  # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
 MOST = 1e15  # of any number
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 PART_KEYS = tuple(attribute.name for attribute in PART)
@@ -34,7 +37,7 @@ def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     """
     refuse_other_keys(record, [attribute.name for attribute in PARAMETERS], "the building")
     parts = list_at(record, "parts")
-    origin = None if record.get("origin") is None else place(record["origin"], "origin")
+    origin = None if record.get("origin") is None else place(record["origin"], "origin", coordinate)
     outline = None if record.get("outline") is None else polygon(record["outline"], "outline")
     status = status_of(record, bool(parts))
     roof = roof_of(parts, outline, origin) if parts else None
@@ -62,8 +65,8 @@ def status_of(record: Mapping[str, Any], has_parts: bool) -> Status:
     """The status told; that of a building which has parts by hand is a model's."""
     code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
     known = {status.code: status for status in Status}
-    if code not in known:
-        raise InputError(f"expected a status ({', '.join(known)}), got {code!r}; leave it as the run wrote it")
+    if not isinstance(code, str) or code not in known:
+        raise InputError(f"expected a status ({', '.join(known)}), got {excerpt(code)}; leave it as the run wrote it")
     if has_parts and not known[code].is_model:
         return Status.MODELLED
     if not has_parts and known[code].is_model:
@@ -103,7 +106,7 @@ def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | N
 def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
     """A part with its planes; without outlines of its own it roofs what its rectangle covers of the building's."""
     refuse_other_keys(mapping(record, where), PART_KEYS, where)
-    kind = record.get("type")
+    kind = text_at(record, "type")
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
     refuse_no_shape(kind, parameters, where)
     parameters = {name: settled(value) for name, value in parameters.items()}
@@ -186,6 +189,35 @@ def quality_of(record: Mapping[str, Any]) -> Quality:
     return Quality(points=int(points), **figures)
 
 
+def refuse_other_kinds(record: Mapping[str, Any]) -> None:
+    """Raise InputError where a value of a building's object is of another kind than a run writes; no geometry is made."""
+    parts = [mapping(part, f"part {index}") for index, part in enumerate(list_at(record, "parts"))]
+    status_of(record, bool(parts))
+    for name in ("detail", "type", "ground_source"):
+        text_at(record, name)
+    for name in ("z_ground", "objective"):
+        figure(record, name)
+    quality_of(record)
+    if record.get("origin") is not None:
+        place(record["origin"], "origin", coordinate)
+    if record.get("outline") is not None:
+        polygon(record["outline"], "outline")
+    for name in ("recognised", "types"):
+        numbers_by_name(record.get(name) or {}, name)
+    for index, part in enumerate(parts):
+        refuse_other_kinds_of_part(part, f"part {index}")
+
+
+def refuse_other_kinds_of_part(part: Mapping[str, Any], where: str) -> None:
+    """Raise InputError where a value of a part is of another kind than a run writes."""
+    if text_at(part, "type") not in CATALOGUE:
+        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got {excerpt(part.get('type'))}")
+    place(part.get("position"), f"position of {where}", measure)
+    number(part.get("rotation", 0.0), f"rotation of {where}")
+    for name in ("parameters", "sigma"):
+        numbers_by_name(part.get(name) or {}, f"{name} of {where}")
+
+
 def refuse_other_keys(record: Mapping[str, Any], known: Any, where: str) -> None:
     other = [str(key)[:40] for key in record if key not in known]
     if other:
@@ -196,13 +228,13 @@ def refuse_other_keys(record: Mapping[str, Any], known: Any, where: str) -> None
 
 def mapping(value: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(value, dict):
-        raise InputError(f"expected an object as {where}, got {shown(value)}; write {{...}}")
+        raise InputError(f"expected an object as {where}, got {excerpt(value)}; write {{...}}")
     return value
 
 
 def as_list(value: Any, where: str) -> list:
     if not isinstance(value, list):
-        raise InputError(f"expected a list as {where}, got {shown(value)}; write [...]")
+        raise InputError(f"expected a list as {where}, got {excerpt(value)}; write [...]")
     return value
 
 
@@ -213,7 +245,7 @@ def list_at(record: Mapping[str, Any], name: str) -> list:
 def text_at(record: Mapping[str, Any], name: str) -> str:
     value = record.get(name)
     if not (value is None or isinstance(value, str)):
-        raise InputError(f"expected text as {name}, got {shown(value)}; put it in quotes")
+        raise InputError(f"expected text as {name}, got {excerpt(value)}; put it in quotes")
     return value or ""
 
 
@@ -221,7 +253,7 @@ def number(value: Any, where: str) -> float:
     """A finite number that a building can have."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not abs(value) < MOST:
-        raise InputError(f"expected a number as {where}, got {shown(value)}; give metres, or degrees for angles")
+        raise InputError(f"expected a number as {where}, got {excerpt(value)}; give metres, or degrees for angles")
     return float(value)
 
 
@@ -235,6 +267,16 @@ def measure(value: Any, where: str) -> float:
     found = number(value, where)
     if abs(found) > WIDEST_M:
         raise InputError(f"expected {where} within {WIDEST_M:g}, got {found:g}; check its unit")
+    return found
+
+
+def coordinate(value: Any, where: str) -> float:
+    """A coordinate of a place on Earth."""
+    found = number(value, where)
+    if abs(found) > FARTHEST_M:
+        raise InputError(
+            f"expected {where} on Earth, within {FARTHEST_M:g} m of its CRS's origin, got {found:g}; check its unit"
+        )
     return found
 
 
@@ -255,14 +297,14 @@ def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
     """How far the footprint was moved; of a building made by hand not at all."""
     value = record.get("shift", [0.0, 0.0])
     if not isinstance(value, list) or len(value) != 2:
-        raise InputError(f"expected two numbers [x, y] as shift, got {shown(value)}; give metres")
+        raise InputError(f"expected two numbers [x, y] as shift, got {excerpt(value)}; give metres")
     return number(value[0], "shift"), number(value[1], "shift")
 
 
 def place(value: Any, where: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
     """Three numbers (3,), each read by `read`."""
     if not isinstance(value, list) or len(value) != 3:
-        raise InputError(f"expected three numbers [x, y, z] as {where}, got {shown(value)}; give metres")
+        raise InputError(f"expected three numbers [x, y, z] as {where}, got {excerpt(value)}; give metres")
     return np.array([read(v, where) for v in value])
 
 
@@ -272,14 +314,8 @@ def polygon(rings: Any, where: str) -> shapely.Polygon:
     for ring in as_list(rings, where):
         corners = as_list(ring, where)
         if len(corners) < 3 or not all(isinstance(xy, list) and len(xy) == 2 for xy in corners):
-            raise InputError(f"expected rings of three or more [x, y] as {where}, got {shown(ring)}; close the ring")
-        found.append([(number(x, where), number(y, where)) for x, y in corners])
+            raise InputError(f"expected rings of three or more [x, y] as {where}, got {excerpt(ring)}; close the ring")
+        found.append([(coordinate(x, where), coordinate(y, where)) for x, y in corners])
     if not found:
         raise InputError(f"expected rings, the outer first, as {where}, got none; write null for no outline")
     return shapely.Polygon(found[0], found[1:])
-
-
-def shown(value: Any) -> str:
-    """A value as a sentence can hold it."""
-    text = "null" if value is None else repr(value)
-    return text if len(text) <= 40 else text[:37] + "..."

@@ -17,9 +17,12 @@ import shapely
 
 from .. import __version__
 from ..errors import HiproofError, InputError, OutputError, is_interrupt
+from ..evaluate.run import run_record
 from ..formats import asked_files, places_of_models
+from ..log import LOGGER
 from ..masking import masked, masked_values
 from ..model import Building
+from ..read.damage import finite
 from ..settings import Settings
 from ..status import Status
 from ..write.cityjson import offset_of
@@ -150,15 +153,6 @@ class Maker:
         return building, texts | {"parameters": Fragment(dump(kept) + b"\n")}
 
 
-def finite(value: Any) -> Any:
-    """A JSON value without NaN and infinities, which JSON does not know: they become null."""
-    if isinstance(value, dict):
-        return {key: finite(inner) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [finite(inner) for inner in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value
-
-
 def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
     """The offset (3,) of a CityJSON file whose first building is `record`."""
     from .record import building_of
@@ -176,7 +170,7 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
     """run.json: what was built of which file, and the clouds and footprints of the run that the file came from."""
     record = {
         "hiproof": __version__,
-        **earlier_record(path.parent / "run.json", head),
+        **earlier_record(path.parent, head),
         "parameters": str(path),
         "crs": None if head.crs is None else head.crs.to_wkt(),
         "buildings": built.buildings,
@@ -188,14 +182,14 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
 
 
-def earlier_record(path: Path, head: FileHead) -> dict[str, Any]:
-    """Settings and inputs of the run whose record lies at `path`, as far as there is one; how and in which units coordinates are written
+def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
+    """Settings and inputs of the run whose record lies in `folder`, as far as there is one; how and in which units coordinates are written
     is as `head` says, with which whoever reads the models finds their place."""
     try:
-        record = json.loads(path.read_text(encoding="utf-8"))
-        known = {name: record[name] for name in ("settings", "inputs") if name in record}
-        settings = dict(known.get("settings", {}))
-    except (OSError, ValueError, TypeError):
-        known, settings = {}, {}
-    told = {"read": {"unit": head.unit}, **settings, "write": dataclasses.asdict(head.write)}
+        record = run_record(folder)
+    except InputError as error:
+        LOGGER.warning("built without the settings and inputs of the run: %s", error)
+        record = {}
+    known = {name: record[name] for name in ("settings", "inputs") if record.get(name)}
+    told = {"read": {"unit": head.unit}, **known.get("settings", {}), "write": dataclasses.asdict(head.write)}
     return {**known, "settings": told, "units": head.units.told()}

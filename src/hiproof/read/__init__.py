@@ -31,6 +31,8 @@ terrain       how high the ground is
 raster        terrain models
 raster_checks whether a raster can be one, and in which unit it counts
 cityjson      documents of CityJSON with their vertices in place
+damage        what becomes of a damaged building in a file of many
+shells        shells of CityJSON, every number checked
 solids        solids of CityJSON and CityGML as they stand
 roofn3d       the RoofN3D data set
 

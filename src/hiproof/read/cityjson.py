@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,51 +13,103 @@ import numpy as np
 from ..errors import InputError
 from ..frames import METRES, Units
 from .crs import units_named
+from .damage import Damaged, excerpt, readable, refuse
+from .plausible import is_plausible
+from .shells import read_vertices
 
 UNUSABLE = (KeyError, IndexError, TypeError, ValueError, AttributeError, OverflowError)
 """What comes of taking a document apart that is JSON, but not what CityJSON says it is."""
 
+ESCAPED = re.compile(
+    r"\\u(?:[dD][89a-fA-F]|0000)"
+)  # in JSON: half a character, of which two may make a whole one, or NUL
+
 
 class Feature(NamedTuple):
     """A CityJSON document or a line of CityJSONSeq: its city `objects` by id, their vertices (n, 3) in world metres, its place in
-    the file, and what its coordinates count in."""
+    the file, and what its coordinates count in. One that `is_damaged` cannot be read and has no objects."""
 
     objects: dict[str, Any]
     vertices: np.ndarray
     place: str
     units: Units
+    is_damaged: bool = False
 
 
-def features(path: Path, otherwise: Units = METRES, known: Units | None = None) -> Iterator[Feature]:
-    """Every document of a file, each by the transform and the CRS of the line before it that has them.
+def features(
+    path: Path, otherwise: Units = METRES, known: Units | None = None, damaged: Damaged = refuse
+) -> Iterator[Feature]:
+    """Yield every document of a file, each by the transform and the CRS of the line before it that has them.
 
-    `otherwise` are the units where no CRS is named, `known` those of one of which more is known than a name tells, if there is one. Raises
-    InputError as `documents` does, and for vertices that are none.
+    `otherwise` are the units where no CRS is named, `known` those of one of which more is known than
+    a name tells, if there is one. A feature that cannot be read is told to `damaged` and comes without
+    objects. Raises InputError as `documents` does.
     """
     transform, units = None, known or otherwise
-    for document, place in documents(path):
-        transform = document.get("transform", transform)
+    for document, place in documents(path, damaged):
+        if not document:
+            yield Feature({}, np.empty((0, 3)), place, units, True)
+            continue
         if name := reference_system(document):
             units = known or units_named(name, otherwise)
         try:
-            vertices = np.array(document["vertices"], float).reshape(-1, 3)
-            with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are the business of who asks
-                if transform:
-                    vertices = vertices * np.array(transform["scale"], float) + np.array(transform["translate"], float)
-                vertices = units.to_metres(vertices)
-            objects = document["CityObjects"]
-            objects.items()
+            transform = read_transform(document) or transform
+            yield Feature(read_objects(document), world_vertices(document, transform, units), place, units)
         except UNUSABLE as error:
-            raise InputError(
-                f"expected CityJSON with vertices, a transform and boundaries in {place}, got {error!r}; "
-                "validate the file first"
-            ) from error
-        yield Feature(objects, vertices, place, units)
+            told = InputError(f"expected CityJSON that can be read in {place}, got {reason_of(error)}; mend it there")
+            (refuse if document["type"] == "CityJSON" else damaged)(told)
+            yield Feature({}, np.empty((0, 3)), place, units, True)
 
 
-def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
-    """(document, its place in the file): of CityJSON the one, of CityJSONSeq (`.jsonl`) each line, the header first.
+def read_transform(document: dict[str, Any]) -> tuple[np.ndarray, np.ndarray] | None:
+    """Read the scale (3,) and the translation (3,) of a document, None where it has none."""
+    told = document.get("transform")
+    if told is None:
+        return None
+    if not isinstance(told, dict):
+        raise ValueError(f"{excerpt(told)} as its transform")
+    scale, translate = (read_vertices([told.get(name)])[0] for name in ("scale", "translate"))
+    if not (np.isfinite(scale).all() and is_plausible(translate[None]).all()):
+        raise ValueError(f"a transform to no place on Earth ({excerpt(told)})")
+    return scale, translate
 
+
+def read_objects(document: dict[str, Any]) -> dict[str, Any]:
+    objects = document.get("CityObjects")
+    if not isinstance(objects, dict):
+        raise ValueError(f"{excerpt(objects)} as its CityObjects")
+    return objects
+
+
+def world_vertices(
+    document: dict[str, Any], transform: tuple[np.ndarray, np.ndarray] | None, units: Units
+) -> np.ndarray:
+    """Read the vertices (n, 3) of a document in world metres."""
+    vertices = read_vertices(document.get("vertices"))
+    with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are the business of who asks
+        if transform:
+            vertices = vertices * transform[0] + transform[1]
+        return units.to_metres(vertices)
+
+
+def unusable(id: str, feature: Feature, error: Exception) -> InputError:
+    """Say in a sentence why the city object `id` of a feature cannot be used."""
+    where = feature.place if f"building {id:.80} in " in feature.place else f"{id:.80} in {feature.place}"
+    return InputError(
+        f"expected {where} to be one that can be used, got {reason_of(error)}; mend it there, or make the file anew with "
+        "`hiproof build`"
+    )
+
+
+def reason_of(error: Exception) -> str:
+    """Say what was found in a document, to complete "got ..."."""
+    return str(error) if type(error) is ValueError else repr(error)
+
+
+def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str, Any], str]]:
+    """Yield (document, its place in the file): of CityJSON the one, of CityJSONSeq (`.jsonl`) each line, the header first.
+
+    A line after the header that cannot be read is told to `damaged` and comes as an empty document.
     Raises InputError for what is no text, no JSON, no object, or of another type.
     """
     if path.suffix.lower() != ".jsonl":
@@ -74,19 +127,35 @@ def documents(path: Path) -> Iterator[tuple[dict[str, Any], str]]:
                 if not line.strip():
                     continue
                 place = f"line {number} of {path}"
-                document = parsed(line, place)
-                kind = document.get("type")
-                if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
-                    raise InputError(
-                        f"expected a CityJSON line followed by CityJSONFeatures, got one of type {kind!r} in {place}; is this another "
-                        "kind of JSON?"
-                    )
+                try:
+                    document = parsed_line(line, place, seen_header)
+                except InputError as error:
+                    (damaged if seen_header else refuse)(error)
+                    document = {}
                 seen_header = True
-                yield document, place
+                yield document, place_of(document, place)
     except (OSError, UnicodeDecodeError) as error:
         raise unreadable(path, error) from error
     if not seen_header:
         raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file; write it anew")
+
+
+def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
+    """Read a line of CityJSONSeq. Raises InputError for what is no header, or no feature after one."""
+    document = parsed(line, place)
+    kind = document.get("type")
+    if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
+        raise InputError(
+            f"expected a CityJSON line followed by CityJSONFeatures, got one of type {excerpt(kind)} in {place}; is this another "
+            "kind of JSON?"
+        )
+    return document
+
+
+def place_of(document: dict[str, Any], place: str) -> str:
+    """Name the building of a feature beside its place in the file."""
+    id = document.get("id")
+    return f"building {id:.80} in {place}" if isinstance(id, str) and id else place
 
 
 def parsed(text: str, place: str) -> dict[str, Any]:
@@ -99,7 +168,7 @@ def parsed(text: str, place: str) -> dict[str, Any]:
         raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error
     if not isinstance(value, dict):
         raise InputError(f"expected a JSON object in {place}, got {type(value).__name__}; is this the right file?")
-    return value
+    return readable(value) if ESCAPED.search(text) else value
 
 
 def refuse_constant(name: str) -> None:

@@ -21,6 +21,7 @@ from ..extras import needed
 from ..masking import masked
 from .wkb import as_polygons, geometry_of
 
+TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
 SCHEMES = ("postgresql", "postgres")
 ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")  # whose user and password, where it has any, are whole
 
@@ -107,7 +108,7 @@ def opened(source: str, condition: str | None = None) -> Iterator[Table]:
     where = f"({where}\n) and ({condition}\n)" if where and condition else where or condition
     psycopg = import_psycopg()
     try:
-        with psycopg.connect(dsn, connect_timeout=10) as connection, connection.cursor() as cursor:
+        with psycopg.connect(dsn, connect_timeout=TIMEOUT_S) as connection, connection.cursor() as cursor:
             connection.read_only = True
             yield Table(cursor, table, geometry or geometry_column(cursor, table, source), where)
     except psycopg.Error as error:

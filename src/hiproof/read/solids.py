@@ -18,22 +18,24 @@ from ..errors import InputError
 from ..frames import METRES
 from ..log import counted
 from ..model import WALL, Face, Solid
-from .cityjson import UNUSABLE, Feature, features
+from .cityjson import UNUSABLE, Feature, features, unusable
 from .crs import units_named
+from .damage import Damaged, refuse
+from .shells import list_of, read_geometries, read_shell
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
 SURFACES = {"RoofSurface", "WallSurface", "GroundSurface", "OuterCeilingSurface", "OuterFloorSurface", "ClosureSurface"}
 
 
-def read_solids(path: str | Path) -> Iterator[tuple[str, Solid]]:
+def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
     """Yield (id, Solid) for each shell in a `.json`, `.jsonl` or `.gml` file, in metres.
 
     They are the file's coordinates, times the unit of the CRS that the file names.
 
     The id is the city object's, with `#2`, `#3` ... for its further shells. CityJSONSeq is read line by line and CityGML
-    city object by city object, so memory does not grow with the file. Raises InputError when the file cannot be read as what
-    its name says.
+    city object by city object, so memory does not grow with the file. A city object that cannot be read is told to `damaged`,
+    which refuses the file by default. Raises InputError when the file cannot be read as what its name says.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -55,7 +57,7 @@ def read_solids(path: str | Path) -> Iterator[tuple[str, Solid]]:
         )
     if not path.is_file():
         raise InputError(f"expected a file at {path}, got none; check the name")
-    yield from readers[suffix](path)
+    yield from readers[suffix](path, damaged)
 
 
 def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
@@ -67,35 +69,28 @@ def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
 # CityJSON
 
 
-def cityjson_solids(path: Path) -> Iterator[tuple[str, Solid]]:
+def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
     """Shells of a CityJSON 1.x or 2.0 file, or of a CityJSONSeq file: the transform is that of the line before."""
-    for feature in features(path):
-        yield from feature_solids(feature)
+    for feature in features(path, damaged=damaged):
+        yield from feature_solids(feature, damaged)
 
 
-def feature_solids(feature: Feature) -> Iterator[tuple[str, Solid]]:
+def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
     """Shells of all city objects of one CityJSON object or feature."""
-    try:
-        found = [
-            (
-                name,
-                [
-                    solid
-                    for geometry in city_object.get("geometry") or ()
-                    if not str(geometry.get("lod", "")).startswith("0")
-                    for solid in geometry_shells(geometry, feature.vertices)
-                ],
-            )
-            for name, city_object in feature.objects.items()
-            if str(city_object.get("type")).startswith("Building")
-        ]
-    except UNUSABLE as error:
-        raise InputError(
-            f"expected CityJSON with vertices, a transform and boundaries in {feature.place}, got {error!r}; "
-            "validate the file first"
-        ) from error
-    for name, solids in found:
-        yield from numbered(name, solids)
+    for name, city_object in feature.objects.items():
+        try:
+            if isinstance(city_object, dict) and not str(city_object.get("type")).startswith("Building"):
+                continue
+            found = [
+                solid
+                for geometry in read_geometries(city_object)
+                if not str(geometry.get("lod", "")).startswith("0")
+                for solid in geometry_shells(geometry, feature.vertices)
+            ]
+        except UNUSABLE as error:
+            damaged(unusable(name, feature, error))
+            continue
+        yield from numbered(name, found)
 
 
 def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Solid]:
@@ -110,26 +105,22 @@ def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Soli
     elif kind not in ("MultiSolid", "CompositeSolid"):
         return []
     shells = []
-    for s, solid in enumerate(boundaries):
-        for k, shell in enumerate(solid):
+    for s, solid in enumerate(list_of(boundaries, "boundaries")):
+        for k, shell in enumerate(list_of(solid, "the boundaries of a solid")):
             named = values[s][k] if values and values[s] else None
             shells.append(shell_solid(shell, named, surfaces, vertices, inward=k > 0))
     return shells
 
 
-def shell_solid(
-    shell: list, values: list | None, surfaces: list[dict], vertices: np.ndarray, inward: bool = False
-) -> Solid:
+def shell_solid(shell: Any, values: Any, surfaces: Any, vertices: np.ndarray, inward: bool = False) -> Solid:
     """One shell (faces of rings of indices) with its semantics, on the vertices it uses."""
-    faces, used = [], sorted({index for face in shell for ring in face for index in ring})
-    if used and (used[0] < 0 or used[-1] >= len(vertices)):
-        raise IndexError(f"vertex {used[-1]} of {len(vertices)}")
+    found = read_shell(shell, values, surfaces, len(vertices))
+    used = sorted({index for surface in found for ring in surface.rings for index in ring})
     number = {index: k for k, index in enumerate(used)}
-    for k, face in enumerate(shell):
-        surface = values[k] if values and k < len(values) else None
-        kind = surfaces[surface].get("type", WALL) if surface is not None else WALL
-        rings = tuple(tuple(number[index] for index in ring) for ring in face)
-        faces.append(Face(tuple(ring[::-1] for ring in rings) if inward else rings, kind))
+    faces = []
+    for surface in found:
+        rings = tuple(tuple(number[index] for index in ring) for ring in surface.rings)
+        faces.append(Face(tuple(ring[::-1] for ring in rings) if inward else rings, surface.kind))
     return Solid(vertices[used], tuple(faces))
 
 
@@ -141,7 +132,7 @@ def local_name(element: Any) -> str:
     return tag.rpartition("}")[2] if isinstance(tag, str) else ""
 
 
-def citygml_solids(path: Path) -> Iterator[tuple[str, Solid]]:
+def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
     """Shells of all solids of a CityGML file, one cityObjectMember after the other.
 
     An object without a gml:Solid gives its boundary surfaces as one shell.
@@ -156,7 +147,12 @@ def citygml_solids(path: Path) -> Iterator[tuple[str, Solid]]:
             if local_name(element) not in ("cityObjectMember", "featureMember"):
                 continue
             members += 1
-            for name, solid in member_solids(element, path):
+            try:
+                found = list(member_solids(element, path))
+            except InputError as error:
+                damaged(error)
+                found = []
+            for name, solid in found:
                 yield name, replace(solid, vertices=units.to_metres(solid.vertices))
             element.clear()
             while element.getprevious() is not None:
@@ -181,13 +177,13 @@ def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
     polygons = {gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"}
     owners = [element for element in member.iter() if local_name(element) in ("Building", "BuildingPart")]
     for owner in owners or list(member)[:1]:
-        solids = []
+        solids, place = [], f"{gml_id(owner) or 'a building without an id'} in {path}"
         for element in own_descendants(owner):
             if local_name(element) == "Solid":
-                solids += gml_shells(element, polygons, path)
+                solids += gml_shells(element, polygons, place)
         if not solids:
             loose = [element for element in own_descendants(owner) if is_loose(element)]
-            solids = [polygons_solid(loose, path)] if loose else []
+            solids = [polygons_solid(loose, place)] if loose else []
         yield from numbered(gml_id(owner) or "unnamed", solids)
 
 
@@ -214,7 +210,7 @@ def surface_kind(polygon: Any, default: str | None) -> str | None:
     return default
 
 
-def gml_shells(solid: Any, polygons: dict[str | None, Any], path: Path) -> list[Solid]:
+def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[Solid]:
     """Exterior and interior shells of a gml:Solid, surfaces by value or by xlink."""
     shells = []
     for boundary in solid:
@@ -226,17 +222,17 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], path: Path) -> list[
             if reference is not None:
                 if reference.lstrip("#") not in polygons:
                     raise InputError(
-                        f"expected a polygon with id {reference} in the same city object in {path}, got none;"
+                        f"expected a polygon with id {reference} among the surfaces of {place}, got none;"
                         " the solid refers to a surface that is missing"
                     )
                 members.append(polygons[reference.lstrip("#")])
             elif local_name(element) == "Polygon":
                 members.append(element)
-        shells.append(polygons_solid(members, path, inward=local_name(boundary) == "interior"))
+        shells.append(polygons_solid(members, place, inward=local_name(boundary) == "interior"))
     return shells
 
 
-def polygons_solid(polygons: list[Any], path: Path, inward: bool = False) -> Solid:
+def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Solid:
     """One shell of gml:Polygons; equal coordinates become one vertex. A ring that is not closed is noted as defect 103."""
     number: dict[tuple[float, ...], int] = {}
     faces: list[Face] = []
@@ -246,7 +242,7 @@ def polygons_solid(polygons: list[Any], path: Path, inward: bool = False) -> Sol
         for ring in polygon.iter():
             if local_name(ring) != "LinearRing":
                 continue
-            points = ring_points(ring, path)
+            points = ring_points(ring, place)
             if len(points) > 1 and points[0] == points[-1]:
                 points = points[:-1]
             else:
@@ -257,15 +253,15 @@ def polygons_solid(polygons: list[Any], path: Path, inward: bool = False) -> Sol
     return Solid(np.array(list(number), float).reshape(-1, 3), tuple(faces), tuple(defects))
 
 
-def ring_points(ring: Any, path: Path) -> list[tuple[float, ...]]:
+def ring_points(ring: Any, place: str) -> list[tuple[float, ...]]:
     """Points of a gml:LinearRing from posList or pos."""
     texts = [element.text or "" for element in ring.iter() if local_name(element) in ("posList", "pos")]
     try:
         values = [float(word) for word in " ".join(texts).split()]
     except ValueError as error:
-        raise InputError(f"expected numbers in a gml:posList of {path}, got: {error}; export the file anew") from error
+        raise InputError(f"expected numbers in a gml:posList of {place}, got: {error}; export the file anew") from error
     if len(values) % 3:
         raise InputError(
-            f"expected three coordinates a point in a gml:LinearRing of {path}, got {counted(len(values), 'number')}; export the file anew, in 3D"
+            f"expected three coordinates a point in a gml:LinearRing of {place}, got {counted(len(values), 'number')}; export the file anew, in 3D"
         )
     return [tuple(values[k : k + 3]) for k in range(0, len(values), 3)]

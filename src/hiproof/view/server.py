@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import base64
+import hashlib
 import json
+import re
 from functools import partial
 from html import escape
-from http.server import SimpleHTTPRequestHandler
 from importlib.resources import files
 from pathlib import Path
+from urllib.parse import unquote, urlsplit
 
-from ..loopback import LoopbackServer, own_hosts
+from ..loopback import HTML, SAFE, Answer, LoopbackHandler, LoopbackServer
 from ..write.colours import type_colours
+
+NAME = re.compile(r"[\w-][\w.-]{0,200}", re.ASCII)  # of a file or folder of tiles: no drive, no way up, nothing hidden
+NO_SOURCE = "'none'"
+KINDS = {".json": "application/json", ".glb": "model/gltf-binary"}
 
 ASSETS = {
     "style": ("hiproof.view", "view.css"),
@@ -44,30 +51,49 @@ def page_of(title: str) -> str:
     return page
 
 
-class Handler(SimpleHTTPRequestHandler):
-    """Serves the page and a folder, only to those who call this machine by its own name."""
+def policy_of(page: str) -> str:
+    """Return the Content-Security-Policy that lets this page run the scripts and styles that stand in it, and no other.
 
-    server: LoopbackServer
+    >>> policy_of("<style>a</style>")[:91]
+    "default-src 'none'; script-src 'none'; style-src 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuY"
+    """
+    sources = {
+        kind: " ".join(digest_of(text) for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL))
+        for kind in ("script", "style")
+    }
+    policy = SAFE["Content-Security-Policy"]
+    for kind, digests in sources.items():
+        policy = policy.replace(f"{kind}-src 'self'", f"{kind}-src {digests or NO_SOURCE}")
+    return policy
 
-    def __init__(self, *args, page: str, **named) -> None:
-        self.page = page.encode()
+
+def digest_of(text: str) -> str:
+    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
+
+
+class Handler(LoopbackHandler):
+    """Serves the page and the files of a folder; it lists none and follows no way out of it."""
+
+    def __init__(self, *args, directory: str, page: str, **named) -> None:
+        self.folder, self.page, self.policy = Path(directory).resolve(), page.encode(), policy_of(page)
         super().__init__(*args, **named)
 
-    def do_GET(self) -> None:
-        if self.headers.get("Host") not in own_hosts(self.server.server_port):
-            self.send_error(403)
-        elif self.path in ("/", "/index.html"):
-            self.send_response(200)
-            self.send_header("Content-Type", "text/html; charset=utf-8")
-            self.send_header("Content-Length", str(len(self.page)))
-            self.end_headers()
-            self.wfile.write(self.page)
-        else:
-            super().do_GET()
+    def answer(self, method: str, body: bytes) -> Answer:
+        if method != "GET":
+            return self.refused(405, "expected GET: this page only shows")
+        path = urlsplit(self.path).path
+        if path in ("/", "/index.html"):
+            return Answer(200, self.page, HTML, {"Content-Security-Policy": self.policy})
+        file = file_at(self.folder, path)
+        if file is None:
+            return self.refused(404, "expected a file of the tiles, got another name")
+        return Answer(200, file.read_bytes(), KINDS.get(file.suffix, "application/octet-stream"))
 
-    def end_headers(self) -> None:
-        self.send_header("Cache-Control", "no-cache")
-        super().end_headers()
 
-    def log_message(self, *args) -> None:
-        """Say nothing: a terminal full of requests helps nobody."""
+def file_at(folder: Path, path: str) -> Path | None:
+    """Return the file below `folder` that an address names, None where there is none."""
+    names = unquote(path).split("/")[1:]
+    if not all(NAME.fullmatch(name) for name in names):
+        return None
+    file = folder.joinpath(*names).resolve()
+    return file if file.is_file() and file.is_relative_to(folder) else None

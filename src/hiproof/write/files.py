@@ -12,7 +12,7 @@ import io
 import os
 import secrets
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import BinaryIO
 
@@ -43,6 +43,11 @@ def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
     """
     advice = ADVICE.get(error.errno or 0, f"got: {error}; check the path, the permissions and the space left")
     return OutputError(f"expected to write {os.fspath(path)}, but {advice}")
+
+
+def elsewhere(error: OutputError, command: str) -> OutputError:
+    """Name the `command` that writes elsewhere, where the place was not of the user's choice."""
+    return OutputError(f"{error}. Write elsewhere with `{command}`")
 
 
 class OutputFile(io.FileIO):
@@ -96,7 +101,7 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
     finally:
         # After a good end the hidden name is gone; SQLite leaves journals beside it after a bad one.
         for leftover in (hidden, *(hidden.with_name(hidden.name + end) for end in ("-journal", "-wal", "-shm"))):
-            leftover.unlink(missing_ok=True)
+            remove(leftover)
 
 
 @contextmanager
@@ -114,7 +119,7 @@ def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
         with opened(hidden, Path(path)) as file:
             yield file
     finally:
-        hidden.unlink(missing_ok=True)
+        remove(hidden)
 
 
 @contextmanager
@@ -131,6 +136,12 @@ def opened(hidden: Path, path: Path) -> Iterator[BinaryIO]:
     finally:
         # Closing the raw file drops what is still buffered after a failure instead of failing again.
         raw.close()
+
+
+def remove(path: Path) -> None:
+    """Remove a file if it can be: where a file system is read-only, there is none, and the error before it is the one to tell."""
+    with suppress(OSError):
+        path.unlink(missing_ok=True)
 
 
 def hidden_name(path: Path) -> Path:

@@ -9,30 +9,29 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterator
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import islice
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
-from ..model import GROUND, ROOF, Face, Solid
-from ..read.cityjson import documents
-from ..read.crs import units_named
-from ..read.database import import_psycopg, refuse_half_a_password
+from ..model import ROOF, Solid
+from ..read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
 from ..rings import ring_normal
-from .attribute_list import OWN, PARTS_LAYER
+from .attribute_list import PARTS_LAYER
 from .roof_figures import FLAT_SLOPE_DEG
 from .triangles import faces_triangles
 
-PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
+BATCH = 500  # buildings sent at once
+LOCKS = 0x6869  # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the extension
+PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")  # names of indexes add 15 characters, and PostgreSQL cuts at 63
 KINDS = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
 MEASURES = ", ".join(f"{a.name} {KINDS[a.kind]}" for a in PARTS_LAYER[3:])
 SCHEMA = """
-create extension if not exists postgis;
 create table if not exists {buildings} (
     id text primary key, status text, roof_type text, attributes jsonb, geom geometry(PolyhedralSurfaceZ, {srid}));
 create table if not exists {roofs} (
@@ -51,51 +50,65 @@ create index if not exists {prefix}_parts_geom on {parts} using gist (geom);
 
 @dataclass(frozen=True)
 class Row:
-    """A building as the tables hold it: its faces over `vertices` (n, 3) in `units`, each with its semantics."""
+    """A building as the tables hold it: its `solid` in metres, None without a model, the types of its parts by number, and the
+    `units` in which the tables hold coordinates."""
 
     id: str
+    status: str | None
+    roof_type: str | None
     attributes: dict[str, Any]
-    vertices: np.ndarray
-    faces: tuple[Face, ...]
-    semantics: tuple[dict[str, Any], ...]
+    solid: Solid | None
+    part_types: Mapping[int, str]
     units: Units = METRES
 
 
-def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", batch: int = 500, known: Units | None = None) -> int:
-    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn` by the models of `folder`.
+def load_rows(
+    dsn: str, rows: Iterator[Row], parts: Iterable[Sequence[tuple]], srid: int = 0, prefix: str = "hiproof"
+) -> int:
+    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`; returns the number of buildings.
 
-    `known` are the units of models of which more is known than their CRS tells: slopes and areas are measured where the run was
-    made. Returns the number of buildings loaded. Raises InputError for a folder without models, OutputError for a database
-    that cannot be written.
+    `parts` are rows of values of PARTS_LAYER and a geometry as WKB, some at a time; those of buildings that are not among
+    `rows` are left out. Raises InputError for a prefix that makes no names of tables, OutputError for a database that cannot
+    be written.
     """
-    path = Path(folder) / "buildings.city.jsonl"
-    if not path.is_file():
+    if not PREFIX.fullmatch(prefix):
         raise InputError(
-            f"expected the output folder of a run, got {folder} without buildings.city.jsonl; check the path, or have "
-            "`hiproof build` make that file of a run's parameters.jsonl"
-        )
-    if not prefix.isidentifier():
-        raise InputError(
-            f"expected a table prefix of letters, digits and underscores, got {prefix!r}; choose another --prefix"
+            f"expected a table prefix of at most 48 letters (a to z), digits and underscores, got {prefix!r:.80}; "
+            "choose another --prefix"
         )
     psycopg = import_psycopg()
+    prefix = prefix.lower()  # as PostgreSQL reads names
     names = {"prefix": prefix} | {table: f"{prefix}_{table}" for table in ("buildings", "roofs", "parts")}
     try:
-        with psycopg.connect(refuse_half_a_password(dsn)) as connection, connection.cursor() as cursor:
-            header, features = open_sequence(path)
-            srid = srid_of(header)
+        with (
+            psycopg.connect(refuse_half_a_password(dsn), connect_timeout=TIMEOUT_S) as connection,
+            connection.cursor() as cursor,
+        ):
+            add_extension(connection, cursor)
+            cursor.execute("select pg_advisory_xact_lock(%s, hashtext(%s))", (LOCKS, prefix))
             empty_tables(cursor, names, srid)
-            named = header.get("metadata", {}).get("referenceSystem")
-            units = known or units_named(named, units_of_run(path.parent))
-            rows = (building_row(header["transform"], feature, units) for feature in features)
-            count = sum(insert(cursor, some, names, srid) for some in batched(rows, batch))
-            insert_parts(cursor, path.with_name("buildings.gpkg"), names["parts"], srid)
-            return count
-    except psycopg.Error as error:
-        reason = str(error).strip().splitlines()[0]
-        raise OutputError(
-            f"expected a PostGIS database that can be written, got: {reason}; check the address"
-        ) from error
+            loaded: set[str] = set()
+            while batch := list(islice(rows, BATCH)):
+                insert(cursor, batch, names, srid)
+                loaded |= {row.id for row in batch}
+            insert_parts(cursor, parts, loaded, names["parts"], srid)
+            return len(loaded)
+    except psycopg.OperationalError as error:
+        raise not_written(error, "; check the address") from error
+    except (psycopg.Error, UnicodeError) as error:
+        raise not_written(error, "") from error
+
+
+def not_written(error: Exception, advice: str) -> OutputError:
+    reason = (str(error).strip().splitlines() or [type(error).__name__])[0]
+    return OutputError(f"expected a PostGIS database that can be written, got: {reason}{advice}")
+
+
+def add_extension(connection: Any, cursor: Any) -> None:
+    """Add PostGIS to the database where it is missing, one load at a time: PostgreSQL does not wait by itself."""
+    cursor.execute("select pg_advisory_xact_lock(%s, 0)", (LOCKS,))
+    cursor.execute("create extension if not exists postgis")
+    connection.commit()
 
 
 def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
@@ -104,100 +117,31 @@ def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
     cursor.execute("delete from {buildings}".format(**names))
     for key, kind in (("buildings", "PolyhedralSurfaceZ"), ("roofs", "PolygonZ"), ("parts", "MultiPolygon")):
         table = names[key]
-        cursor.execute("select srid from geometry_columns where f_table_name = %s", (table,))
-        if {known for (known,) in cursor.fetchall()} != {srid}:
+        cursor.execute("select Find_SRID(current_schema()::text, %s, 'geom')", (table,))
+        if cursor.fetchone() != (srid,):
             cursor.execute(f"alter table {table} alter column geom type geometry({kind}, {srid})")
 
 
-def batched(rows: Iterator[Row], size: int) -> Iterator[list[Row]]:
-    while batch := list(islice(rows, size)):
-        yield batch
-
-
-def open_sequence(path: Path) -> tuple[dict, Iterator[dict]]:
-    """The first line of a CityJSONSeq and an iterator over its features."""
-    lines = (document for document, _ in documents(path))
-    return next(lines), lines
-
-
-def srid_of(header: dict) -> int:
-    """EPSG code of the metadata's reference system; 0 (unknown to PostGIS) without one."""
-    code = str(header.get("metadata", {}).get("referenceSystem", "")).rsplit("/", 1)[-1]
-    return int(code) if code.isdigit() else 0
-
-
-def units_of_run(folder: Path) -> Units:
-    """Units that the record of a run tells of, metres where there is no record."""
-    record = folder / "run.json"
-    told = json.loads(record.read_text(encoding="utf-8")).get("units", {}) if record.is_file() else {}
-    return Units(told.get("metres_in_plan_unit", 1.0), told.get("metres_in_height_unit", 1.0))
-
-
-def building_row(transform: dict, feature: dict, units: Units = METRES) -> Row:
-    """The building of a CityJSON feature whose coordinates are integers by `transform`."""
-    vertices = np.asarray(feature["vertices"], float).reshape(-1, 3) * transform["scale"] + transform["translate"]
-    city_object = feature["CityObjects"][feature["id"]]
-    solids = [g for o in feature["CityObjects"].values() for g in o.get("geometry", []) if g["type"] == "Solid"]
-    level = max((geometry["lod"] for geometry in solids), default="")
-    faces, semantics = [], []
-    for geometry in (solid for solid in solids if solid["lod"] == level):
-        surfaces, values = geometry["semantics"]["surfaces"], geometry["semantics"]["values"][0]
-        for rings, index in zip(geometry["boundaries"][0], values, strict=True):
-            semantics.append(surfaces[index])
-            faces.append(Face(tuple(map(tuple, rings)), surfaces[index]["type"]))
-    if sum(face.kind == GROUND for face in faces) > 1:
-        vertices, faces, semantics = in_one_shell(vertices, faces, semantics, units)
-    return Row(feature["id"], city_object.get("attributes", {}), vertices, tuple(faces), tuple(semantics), units)
-
-
-def in_one_shell(
-    vertices: np.ndarray, faces: list[Face], semantics: list[dict[str, Any]], units: Units
-) -> tuple[np.ndarray, list[Face], list[dict[str, Any]]]:
-    """Vertices, faces and semantics of a building in parts, without the walls between them."""
-    from ..compose.building_parts import whole_of
-
-    whole = whole_of(Solid(units.to_metres(vertices), tuple(faces)))
-    roofs = [said for face, said in zip(faces, semantics, strict=True) if face.kind == ROOF]
-    others = [{"type": face.kind} for face in whole.faces if face.kind != ROOF]
-    return units.from_metres(whole.vertices), list(whole.faces), [*roofs, *others]
-
-
-def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> int:
+def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> None:
     """Insert buildings together with their roof surfaces."""
     geometry = f"ST_GeomFromEWKT('SRID={srid};' || %s::text)"
     cursor.executemany(
         f"insert into {names['buildings']} values (%s, %s, %s, %s, {geometry})",
-        [
-            (r.id, r.attributes.get(f"{OWN}status"), r.attributes.get(f"{OWN}roof_type"), json.dumps(r.attributes),
-             polyhedral_wkt(r))
-            for r in rows
-        ],
-    )  # fmt: skip
+        [(r.id, r.status, r.roof_type, json.dumps(r.attributes), polyhedral_wkt(r)) for r in rows],
+    )
     cursor.executemany(
         f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, %s, {geometry})",
         [roof for row in rows for roof in roof_rows(row)],
     )
-    return len(rows)
 
 
-def insert_parts(cursor: Any, path: Path, table: str, srid: int) -> None:
-    """Insert the layer `parts` of the GeoPackage at `path`; nothing where there is none."""
-    import pyogrio
-
-    if not path.is_file() or "parts" not in pyogrio.list_layers(path)[:, 0]:
-        return
+def insert_parts(cursor: Any, parts: Iterable[Sequence[tuple]], loaded: set[str], table: str, srid: int) -> None:
+    """Insert the rows of parts whose building is among those `loaded`."""
     columns = [attribute.name for attribute in PARTS_LAYER]
     values = ", ".join(["%s"] * len(columns))
     sql = f"insert into {table} ({', '.join(columns)}, geom) values ({values}, ST_SetSRID(%s::geometry, {srid}))"
-    start = 0
-    while True:
-        _, _, wkb, found = pyogrio.raw.read(
-            path, layer="parts", columns=columns, skip_features=start, max_features=PARTS_AT_ONCE
-        )
-        cursor.executemany(sql, [(*map(known, row), geometry) for *row, geometry in zip(*found, wkb, strict=True)])
-        start += len(wkb)
-        if len(wkb) < PARTS_AT_ONCE:
-            return
+    for some in parts:
+        cursor.executemany(sql, [tuple(map(known, row)) for row in some if row[0] in loaded])
 
 
 def known(value: Any) -> Any:
@@ -208,17 +152,12 @@ def known(value: Any) -> Any:
 
 def roof_rows(row: Row) -> Iterator[tuple]:
     """A row a roof surface: (building, number, part, type, slope, azimuth, area, WKT)."""
-    roofs = [(face, said) for face, said in zip(row.faces, row.semantics, strict=True) if face.kind == ROOF]
-    for number, (face, said) in enumerate(roofs):
-        rings = [row.vertices[list(ring)] for ring in face.rings]
-        yield (
-            row.id,
-            number,
-            said.get(f"{OWN}part"),
-            said.get(f"{OWN}part_type"),
-            *lie_of([row.units.to_metres(ring) for ring in rings]),
-            f"POLYGON Z {rings_wkt(rings)}",
-        )
+    if row.solid is None:
+        return
+    for number, face in enumerate(row.solid.of_kind(ROOF)):
+        rings = [row.solid.vertices[list(ring)] for ring in face.rings]
+        wkt = f"POLYGON Z {rings_wkt([row.units.from_metres(ring) for ring in rings])}"
+        yield (row.id, number, face.part, row.part_types.get(face.part), *lie_of(rings), wkt)
 
 
 def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
@@ -232,8 +171,11 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
 
 def polyhedral_wkt(row: Row) -> str | None:
     """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None without one."""
-    triangles = [t for face in faces_triangles(row.vertices, row.faces) for t in row.vertices[face]]
-    return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt([t]) for t in triangles)})" if triangles else None
+    if row.solid is None:
+        return None
+    places = row.units.from_metres(row.solid.vertices)
+    triangles = [places[t] for face in faces_triangles(row.solid.vertices, row.solid.faces) for t in face]
+    return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt([t]) for t in triangles)})"
 
 
 def rings_wkt(rings: list[np.ndarray]) -> str:

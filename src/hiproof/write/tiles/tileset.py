@@ -48,8 +48,8 @@ def write_models(
     """
     folder, globe = Path(folder), None if crs is None else Globe.of(crs, geoid_height_m)
     make_room(folder)
-    warn_of(globe)
     with scratch(folder) as file:
+        warn_of(globe)
         city = WaitingCity(file, globe)
         for model in buildings:
             city.add(model)
