@@ -5,7 +5,7 @@ import warnings
 import pytest
 
 import planted
-from hiproof import log
+from hiproof import log, masking
 from hiproof.city import run as city_run
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.tasks import ALL, make_ready
@@ -27,6 +27,12 @@ def log_as_it_was():
     yield
     log.LOGGER.handlers[:], warnings.showwarning = handlers, show
     log.LOGGER.setLevel(level)
+
+
+@pytest.fixture(autouse=True)
+def secrets_as_they_were(monkeypatch):
+    """Secrets that a test uses are hidden in its own messages alone."""
+    monkeypatch.setattr(masking, "SECRETS", masking.Secrets())
 
 
 @pytest.fixture(scope="session")

@@ -1,14 +1,20 @@
 """Secrets never leave the process: whatever is written or printed goes through `masked`.
 
 Addresses hold passwords in several ways (`scheme://user:password@host`, `?password=`, `PG:... password='...'`, signed
-links) and appear in the middle of others' error texts, so they are looked for in any text. In doubt more is hidden: an
-address shown with too little in it harms nobody.
+links) and appear in the middle of others' error texts, so they are looked for in any text. Libraries also quote what they
+make of a malformed address, a piece of a password alone for example. So `remember` takes the secrets out of an address where it
+comes in, and `masked` hides them and their pieces wherever they stand, as they are, percent-encoded or quoted. In doubt more is
+hidden: an address shown with too little in it harms nobody.
 """
 
 from __future__ import annotations
 
+import json
+import os
 import re
+from collections.abc import Iterable, Iterator
 from typing import Any
+from urllib.parse import quote, quote_plus, unquote, unquote_plus
 
 HIDDEN = "..."
 
@@ -16,11 +22,121 @@ HIDDEN = "..."
 AFTER_USER = re.compile(r"(://[^\s:@/?#\[]*):(?:[^\s?#]*@|(?!\d*(?:[/?#\s]|$))\S*@)")
 TOKEN_AS_USER = re.compile(r"(https?://)[^\s:@/?#]+@", re.IGNORECASE)
 ENCODED = re.compile(r"(%3A%2F%2F)[^\s&/]*%40", re.IGNORECASE)
+NAME = r"(?<![a-z])(?:[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)|pass|sig|key|accesskeyid)\s*=\s*"
 NAMED = re.compile(
-    r"((?<![a-z])(?:[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)|pass|sig|key)\s*=\s*)"
-    r"""(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^&\s]*[^&\s,;:.)'"])""",
+    rf"({NAME})" r"""(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^&\s]*[^&\s,;:.)'"])""",
     re.IGNORECASE,
 )
+
+SCHEME = re.compile(r"^(?:/vsi\w+[/?])?[\w+.-]*:?//?|^[\w+.-]+:(?=[^@]*:)")  # or what of it a slip has left
+VALUE = re.compile(rf"{NAME}(.*)", re.IGNORECASE | re.DOTALL)  # of a parameter, and all that follows
+END = re.compile(r"[&\s;]+[\w-]+\s*=")  # of a value: the next parameter
+BREAKS = re.compile(r"[^\w.~-]+")  # where programs cut an address into pieces
+WHOLE_WORD_BELOW = 4  # characters; shorter secrets, and those like words, are hidden as whole words alone
+NO_SECRET = re.compile(r"\W*.?\W*|\d{1,3}")  # is hidden in addresses alone: it stands in every other sentence
+ADDRESS = re.compile(
+    r"//|@|%2F%2F|^/vsi|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=", re.IGNORECASE
+)
+
+
+class Secrets:
+    """Secrets of the addresses seen so far, with the pattern that finds them in a text."""
+
+    def __init__(self) -> None:
+        self.known: set[str] = set()
+        self.pattern: re.Pattern | None = None
+
+    def add(self, secrets: Iterable[str]) -> None:
+        new = set(secrets) - self.known
+        if new:
+            self.known |= new
+            forms = {form for secret in self.known for form in forms_of(secret)}
+            self.pattern = re.compile("|".join(map(pattern_of, sorted(forms, key=len, reverse=True))), re.IGNORECASE)
+
+    def hide(self, text: str) -> str:
+        return text if self.pattern is None else self.pattern.sub(HIDDEN, text)
+
+
+SECRETS = Secrets()
+
+
+def remember(*addresses: object) -> None:
+    """Hide the passwords, tokens and signatures of these addresses in all that is written from now on.
+
+    What is no address, such as a condition or the name of a file that is there, holds none.
+    """
+    for address in addresses:
+        if isinstance(address, str) and ADDRESS.search(address) and not names_a_file(address):
+            SECRETS.add(secrets_of(address))
+
+
+def names_a_file(address: str) -> bool:
+    try:
+        return os.path.exists(address)
+    except ValueError:  # a NUL, which no file has in its name
+        return False
+
+
+def secrets_of(address: str) -> set[str]:
+    """The secrets in an address, however malformed, with the pieces into which a program may cut them.
+
+    >>> sorted(secrets_of("postgresql//adm:S3cr3t@127.0.0.1/t")), sorted(secrets_of("host=h password=S3c r3t user=me"))
+    (['S3cr3t'], ['S3c', 'S3c r3t', 'r3t'])
+    >>> secrets_of("tiles/a.laz"), secrets_of("https://host:8080/tile.laz"), secrets_of("postgresql://me@host/db")
+    (set(), set(), set())
+    """
+    decoded = unquote(address)
+    whole = {secret for text in {address, decoded, unquote(decoded)} for secret in candidates(text)}
+    pieces = {piece for secret in whole for text in (secret, unquote(secret)) for piece in BREAKS.split(text)}
+    return {secret for secret in whole | pieces if not NO_SECRET.fullmatch(secret)}
+
+
+def candidates(address: str) -> Iterator[str]:
+    """Yield what may be a secret of an address: what a user's name is followed by up to an @, and values of named parameters."""
+    rest = SCHEME.sub("", address, count=1)
+    for end in {rest.find("@"), rest.rfind("@"), re.split(r"[?#]", rest, maxsplit=1)[0].rfind("@")}:
+        user, colon, password = rest[: max(end, 0)].partition(":")
+        if colon:
+            yield password
+        elif re.match(r"(?:/vsi\w+/)?https?:", address, re.IGNORECASE):
+            yield user
+    for found in VALUE.finditer(address):
+        yield from values_at(found[1])
+    for found in re.finditer(NAME, address, re.IGNORECASE):  # those within the value of an earlier one
+        yield from values_at(address[found.end() :])
+
+
+def values_at(text: str) -> Iterator[str]:
+    """Yield what may be the value that a parameter's text begins with: quoted, or up to the next parameter, or to the first sign."""
+    if not text:
+        return
+    if text[0] in "'\"":
+        inner = re.match(r"((?:\\.|[^\\])*?)(?:(?<!\\)" + text[0] + r"|$)", text[1:], re.DOTALL)
+        value = inner[1] if inner else text[1:]
+        yield from (value, re.sub(r"\\(.)", r"\1", value))
+        return
+    value = END.split(text, maxsplit=1)[0]
+    yield from (value, unquote_plus(value), re.split(r"[&\s]", value, maxsplit=1)[0])
+
+
+def forms_of(secret: str) -> set[str]:
+    """How a secret may be written: as it is, decoded, encoded, and as programs quote texts and bytes."""
+    plain = {secret, unquote(secret), unquote_plus(secret)}
+    encoded = {encode(text) for text in plain for encode in (quote, quote_plus)} | {
+        quote(text, safe="") for text in plain
+    }
+    quoted = {repr(text)[1:-1] for text in plain} | {json.dumps(text)[1:-1] for text in plain}
+    doubled = {text.replace("'", "''") for text in plain} | {text.replace("\\", "\\\\") for text in plain}
+    as_bytes = {repr(text.encode("utf-8", "replace"))[2:-1] for text in plain}
+    return {form for form in plain | encoded | quoted | doubled | as_bytes if re.search(r"\w", form)}
+
+
+def pattern_of(form: str) -> str:
+    """The pattern that finds a form of a secret; a short one, or one like a word, where no letter stands beside it."""
+    is_word = form.isalpha() and (form.islower() or form.isupper() or form.istitle())
+    if len(form) >= WHOLE_WORD_BELOW and not is_word:
+        return re.escape(form)
+    return rf"(?:(?<!\w)|(?<=%[0-9a-f]{{2}})|(?<=\\[a-z])){re.escape(form)}(?!\w)"
 
 
 def masked(text: str) -> str:
@@ -34,7 +150,7 @@ def masked(text: str) -> str:
     text = AFTER_USER.sub(rf"\1:{HIDDEN}@", text)
     text = TOKEN_AS_USER.sub(rf"\1{HIDDEN}@", text)
     text = ENCODED.sub(rf"\1{HIDDEN}%40", text)
-    return NAMED.sub(rf"\1{HIDDEN}", text)
+    return SECRETS.hide(NAMED.sub(rf"\1{HIDDEN}", text))
 
 
 def masked_values(value: Any) -> Any:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from ..masking import remember
 from ..settings import Settings
 
 Box = tuple[float, float, float, float]
@@ -40,3 +41,6 @@ class Request:
     restart: bool = field(default=False, metadata=NO_MATTER)
     where: str | None = field(default=None, metadata=WHICH)
     bbox: Box | None = field(default=None, metadata=WHICH)
+
+    def __post_init__(self) -> None:
+        remember(*self.clouds, self.footprints, self.terrain, self.overrides, self.scheduler)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from collections.abc import Iterator
+from itertools import takewhile
 
+CUT_OFF = re.compile(r"//[^/@\s]*:(?!\d*(?:/|$))[^@]*$")  # an address that ends within its password
 INTERRUPTED = 130  # exit code, as shells know it: 128 and the signal's number
 KEPT = "interrupted; no file is left half written. What a run had finished is kept: the same command goes on from there"
 
@@ -16,8 +20,10 @@ def main() -> None:
     from .. import log
     from ..compiled import news
     from ..errors import HiproofError, is_interrupt
+    from ..masking import remember
     from .app import app
 
+    remember(*addresses_in(sys.argv[1:]))
     log.start()
     news.listener = news.Lines(log.LOGGER.warning)
     try:
@@ -35,3 +41,20 @@ def main() -> None:
             sys.exit(INTERRUPTED)
         log.LOGGER.error("failed; please report this:", exc_info=True)
         sys.exit(1)
+
+
+def addresses_in(arguments: list[str]) -> Iterator[str]:
+    """Yield what may be addresses: arguments, values of options, and passwords that a blank has cut into several arguments.
+
+    >>> list(addresses_in(["load", "--prefix=a", "password=S3", "cr3t", "-x"]))
+    ['load', '--prefix=a', 'a', 'password=S3', 'password=S3 cr3t', 'cr3t', '-x']
+    """
+    for index, argument in enumerate(arguments):
+        yield argument
+        if argument.startswith("--") and "=" in argument:
+            yield argument.partition("=")[2]
+        more = list(takewhile(lambda other: not other.startswith("-"), arguments[index + 1 :]))
+        if argument.lower().startswith(("password=", "pwd=")):
+            yield " ".join([argument, *takewhile(lambda other: "=" not in other, more)])
+        elif CUT_OFF.search(argument) and any("@" in other for other in more):
+            yield " ".join([argument, *more])

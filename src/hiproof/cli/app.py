@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from .. import __version__
+from ..masking import masked
 from .attributes import attributes
 from .build import build
 from .check import check
@@ -25,7 +29,33 @@ from .train import train
 from .view import view
 from .warm import warm
 
+
+class MaskingGroup(TyperGroup):
+    """The commands, whose complaints about wrong usage hold no password of an argument."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        with complaints_masked():
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        with complaints_masked():
+            return super().invoke(ctx)
+
+
+@contextmanager
+def complaints_masked() -> Iterator[None]:
+    """Mask what click, which some versions of typer hold inside, says of wrong usage: it names arguments as they are."""
+    try:
+        yield
+    except Exception as error:
+        if hasattr(error, "format_message"):
+            told = masked(error.format_message())
+            error.format_message = lambda: told
+        raise
+
+
 app = typer.Typer(
+    cls=MaskingGroup,
     name="hiproof",
     help="Airborne LiDAR point clouds into watertight, semantic, parametric LoD2 building models.",
     no_args_is_help=True,

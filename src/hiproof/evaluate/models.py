@@ -28,7 +28,7 @@ RUN_MODELS = FORMATS["cityjson"].file
 PART, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
 """What hiproof tells of a roof surface: its part's number and type."""
 
-MOST_PARTS = 2**31  # of a building, so that their numbers fit the columns and tables of all formats
+MOST_PART_NUMBER = 2**31  # of a building, so that their numbers fit the columns and tables of all formats
 
 
 @dataclass(frozen=True)
@@ -170,7 +170,7 @@ def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> li
 def part_of(surface: Surface) -> int:
     """The number of the part that a roof surface belongs to, 0 where the file does not tell."""
     number = surface.semantics.get(PART, 0)
-    if type(number) is not int or not 0 <= number < MOST_PARTS:
+    if type(number) is not int or not 0 <= number < MOST_PART_NUMBER:
         raise ValueError(f"{excerpt(number)} as the number of a part")
     return number
 

@@ -18,7 +18,7 @@ import shapely
 
 from ..errors import InputError
 from ..extras import needed
-from ..masking import masked
+from ..masking import masked, remember
 from .wkb import as_polygons, geometry_of
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
@@ -28,7 +28,7 @@ ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")  # whose user and password, w
 
 def is_database(source: Any) -> bool:
     """Whether a footprint source names a database rather than a file."""
-    return isinstance(source, str) and urlsplit(source).scheme in SCHEMES
+    return isinstance(source, str) and source.partition(":")[0].lower() in SCHEMES
 
 
 def read_table(
@@ -118,8 +118,11 @@ def opened(source: str, condition: str | None = None) -> Iterator[Table]:
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
     """(dsn, table, geometry column or None, condition or None) of a source."""
-    url = urlsplit(refuse_half_a_password(source))
-    query = parse_qs(url.query)
+    try:
+        url = urlsplit(refuse_half_a_password(source))
+        query = parse_qs(url.query)
+    except ValueError as error:
+        raise InputError(f"expected a PostGIS table at {source}, got: {error}; check the address") from error
     own = {name: query.pop(name, [None])[0] for name in ("table", "geometry", "where")}
     if not own["table"]:
         raise InputError(f"expected a table in {source}, got none; add ?table=schema.name to the address")
@@ -129,6 +132,7 @@ def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
 
 def refuse_half_a_password(address: str) -> str:
     """`address`, unless its password ends at a / ? or # of its own: the rest would be taken for a host and shown."""
+    remember(address)
     if ADDRESS.match(masked(address)) and not ADDRESS.match(address):
         raise InputError(
             f"expected %2F, %3F and %23 for / ? and # in the password of {address}, got the signs themselves"

@@ -16,6 +16,7 @@ from pyproj import CRS
 from ..errors import InputError, InputWarning
 from ..frames import Units
 from ..log import counted
+from ..masking import remember
 from ..model import Footprint
 from ..rings import clockwise
 from ..settings import Settings
@@ -117,6 +118,7 @@ def read_features(
 
     Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
     """
+    remember(str(path))
     if is_database(path):
         return read_table(str(path), where)
     refuse_missing(path)

@@ -18,7 +18,7 @@ from pyproj import CRS
 from ..errors import DamagedRaster, InputError, InputWarning
 from ..extras import needed
 from ..frames import Units
-from ..masking import masked
+from ..masking import masked, remember
 from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
 from .plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from .raster_checks import alpha_band, band_unit, height_band, refuse_without_position, scale_and_offset
@@ -77,6 +77,7 @@ class RasterTerrain:
 
         `units` are those of `crs`, which need naming where there is none.
         """
+        remember(str(path))
         self.path, self.source = str(path), f"terrain model {Path(masked(str(path))).name}"
         self.crs = parse_crs(crs)
         self.tiles: OrderedDict[tuple[int, int], np.ndarray] = OrderedDict()

@@ -10,6 +10,7 @@ from typing import Any, BinaryIO
 
 from ..errors import InputError
 from ..extras import needed
+from ..masking import remember
 
 BLOCK_BYTES = 1 << 20  # bytes a request; a server's answer takes longer than a megabyte's way
 
@@ -32,6 +33,7 @@ def opened(path: str | Path) -> Iterator[BinaryIO]:
 
 def open_address(url: str) -> BinaryIO:
     fsspec = import_fsspec()
+    remember(url)
     try:
         # buffered once more: fsspec's own files read lines of any length only
         return io.BufferedReader(fsspec.open(url, "rb", block_size=BLOCK_BYTES).open())

@@ -1,0 +1,196 @@
+"""Malformed addresses with a known secret, and everything that may repeat it.
+
+    PYTHONPATH=tests python -m fuzz.leaking_addresses COUNT [SEED]
+
+prints the leaks that COUNT addresses find. The same seed makes the same addresses.
+"""
+
+from __future__ import annotations
+
+import logging
+import random
+import re
+import sys
+import tempfile
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import redirect_stderr, redirect_stdout, suppress
+from io import StringIO
+from pathlib import Path
+from unittest.mock import patch
+from urllib.parse import quote, unquote
+
+from hiproof import cli, masking
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.compiled import news
+from hiproof.log import LOGGER
+from sample_models import write_sample_run
+
+PARTS = ("Xq7Zw", "kV9jR", "Tb4Yh")  # of secrets; no word of a message holds one
+SIGNS = (
+    "",
+    "%",
+    "%%",
+    "%zz",
+    "%4",
+    "@",
+    ":",
+    "/",
+    "//",
+    "?",
+    "#",
+    "&",
+    "=",
+    " ",
+    "'",
+    '"',
+    "\\",
+    ",",
+    ";",
+    "+",
+    "[",
+    "]",
+)
+SIGNS += ("%20", "%40", "%2F", "%25", "é", "\t", "$", "!", "|", "<", "{", "..", "-", "\u202e")
+SHAPES = (
+    "postgresql://adm:{}@127.0.0.1:1/t?table=fp",
+    "postgres://adm:{}@127.0.0.1:1/t?table=fp",
+    "postgresql//adm:{}@127.0.0.1:1/t?table=fp",
+    "postgresql:/adm:{}@127.0.0.1:1/t?table=fp",
+    "postgresql:adm:{}@127.0.0.1:1/t",
+    "postgresql:// adm:{}@127.0.0.1:1/t",
+    "adm:{}@127.0.0.1:1/t",
+    "POSTGRESQL://adm:{}@127.0.0.1:1/t?table=fp",
+    "postgresql://adm:{}@127.0.0.1:x/t?table=fp",
+    "postgresql://adm:{}@[::1/t?table=fp",
+    "postgresql://adm:{}@/t?table=fp&host=/nowhere",
+    "postgresql://adm:{}@127.0.0.1:1/t?table=fp&sslmode=never",
+    "postgresql://adm@127.0.0.1:1/t?table=fp&password={}",
+    "postgresql://adm@127.0.0.1:1/t?password={}&table=fp",
+    "postgresql://127.0.0.1:1/t?user=adm&password={}&table=fp&nonsense=1",
+    "host=127.0.0.1 port=1 user=adm password={}",
+    "host=127.0.0.1 port=1 password={} user=adm",
+    "host=127.0.0.1 port=1 password='{}' user=adm",
+    "host=127.0.0.1 port=1 password='{} user=adm",
+    "host=127.0.0.1 port=1 password = {} nonsense",
+    "PG:host=127.0.0.1 port=1 user=adm password={} dbname=t",
+    "https://adm:{}@127.0.0.1:1/a.laz",
+    "https://{}@127.0.0.1:1/a.laz",
+    "http:/adm:{}@127.0.0.1:1/a.laz",
+    "http//adm:{}@127.0.0.1:1/a.laz",
+    "http://127.0.0.1:1/a.laz?sig={}&v=1",
+    "http://127.0.0.1:1/a.laz?X-Amz-Signature={}",
+    "http://127.0.0.1:1/a.laz?access_token={}",
+    "http://127.0.0.1:1/a.laz?AWSAccessKeyId=adm&Signature={}&Expires=9",
+    "s3://adm:{}@bucket/a.laz",
+    "ftp://adm:{}@127.0.0.1:1/a.laz",
+    "nothing://adm:{}@127.0.0.1:1/a.laz",
+    "/vsicurl/http://adm:{}@127.0.0.1:1/a.tif",
+)
+
+
+def secret(rng: random.Random) -> str:
+    sign = (rng.choice(SIGNS), rng.choice(SIGNS))
+    made = PARTS[0] + sign[0] + PARTS[1] + (sign[1] + PARTS[2] if rng.random() < 0.5 else "")
+    return quote(made, safe="") if rng.random() < 0.2 else made
+
+
+def address(rng: random.Random) -> str:
+    """An address with a secret, in some with a character dropped or repeated outside of it."""
+    before, after = rng.choice(SHAPES).split("{}")
+    if rng.random() < 0.2 and len(after) > 3:
+        place = rng.randrange(1, len(after))
+        after = after[:place] + after[place:][rng.choice([0, 1]) :] + rng.choice(["", "", "@", ":", " "])
+    return before + secret(rng) + after
+
+
+def called(*arguments: str) -> str:
+    """What the command line says."""
+    out = StringIO()
+    level, handlers, show, listener = LOGGER.level, LOGGER.handlers[:], warnings.showwarning, news.listener
+    try:
+        asked = patch.object(sys, "argv", ["hiproof", *arguments])
+        with asked, redirect_stdout(out), redirect_stderr(out), suppress(SystemExit):
+            cli.main()
+    finally:
+        LOGGER.handlers[:], warnings.showwarning, news.listener = handlers, show, listener
+        LOGGER.setLevel(level)
+    return out.getvalue()
+
+
+def files_in(folder: Path) -> str:
+    """The content of all files, as text."""
+    return "\n".join(
+        f"{file.name}\n{file.read_bytes().decode('latin-1')}" for file in folder.rglob("*") if file.is_file()
+    )
+
+
+def ways(folder: Path) -> dict[str, Callable[[str], str]]:
+    """All that may repeat an address, by what the address is given as; texts of screen, log and files."""
+    run, cloud, log, out = folder / "run", str(folder / "cloud.xyz"), folder / "log", folder / "out"
+    asked = ("reconstruct", "--out", str(out), "--log-file", str(log), "--log-level", "debug", "--restart")
+
+    def api(told: str) -> str:
+        try:
+            with redirect_stderr(StringIO()) as said:
+                reconstruct_area(Request((cloud,), out, told, restart=True))
+        except Exception as error:
+            return said.getvalue() + str(error)
+        return said.getvalue()
+
+    return {
+        "load": lambda told: called("load", str(run), told),
+        "load in pieces": lambda told: called("load", str(run), *told.split()),
+        "footprints": lambda told: called(*asked, cloud, "--footprints", told) + files_in(out) + files_in(log.parent),
+        "cloud": lambda told: called(*asked, cloud, told) + files_in(out) + files_in(log.parent),
+        "terrain": lambda told: called(*asked, cloud, "--terrain", told) + files_in(out),
+        "overrides": lambda told: called(*asked, cloud, f"--overrides={told}") + files_in(out),
+        "evaluate": lambda told: called("evaluate", str(run), told, "--out", str(out)) + files_in(out),
+        "classify": lambda told: called("classify", told, str(out / "c.laz")),
+        "check": lambda told: called("check", told),
+        "wrong command": lambda told: called(told),
+        "from Python": api,
+    }
+
+
+def leak(text: str) -> str:
+    """Which part of a secret stands in a text, as it is or encoded; empty where none does."""
+    for some in (text, unquote(text), unquote(unquote(text))):
+        for part in PARTS:
+            for start in range(len(part) - 2):
+                if part[start : start + 4].lower() in some.lower():
+                    return part[start : start + 4]
+    return ""
+
+
+def leaks(folder: Path, count: int, seed: int = 0, chosen: int = 100) -> Iterator[tuple[str, str, str]]:
+    """Yield (way, address, what was said) of those of `count` addresses whose secret is repeated by some `chosen` ways."""
+    write_sample_run(folder / "run")
+    (folder / "cloud.xyz").write_text("".join(f"{x} {y} 5.0\n" for x in range(8) for y in range(8)))
+    known = ways(folder)
+    for number in range(seed, seed + count):
+        rng = random.Random(number)
+        told = address(rng)
+        for way in rng.sample(sorted(known), min(chosen, len(known))):
+            masking.SECRETS = masking.Secrets()
+            said = known[way](told)
+            for file in (folder / "log", *(folder / "out").rglob("*")):
+                if file.is_file():
+                    file.unlink()
+            if leak(said):
+                yield way, told, said
+
+
+def main() -> None:
+    count, seed = int(sys.argv[1]), int(sys.argv[2]) if len(sys.argv) > 2 else 0
+    logging.captureWarnings(False)
+    with tempfile.TemporaryDirectory() as folder:
+        found = list(leaks(Path(folder), count, seed))
+    for way, told, said in found[:20]:
+        around = [line for line in said.splitlines() if leak(line)]
+        print(f"--- {way}\n{told}\n{re.sub(chr(10), ' ', str(around[:3]))[:600]}")
+    print(f"{count} addresses, {len(found)} leaks")
+
+
+if __name__ == "__main__":
+    main()
