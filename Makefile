@@ -1,4 +1,4 @@
-# Two commands do everything on a machine with Python 3.11 to 3.13 and git: `make demo` and `make test`.
+# Two commands do everything on a machine with Python 3.11 or later and git: `make demo` and `make test`.
 PYTHON ?= python3
 VENV ?= .venv
 BIN := $(VENV)/bin

@@ -3,6 +3,7 @@
 import logging
 import sys
 import warnings
+from pathlib import Path
 
 import pytest
 
@@ -120,3 +121,16 @@ def test_lines_of_several_workers_stay_whole(tmp_path):
     list(executor.run(warnings.warn, [(f"task {i}", InputWarning) for i in range(40)]))
     executor.close()
     assert sorted(said(tmp_path / "run.log")) == sorted(("WARNING", f"task {i}") for i in range(40))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full, a device that is always full")
+def test_a_full_disk_ends_the_log_and_not_the_work(tmp_path, capsys):
+    log.start(file=Path("/dev/full"))
+    for number in range(3):
+        log.LOGGER.warning("warning %d", number)
+    told = capsys.readouterr().err.splitlines()
+    full = "hiproof: expected to write the log to /dev/full, got: No space left on device; the work goes on without the log"
+    assert sorted(told) == sorted([full, *(f"hiproof: warning {number}" for number in range(3))])
+    log.start(file=tmp_path / "run.log")
+    log.LOGGER.warning("kept")
+    assert said(tmp_path / "run.log") == [("WARNING", "kept")]

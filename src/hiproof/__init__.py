@@ -11,6 +11,7 @@ since a module of the same name would otherwise take its place.
 from importlib import import_module
 from typing import Any
 
+from . import early  # first, so that Ctrl-C while the rest is imported ends the command quietly  # noqa: F401
 from .reconstruct import reconstruct
 
 __version__ = "0.1.0"

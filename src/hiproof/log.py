@@ -10,7 +10,9 @@ from __future__ import annotations
 import logging
 import sys
 import warnings
+from contextlib import suppress
 from enum import StrEnum
+from multiprocessing import parent_process
 from pathlib import Path
 
 from .errors import HiproofWarning, OutputError
@@ -64,6 +66,21 @@ class Elsewhere(logging.Handler):
             LOGGER.debug("%s: %s", record.name, record.getMessage())
 
 
+class KeptFile(logging.FileHandler):
+    """A log file that may fill its disk: the work goes on without it, which is said once."""
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        error = sys.exc_info()[1]
+        if not isinstance(error, OSError):
+            return super().handleError(record)
+        LOGGER.removeHandler(self)
+        with suppress(OSError):
+            self.close()
+        if parent_process() is None:  # of the processes that write to the file, the first tells
+            told = f"{error.strerror or error}; the work goes on without the log"
+            LOGGER.warning("expected to write the log to %s, got: %s", self.baseFilename, told)
+
+
 def start(level: Level = Level.warning, file: Path | None = None) -> None:
     """Show the log of `level` and above on standard error, and keep that of `info` and above (`debug`, if that is the
     level) at the end of `file`. What was started before ends. Raises OutputError where the file cannot be written."""
@@ -71,7 +88,7 @@ def start(level: Level = Level.warning, file: Path | None = None) -> None:
     if file is not None:
         try:
             Path(file).parent.mkdir(parents=True, exist_ok=True)
-            kept = logging.FileHandler(file, encoding="utf-8")
+            kept = KeptFile(file, encoding="utf-8")
         except OSError as error:
             raise OutputError(
                 f"expected a --log-file that can be written, got {file}: {error}; name another"

@@ -2,6 +2,7 @@
 
 import os
 import signal
+import subprocess
 import sys
 import time
 import warnings
@@ -78,6 +79,22 @@ def test_an_interrupt_ends_a_build_from_parameters(hiproof, town, tmp_path, monk
     assert hiproof("reconstruct", town[0], "--footprints", town[1], "--out", out) == 0
     monkeypatch.setattr("hiproof.parametric.run.build", interrupted_in_compiled_code)
     assert hiproof("build", out / "parameters.jsonl", "--out", tmp_path / "built") == 130
+
+
+@pytest.mark.parametrize("imported", ["hiproof.early", "numpy", "typer"])
+def test_an_interrupt_while_packages_are_imported_ends_without_a_traceback(imported):
+    command = [sys.executable, "-X", "importtime", "-m", "hiproof", "settings"]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+        next(line for line in process.stderr if line.rstrip().endswith(imported))
+        time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        said = [line for line in process.stderr if not line.startswith("import time:")]
+    assert process.returncode == 130 and said in ([], [f"hiproof: {cli.KEPT}\n"])
+
+
+def test_importing_the_package_leaves_interrupts_alone():
+    script = "import hiproof, signal; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout == "True\n"
 
 
 def interrupted_worker():

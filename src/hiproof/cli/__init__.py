@@ -7,8 +7,9 @@ import sys
 from collections.abc import Iterator
 from itertools import takewhile
 
+from ..early import INTERRUPTED, interrupt_as_usual
+
 CUT_OFF = re.compile(r"//[^/@\s]*:(?!\d*(?:/|$))[^@]*$")  # an address that ends within its password
-INTERRUPTED = 130  # exit code, as shells know it: 128 and the signal's number
 KEPT = "interrupted; no file is left half written. What a run had finished is kept: the same command goes on from there"
 
 
@@ -26,6 +27,7 @@ def main() -> None:
     remember(*addresses_in(sys.argv[1:]))
     log.start()
     news.listener = news.Lines(log.LOGGER.warning)
+    interrupt_as_usual()
     try:
         app()
     except HiproofError as error:
@@ -35,8 +37,8 @@ def main() -> None:
         if end.code == INTERRUPTED:  # Ctrl-C, of which typer says nothing
             log.LOGGER.error(KEPT)
         raise
-    except Exception as error:
-        if is_interrupt(error):
+    except (Exception, KeyboardInterrupt) as error:
+        if isinstance(error, KeyboardInterrupt) or is_interrupt(error):
             log.LOGGER.error(KEPT)
             sys.exit(INTERRUPTED)
         log.LOGGER.error("failed; please report this:", exc_info=True)
