@@ -1,6 +1,8 @@
-"""What the command does before anything else is imported: Ctrl-C ends it at once, for nothing is begun that could be left half done.
+"""What the command does before anything else is imported: Ctrl-C ends it at once, for nothing is
+begun that could be left half done.
 
-Python would show a traceback of whatever import it came in, and some packages make other errors of it.
+Python would show a traceback of whatever import it came in, and some packages make other errors of
+it.
 """
 
 from __future__ import annotations
@@ -19,13 +21,15 @@ def end_at_once(*_: Any) -> None:
 
 
 def is_command() -> bool:
-    """Whether this process was started as `hiproof` or `python -m hiproof`, rather than by a program that imports the package."""
+    """Whether this process was started as `hiproof` or `python -m hiproof`, rather than by a
+    program that imports the package."""
     started = os.path.basename(sys.argv[0]) if sys.argv else ""
     return started.removesuffix(".exe") == "hiproof" or (started == "-m" and "hiproof" in sys.orig_argv)
 
 
 def end_at_once_on_interrupt() -> None:
-    """Let Ctrl-C end the command at once, until `interrupt_as_usual`; where it is ignored, it stays so."""
+    """Let Ctrl-C end the command at once, until `interrupt_as_usual`; where it is ignored, it stays
+    so."""
     is_main = threading.current_thread() is threading.main_thread()
     if is_command() and is_main and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, end_at_once)

@@ -1,8 +1,10 @@
-"""What the program says while it works: standard logging under the name `hiproof`, warnings among it, secrets masked.
+"""What the program says while it works: standard logging under the name `hiproof`, warnings among
+it, secrets masked.
 
-The library logs and leaves it to its user what becomes of that; the command line shows warnings and errors on standard
-error, and with `--log-file` keeps everything from progress on, with time and process, in a file. Worker processes of this
-machine write to the same places; those of a Dask cluster to Dask's own logs.
+The library logs and leaves it to its user what becomes of that; the command line shows warnings and
+errors on standard error, and with `--log-file` keeps everything from progress on, with time and
+process, in a file. Worker processes of this machine write to the same places; those of a Dask
+cluster to Dask's own logs.
 """
 
 from __future__ import annotations
@@ -59,7 +61,8 @@ class Console(logging.Handler):
 
 
 class Elsewhere(logging.Handler):
-    """What other packages log, in their own words: for `debug` alone, and not straight to standard error."""
+    """What other packages log, in their own words: for `debug` alone, and not straight to standard
+    error."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if not record.name.startswith(LOGGER.name):
@@ -82,8 +85,9 @@ class KeptFile(logging.FileHandler):
 
 
 def start(level: Level = Level.warning, file: Path | None = None) -> None:
-    """Show the log of `level` and above on standard error, and keep that of `info` and above (`debug`, if that is the
-    level) at the end of `file`. What was started before ends. Raises OutputError where the file cannot be written."""
+    """Show the log of `level` and above on standard error, and keep that of `info` and above
+    (`debug`, if that is the level) at the end of `file`. What was started before ends. Raises
+    OutputError where the file cannot be written."""
     handlers: list[logging.Handler] = [handler_of(Console(), "hiproof: %(message)s", level.number)]
     if file is not None:
         try:
@@ -113,7 +117,8 @@ def handler_of(handler: logging.Handler, form: str, level: int) -> logging.Handl
 
 
 def started() -> tuple:
-    """The arguments of `start` that a worker process needs to log as this one does; none where nothing was started."""
+    """The arguments of `start` that a worker process needs to log as this one does; none where
+    nothing was started."""
     console = next((handler for handler in LOGGER.handlers if isinstance(handler, Console)), None)
     if console is None:
         return ()
@@ -124,6 +129,7 @@ def started() -> tuple:
 def log_warning(
     message: Warning | str, category: type, filename: str, lineno: int, file: object = None, line: str | None = None
 ) -> None:
-    """A warning as users read it: the sentence alone, without the place in the source. Other packages' are for `debug`."""
+    """A warning as users read it: the sentence alone, without the place in the source. Other
+    packages' are for `debug`."""
     level = logging.WARNING if issubclass(category, HiproofWarning) else logging.DEBUG
     LOGGER.log(level, " ".join(str(message).split()))

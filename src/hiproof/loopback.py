@@ -1,4 +1,5 @@
-"""Pages for one person at this machine: a server at the loopback address, who may ask it, and what goes with every answer."""
+"""Pages for one person at this machine: a server at the loopback address, who may ask it, and what
+goes with every answer."""
 
 from __future__ import annotations
 
@@ -18,7 +19,8 @@ from .errors import InputError
 from .log import LOGGER
 
 LOOPBACK = "127.0.0.1"
-QUIET_S = 60.0  # seconds until a request must be here whole, and until a connection that says nothing is closed
+# Seconds until a request must be here whole, and until a connection that says nothing is closed.
+QUIET_S = 60.0
 END_S = 30.0  # seconds that answers on their way get when the server ends
 MOST_THREADS = 128  # of this process, each a connection: a browser opens six
 MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's parts take
@@ -38,7 +40,8 @@ Headers = Mapping[str, str] | Message
 
 
 class Answer(NamedTuple):
-    """An HTTP answer: its code, its bytes, what kind of text they are, and headers in place of those of SAFE."""
+    """An HTTP answer: its code, its bytes, what kind of text they are, and headers in place of
+    those of SAFE."""
 
     code: int
     body: bytes
@@ -47,7 +50,8 @@ class Answer(NamedTuple):
 
 
 class LoopbackServer(ThreadingHTTPServer):
-    """Listens at the loopback address alone; `port` 0 is any that is free. Raises InputError where the port is taken.
+    """Listens at the loopback address alone; `port` 0 is any that is free. Raises InputError where
+    the port is taken.
 
     Closing it waits for answers on their way, so that what they write is whole.
     """
@@ -115,7 +119,8 @@ def stop(*_: Any) -> None:
 
 
 class TimedReader(io.RawIOBase):
-    """What comes from a socket until `until` (by time.monotonic), which whoever sends byte by byte cannot put off."""
+    """What comes from a socket until `until` (by time.monotonic), which whoever sends byte by byte
+    cannot put off."""
 
     def __init__(self, connection: socket.socket) -> None:
         self.connection, self.until = connection, 0.0
@@ -132,10 +137,12 @@ class TimedReader(io.RawIOBase):
 
 
 class LoopbackHandler(BaseHTTPRequestHandler):
-    """Reads requests of this machine's own pages and sends what `answer` says to them; others are refused before."""
+    """Reads requests of this machine's own pages and sends what `answer` says to them; others are
+    refused before."""
 
     protocol_version = "HTTP/1.1"
-    disable_nagle_algorithm = True  # else the body waits until the browser has said that the head came
+    # Without this the body waits until the browser has confirmed the head.
+    disable_nagle_algorithm = True
     server: LoopbackServer
 
     def answer(self, method: str, body: bytes) -> Answer:
@@ -157,7 +164,8 @@ class LoopbackHandler(BaseHTTPRequestHandler):
 
     def do_GET(self) -> None:
         if self.headers.get("Content-Length") or self.headers.get("Transfer-Encoding"):
-            self.close_connection = True  # nobody reads that body, which must not be taken for the next request
+            # Nobody reads that body, which must not be taken for the next request.
+            self.close_connection = True
         self.send(self.safe_answer("GET"))
 
     do_HEAD = do_GET
@@ -190,7 +198,8 @@ class LoopbackHandler(BaseHTTPRequestHandler):
             self.wfile.write(answer.body)
 
     def end_headers(self) -> None:
-        """End the head of every answer, of errors too, with the headers that keep a page to itself."""
+        """End the head of every answer, of errors too, with the headers that keep a page to
+        itself."""
         if self.request_version != "HTTP/0.9":
             for name, value in {**SAFE, **getattr(self, "own", {})}.items():
                 self.send_header(name, value)
@@ -204,7 +213,8 @@ class LoopbackHandler(BaseHTTPRequestHandler):
 
 
 def refusal(headers: Headers, port: int) -> str:
-    """Say why those who ask with these headers may not: they must call this machine by its own name, as a page of its own.
+    """Say why those who ask with these headers may not: they must call this machine by its own
+    name, as a page of its own.
 
     >>> refusal({"Host": "localhost:8000"}, 8000), refusal({"Host": "localhost:8000", "Origin": "null"}, 8000)
     ('', 'expected a request of this page, got one of another origin')
@@ -222,10 +232,12 @@ def refusal(headers: Headers, port: int) -> str:
 
 
 def own_hosts(port: int) -> set[Any]:
-    """What a request's Host may be: a site elsewhere that gives its own name this machine's address has another.
+    """What a request's Host may be: a site elsewhere that gives its own name this machine's address
+    has another.
 
     >>> sorted(own_hosts(8000))
     ['127.0.0.1:8000', 'localhost:8000']
     """
     names = (LOOPBACK, "localhost")
-    return {f"{name}:{port}" for name in names} | (set(names) if port == 80 else set())  # which browsers leave out
+    # Browsers leave out port 80.
+    return {f"{name}:{port}" for name in names} | (set(names) if port == 80 else set())

@@ -1,10 +1,11 @@
 """Secrets never leave the process: whatever is written or printed goes through `masked`.
 
-Addresses hold passwords in several ways (`scheme://user:password@host`, `?password=`, `PG:... password='...'`, signed
-links) and appear in the middle of others' error texts, so they are looked for in any text. Libraries also quote what they
-make of a malformed address, a piece of a password alone for example. So `remember` takes the secrets out of an address where it
-comes in, and `masked` hides them and their pieces wherever they stand, as they are, percent-encoded or quoted. In doubt more is
-hidden: an address shown with too little in it harms nobody.
+Addresses hold passwords in several ways (`scheme://user:password@host`, `?password=`, `PG:...
+password='...'`, signed links) and appear in the middle of others' error texts, so they are looked
+for in any text. Libraries also quote what they make of a malformed address, a piece of a password
+alone for example. So `remember` takes the secrets out of an address where it comes in, and `masked`
+hides them and their pieces wherever they stand, as they are, percent-encoded or quoted. In doubt
+more is hidden: an address shown with too little in it harms nobody.
 """
 
 from __future__ import annotations
@@ -28,12 +29,16 @@ NAMED = re.compile(
     re.IGNORECASE,
 )
 
-SCHEME = re.compile(r"^(?:/vsi\w+[/?])?[\w+.-]*:?//?|^[\w+.-]+:(?=[^@]*:)")  # or what of it a slip has left
-VALUE = re.compile(rf"{NAME}(.*)", re.IGNORECASE | re.DOTALL)  # of a parameter, and all that follows
+# A scheme, or what a slip has left of it.
+SCHEME = re.compile(r"^(?:/vsi\w+[/?])?[\w+.-]*:?//?|^[\w+.-]+:(?=[^@]*:)")
+# The value of a parameter with a secret, and all that follows.
+VALUE = re.compile(rf"{NAME}(.*)", re.IGNORECASE | re.DOTALL)
 END = re.compile(r"[&\s;]+[\w-]+\s*=")  # of a value: the next parameter
 BREAKS = re.compile(r"[^\w.~-]+")  # where programs cut an address into pieces
-WHOLE_WORD_BELOW = 4  # characters; shorter secrets, and those like words, are hidden as whole words alone
-NO_SECRET = re.compile(r"\W*.?\W*|\d{1,3}")  # is hidden in addresses alone: it stands in every other sentence
+# Characters below which a secret is hidden as a whole word only, like one that is a word.
+WHOLE_WORD_BELOW = 4
+# What is hidden in addresses only: single letters and small numbers stand in most sentences.
+NO_SECRET = re.compile(r"\W*.?\W*|\d{1,3}")
 ADDRESS = re.compile(
     r"//|@|%2F%2F|^/vsi|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=", re.IGNORECASE
 )
@@ -61,7 +66,8 @@ SECRETS = Secrets()
 
 
 def remember(*addresses: object) -> None:
-    """Hide the passwords, tokens and signatures of these addresses in all that is written from now on.
+    """Hide the passwords, tokens and signatures of these addresses in all that is written from now
+    on.
 
     What is no address, such as a condition or the name of a file that is there, holds none.
     """
@@ -78,7 +84,8 @@ def names_a_file(address: str) -> bool:
 
 
 def secrets_of(address: str) -> set[str]:
-    """The secrets in an address, however malformed, with the pieces into which a program may cut them.
+    """The secrets in an address, however malformed, with the pieces into which a program may cut
+    them.
 
     >>> sorted(secrets_of("postgresql//adm:S3cr3t@127.0.0.1/t")), sorted(secrets_of("host=h password=S3c r3t user=me"))
     (['S3cr3t'], ['S3c', 'S3c r3t', 'r3t'])
@@ -92,7 +99,8 @@ def secrets_of(address: str) -> set[str]:
 
 
 def candidates(address: str) -> Iterator[str]:
-    """Yield what may be a secret of an address: what a user's name is followed by up to an @, and values of named parameters."""
+    """Yield what may be a secret of an address: what a user's name is followed by up to an @, and
+    values of named parameters."""
     rest = SCHEME.sub("", address, count=1)
     for end in {rest.find("@"), rest.rfind("@"), re.split(r"[?#]", rest, maxsplit=1)[0].rfind("@")}:
         user, colon, password = rest[: max(end, 0)].partition(":")
@@ -102,12 +110,14 @@ def candidates(address: str) -> Iterator[str]:
             yield user
     for found in VALUE.finditer(address):
         yield from values_at(found[1])
-    for found in re.finditer(NAME, address, re.IGNORECASE):  # those within the value of an earlier one
+    # VALUE takes all that follows, so parameters within it are looked for by their names.
+    for found in re.finditer(NAME, address, re.IGNORECASE):
         yield from values_at(address[found.end() :])
 
 
 def values_at(text: str) -> Iterator[str]:
-    """Yield what may be the value that a parameter's text begins with: quoted, or up to the next parameter, or to the first sign."""
+    """Yield what may be the value that a parameter's text begins with: quoted, or up to the next
+    parameter, or to the first sign."""
     if not text:
         return
     if text[0] in "'\"":
@@ -120,7 +130,8 @@ def values_at(text: str) -> Iterator[str]:
 
 
 def forms_of(secret: str) -> set[str]:
-    """How a secret may be written: as it is, decoded, encoded, and as programs quote texts and bytes."""
+    """How a secret may be written: as it is, decoded, encoded, and as programs quote texts and
+    bytes."""
     plain = {secret, unquote(secret), unquote_plus(secret)}
     encoded = {encode(text) for text in plain for encode in (quote, quote_plus)} | {
         quote(text, safe="") for text in plain
@@ -132,7 +143,8 @@ def forms_of(secret: str) -> set[str]:
 
 
 def pattern_of(form: str) -> str:
-    """The pattern that finds a form of a secret; a short one, or one like a word, where no letter stands beside it."""
+    """The pattern that finds a form of a secret; a short one, or one like a word, where no letter
+    stands beside it."""
     is_word = form.isalpha() and (form.islower() or form.isupper() or form.istitle())
     if len(form) >= WHOLE_WORD_BELOW and not is_word:
         return re.escape(form)
@@ -140,7 +152,8 @@ def pattern_of(form: str) -> str:
 
 
 def masked(text: str) -> str:
-    """`text` with the passwords, tokens and signatures of all addresses in it replaced by three dots.
+    """`text` with the passwords, tokens and signatures of all addresses in it replaced by three
+    dots.
 
     >>> masked("expected a table at postgresql://me:secret@host/db?table=fp, got none")
     'expected a table at postgresql://me:...@host/db?table=fp, got none'

@@ -14,9 +14,11 @@ KEPT = "interrupted; no file is left half written. What a run had finished is ke
 
 
 def main() -> None:
-    """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C exit code 130.
+    """Entry point of `hiproof`: errors meant for the user become one line and exit code 2, Ctrl-C
+    exit code 130.
 
-    An error of our own making shows its traceback, passwords masked as in all of the log, and ends with exit code 1.
+    An error of our own making shows its traceback, passwords masked as in all of the log, and ends
+    with exit code 1.
     """
     from .. import log
     from ..compiled import news
@@ -46,7 +48,8 @@ def main() -> None:
 
 
 def addresses_in(arguments: list[str]) -> Iterator[str]:
-    """Yield what may be addresses: arguments, values of options, and passwords that a blank has cut into several arguments.
+    """Yield what may be addresses: arguments, values of options, and passwords that a blank has cut
+    into several arguments.
 
     >>> list(addresses_in(["load", "--prefix=a", "password=S3", "cr3t", "-x"]))
     ['load', '--prefix=a', 'a', 'password=S3', 'password=S3 cr3t', 'cr3t', '-x']

@@ -18,12 +18,14 @@ def check(
         float, typer.Option(min=0.0, help="largest distance of a vertex from its face's plane, m")
     ] = 0.01,
 ) -> None:
-    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid or cannot be read."""
+    """Check solids for validity by ISO 19107 (val3dity's codes); exit code 1 if any is invalid or
+    cannot be read."""
     raise typer.Exit(1 if count_invalid(files, planarity) else 0)
 
 
 def count_invalid(files: list[Path], planarity_m: float) -> int:
-    """How many solids of `files` are invalid or damaged; prints a line for each of them and a count a file."""
+    """How many solids of `files` are invalid or damaged; prints a line for each of them and a count
+    a file."""
     from ..compose import check_solid
     from ..read.solids import read_solids
 

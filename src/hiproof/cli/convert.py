@@ -32,7 +32,8 @@ def convert(
         typer.Option(help="height of the geoid above the ellipsoid, m, for 3dtiles [default: by pyproj's grid]"),
     ] = None,
 ) -> None:
-    """Convert the models of a run to a format of 3D viewers, with building ids, roof types and parameters as properties.
+    """Convert the models of a run to a format of 3D viewers, with building ids, roof types and
+    parameters as properties.
 
     Exit code: 0 all models were converted, 2 damaged ones were left out, or unusable input.
     """
@@ -50,7 +51,8 @@ def convert(
 
 
 def convert_run(folder: Path, path: Path, name: str, crs: str | None = None, **given: float) -> LeftOut:
-    """Write the models of the run in `folder` to `path` in the format `name`; returns what damage left out."""
+    """Write the models of the run in `folder` to `path` in the format `name`; returns what damage
+    left out."""
     from ..view.run_models import run_buildings, run_crs_text
 
     left_out = LeftOut()

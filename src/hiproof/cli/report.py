@@ -22,9 +22,11 @@ def report(
     layer: Annotated[str | None, typer.Option(help="layer of the footprints")] = None,
     out: Annotated[Path | None, typer.Option(help="file to write [default: report.html in the folder]")] = None,
 ) -> None:
-    """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings, settings.
+    """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings,
+    settings.
 
-    Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable input.
+    Exit code: 0 all buildings could be read, 2 damaged ones are shown without a model, or unusable
+    input.
     """
     from ..evaluate.report import write_report
     from ..evaluate.run import evaluate_run

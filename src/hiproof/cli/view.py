@@ -21,7 +21,8 @@ def view(
     port: Annotated[int, typer.Option(min=0, max=65535, help="port on this machine [default: any that is free]")] = 0,
     browser: Annotated[bool, typer.Option(help="open the browser, or only tell the address")] = True,
 ) -> None:
-    """Show the models of a run in the browser, without a network: 3D Tiles are made of them first, where they are not yet.
+    """Show the models of a run in the browser, without a network: 3D Tiles are made of them first,
+    where they are not yet.
 
     Turn, zoom, click on a building for its attributes. Ctrl-C ends it.
     """
@@ -38,9 +39,11 @@ def view(
 
 @contextmanager
 def tiles_of(folder: Path) -> Iterator[Path]:
-    """Yield the folder's own tiles, or those of the run in it, made where they are missing or older than the models.
+    """Yield the folder's own tiles, or those of the run in it, made where they are missing or older
+    than the models.
 
-    Where the folder cannot be written, they are made in a temporary one, which goes when the block ends.
+    Where the folder cannot be written, they are made in a temporary one, which goes when the block
+    ends.
     """
     from ..evaluate.models import run_models
     from ..write.tiles.tileset import TILESET

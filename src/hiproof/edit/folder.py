@@ -1,4 +1,5 @@
-"""The run's folder: its buildings sorted by doubt, each read from parameters.jsonl when it is asked for."""
+"""The run's folder: its buildings sorted by doubt, each read from parameters.jsonl when it is asked
+for."""
 
 from __future__ import annotations
 
@@ -22,7 +23,8 @@ MOST_DOUBT = 100.0  # more than all reasons together
 
 @dataclass(frozen=True)
 class Row:
-    """A building in the list: where its line starts in the file, and what speaks for looking at it."""
+    """A building in the list: where its line starts in the file, and what speaks for looking at
+    it."""
 
     id: str
     start: int

@@ -1,4 +1,5 @@
-"""Finished models read back from CityJSON: what evaluation, the report and the conversions start from."""
+"""Finished models read back from CityJSON: what evaluation, the report and the conversions start
+from."""
 
 from __future__ import annotations
 
@@ -28,13 +29,15 @@ RUN_MODELS = FORMATS["cityjson"].file
 PART, PART_TYPE = f"{OWN}part", f"{OWN}part_type"
 """What hiproof tells of a roof surface: its part's number and type."""
 
-MOST_PART_NUMBER = 2**31  # of a building, so that their numbers fit the columns and tables of all formats
+# Of a building, so that their numbers fit the columns and tables of all formats.
+MOST_PART_NUMBER = 2**31
 
 
 @dataclass(frozen=True)
 class BuildingModel:
-    """One building of a file: its `attributes`, its `solid` in world metres (None where the file has none), and the roof types of its
-    parts by number (`Face.part`). `is_damaged` where the file's text of it cannot be read."""
+    """One building of a file: its `attributes`, its `solid` in world metres (None where the file
+    has none), and the roof types of its parts by number (`Face.part`). `is_damaged` where the
+    file's text of it cannot be read."""
 
     id: str
     attributes: dict[str, Any] = field(default_factory=dict)
@@ -83,13 +86,15 @@ def read_models(
     damaged: Damaged = refuse,
     must_be_valid: bool = False,
 ) -> Iterator[BuildingModel]:
-    """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts joined, in metres.
+    """Yield the buildings of a CityJSON or CityJSONSeq file in its order, the solids of their parts
+    joined, in metres.
 
-    Solids of the highest level of detail count, and building parts that hiproof cut come as the whole that they were. `otherwise` are the units of a file
-    that names no CRS, `known` those of one of which more is known than it names. A building whose text or solid is of no use
-    is told to `damaged`, which refuses the file by default, and comes without a solid, so that the order stays; with
-    `must_be_valid` so does one whose solid is invalid by ISO 19107. Raises InputError for files that cannot be read as CityJSON,
-    or that are in degrees.
+    Solids of the highest level of detail count, and building parts that hiproof cut come as the
+    whole that they were. `otherwise` are the units of a file that names no CRS, `known` those of
+    one of which more is known than it names. A building whose text or solid is of no use is told to
+    `damaged`, which refuses the file by default, and comes without a solid, so that the order
+    stays; with `must_be_valid` so does one whose solid is invalid by ISO 19107. Raises InputError
+    for files that cannot be read as CityJSON, or that are in degrees.
     """
     for feature in features(Path(path), otherwise, known, damaged):
         if feature.is_damaged:
@@ -128,7 +133,8 @@ def plain_attributes(attributes: Any) -> dict[str, Any]:
 
 
 def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
-    """Return the model. Raises ValueError if its solid cannot be drawn, or must be valid and is not."""
+    """Return the model. Raises ValueError if its solid cannot be drawn, or must be valid and is
+    not."""
     if model.solid is None:
         return model
     findings = check_solid(model.solid) if must_be_valid else []
@@ -143,7 +149,8 @@ def usable(model: BuildingModel, must_be_valid: bool) -> BuildingModel:
 
 
 def joined(solid: Solid, family: list[dict[str, Any]]) -> Solid:
-    """`solid` as one shell where it is several, those of building parts that hiproof cut: without the walls between them."""
+    """`solid` as one shell where it is several, those of building parts that hiproof cut: without
+    the walls between them."""
     own = [member for member in family if f"{OWN}primitives" in (member.get("attributes") or {})]
     if not own or len(solid.of_kind(GROUND)) < 2:
         return solid
@@ -184,7 +191,8 @@ def level_of_detail(geometry: dict[str, Any]) -> float:
 
 
 def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
-    """A solid with only the vertices its faces use, each of which must be a place; ValueError otherwise."""
+    """A solid with only the vertices its faces use, each of which must be a place; ValueError
+    otherwise."""
     rings = [ring for face in faces for ring in (face.rings or ((),))]
     least = min(len(set(ring)) for ring in rings)
     if least < 3:

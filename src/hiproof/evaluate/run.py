@@ -52,9 +52,11 @@ RECORD: dict[tuple[str, ...], Any] = {
 
 @dataclass(frozen=True)
 class EvaluatedRun:
-    """Models in the run's order, the points (n, 3) of each in world metres, and their figures; `record` is run.json.
+    """Models in the run's order, the points (n, 3) of each in world metres, and their figures;
+    `record` is run.json.
 
-    `footprints` are plan polygons in world metres, None where a building has none; `clouds` the files measured against.
+    `footprints` are plan polygons in world metres, None where a building has none; `clouds` the
+    files measured against.
     """
 
     models: tuple[BuildingModel, ...]
@@ -81,12 +83,14 @@ def evaluate_run(
     damaged: Damaged = refuse,
     must_be_valid: bool = False,
 ) -> EvaluatedRun:
-    """Read the models of `folder` and measure them against `clouds` and `footprints`; where none are named, against those that
-    the run was made from, as far as they are there. Without any clouds no residual figures come out.
+    """Read the models of `folder` and measure them against `clouds` and `footprints`; where none
+    are named, against those that the run was made from, as far as they are there. Without any
+    clouds no residual figures come out.
 
-    The building classes, the CRS and the units are those the run was made with; `layer` is that of the footprints.
-    A damaged building, with `must_be_valid` one with an invalid solid too, is told to `damaged`, which refuses the run by default,
-    and has no solid. Raises InputError for what cannot be read.
+    The building classes, the CRS and the units are those the run was made with; `layer` is that of
+    the footprints. A damaged building, with `must_be_valid` one with an invalid solid too, is told
+    to `damaged`, which refuses the run by default, and has no solid. Raises InputError for what
+    cannot be read.
     """
     record = run_record(folder)
     known = found_inputs(record)
@@ -111,7 +115,8 @@ def evaluate_run(
 
 
 def run_record(folder: Path) -> dict[str, Any]:
-    """Content of run.json, empty where the folder has none. Raises InputError where it is no record of a run."""
+    """Content of run.json, empty where the folder has none. Raises InputError where it is no record
+    of a run."""
     path = Path(folder) / "run.json"
     record = parsed(read_text(path), f"the record of a run, {path}") if path.is_file() else {}
     try:
@@ -156,7 +161,8 @@ def run_crs(record: dict[str, Any]) -> Any:
 
 
 def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]) -> np.ndarray:
-    """Points (n, 3) of the building classes around `areas`; all points of clouds without classes."""
+    """Points (n, 3) of the building classes around `areas`; all points of clouds without
+    classes."""
     from ..read.pointcloud import expand_paths, read_points, refuse_other_crs
 
     settings = run_settings(record)
@@ -177,7 +183,8 @@ def footprint_of_each(
     record: dict[str, Any],
     asked: dict[str, Any],
 ) -> list[Any]:
-    """The footprint polygon of each model, None without one; `asked` is what else `read_footprints` is told."""
+    """The footprint polygon of each model, None without one; `asked` is what else `read_footprints`
+    is told."""
     if path is None:
         return [None] * len(models)
     from ..read.footprints import read_footprints
@@ -194,18 +201,21 @@ def run_units(record: dict[str, Any]) -> Units:
 
 
 def way_to_models(record: dict[str, Any]) -> Units | None:
-    """From the world metres of a run's clouds to its models, where these are in another CRS; None where they are not."""
+    """From the world metres of a run's clouds to its models, where these are in another CRS; None
+    where they are not."""
     asked = run_out_crs(record)
     return FileUnits.of(run_crs(record), run_units(record), asked).cityjson if asked else None
 
 
 def run_out_crs(record: dict[str, Any]) -> str:
-    """What the run was asked to write its coordinates in, empty where that is the CRS of its clouds."""
+    """What the run was asked to write its coordinates in, empty where that is the CRS of its
+    clouds."""
     return ((record.get("settings") or {}).get("write") or {}).get("out_crs") or ""
 
 
 def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:
-    """The building of the reference file that stands for each model; one line where none does for any."""
+    """The building of the reference file that stands for each model; one line where none does for
+    any."""
     if path is None:
         return [None] * len(models)
     others = [(model, outline) for model in read_models(path) if (outline := own_outline(model)) is not None]

@@ -1,4 +1,5 @@
-"""parameters.jsonl read line by line: its head, its buildings, and its errors by line and column."""
+"""parameters.jsonl read line by line: its head, its buildings, and its errors by line and
+column."""
 
 from __future__ import annotations
 
@@ -20,13 +21,15 @@ from ..settings import Settings
 from ..write.parameters import VERSION, FileHead
 
 HEAD = "hiproof_parameters"
-DAMAGED: dict[str, Any] = {"damaged": True}  # this very object stands for a line that cannot be read
+# This very object stands for a line that cannot be read.
+DAMAGED: dict[str, Any] = {"damaged": True}
 
 
 def read_parameters(path: str | os.PathLike) -> list[dict[str, Any]]:
     """The objects of all buildings in a parameters.jsonl, in its order.
 
-    Raises InputError when it cannot be read or is no such file, naming line and column where its JSON is broken.
+    Raises InputError when it cannot be read or is no such file, naming line and column where its
+    JSON is broken.
     """
     with opened_parameters(path) as (_, records):
         return list(records)
@@ -38,11 +41,12 @@ def opened_parameters(
 ) -> Iterator[tuple[FileHead, Iterator[dict[str, Any]]]]:
     """The head of the parameters.jsonl at `path`, and its buildings one by one.
 
-    A line that cannot be read is told to `damaged`, which refuses the file by default, and comes as DAMAGED. Raises
-    InputError for a file that is no parameters.jsonl.
+    A line that cannot be read is told to `damaged`, which refuses the file by default, and comes as
+    DAMAGED. Raises InputError for a file that is no parameters.jsonl.
     """
     try:
-        with Path(path).open(encoding="utf-8-sig") as file:  # editors may begin it with a mark of the encoding
+        # Editors may begin it with a mark of the encoding.
+        with Path(path).open(encoding="utf-8-sig") as file:
             lines = objects(file, path, damaged)
             yield head_of(next(lines, None), path), records(lines, path, damaged)
     except (OSError, UnicodeDecodeError) as error:
@@ -53,7 +57,8 @@ def opened_parameters(
 
 
 def objects(file: Any, path: str | os.PathLike, damaged: Damaged = refuse) -> Iterator[tuple[int, Any]]:
-    """(line, JSON value) of every line that is not blank; DAMAGED in place of one that is told to `damaged`."""
+    """(line, JSON value) of every line that is not blank; DAMAGED in place of one that is told to
+    `damaged`."""
     for number, line in enumerate(file, 1):
         if line.strip():
             try:

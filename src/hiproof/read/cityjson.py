@@ -1,4 +1,5 @@
-"""CityJSON and CityJSONSeq files document by document, with their vertices in place, or a sentence that says why not."""
+"""CityJSON and CityJSONSeq files document by document, with their vertices in place, or a sentence
+that says why not."""
 
 from __future__ import annotations
 
@@ -26,8 +27,9 @@ ESCAPED = re.compile(
 
 
 class Feature(NamedTuple):
-    """A CityJSON document or a line of CityJSONSeq: its city `objects` by id, their vertices (n, 3) in world metres, its place in
-    the file, and what its coordinates count in. One that `is_damaged` cannot be read and has no objects."""
+    """A CityJSON document or a line of CityJSONSeq: its city `objects` by id, their vertices (n, 3)
+    in world metres, its place in the file, and what its coordinates count in. One that `is_damaged`
+    cannot be read and has no objects."""
 
     objects: dict[str, Any]
     vertices: np.ndarray
@@ -39,11 +41,12 @@ class Feature(NamedTuple):
 def features(
     path: Path, otherwise: Units = METRES, known: Units | None = None, damaged: Damaged = refuse
 ) -> Iterator[Feature]:
-    """Yield every document of a file, each by the transform and the CRS of the line before it that has them.
+    """Yield every document of a file, each by the transform and the CRS of the line before it that
+    has them.
 
-    `otherwise` are the units where no CRS is named, `known` those of one of which more is known than
-    a name tells, if there is one. A feature that cannot be read is told to `damaged` and comes without
-    objects. Raises InputError as `documents` does.
+    `otherwise` are the units where no CRS is named, `known` those of one of which more is known
+    than a name tells, if there is one. A feature that cannot be read is told to `damaged` and comes
+    without objects. Raises InputError as `documents` does.
     """
     transform, units = None, known or otherwise
     for document, place in documents(path, damaged):
@@ -86,7 +89,8 @@ def world_vertices(
 ) -> np.ndarray:
     """Read the vertices (n, 3) of a document in world metres."""
     vertices = read_vertices(document.get("vertices"))
-    with np.errstate(invalid="ignore", over="ignore"):  # numbers beyond all bounds are the business of who asks
+    # Numbers beyond all bounds are the business of who asks.
+    with np.errstate(invalid="ignore", over="ignore"):
         if transform:
             vertices = vertices * transform[0] + transform[1]
         return units.to_metres(vertices)
@@ -107,7 +111,8 @@ def reason_of(error: Exception) -> str:
 
 
 def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str, Any], str]]:
-    """Yield (document, its place in the file): of CityJSON the one, of CityJSONSeq (`.jsonl`) each line, the header first.
+    """Yield (document, its place in the file): of CityJSON the one, of CityJSONSeq (`.jsonl`) each
+    line, the header first.
 
     A line after the header that cannot be read is told to `damaged` and comes as an empty document.
     Raises InputError for what is no text, no JSON, no object, or of another type.
@@ -141,7 +146,8 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
 
 
 def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
-    """Read a line of CityJSONSeq. Raises InputError for what is no header, or no feature after one."""
+    """Read a line of CityJSONSeq. Raises InputError for what is no header, or no feature after
+    one."""
     document = parsed(line, place)
     kind = document.get("type")
     if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
@@ -162,7 +168,8 @@ def parsed(text: str, place: str) -> dict[str, Any]:
     """A JSON object. Raises InputError naming the place."""
     try:
         value = json.loads(text, parse_constant=refuse_constant)
-    except (ValueError, RecursionError) as error:  # a ValueError too for numbers of thousands of digits
+    # A ValueError too for numbers of thousands of digits.
+    except (ValueError, RecursionError) as error:
         if text.lstrip("\ufeff \t\r\n").startswith("<"):
             raise InputError(f"expected JSON in {place}, got XML, such as CityGML; name a CityJSON file") from error
         raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error

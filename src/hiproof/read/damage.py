@@ -1,7 +1,8 @@
-"""What becomes of a damaged building in a file of many: refuse the file, or leave it out and say so.
+"""What becomes of a damaged building in a file of many: refuse the file, or leave it out and say
+so.
 
-Readers call `damaged(error)` with one sentence for each building that they cannot read, and go on with
-the next one when that returns.
+Readers call `damaged(error)` with one sentence for each building that they cannot read, and go on
+with the next one when that returns.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ T = TypeVar("T")
 Damaged = Callable[[InputError], None]
 
 MOST_TOLD = 20  # sentences on damaged buildings; a ruined file may have a million
-UNREADABLE = re.compile("[\0\ud800-\udfff]")  # NUL and halves of characters, which files and databases refuse
+# NUL and halves of characters, which files and databases refuse.
+UNREADABLE = re.compile("[\0\ud800-\udfff]")
 
 
 def refuse(error: InputError) -> None:
@@ -38,7 +40,8 @@ class LeftOut:
             LOGGER.warning("left out: %s", error)
 
     def sound(self, buildings: Iterator[T]) -> Iterator[T]:
-        """Yield `buildings`, those that could be read. Raises InputError where damage left none of them."""
+        """Yield `buildings`, those that could be read. Raises InputError where damage left none of
+        them."""
         is_empty = True
         for building in buildings:
             is_empty = False

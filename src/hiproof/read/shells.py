@@ -1,7 +1,7 @@
 """Shells of CityJSON geometries, every number in them checked before it is used.
 
-What is wrong is raised as a ValueError whose text completes "got ...": the caller knows the building
-and the file.
+What is wrong is raised as a ValueError whose text completes "got ...": the caller knows the
+building and the file.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ class Surface(NamedTuple):
 def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Surface]:
     """Read the faces of one shell over `count` vertices.
 
-    `values` are the numbers of the faces' semantics among `surfaces`, None where a file has none; a face beyond their end has
-    none either.
+    `values` are the numbers of the faces' semantics among `surfaces`, None where a file has none; a
+    face beyond their end has none either.
     """
     faces = [read_rings(face, count) for face in list_of(shell, "a shell")]
     numbers = list_of([] if values is None else values, "semantic values")

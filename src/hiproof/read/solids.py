@@ -1,8 +1,10 @@
-"""Solids back from CityJSON, CityJSONSeq and CityGML 2.0 files, as they stand: for the validity check and for scanning.
+"""Solids back from CityJSON, CityJSONSeq and CityGML 2.0 files, as they stand: for the validity
+check and for scanning.
 
-Each shell of each solid of a building or building part comes out by itself: a CompositeSolid or MultiSolid as several, the inner shells of a Solid turned
-inside out, so that each is a closed shell whose faces should point outwards. A MultiSurface comes out as one shell too, unless
-it is a footprint (LoD 0); that it is rarely closed is for the check to say.
+Each shell of each solid of a building or building part comes out by itself: a CompositeSolid or
+MultiSolid as several, the inner shells of a Solid turned inside out, so that each is a closed shell
+whose faces should point outwards. A MultiSurface comes out as one shell too, unless it is a
+footprint (LoD 0); that it is rarely closed is for the check to say.
 """
 
 from __future__ import annotations
@@ -33,9 +35,10 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
 
     They are the file's coordinates, times the unit of the CRS that the file names.
 
-    The id is the city object's, with `#2`, `#3` ... for its further shells. CityJSONSeq is read line by line and CityGML
-    city object by city object, so memory does not grow with the file. A city object that cannot be read is told to `damaged`,
-    which refuses the file by default. Raises InputError when the file cannot be read as what its name says.
+    The id is the city object's, with `#2`, `#3` ... for its further shells. CityJSONSeq is read
+    line by line and CityGML city object by city object, so memory does not grow with the file. A
+    city object that cannot be read is told to `damaged`, which refuses the file by default. Raises
+    InputError when the file cannot be read as what its name says.
     """
     path = Path(path)
     suffix = path.suffix.lower()
@@ -70,7 +73,8 @@ def numbered(name: str, solids: list[Solid]) -> Iterator[tuple[str, Solid]]:
 
 
 def cityjson_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
-    """Shells of a CityJSON 1.x or 2.0 file, or of a CityJSONSeq file: the transform is that of the line before."""
+    """Shells of a CityJSON 1.x or 2.0 file, or of a CityJSONSeq file: the transform is that of the
+    line before."""
     for feature in features(path, damaged=damaged):
         yield from feature_solids(feature, damaged)
 
@@ -188,7 +192,8 @@ def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
 
 
 def is_loose(element: Any) -> bool:
-    """Whether an element is a polygon of a boundary surface, not of one that is a footprint or a roof's edge (LoD 0)."""
+    """Whether an element is a polygon of a boundary surface, not of one that is a footprint or a
+    roof's edge (LoD 0)."""
     if local_name(element) != "Polygon" or surface_kind(element, None) is None:
         return False
     return not any(local_name(ancestor).startswith("lod0") for ancestor in element.iterancestors())
@@ -233,7 +238,8 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[
 
 
 def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Solid:
-    """One shell of gml:Polygons; equal coordinates become one vertex. A ring that is not closed is noted as defect 103."""
+    """One shell of gml:Polygons; equal coordinates become one vertex. A ring that is not closed is
+    noted as defect 103."""
     number: dict[tuple[float, ...], int] = {}
     faces: list[Face] = []
     defects: list[tuple[int, int]] = []

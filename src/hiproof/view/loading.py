@@ -21,10 +21,12 @@ MOST_SRID = 998_999  # of a reference system of PostGIS
 
 
 def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", damaged: Damaged = refuse) -> int:
-    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn` by the models of `folder`.
+    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`
+    by the models of `folder`.
 
-    Returns the number of buildings loaded. A damaged building is told to `damaged`, which refuses the run by default, and left
-    out. Raises InputError for a folder without models, OutputError for a database that cannot be written.
+    Returns the number of buildings loaded. A damaged building is told to `damaged`, which refuses
+    the run by default, and left out. Raises InputError for a folder without models, OutputError for
+    a database that cannot be written.
     """
     rows = database_rows(folder, damaged)
     srid = srid_of(next(documents(run_models(folder)))[0])
@@ -32,8 +34,8 @@ def load_postgis(folder: Path, dsn: str, prefix: str = "hiproof", damaged: Damag
 
 
 def database_rows(folder: Path, damaged: Damaged = refuse) -> Iterator[Row]:
-    """Yield the rows of a run's buildings, coordinates in the units of its files; those that are damaged, or whose id comes
-    again, are told to `damaged` and left out."""
+    """Yield the rows of a run's buildings, coordinates in the units of its files; those that are
+    damaged, or whose id comes again, are told to `damaged` and left out."""
     path, record = run_models(folder), run_record(folder)
     header, _ = next(documents(path))
     units = way_to_models(record) or units_named(reference_system(header), run_units(record))
@@ -49,13 +51,15 @@ def database_rows(folder: Path, damaged: Damaged = refuse) -> Iterator[Row]:
 
 
 def srid_of(header: dict[str, Any]) -> int:
-    """Return the EPSG code of the metadata's reference system; 0 (unknown to PostGIS) without one."""
+    """Return the EPSG code of the metadata's reference system; 0 (unknown to PostGIS) without
+    one."""
     code = (reference_system(header) or "").rpartition("/")[2]
     return int(code) if code.isascii() and code.isdigit() and len(code) < 7 and int(code) <= MOST_SRID else 0
 
 
 def part_rows(path: Path) -> Iterator[list[tuple]]:
-    """Yield the rows of the layer `parts` of the GeoPackage at `path`, some at a time; nothing where there is none.
+    """Yield the rows of the layer `parts` of the GeoPackage at `path`, some at a time; nothing
+    where there is none.
 
     Raises InputError for a file that is no GeoPackage of a run.
     """
@@ -80,7 +84,8 @@ def part_rows(path: Path) -> Iterator[list[tuple]]:
 
 
 def read_some(path: Path, start: int) -> list[tuple]:
-    """Read rows of the layer `parts` from `start` on: values of PARTS_LAYER and the geometry. Raises ValueError for others."""
+    """Read rows of the layer `parts` from `start` on: values of PARTS_LAYER and the geometry.
+    Raises ValueError for others."""
     import pyogrio
 
     columns = [attribute.name for attribute in PARTS_LAYER]

@@ -1,4 +1,5 @@
-"""The finished models of a run's folder with all that is told of them: attributes, parameters, the CRS."""
+"""The finished models of a run's folder with all that is told of them: attributes, parameters, the
+CRS."""
 
 from __future__ import annotations
 
@@ -24,7 +25,8 @@ TOLD = ("type", "parameters", "position", "rotation")
 
 
 def run_crs_text(folder: Path) -> str | None:
-    """The CRS of the run in `folder`, heights included where they are known; None where it has none."""
+    """The CRS of the run in `folder`, heights included where they are known; None where it has
+    none."""
     header, _ = next(documents(run_models(folder)))
     record = run_record(folder)
     return crs_text(crs_of_files(run_crs(record), run_out_crs(record))) or reference_system(header)
@@ -33,8 +35,9 @@ def run_crs_text(folder: Path) -> str | None:
 def run_buildings(folder: Path, damaged: Damaged = refuse) -> Iterator[ViewedModel]:
     """The run's buildings that have a solid.
 
-    Among the attributes are the `parameters` of the roof as JSON, where the folder has them. A building that is damaged in
-    either file is told to `damaged`, which refuses the run by default, and left out. Raises InputError for what cannot be read.
+    Among the attributes are the `parameters` of the roof as JSON, where the folder has them. A
+    building that is damaged in either file is told to `damaged`, which refuses the run by default,
+    and left out. Raises InputError for what cannot be read.
     """
     path, records = Path(folder) / FORMATS["parameters"].file, None
     units = run_units(run_record(folder))
@@ -58,7 +61,8 @@ def run_buildings(folder: Path, damaged: Damaged = refuse) -> Iterator[ViewedMod
 
 
 def refuse_other_run(record: dict[str, Any], id: str, path: Path) -> None:
-    """Raise InputError where `record` of the parameters is of another building than `id`, whose model stands in its place."""
+    """Raise InputError where `record` of the parameters is of another building than `id`, whose
+    model stands in its place."""
     known = str(record.get("id"))
     if id != known and not id.startswith(f"{known}.."):  # where an id comes twice, models number it
         raise InputError(
@@ -68,7 +72,8 @@ def refuse_other_run(record: dict[str, Any], id: str, path: Path) -> None:
 
 
 def parameters_text(record: dict[str, Any]) -> str | None:
-    """What the parameters say of a building as JSON, its parts without outlines; None where it has no parts."""
+    """What the parameters say of a building as JSON, its parts without outlines; None where it has
+    no parts."""
     refuse_other_kinds(record)
     parts = [{name: part.get(name) for name in TOLD} for part in record.get("parts") or ()]
     return json.dumps({"origin": record.get("origin"), "parts": parts}, separators=(",", ":")) if parts else None

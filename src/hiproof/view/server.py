@@ -1,4 +1,5 @@
-"""A page that shows 3D Tiles, served to this machine's browser alone; it asks nothing of the network."""
+"""A page that shows 3D Tiles, served to this machine's browser alone; it asks nothing of the
+network."""
 
 from __future__ import annotations
 
@@ -15,7 +16,8 @@ from urllib.parse import unquote, urlsplit
 from ..loopback import HTML, SAFE, Answer, LoopbackHandler, LoopbackServer
 from ..write.colours import type_colours
 
-NAME = re.compile(r"[\w-][\w.-]{0,200}", re.ASCII)  # of a file or folder of tiles: no drive, no way up, nothing hidden
+# Of a file or folder of tiles: no drive, no way up, nothing hidden.
+NAME = re.compile(r"[\w-][\w.-]{0,200}", re.ASCII)
 NO_SOURCE = "'none'"
 KINDS = {".json": "application/json", ".glb": "model/gltf-binary"}
 
@@ -52,7 +54,8 @@ def page_of(title: str) -> str:
 
 
 def policy_of(page: str) -> str:
-    """Return the Content-Security-Policy that lets this page run the scripts and styles that stand in it, and no other.
+    """Return the Content-Security-Policy that lets this page run the scripts and styles that stand
+    in it, and no other.
 
     >>> policy_of("<style>a</style>")[:91]
     "default-src 'none'; script-src 'none'; style-src 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuY"

@@ -1,8 +1,10 @@
-"""Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof surface, the area where a part shows.
+"""Models into PostGIS: a polyhedral surface a building with all attributes, a polygon a roof
+surface, the area where a part shows.
 
-The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners of a face that are
-stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a table of their own.
-A prefix's tables hold one run: loading replaces what they held, in one transaction, so that readers see either run.
+The surfaces of buildings are triangles: PostGIS computes exactly, and in exact numbers the corners
+of a face that are stored to a tenth of a millimetre lie in no plane. Roof surfaces stay whole in a
+table of their own. A prefix's tables hold one run: loading replaces what they held, in one
+transaction, so that readers see either run.
 """
 
 from __future__ import annotations
@@ -28,7 +30,8 @@ from .triangles import faces_triangles
 
 BATCH = 500  # buildings sent at once
 LOCKS = 0x6869  # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the extension
-PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")  # names of indexes add 15 characters, and PostgreSQL cuts at 63
+# Names of indexes add 15 characters, and PostgreSQL cuts at 63.
+PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")
 KINDS = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
 MEASURES = ", ".join(f"{a.name} {KINDS[a.kind]}" for a in PARTS_LAYER[3:])
 SCHEMA = """
@@ -50,8 +53,8 @@ create index if not exists {prefix}_parts_geom on {parts} using gist (geom);
 
 @dataclass(frozen=True)
 class Row:
-    """A building as the tables hold it: its `solid` in metres, None without a model, the types of its parts by number, and the
-    `units` in which the tables hold coordinates."""
+    """A building as the tables hold it: its `solid` in metres, None without a model, the types of
+    its parts by number, and the `units` in which the tables hold coordinates."""
 
     id: str
     status: str | None
@@ -65,11 +68,12 @@ class Row:
 def load_rows(
     dsn: str, rows: Iterator[Row], parts: Iterable[Sequence[tuple]], srid: int = 0, prefix: str = "hiproof"
 ) -> int:
-    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`; returns the number of buildings.
+    """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`;
+    returns the number of buildings.
 
-    `parts` are rows of values of PARTS_LAYER and a geometry as WKB, some at a time; those of buildings that are not among
-    `rows` are left out. Raises InputError for a prefix that makes no names of tables, OutputError for a database that cannot
-    be written.
+    `parts` are rows of values of PARTS_LAYER and a geometry as WKB, some at a time; those of
+    buildings that are not among `rows` are left out. Raises InputError for a prefix that makes no
+    names of tables, OutputError for a database that cannot be written.
     """
     if not PREFIX.fullmatch(prefix):
         raise InputError(
@@ -105,7 +109,8 @@ def not_written(error: Exception, advice: str) -> OutputError:
 
 
 def add_extension(connection: Any, cursor: Any) -> None:
-    """Add PostGIS to the database where it is missing, one load at a time: PostgreSQL does not wait by itself."""
+    """Add PostGIS to the database where it is missing, one load at a time: PostgreSQL does not wait
+    by itself."""
     cursor.execute("select pg_advisory_xact_lock(%s, 0)", (LOCKS,))
     cursor.execute("create extension if not exists postgis")
     connection.commit()
@@ -145,7 +150,8 @@ def insert_parts(cursor: Any, parts: Iterable[Sequence[tuple]], loaded: set[str]
 
 
 def known(value: Any) -> Any:
-    """A value of a table as the database takes it; NaN, which stands for what is not known, as null."""
+    """A value of a table as the database takes it; NaN, which stands for what is not known, as
+    null."""
     value = value.item() if isinstance(value, np.generic) else value
     return None if isinstance(value, float) and math.isnan(value) else value
 
@@ -161,7 +167,8 @@ def roof_rows(row: Row) -> Iterator[tuple]:
 
 
 def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
-    """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat), true area (m2) of rings in metres."""
+    """Slope (deg), azimuth of the fall line (deg clockwise from north, None where flat), true area
+    (m2) of rings in metres."""
     normal = np.sum([ring_normal(ring) for ring in rings], axis=0)
     area = float(np.linalg.norm(normal))
     slope = float(np.degrees(np.arctan2(np.hypot(*normal[:2]), abs(normal[2]))))
@@ -170,7 +177,8 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
 
 
 def polyhedral_wkt(row: Row) -> str | None:
-    """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None without one."""
+    """The shell as triangles over the solid's own vertices, so that neighbours stay joined; None
+    without one."""
     if row.solid is None:
         return None
     places = row.units.from_metres(row.solid.vertices)
