@@ -12,6 +12,7 @@ import shapely
 
 import planted
 from hiproof.city import run as city_run
+from hiproof.city.bundles import bundles_in
 from hiproof.city.ledger import Ledger, Task
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.city.sort import Gatherer
@@ -47,6 +48,7 @@ def test_a_building_that_ends_its_process_is_left_out_alone(solve, town_files, u
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
     rows = by_id(tmp_path)
     assert "process died" in rows.pop(planted.DEADLY)["detail"]
+    assert [bundle.name for bundle in bundles_in(tmp_path)] == [planted.DEADLY]
     assert rows == {id: row for id, row in by_id(undisturbed).items() if id != planted.DEADLY}
 
 

@@ -172,6 +172,12 @@ class CitySettings:
         choices=("merged", "tiles", "both"),
         option="--models",
     )
+    keep_failures: bool = setting(
+        True,
+        "keep points, outline and settings of up to 20 buildings that hit an internal error in the folder failures of the "
+        "output, to be sent with a report (`hiproof repro` runs them again)",
+        option="--keep-failures",
+    )
 
 
 @dataclass(frozen=True)

@@ -224,6 +224,10 @@ class Ledger:
     def column(self, name: str) -> list:
         return [value for (value,) in self.database.execute(f"select {name} from building order by position")]
 
+    def failed_ids(self) -> list[str]:
+        """Ids of all buildings that hit an internal error."""
+        return [id for (id,) in self.database.execute("select id from building where status = 'internal_error'")]
+
     def failures(self, limit: int = 20) -> list[Failure]:
         """The first buildings that hit an internal error."""
         sql = "select id, detail from building where status = 'internal_error' order by position limit ?"

@@ -144,7 +144,7 @@ def jobs_from_footprints(
     footprints = footprints_of(request, frame, where=request.where, bbox=request.bbox)
     if request.bbox and not footprints:
         raise InputError(nothing_in(request.bbox))
-    say_if_columns_run_out(request.footprints, footprints)
+    say_if_columns_run_out(str(request.footprints), footprints)
     bounds = frame.units.to_metres(plan_bounds(headers).reshape(-1, 2)).reshape(-1, 4)
     if len(bounds):
         check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)

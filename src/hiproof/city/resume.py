@@ -17,6 +17,7 @@ from ..log import LOGGER, counted
 from ..masking import masked_values
 from ..write.files import atomic
 from . import noted
+from .bundles import remove_bundles
 from .changed import take_over
 from .ledger import Ledger, Task
 from .marks import changed_files, choice_of, inputs_of, mark_of
@@ -186,6 +187,7 @@ def remove_unasked(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
 def forget(state: Path, ledger: Ledger) -> None:
     """Drop all that an earlier run in this folder has left of its state (output files that it will replace stay until then)."""
     remove_tiles(state.parent)
+    remove_bundles(state.parent)
     ledger.forget()
     (state / REDO).unlink(missing_ok=True)
     for name in ("tiles", "points", noted.FOLDER):

@@ -24,6 +24,7 @@ from ..masking import masked, masked_values
 from ..stages import asks_network, fits_one
 from ..status import Doubt, Status
 from ..write.files import atomic
+from .bundles import bundles_of, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
 from .executors import make_executor
@@ -57,6 +58,7 @@ class Summary:
     seconds: dict[str, float]
     units: Units = METRES
     doubts: dict[Doubt, int] = field(default_factory=dict)
+    bundles: Path | None = None  # where the input of failed buildings is kept
 
     @property
     def exit_code(self) -> int:
@@ -99,6 +101,7 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         clock.lap("solve")
         if ledger.get("merged") != "yes":
             merge(plan, state, Path(request.out), progress)
+        remove_bundles(Path(request.out), ledger.failed_ids())
         summary = summarise(request, plan, ledger, clock)
         LOGGER.info("%s: %s; seconds: %s", counted(summary.buildings, "building"), summary.by_status, summary.seconds)
         write_run_record(request, plan, summary)
@@ -263,6 +266,7 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
         seconds=clock.seconds,
         units=plan.head.units.gml,
         doubts=ledger.doubts(),
+        bundles=bundles_of(Path(request.out)),
     )
 
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import copy
 import dataclasses
 import functools
 import threading
 import time
 import traceback
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +30,7 @@ from ..status import Doubt, Status
 from ..write.files import atomic_file
 from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
+from .bundles import TerrainRecorder, keep_failure
 from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_alone, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
 from .ledger import Outcome
@@ -37,9 +40,11 @@ from .outlines import row_outline
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, job_of_footprint, load_plan, neighbourhood
 from .sort import load_points
-from .terrain_check import WhereLikeGround, doubt_of_terrain
+from .terrain_check import TerrainModel, WhereLikeGround, doubt_of_terrain
 
 NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
+
+DIED = "the process died while it worked on this building"
 
 BESIDE_ALL_M = 10.0  # m around a building that show whether there is ground between roofs; yards are as wide
 
@@ -47,7 +52,7 @@ BESIDE_ALL_M = 10.0  # m around a building that show whether there is ground bet
 class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
 
-    def __init__(self, points: dict[str, np.ndarray], model: RasterTerrain | None, plan: WorkPlan):
+    def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
         self.roof, self.model, self.plan = points["roof"], model, plan
         self.grid = PointGrid(self.roof)
         self.ground = ground_cells(points["ground"])
@@ -161,6 +166,7 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
         load_points(root, tile), terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()), plan
     )
     overrides, kept = load_overrides(root), kept_parts(root, tile, plan)
+    keep = functools.partial(keep_failure, root, tile, plan)
     parts, rows = [], []
     for index in plan.tiles[tile]:
         if index in kept:
@@ -168,9 +174,10 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
             continue
         job, start = plan.jobs[index], time.perf_counter()
         if index in avoid:
-            building, part = failed(plan, job, "the process died while it worked on this building")
+            building, part = failed(plan, job, DIED)
+            keep(job, DIED, no_terrain)
         else:
-            building, part = solve_one(plan, job, surroundings, overrides.get(index))
+            building, part = solve_one(plan, job, surroundings, overrides.get(index), keep)
         parts.append(part)
         rows.append(outcome_of(index, building, time.perf_counter() - start))
     write_tile(plan, root.parent, tile, parts)
@@ -196,14 +203,29 @@ def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: i
     return read_terrain(path, CRS.from_wkt(crs_wkt) if crs_wkt else None, units) if path else None
 
 
+def nothing_kept(job: Job, trace: str, terrain: Callable[[], TerrainRecorder | None]) -> None:
+    """Keep nothing of a building that failed."""
+
+
+def no_terrain() -> None:
+    """Record no terrain: the building must not be solved again here."""
+
+
 def solve_one(
-    plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None = None
+    plan: WorkPlan,
+    job: Job,
+    surroundings: Surroundings,
+    override: Override | None = None,
+    keep: Callable[[Job, str, Callable[[], TerrainRecorder | None]], None] = nothing_kept,
 ) -> tuple[Building, Fragments]:
     """One building and its texts, whatever happens: an exception becomes its status.
+
+    `keep` is called with the traceback.
 
     MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone. So is
     DamagedRaster, for the terrain model is the run's and not the building's.
     """
+    record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
     try:
         job, moved = surroundings.moved(job)
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
@@ -223,14 +245,30 @@ def solve_one(
         building = remarked(remarked(building, moved), found.remark)
         building = remarked(building, surroundings.doubt_of_terrain(job))
         building = remarked(surroundings.looked_at(building, job, points), doubt_of_ground(building))
-        return fragments(building, plan.names_of(job), plan.head)
+        building, texts = fragments(building, plan.names_of(job), plan.head)
+        if building.status is Status.INTERNAL_ERROR:
+            keep(job, building.detail, record_terrain)
+        return building, texts
     except (MemoryError, DamagedRaster):
         raise
     except Exception as error:
         if is_interrupt(error):
             raise KeyboardInterrupt from error
+        keep(job, traceback.format_exc(), record_terrain)
         place = traceback.extract_tb(error.__traceback__)[-1]
         return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+
+
+def recorded_terrain(
+    plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None
+) -> TerrainRecorder | None:
+    """Solve the building again to record the heights of the terrain model that it looks up; None without a model."""
+    if surroundings.model is None:
+        return None
+    again = copy.copy(surroundings)
+    again.model = recorder = TerrainRecorder(surroundings.model)
+    solve_one(plan, job, again, override)
+    return recorder
 
 
 def told_of_thinning(building: Building, used: int, count: int) -> Building:

@@ -6,9 +6,10 @@ does not declare. The cloud's own ground points fit the cloud's roofs, so they d
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 
-from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain
 from ..status import Doubt
 
@@ -18,6 +19,12 @@ FAR_GROUND_M = 2.0
 OTHER_GROUND_M = 5.0
 """Difference (m) from which on the model's height is not used: height systems differ by 10 to 100 m, codes for "no data"
 by more, while a model and ground points of one place agree within 2 m also on slopes."""
+
+
+class TerrainModel(Terrain, Protocol):
+    """A terrain that also knows where its raster holds a code for "no data"."""
+
+    def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray: ...
 
 
 class WhereLikeGround:
@@ -33,7 +40,7 @@ class WhereLikeGround:
         return np.where(apart > OTHER_GROUND_M, np.nan, heights)
 
 
-def doubt_of_terrain(model: RasterTerrain, ground: Terrain, xy: np.ndarray) -> str:
+def doubt_of_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
     """A remark where the terrain model has no true height at some of the corners `xy` (n, 2) of an outline, or lies far
     above or below the ground points there. Empty otherwise."""
     coded = model.is_coded_at(xy)

@@ -22,6 +22,7 @@ from .evaluate import evaluate
 from .load import load
 from .reconstruct import reconstruct
 from .report import report
+from .repro import repro
 from .segment import segment
 from .settings import settings
 from .status import status
@@ -92,6 +93,7 @@ for command in (
     edit,
     evaluate,
     report,
+    repro,
     convert,
     view,
     classify,

@@ -83,4 +83,6 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
         show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
     for id, why in summary.failures:
         show(Text.assemble(("internal error:", "red"), f" building {id}: {why}"))
+    if summary.bundles:
+        show(Text(f"please report these, with the folders of the buildings in {summary.bundles}"))
     show(Text("models: " + ", ".join(map(str, summary.models))))
