@@ -1,6 +1,6 @@
 """Compound roofs on a real town: solids for every footprint at four densities, measured against all points.
 
-usage: python -m benchmarks.delft [--set delft|amsterdam_west] [--shares 1 0.5 0.25 0.125] [--parity even|odd]
+usage: python -m benchmarks.delft [--set delft|amsterdam_west|two_epochs] [--shares 1 0.5 0.25 0.125] [--parity even|odd]
            [--data DIR] [--tools ../shared/tools]
 
 Fits and composes every footprint of the folder from its `*.laz` (class 6), thinned as `thin_cloud.py` does, writes the
@@ -10,7 +10,8 @@ reporting only.
 
 Prints one row a density: the measured figures, faces in the mean, parts in the mean, the share of the roof area in plan
 whose part has a type other than "free", milliseconds a building on one core for fitting and for composing, how far
-roofs leave the range of their points, and how many solids the check refused; below it the area by type.
+roofs leave the range of their points, how many solids the check refused, and how many parts are narrower than 1 m (of these,
+how many stand 2 m or more above all they touch); below it the area by type.
 """
 
 from __future__ import annotations
@@ -36,9 +37,11 @@ from hiproof.settings import Settings
 from hiproof.status import Status
 from hiproof.write import write_cityjson
 
-from .judging import SHARED, area_by_type, fitted, named_share, tool
+from .judging import SHARED, area_by_type, count_narrow_parts, fitted, named_share, tool
 
 SETS = {"delft": "footprints.gpkg", "amsterdam_west": "footprints_bag.gpkg"}
+EPOCHS = {"two_epochs": "footprints.gpkg"}  # sets whose clouds lie in folders by year
+EPOCH = "2014"
 BUILDING_CLASS = 6
 WALL_M = 3.0
 
@@ -97,7 +100,8 @@ class Asked:
 def asked_of(name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None) -> Asked:
     """The set `name`, its cloud thinned to `share`; `data` is its folder where that is another."""
     data = data or SHARED / "data" / name
-    footprints, clouds = asked_footprints(data / SETS[name], parity), sorted(data.glob("*.laz"))
+    footprints = asked_footprints(data / (SETS | EPOCHS)[name], parity)
+    clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
     cloud = thinned(clouds, share)
     indices = points_of_footprints(cloud, footprints)
     return Asked(footprints, clouds, [(cloud[i], f) for i, f in zip(indices, footprints, strict=True) if len(i)])
@@ -124,6 +128,7 @@ def measure(buildings: list[Building], asked: Asked, tools: Path = SHARED / "too
 def row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
     buildings, columns = models_of(asked, settings)
     figures = measure(buildings, asked, tools)
+    narrow, standing = np.sum([count_narrow_parts(building.roof) for building in buildings], axis=0)
     both, areas = 1e3 * (columns["fit"] + columns["compose"]), area_by_type(buildings)
     return (
         f"{share:<6g} {len(asked.footprints)} footprints  share {figures['share_within_20cm']:.4f}  modelled {figures['modelled']}"
@@ -131,13 +136,14 @@ def row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
         f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named {named_share(buildings):.3f}"
         f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(both):.1f} mean {both.mean():.1f} max {both.max():.0f}"
         f" (fit {1e3 * np.median(columns['fit']):.1f})  beyond {columns['beyond'].max():.2f}  bad {columns['bad'].sum():.0f}"
+        f"  narrow {narrow} (standing {standing})"
         f"\n       " + ", ".join(f"{name} {area / areas.total():.1%}" for name, area in areas.items())
     )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--set", choices=list(SETS), default="delft")
+    parser.add_argument("--set", choices=[*SETS, *EPOCHS], default="delft")
     parser.add_argument("--data", type=Path, help="folder of the set's files")
     parser.add_argument("--tools", type=Path, default=SHARED / "tools")
     parser.add_argument("--shares", type=float, nargs="+", default=[1.0, 0.5, 0.25, 0.125])

@@ -11,6 +11,7 @@ from types import ModuleType
 
 import numpy as np
 import shapely
+from scipy.spatial import cKDTree
 
 from hiproof.fit.union import BuildingFit, fit_building
 from hiproof.model import Building, Roof
@@ -18,6 +19,7 @@ from hiproof.settings import Settings
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 RASTER_M = 0.2
+NARROW_M, STANDING_M = 1.0, 2.0  # m: nobody draws a part that is narrower; a step by which one stands out
 
 
 def fitted(points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None) -> BuildingFit:
@@ -49,6 +51,28 @@ def visible_areas(roof: Roof) -> np.ndarray:
     xy = raster(roof.outline)
     top = np.argmax([part.height_at(xy) for part in roof.parts], axis=0)
     return roof.outline.area * np.bincount(top, minlength=len(roof.parts)) / len(top)
+
+
+def count_narrow_parts(roof: Roof) -> tuple[int, int]:
+    """Count the parts narrower than NARROW_M, and those of them that stand STANDING_M or more above all they touch.
+
+    A part's width is that of the smallest rectangle around its outlines within the roof's.
+    """
+    xy = raster(roof.outline)
+    heights = np.array([np.nan_to_num(part.height_at(xy), nan=-np.inf) for part in roof.parts])
+    top, z = heights.argmax(axis=0), heights.max(axis=0)
+    beside = cKDTree(xy)
+    narrow = standing = 0
+    for number, part in enumerate(roof.parts):
+        outline = shapely.union_all([piece.outline for piece in part.pieces]).intersection(roof.outline)
+        sides = np.hypot(*np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(outline)), axis=0).T)
+        if len(sides) < 4 or sides.min() >= NARROW_M:
+            continue
+        narrow += 1
+        own = np.flatnonzero(top == number)
+        around = {i for near in beside.query_ball_point(xy[own], 2.1 * RASTER_M) for i in near if top[i] != number}
+        standing += bool(around) and z[own].min() > z[list(around)].max() + STANDING_M
+    return narrow, standing
 
 
 def area_by_type(buildings: Iterable[Building]) -> Counter[str]:
