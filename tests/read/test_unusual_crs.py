@@ -22,6 +22,7 @@ from hiproof.read.crs import UnknownCRS, names_place, parse_crs, units_of, verti
 from hiproof.read.footprints import read_footprints
 from hiproof.read.las_crs import las_crs
 from hiproof.read.pointcloud import read_header, read_points
+from hiproof.read.terrain import read_terrain
 from hiproof.settings import Settings
 
 pytestmark = pytest.mark.filterwarnings("ignore:You will likely lose important projection information")
@@ -361,3 +362,27 @@ def test_clouds_and_footprints_in_two_units_and_one_unknown_place_are_refused(tm
 def test_what_is_local_is_said(tmp_path):
     with pytest.warns(InputWarning, match="names a local CRS, NAD83 / Texas Central"):
         frame_of(tmp_path, OWN_FEET)
+
+
+@pytest.mark.parametrize(
+    ("cloud", "raster"), [("US feet", "EPSG:32614"), ("LOCAL_CS", "EPSG:32633"), (None, "LOCAL_CS")]
+)
+def test_a_terrain_model_beside_a_local_cloud_is_asked_in_its_own_coordinates(tmp_path, cloud, raster):
+    rasterio = pytest.importorskip("rasterio")
+    crs = rasterio.crs.CRS.from_wkt(CRS(LOCAL[raster][0] if raster in LOCAL else raster).to_wkt("WKT1_GDAL"))
+    place = rasterio.transform.from_origin(500000, 4649800, 1, 1)
+    profile = {
+        "driver": "GTiff",
+        "height": 40,
+        "width": 40,
+        "count": 1,
+        "dtype": "float32",
+        "crs": crs,
+        "transform": place,
+    }
+    with rasterio.open(tmp_path / "dtm.tif", "w", **profile) as file:
+        file.write(np.full((40, 40), 7.0, np.float32), 1)
+    asked = parse_crs(LOCAL[cloud][0] if cloud else "EPSG:32633")
+    units = units_of(asked)
+    terrain = read_terrain(tmp_path / "dtm.tif", asked, units)
+    assert terrain.height_at(units.to_metres([[500010.0, 4649780.0]]))[0] == pytest.approx(7.0)

@@ -248,12 +248,12 @@ def operations_between(
     return [find_operation(subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y)))]
 
 
-def say_if_columns_run_out(path: str, footprints: tuple[Footprint, ...]) -> None:
+def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) -> None:
     """One line, before any work, where footprints have more attributes than a GeoPackage has columns."""
     count = len({name for footprint in footprints for name in footprint.attributes})
     if count > (room := attributes_with_a_column()):
         warnings.warn(
-            f"{masked(path)}: has {count:,} attributes; buildings.gpkg holds the first {room:,}, because its tables have at "
+            f"{masked(str(path))}: has {count:,} attributes; buildings.gpkg holds the first {room:,}, because its tables have at "
             "most 2,000 columns, and the other files hold all",
             InputWarning,
         )

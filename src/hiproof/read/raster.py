@@ -19,7 +19,7 @@ from ..errors import DamagedRaster, InputError, InputWarning
 from ..extras import needed
 from ..frames import Units
 from ..masking import masked, remember
-from .crs import horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
+from .crs import horizontal_crs, names_place, parse_crs, same_horizontal, units_of, vertical_crs, way_between
 from .plausible import HIGHEST_LAND_M, LOWEST_LAND_M
 from .raster_checks import alpha_band, band_unit, height_band, refuse_without_position, scale_and_offset
 
@@ -116,13 +116,13 @@ class RasterTerrain:
         return parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
 
     def make_transformer(self):
-        """From the coordinates asked for to the raster's; None where they are the same in plan, or one is unknown."""
+        """From the coordinates asked for to the raster's; None where they are the same in plan, or one is unknown or local."""
         own = self.own_crs
         if self.crs is None or own is None or same_horizontal(self.crs, own):
             return None
-        from pyproj import Transformer
-
-        return Transformer.from_crs(self.crs, own, always_xy=True)
+        if not (names_place(self.crs) and names_place(own)):
+            return None
+        return way_between(self.crs, own)
 
     def height_unit(self) -> float:
         """Metres in one unit of the raster's heights: as its band says, else its CRS, else as the cloud counts.
