@@ -188,7 +188,7 @@ def test_a_roof_that_cannot_be_composed_falls_back_to_a_flat_block_and_says_so(m
             raise CompositionError("planted")
         return compose(roof, z_ground, settings)
 
-    monkeypatch.setattr("hiproof.compose.compose", refuses_slopes)
+    monkeypatch.setattr("hiproof.compose.readable.compose", refuses_slopes)
     building = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
     assert building.status is Status.SIMPLIFIED
     assert "planted" in building.detail
@@ -224,8 +224,7 @@ def test_a_part_that_cannot_be_composed_is_given_up_and_not_the_roof(monkeypatch
         return any(part.type == "gable" for part in roof.parts)
 
     points = two_level_points()
-    monkeypatch.setattr("hiproof.compose.compose", refused(has_gable))
-    monkeypatch.setattr("hiproof.compose.simpler.compose", refused(has_gable))
+    monkeypatch.setattr("hiproof.compose.readable.compose", refused(has_gable))
     building = hiproof.reconstruct(points, shapely.box(0, 0, 12, 8), settings=PLAIN)
     assert building.status is Status.SIMPLIFIED
     assert "(gable) was made level" in building.detail and "planted" in building.detail

@@ -1,4 +1,4 @@
-"""Give up as little of a roof as possible where it cannot become a valid solid: one part after another, not the roof."""
+"""Give up as little of a roof as possible where it cannot become a valid solid."""
 
 from __future__ import annotations
 
@@ -20,8 +20,9 @@ def compose_simpler(
 ) -> tuple[Roof, Solid, str]:
     """Compose the roof without the parts that fail, and say what was given up.
 
-    A part that fails is left out or made level, whichever leaves more of `points` (n, 3) on the roof and makes a valid
-    solid. Where that does not do, the next part follows. Raises CompositionError when only one part is left.
+    A part that fails is left out or made level, whichever leaves more of `points` (n, 3) on the
+    roof and makes a valid solid. Where that does not do, the next part follows. Raises
+    CompositionError when only one part is left.
     """
     given_up: list[str] = []
     while True:
@@ -38,7 +39,7 @@ def compose_simpler(
 
 
 def simpler_roofs(roof: Roof, failing: tuple[int, ...], points: np.ndarray) -> Iterator[tuple[float, Roof, str]]:
-    """Yield (share of points on it, roof, what was given up) for each part that fails, or for all where none is known."""
+    """Yield (share of points on it, roof, what was given up) for each part that fails, or for all."""
     if len(roof.parts) < 2:
         return
     for k in failing or range(len(roof.parts)):
@@ -51,7 +52,7 @@ def simpler_roofs(roof: Roof, failing: tuple[int, ...], points: np.ndarray) -> I
 
 
 def level_part(part: Part, points: np.ndarray) -> Part:
-    """Return a flat part in the place of `part`, at the median height of it over its points, or at its own height."""
+    """Return a flat part in the place of `part`, at the median height of its points or its own."""
     z = part.height_at(points[:, :2])
     z = points[np.isfinite(z) & (np.abs(z - points[:, 2]) < NEAR_M), 2]
     height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)
@@ -63,6 +64,6 @@ def level_part(part: Part, points: np.ndarray) -> Part:
 
 
 def share_near(roof: Roof, points: np.ndarray) -> float:
-    """Return the share of points (n, 3) that lie on the roof; without any, the parts' number decides."""
+    """Return the share of points (n, 3) that lie on the roof."""
     off = np.abs(roof.height_at(points[:, :2]) - points[:, 2])
     return float(np.mean(off < NEAR_M)) if len(points) else 0.0

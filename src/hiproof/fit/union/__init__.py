@@ -31,7 +31,9 @@ bays        level volumes over small pieces that walls cut off the outline
 members     the volumes whose planes points tell, by the unknowns of all
 agree       planes, slopes, ridges and eaves that volumes have in common
 corners     hips and valleys that end beside a corner of the outline end in it
-hips        steps below hips, where a hip's plane comes down to its neighbours' eaves
+drawn_plan  the plan that a roof would be drawn with: its corners, and the planes beside its edges
+repairs     what nearly meets in it and might be made to
+weld        those of them that pay: sides end in corners, low steps become fold lines
 regions     where each volume roofs the outline
 names       volume -> named part of the family of roof shapes
 teeth       rows of equal monopitches as saw-teeth
@@ -59,7 +61,6 @@ from .bays import with_bays
 from .clamp import clamped
 from .fit import BuildingFit
 from .groups import draw_in_groups, run_in_groups
-from .hips import with_steps_at_hips
 from .larger import put_together
 from .names import part_of
 from .objective import base_shows
@@ -72,6 +73,7 @@ from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
 from .shown import highest_of, that_show
 from .slivers import without_slivers, without_specks
 from .unite import Ends, ends_of, ends_within, united
+from .weld import weld
 from .whole import Whole
 
 __all__ = ["BuildingFit", "fit_building"]
@@ -105,10 +107,10 @@ def fit_building(
     whole, ends = Whole(scene, plan, outline), ends_of(outline, plan, scene)
     volumes = tidy_volumes(volumes, ends, whole)
     unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
-    roof = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, whole)
-    volumes, sides, planes = roof.volumes, roof.sides, roof.planes
-    sides = with_steps_at_hips(volumes, planes, sides, scene)
-    regions = regions_of(volumes, planes, sides, plan, outline, scene, bool(base_shows(volumes, scene)))
+    roof, agreement = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, whole)
+    volumes, base = roof.volumes, bool(base_shows(roof.volumes, scene))
+    sides, planes = weld(volumes, roof.sides, agreement, outline, plan, scene, base)
+    regions = regions_of(volumes, planes, sides, plan, outline, scene, base)
     parts = [
         part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)
         for k, own in places_of(regions, outline, plan)

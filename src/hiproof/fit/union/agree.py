@@ -44,6 +44,7 @@ class Fit:
     covariance: np.ndarray
     rows: list[np.ndarray]
     cost: float
+    basis: np.ndarray
 
 
 class Asked(NamedTuple):
@@ -57,23 +58,36 @@ class Asked(NamedTuple):
     spared: float = 0.0
 
 
-def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> list[Planes]:
+class Agreement(NamedTuple):
+    """All volumes' planes fitted together, the members by their volume's number, and the unknowns: those that the
+    equations which hold leave free, as a basis (p, q), and where they started (p,)."""
+
+    planes: list[Planes]
+    members: dict[int, Member]
+    basis: np.ndarray
+    start: np.ndarray
+
+
+def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> Agreement:
     """The planes of all volumes fitted together, equal in what they have in common and at the corners of the outline."""
     members = members_of(volumes, sides, planes, scene)
     known = list(members.values())
     if not known:
-        return planes
+        return Agreement(planes, members, np.zeros((0, 0)), np.zeros(0))
     start = unknowns_of(known)
+    alone = Agreement(planes, members, np.eye(len(start)), start)
     at_corners = (Asked(*one, np.inf, SPARED_UNITS) for one in creases_at_corners(known, start, scene.corners[0]))
     asked = sorted((*likely(known, start), *at_corners), key=lambda one: one.gap)
     found = fitted_as_asked(known, start, asked, scene) if asked else None
     if found is None:
-        return planes
+        return alone
     agreed_planes = list(planes)
     for k, member, rows in zip(members, known, found.rows, strict=True):
         agreed_planes[k] = replace(planes[k], rows=rows, design=member.own, covariance=found.covariance)
     worse = roof_misfit(volumes, agreed_planes, scene) - roof_misfit(volumes, planes, scene)
-    return planes if worse > MOST_WORSE_SHARE * scene.n else agreed_planes
+    if worse > MOST_WORSE_SHARE * scene.n:
+        return alone
+    return Agreement(agreed_planes, members, found.basis, start)
 
 
 def roof_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
@@ -99,7 +113,7 @@ def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked]
     best = free = fitted(members, basis, start, scene)
     if not math.isfinite(free.cost):  # improper: members keep their planes until a proper fit is found
         rows = [member.rows for member in members]
-        best = Fit(start, free.covariance, rows, cost_of_rows(members, rows, scene))
+        best = Fit(start, free.covariance, rows, cost_of_rows(members, rows, scene), basis)
     while asked:
         later, before = [], len(held)
         for one in asked:
@@ -257,7 +271,7 @@ def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: S
     cost = cost_of_rows(members, rows, scene)
     if not all(proper(own, member.walls) for member, own in zip(members, rows, strict=True)):
         cost = np.inf
-    return Fit(unknowns, inverse * misfit / max(total, 1.0), rows, cost)
+    return Fit(unknowns, inverse * misfit / max(total, 1.0), rows, cost, basis)
 
 
 def cost_of_rows(members: list[Member], rows: list[np.ndarray], scene: Scene) -> float:

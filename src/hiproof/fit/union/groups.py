@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from .agree import agreed
+from .agree import Agreement, agreed
 from .box import Box, box_around
 from .finish import Planes, planes_as_found
 from .scene import Scene
@@ -79,11 +79,15 @@ def look_at(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | Non
     return None if scene is None else (scene, [0, *whole.volumes_in(box)])
 
 
-def draw_in_groups(volumes: np.ndarray, ends: Ends, whole: Whole) -> Drawn:
-    """The volumes with their sides and planes, and those that agree with their neighbours equal to these."""
+def draw_in_groups(volumes: np.ndarray, ends: Ends, whole: Whole) -> tuple[Drawn, Agreement]:
+    """The volumes with their sides and planes, and those that agree with their neighbours equal to these.
+
+    Of volumes that are not looked at all at once no common unknowns are known: their agreement has no members.
+    """
     if len(volumes) <= MOST_AT_ONCE:
         roof = drawn(volumes, ends, whole.scene, {})
-        return replace(roof, planes=agreed(volumes, roof.sides, roof.planes, whole.scene))
+        agreement = agreed(volumes, roof.sides, roof.planes, whole.scene)
+        return replace(roof, planes=agreement.planes), agreement
     whole.set_volumes(volumes.copy())
     sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
     planes = [found_planes(row, whole.scene) for row in volumes]
@@ -95,11 +99,12 @@ def draw_in_groups(volumes: np.ndarray, ends: Ends, whole: Whole) -> Drawn:
         rows = whole.volumes[numbers]
         roof = drawn(rows, ends_within(ends, scene), scene, {})
         held = [own if k in group else hold(own) for k, own in zip(numbers, roof.planes, strict=True)]
-        together = agreed(rows, roof.sides, held, scene)
+        together = agreed(rows, roof.sides, held, scene).planes
         for k in group:
             at = numbers.index(k)
             sides[k], planes[k] = roof.sides[at], together[at]
-    return Drawn(volumes, sides, planes, sum(own.cost + own.price for own in planes))
+    agreement = Agreement(planes, {}, np.zeros((0, 0)), np.zeros(0))
+    return Drawn(volumes, sides, planes, sum(own.cost + own.price for own in planes)), agreement
 
 
 def found_planes(volume: np.ndarray, scene: Scene) -> Planes:

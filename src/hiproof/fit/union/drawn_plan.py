@@ -1,0 +1,133 @@
+"""The plan that a roof under construction would be drawn with: places, edges, corners, planes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+from ...compose.arrangement import GRID_M, OUTSIDE
+from ...compose.cells import arrange, plan_problem
+from ...compose.levels import split_at_crossings, stack_levels
+from ...errors import CompositionError
+from ...frames import LocalFrame
+from ...model import Part, Piece, Roof
+from ...settings import ComposeSettings
+from .finish import Planes
+from .plan import Plan
+from .scene import Scene
+from .volumes import DIRECTION
+
+STRAIGHT_M = 0.02  # m; a corner nearer to the line between its two neighbours is none
+REACH_M = 0.0012  # m; as a solid's plan is arranged at the first attempt
+SAME_PLANE = 1e-5  # rise over run, and m: planes and slopes nearer to each other are one
+
+
+@dataclass(frozen=True)
+class DrawnPlan:
+    """A roof's plan in local coordinates.
+
+    `places` (m, 2) are its vertices; `edges` (e, 2) their numbers and `beside` (e, 2) the numbers
+    of the planes left and right of each, -1 outside. `planes` (p, 3) give heights of local x, y, 1;
+    `owner` (p, 2) says whose plane that is: the volume's number, and the plane's in it. `corners`
+    counts the roof's corners at all levels, straight ones left out.
+    """
+
+    places: np.ndarray
+    edges: np.ndarray
+    beside: np.ndarray
+    planes: np.ndarray
+    owner: np.ndarray
+    corners: int
+
+    @property
+    def shown(self) -> np.ndarray:
+        """The numbers of the planes that show."""
+        return np.unique(self.beside[self.beside >= 0])
+
+    def gap(self, edge: int) -> np.ndarray:
+        """How far apart (m) the planes beside an edge are at its two ends; infinite at the outline."""
+        if self.beside[edge].min() < 0:
+            return np.array([np.inf, np.inf])
+        at = np.column_stack([self.places[self.edges[edge]], np.ones(2)])
+        left, right = self.planes[self.beside[edge]]
+        return np.abs(at @ (left - right))
+
+
+def draw_plan(
+    regions: list[list[shapely.Polygon]],
+    volumes: np.ndarray,
+    planes: list[Planes],
+    outline: shapely.Polygon,
+    plan: Plan,
+    scene: Scene,
+) -> DrawnPlan | None:
+    """Draw volumes over their `regions`; None where these make no plan."""
+    pieces, owner = [], []
+    for k, polygons in enumerate(regions):
+        there = np.flatnonzero(np.isfinite(planes[k].rows[:, 2]))
+        rows = local_planes(planes[k].rows[there], scene.turn[int(volumes[k, DIRECTION])], plan)
+        for polygon in polygons:
+            pieces.append(Piece(polygon, rows))
+            owner += [(k, p) for p in there]
+    roof = Roof((Part("free", tuple(pieces)),), outline, LocalFrame(np.zeros(3)))
+    options = ComposeSettings()
+    try:
+        problem = plan_problem(roof)
+        cells = arrange(problem, REACH_M, options.min_face_area_m2, options.min_face_width_m)
+    except CompositionError:
+        return None
+    return counted_plan(cells, problem.planes, np.array(owner))
+
+
+def counted_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan | None:
+    """The plan of `cells`, in metres; None where a plane is in it that no volume owns."""
+    split = split_at_crossings(cells.xy, cells.edges, cells.side, grid_planes, REACH_M / GRID_M)
+    xy, edges, side, ties = split
+    if not len(edges) or side.max() >= len(owner):
+        return None
+    low = -1e9  # grid units; far below any roof
+    _, _, follow, _, level, vertices = stack_levels(xy, edges, side, grid_planes, low, ties)
+    roofed = side.ravel() != OUTSIDE
+    ends = np.column_stack([level, level[follow]])[roofed]
+    planes = grid_planes * [1.0, 1.0, GRID_M]
+    corners = count_corners(ends, vertices * GRID_M)
+    return DrawnPlan(xy * GRID_M, edges, side, planes[: len(owner)], owner, corners)
+
+
+def count_corners(ends: np.ndarray, vertices: np.ndarray) -> int:
+    """Count the vertices (n, 3) at the `ends` (m, 2) of edges that are not straight between two."""
+    pairs = np.unique(np.sort(ends[ends[:, 0] != ends[:, 1]], axis=1), axis=0)
+    both = np.concatenate([pairs, pairs[:, ::-1]])
+    both = both[np.argsort(both[:, 0], kind="stable")]
+    at, first, count = np.unique(both[:, 0], return_index=True, return_counts=True)
+    middle = first[count == 2]
+    v, a, b = vertices[at[count == 2]], vertices[both[middle, 1]], vertices[both[middle + 1, 1]]
+    way = b - a
+    share = ((v - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12)
+    off = np.linalg.norm(v - a - share[:, None] * way, axis=1)
+    straight = (off < STRAIGHT_M) & (share > 0.0) & (share < 1.0)
+    return len(at) - int(straight.sum())
+
+
+def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:
+    """Count planes (k, 3), those that are one once only, and their slopes other than level.
+
+    `turns` (k, 2) are cosine and sine of the direction in whose axes each is given.
+    """
+    c, s = turns.T
+    a, b, z = rows.T
+    common = np.column_stack([c * a - s * b, s * a + c * b, z])
+    apart = np.abs(common[:, None] - common).max(axis=2) > SAME_PLANE
+    slopes = np.sort(np.hypot(rows[:, 0], rows[:, 1]))
+    slopes = slopes[slopes > SAME_PLANE]
+    distinct = sum(apart[k, :k].all() for k in range(len(rows)))
+    return int(distinct) + int((np.diff(slopes, prepend=0.0) > SAME_PLANE).sum())
+
+
+def local_planes(rows: np.ndarray, turn: np.ndarray, plan: Plan) -> np.ndarray:
+    """Planes (k, 3) of local x, y, 1 from those in axes turned by `turn` from the plan's."""
+    c, s = turn
+    gradients = rows[:, :2] @ np.array([[c, s], [-s, c]]) @ plan.frame.rotation
+    return np.column_stack([gradients, rows[:, 2] - gradients @ plan.frame.origin[:2]])

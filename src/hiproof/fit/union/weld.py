@@ -1,0 +1,347 @@
+"""Make what nearly meets meet, where the roof gets cheaper by it: sides, corners and low steps.
+
+    misfit + units * (parameters that show + corners)
+
+A corner has a price because it is what a draughtsman counts. Repairs are tried the smallest first,
+each in a window around it, and one that pays is kept. After a round the roof is drawn anew, until
+no repair pays. The outline never moves.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+
+from .agree import Agreement, fitted, null_space
+from .drawn_plan import DrawnPlan, count_parameters, draw_plan, local_planes
+from .finish import Planes
+from .objective import costs, misfits
+from .plan import Plan
+from .regions import polygons_of, quad_of, regions_of
+from .repairs import Repair, find_repairs
+from .scene import Scene
+from .sides import Side, corners_of
+from .volumes import DIRECTION, PARAMETER_COST, U0, V0, V1, with_and_without
+
+# units of evidence that a corner of the drawn roof costs; above, recall and the share of points
+# fall
+CORNER_COST = 0.5
+# units of evidence that a repair may save; one that makes its points dearer by more is not drawn
+MOST_SAVED = 2.5
+WINDOW_M2, MARGIN_M = (
+    400.0,
+    2.0,
+)  # a roof of so many square metres is one window; how far a window reaches beyond a repair
+# repairs that are drawn for every WINDOW_M2 of the outline, and rounds: each draws as much as
+# composing its window costs.
+# What comes after them stays as the search left it.
+MOST_TRIALS, MOST_ROUNDS = 40, 20
+MOST_POINTS = 1500  # of a window that judge; of more every k-th
+ENDS = (0, 3), (1, 2), (0, 1), (2, 3)  # the corners of a volume in which each of its sides ends
+LEFT_OVER = 1e-9  # m; an equation that the others leave so little of holds by them
+ONE_LINE_M = 0.02  # sides of two volumes nearer than this are one line
+
+
+class Problem(NamedTuple):
+    """What does not change while a roof is welded.
+
+    `xy` (n, 2) are its points in local coordinates, `order` (n,) their numbers by ascending x.
+    """
+
+    volumes: np.ndarray
+    outline: shapely.Polygon
+    plan: Plan
+    scene: Scene
+    agreement: Agreement
+    base: bool
+    xy: np.ndarray
+    order: np.ndarray
+
+
+class State(NamedTuple):
+    """A roof: its sides and planes, the unknowns that its equations leave free (p, q), and what the
+    points of its members cost under these."""
+
+    sides: list[list[Side]]
+    planes: list[Planes]
+    basis: np.ndarray
+    cost: float
+
+
+class Window(NamedTuple):
+    """A part of a roof: its `box` in local coordinates, the numbers of the volumes that reach into
+    it, the outline within it, the scene of the points in it, and those that judge (local `xy` (n,
+    2), `z` (n,)), each for `weight` points."""
+
+    box: shapely.Polygon
+    numbers: np.ndarray
+    outlines: list[shapely.Polygon]
+    scene: Scene
+    xy: np.ndarray
+    z: np.ndarray
+    weight: float
+
+
+def weld(
+    volumes: np.ndarray,
+    sides: list[list[Side]],
+    agreement: Agreement,
+    outline: shapely.Polygon,
+    plan: Plan,
+    scene: Scene,
+    base: bool,
+) -> tuple[list[list[Side]], list[Planes]]:
+    """Return the sides and planes of all volumes with every repair that pays."""
+    problem = problem_of(volumes, agreement, outline, plan, scene, base)
+    state = state_before(sides, problem)
+    tried: set[tuple] = set()
+    for _ in range(MOST_ROUNDS):
+        drawn = draw(state, problem)
+        better = state if drawn is None else after_a_round(state, drawn, tried, problem)
+        if better is state:
+            break
+        state = better
+    return state.sides, state.planes
+
+
+def problem_of(
+    volumes: np.ndarray,
+    agreement: Agreement,
+    outline: shapely.Polygon,
+    plan: Plan,
+    scene: Scene,
+    base: bool,
+) -> Problem:
+    points = np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]])
+    xy = plan.frame.xy_local(points)
+    order = np.argsort(xy[:, 0], kind="stable")
+    return Problem(volumes, outline, plan, scene, agreement, base, xy, order)
+
+
+def state_before(sides: list[list[Side]], problem: Problem) -> State:
+    """The roof as volumes agree on it."""
+    planes, members, basis, start = problem.agreement
+    known = list(members.values())
+    cost = fitted(known, basis, start, problem.scene).cost if known else 0.0
+    return State(sides, list(planes), basis, cost)
+
+
+def draw(state: State, problem: Problem) -> DrawnPlan | None:
+    """The whole roof's plan; None where none comes out."""
+    volumes, outline, plan, scene, _, base, *_ = problem
+    regions = regions_of(volumes, state.planes, state.sides, plan, outline, scene, base)
+    return draw_plan(regions, volumes, state.planes, outline, plan, scene)
+
+
+def after_a_round(state: State, drawn: DrawnPlan, tried: set[tuple], problem: Problem) -> State:
+    """The roof with every repair that pays, of those not `tried`, one in each window."""
+    area = problem.outline.area
+    most = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
+    changed: list[shapely.Polygon] = []
+    window, quads = None, quads_of(state, problem)
+    for repair in find_repairs(drawn, problem.volumes, state.sides, problem.plan, problem.scene):
+        if repair.key in tried or len(tried) >= most:
+            continue
+        box = box_of(repair, state, problem) if area > WINDOW_M2 else whole_box(problem)
+        if any(shapely.intersects(box, other) for other in changed):
+            continue
+        if window is None or not window.box.equals(box):
+            window = window_of(box, quads, problem)
+        after = repaired(state, repair, window, problem)
+        if after is None:
+            continue
+        tried.add(repair.key)
+        if pays(state, after, drawn, window, problem):
+            state = after
+            changed.append(box)
+    return state
+
+
+def pays(before: State, after: State, drawn: DrawnPlan, window: Window, problem: Problem) -> bool:
+    """Whether a window of the roof is cheaper `after`, and has fewer corners."""
+    beyond = owners_beyond(drawn, window.box)
+    was, now = (price_of(state, beyond, window, problem) for state in (before, after))
+    return was is not None and now is not None and now[0] < was[0] and now[1] < was[1]
+
+
+def owners_beyond(drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
+    """The planes, by volume and number, that show beyond a window too."""
+    x0, y0, x1, y1 = box.bounds
+    x, y = drawn.places.T
+    out = (x < x0) | (x > x1) | (y < y0) | (y > y1)
+    beside = drawn.beside[out[drawn.edges].any(axis=1)]
+    return {(k, p) for k, p in drawn.owner[np.unique(beside[beside >= 0])].tolist()}
+
+
+def whole_box(problem: Problem) -> shapely.Polygon:
+    """The window that holds all of the roof."""
+    return shapely.box(*problem.outline.bounds)
+
+
+def box_of(repair: Repair, state: State, problem: Problem) -> shapely.Polygon:
+    """The window of a repair: around the sides that move and the volumes whose planes change."""
+    volumes, _, plan, scene = problem[:4]
+    owners = {k for _, terms in repair.equations for _, (k, _) in terms}
+    quads = [quad_of(volumes[k], state.sides[k], plan, scene) for k in owners if k > 0]
+    places = [shapely.get_coordinates(quad) for quad in quads]
+    for (k, edge), side in repair.sides.items():
+        c, s = scene.turn[int(volumes[k, DIRECTION])]
+        for j, own_edge in on_one_line(volumes, state.sides, k, edge):
+            for line in (state.sides[j][own_edge], side):
+                own = [line if e == own_edge else other for e, other in enumerate(state.sides[j])]
+                ends = corners_of(own)[list(ENDS[own_edge])]
+                places.append(plan.frame.xy_local(ends @ np.array([[c, s], [-s, c]])))
+    if not places or 0 in owners:
+        return whole_box(problem)
+    low, high = (end(np.concatenate(places), axis=0) for end in (np.min, np.max))
+    return shapely.box(*(low - MARGIN_M), *(high + MARGIN_M))
+
+
+def quads_of(state: State, problem: Problem) -> list[shapely.Polygon]:
+    """The plans of all volumes but the base, in local coordinates."""
+    volumes, _, plan, scene = problem[:4]
+    return [quad_of(volumes[k], state.sides[k], plan, scene) for k in range(1, len(volumes))]
+
+
+def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Problem) -> Window:
+    """What of the roof, whose volumes have these `quads`, lies in a box of local coordinates."""
+    scene, xy, order = problem.scene, problem.xy, problem.order
+    numbers = np.array([0, *(1 + np.flatnonzero(shapely.intersects(quads, box)))], int)
+    x0, y0, x1, y1 = box.bounds
+    first, last = np.searchsorted(xy[:, 0], (x0, x1), sorter=order)
+    strip = np.sort(order[first:last])
+    inside = strip[(xy[strip, 1] >= y0) & (xy[strip, 1] <= y1)]
+    columns = np.ascontiguousarray
+    count = min(len(inside), MOST_POINTS)
+    seen = scene._replace(
+        U=columns(scene.U[:, inside]), V=columns(scene.V[:, inside]), z=scene.z[inside], n=len(inside)
+    )
+    judges = inside[np.arange(count) * len(inside) // max(count, 1)]
+    outline = problem.outline
+    within = polygons_of(outline if box.covers(outline) else shapely.intersection(outline, box))
+    weight = len(inside) / max(count, 1)
+    return Window(box, numbers, within, seen, xy[judges], scene.z[judges], weight)
+
+
+def price_of(state: State, beyond: set[tuple[int, int]], window: Window, problem: Problem) -> tuple[float, int] | None:
+    """What a window of a roof costs (points), with the parameters that show in it or `beyond`, and
+    its corners.
+
+    None where no plan comes out.
+    """
+    plan, scene, numbers = problem.plan, problem.scene, window.numbers
+    volumes, planes = problem.volumes[numbers], [state.planes[k] for k in numbers]
+    sides = [state.sides[k] for k in numbers]
+    shown, corners, height = set(beyond), 0, np.full(len(window.z), -np.inf)
+    for outline in window.outlines:
+        regions = regions_of(volumes, planes, sides, plan, outline, window.scene, problem.base)
+        drawn = draw_plan(regions, volumes, planes, outline, plan, scene)
+        if drawn is None:
+            return None
+        corners += drawn.corners
+        shown |= {(int(numbers[k]), int(p)) for k, p in drawn.owner[drawn.shown]}
+        raise_heights(height, regions, volumes, planes, window, plan)
+    rows = np.array([state.planes[k].rows[p] for k, p in sorted(shown)])
+    turns = scene.turn[problem.volumes[[k for k, _ in sorted(shown)], DIRECTION].astype(int)]
+    misfit = window.weight * float(misfits(window.z, height, scene).sum())
+    units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * corners
+    return misfit + scene.evidence * units, corners
+
+
+def raise_heights(
+    height: np.ndarray, regions: list, volumes: np.ndarray, planes: list[Planes], window: Window, plan: Plan
+) -> None:
+    """Raise the `height` (n,) over a window's points to that of the volumes in whose regions they
+    lie."""
+    x, y = window.xy.T
+    for volume, own, polygons in zip(volumes, planes, regions, strict=True):
+        rows = own.rows[np.isfinite(own.rows[:, 2])]
+        rows = local_planes(rows, window.scene.turn[int(volume[DIRECTION])], plan)
+        for polygon in polygons:
+            inside = shapely.contains_xy(polygon, x, y)
+            z = (window.xy[inside] @ rows[:, :2].T + rows[:, 2]).min(axis=1)
+            height[inside] = np.maximum(height[inside], z)
+
+
+def repaired(state: State, repair: Repair, window: Window, problem: Problem) -> State | None:
+    """The roof after a repair; None where its points ask too much for it."""
+    most = MOST_SAVED * problem.scene.evidence
+    sides, planes, basis, cost = state
+    for (k, edge), side in repair.sides.items():
+        own = int(np.flatnonzero(window.numbers == k)[0])
+        volumes = problem.volumes[window.numbers]
+        if dearer(volumes, own, edge, sides[k][edge], side, window.scene) > most:
+            return None
+        sides = with_line_moved(problem.volumes, sides, k, edge, side)
+    if not repair.equations:
+        return State(sides, planes, basis, cost)
+    found = equalised(repair, state, most, problem)
+    return None if found is None else State(sides, *found)
+
+
+def equalised(
+    repair: Repair, state: State, most: float, problem: Problem
+) -> tuple[list[Planes], np.ndarray, float] | None:
+    """Planes fitted under a repair's equations too, the unknowns left free, the points' cost.
+
+    None where points cost over `most` more.
+    """
+    members, start = problem.agreement.members, problem.agreement.start
+    rows = []
+    for place, terms in repair.equations:
+        if any(k not in members for _, (k, _) in terms):
+            return None
+        at = np.append((place - problem.plan.frame.origin[:2]) @ problem.plan.frame.rotation.T, 1.0)
+        rows.append(sum(weight * (at @ members[k].common[p]) for weight, (k, p) in terms))
+    equations = np.array(rows) @ state.basis
+    if not np.abs(equations).max() > LEFT_OVER:
+        return None
+    free = state.basis @ null_space(equations)
+    if not free.shape[1]:
+        return None
+    known = [replace(member, rows=state.planes[k].rows) for k, member in members.items()]
+    found = fitted(known, free, start, problem.scene)
+    if not math.isfinite(found.cost) or found.cost > state.cost + most:
+        return None
+    planes = list(state.planes)
+    for k, own in zip(members, found.rows, strict=True):
+        # as well known as before: that planes meet somewhere does not say how well it is known
+        planes[k] = replace(planes[k], rows=own)
+    return planes, free, found.cost
+
+
+def with_line_moved(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int, line: Side) -> list[list[Side]]:
+    """All sides, with those on the line of side `edge` of volume k moved onto another `line`."""
+    moved = [list(own) for own in sides]
+    for j, other in on_one_line(volumes, sides, k, edge):
+        moved[j][other] = replace(line, sigma=sides[j][other].sigma)
+    return moved
+
+
+def on_one_line(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> list[tuple[int, int]]:
+    """The sides, as (volume, edge), on the line of side `edge` of volume k and off the outline."""
+    was = sides[k][edge]
+    alike = np.flatnonzero(volumes[1:, DIRECTION] == volumes[k, DIRECTION]) + 1
+    every = [(int(j), e) for j in alike for e in (edge & 2, edge | 1)]
+    return [(j, e) for j, e in every if is_one_line(sides[j][e], was)]
+
+
+def is_one_line(one: Side, other: Side) -> bool:
+    near = abs(one.at - other.at) < ONE_LINE_M and abs(one.lean - other.lean) < ONE_LINE_M
+    return near and not one.anchored
+
+
+def dearer(volumes: np.ndarray, k: int, edge: int, was: Side, side: Side, scene: Scene) -> float:
+    """How much more the points of a `scene` cost where `edge` of volume k lies on the line `side`."""
+    axis, direction, sign = edge // 2, int(volumes[k, DIRECTION]), -1.0 if edge % 2 == 0 else 1.0
+    x, y = (scene.U[direction], scene.V[direction])[:: 1 if axis == 0 else -1]
+    within = (y >= volumes[k, V0 - 2 * axis]) & (y <= volumes[k, V1 - 2 * axis])
+    within &= sign * (x - volumes[k, U0 + (edge ^ 1)]) >= 0.0
+    before, after = (within & (sign * (x - line.at - line.lean * y) <= 0.0) for line in (was, side))
+    everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
+    gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
+    return float(gain[after].sum() - gain[before].sum())

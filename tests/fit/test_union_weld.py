@@ -1,0 +1,92 @@
+"""Welding: a repair is kept where the roof gets cheaper, judged in a window as on the whole roof; outlines never move."""
+
+import importlib
+
+import numpy as np
+import pytest
+
+from hiproof.compose import compose
+from hiproof.fit import union
+from hiproof.fit.union import fit_building
+from hiproof.fit.union.sides import Side
+from hiproof.simulate import Defects, ScanSettings, random_compound, scan_solids
+
+weld = importlib.import_module("hiproof.fit.union.weld")
+
+
+def scanned(kind, seed):
+    """Points and outline of a simulated compound in its local frame, 5 points a square metre."""
+    roof = random_compound(np.random.default_rng(seed), kind).roof
+    settings = ScanSettings(density=5.0, defects=Defects.none())
+    cloud = scan_solids([compose(roof, -3.0)], np.random.default_rng(seed), settings)
+    return cloud.points[cloud.points[:, 2] > -2.0], roof.outline
+
+
+def before_welding(monkeypatch, kind, seed):
+    """What `weld` is called with for a compound: its problem and the roof as the search left it."""
+    seen = {}
+
+    def spy(volumes, sides, agreement, outline, plan, scene, base):
+        seen["problem"] = weld.problem_of(volumes, agreement, outline, plan, scene, base)
+        seen["state"] = weld.state_before(sides, seen["problem"])
+        return weld.weld(volumes, sides, agreement, outline, plan, scene, base)
+
+    monkeypatch.setattr(union, "weld", spy)
+    points, outline = scanned(kind, seed)
+    fit = fit_building(points, outline)
+    assert fit.outline.equals(outline)
+    return seen["problem"], seen["state"]
+
+
+def price(state, problem, box=None):
+    """Price and corners of a roof, in a window or as a whole."""
+    box = problem.outline.envelope if box is None else box
+    window = weld.window_of(box, weld.quads_of(state, problem), problem)
+    drawn = weld.draw(state, problem)
+    return weld.price_of(state, weld.owners_beyond(drawn, box), window, problem)
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("L", 1), ("dormered", 2), ("two_level", 3), ("T", 4)])
+def test_a_welded_roof_costs_no_more_and_welding_again_changes_nothing(monkeypatch, kind, seed):
+    problem, state = before_welding(monkeypatch, kind, seed)
+    volumes, outline, plan, scene, agreement, base, *_ = problem
+    sides, planes = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
+    after = state._replace(sides=sides, planes=planes)
+    assert price(after, problem) <= price(state, problem)
+    again, _ = weld.weld(volumes, sides, agreement._replace(planes=planes), outline, plan, scene, base)
+    assert again == sides
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("dormered", 2), ("dormered", 5), ("T", 4)])
+def test_a_window_judges_a_moved_side_as_the_whole_roof_does(monkeypatch, kind, seed):
+    problem, state = before_welding(monkeypatch, kind, seed)
+    compared = 0
+    for k in range(1, len(problem.volumes)):
+        for edge, side in enumerate(state.sides[k]):
+            if not side.anchored:
+                line = Side(side.at + 0.4, side.lean, False, side.sigma)
+                moved = weld.with_line_moved(problem.volumes, state.sides, k, edge, line)
+                after = state._replace(sides=moved)
+                box = weld.box_of(weld.Repair(0.4, {(k, edge): line}), state, problem)
+                in_window, on_roof = (
+                    np.subtract(price(after, problem, b), price(state, problem, b)) for b in (box, None)
+                )
+                assert in_window == pytest.approx(on_roof, abs=1e-6)
+                compared += 1
+    assert compared
+
+
+def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):
+    """Where a welded side is moved by 2 cm, welding leaves no more corners than there were."""
+    problem, state = before_welding(monkeypatch, "dormered", 2)
+    volumes, outline, plan, scene, agreement, base, *_ = problem
+    sides, planes = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
+    settled = state._replace(sides=sides, planes=planes)
+    for k in range(1, len(volumes)):
+        for edge, side in enumerate(sides[k]):
+            if not side.anchored and np.isfinite(side.sigma):
+                line = Side(side.at + 0.02, side.lean, False, side.sigma)
+                apart = weld.with_line_moved(volumes, sides, k, edge, line)
+                back, _ = weld.weld(volumes, apart, agreement._replace(planes=planes), outline, plan, scene, base)
+                moved = state._replace(sides=back, planes=planes)
+                assert price(moved, problem)[1] <= price(settled, problem)[1]
