@@ -154,12 +154,12 @@ def test_a_footprint_in_a_forest_holds_no_roof_and_says_so(tmp_path):
     assert "no roof seen: its points are leaves" in rows["wood"]["detail"]
 
 
-def test_a_footprint_on_a_lawn_holds_no_roof_and_says_so(tmp_path):
+def test_a_footprint_on_a_lawn_holds_no_building_and_says_so(tmp_path):
     town = make_town(1)
     lawn = shapely.box(85000, 446000, 85007, 446010)
     with pytest.warns(InputWarning):
         rows = run(tmp_path, town.xyz, np.ones(len(town.xyz)), {"lawn": lawn})
-    assert rows["lawn"]["status"] == "no_roof"
+    assert rows["lawn"]["status"] == "no_building"
     assert "its points are ground" in rows["lawn"]["detail"]
 
 

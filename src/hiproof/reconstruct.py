@@ -24,6 +24,7 @@ def reconstruct(
     terrain: Terrain | None = None,
     settings: Settings | None = None,
     id: str = "building",
+    ground: np.ndarray | None = None,
 ) -> Building:
     """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits).
 
@@ -31,6 +32,7 @@ def reconstruct(
     and those that are nowhere on Earth (not finite, 3.4e38) are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
     beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
     `hiproof.Terrain`; without one the ground is assumed below the lowest point, or at the foot of walls that are seen.
+    ground: (m, 3) ground points in and around the footprint, by which bare ground inside it is cut out (`footprint_trust`).
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError
     for points of another shape, for a footprint, a terrain or settings of another kind, and for settings that ask the network
     where the extra `network` is not installed.
@@ -50,13 +52,19 @@ def reconstruct(
         return dataclasses.replace(building, status=status, detail=status.value)
     frame = LocalFrame.around(points)
     points, outline = frame.to_local(points), stages.to_local(outline, frame)
+    site = stages.look_at_ground(points, outline, ground, frame, terrain, settings)
+    if site.is_empty:
+        return dataclasses.replace(building, status=Status.NO_BUILDING, detail=site.remark)
+    points, outline = site.points, site.outline
     recognised = stages.recognise(points, settings)
     building = dataclasses.replace(building, recognised=recognised.types)
     fitted = stages.fit(points, outline, recognised, settings)
     if not fitted.parts:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
     roof = Roof(fitted.parts, fitted.outline, frame)
-    ground = stages.find_ground(fitted.outline, points, frame, terrain, roof)
-    roof, solid, fitted = stages.solid_or_simpler(roof, points, ground, fitted, settings)
-    building = stages.judge(building, roof, solid, points, fitted, ground, settings)
-    return stages.remarked(building, of_footprint)
+    base = stages.find_ground(fitted.outline, points, frame, terrain, roof)
+    roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
+    building = stages.judge(building, roof, solid, points, fitted, base, settings)
+    for text in (of_footprint, site.remark):
+        building = stages.remarked(building, text)
+    return building

@@ -156,6 +156,20 @@ class ReconstructSettings:
         choices=("auto", "off"),
         option="--align",
     )
+    footprint_trust: str = setting(
+        "points",
+        "points: bare ground inside a footprint (a yard that is no hole, a wing pulled down) is cut out of it; full: it is "
+        "roofed over, and a remark says so",
+        choices=("points", "full"),
+        option="--footprint-trust",
+    )
+    empty_footprints: str = setting(
+        "skip",
+        "skip: a footprint whose points lie on the ground gets no model and the status no_building; model: it gets the model "
+        "of whatever points it has",
+        choices=("skip", "model"),
+        option="--empty-footprints",
+    )
     poor_share: float = setting(0.5, "a model with a smaller share of points within 0.2 m is called poor", "", 0.0, 1.0)
 
 

@@ -23,6 +23,7 @@ from .status import Doubt, Status
 if TYPE_CHECKING:
     from .evaluate.metrics import Inner
     from .fit.align import Shift
+    from .fit.site import Site
     from .read.terrain import Terrain
 
 LIKELY = 0.05
@@ -260,6 +261,23 @@ def simplified_in_pieces(xy: np.ndarray, tolerance_m: float) -> np.ndarray:
         shapely.simplify(pieces, tolerance_m, preserve_topology=False), return_index=True
     )
     return simple[np.append(piece[1:] == piece[:-1], True)]  # each piece begins where the one before it ends
+
+
+def look_at_ground(
+    points: np.ndarray,
+    outline: shapely.Polygon | None,
+    ground: np.ndarray | None,
+    frame: LocalFrame,
+    terrain: Terrain | None,
+    settings: Settings,
+) -> Site:
+    """Points and outline, both in the local frame, without bare ground inside the outline; or that nothing stands there."""
+    from .fit.site import Site, look_at_ground
+
+    if outline is None or (terrain is None and ground is None):
+        return Site(points, outline)
+    ground = np.zeros((0, 3)) if ground is None else frame.to_local(finite(ground))
+    return look_at_ground(points, outline, ground, frame, terrain, settings)
 
 
 def remarked(building: Building, remark: str) -> Building:

@@ -11,6 +11,7 @@ class Status(Enum):
     SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a simpler one stands in for it"
     FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
+    NO_BUILDING = "no model: nothing stands on the footprint, its points lie on the ground"
     BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"
     NOT_BUILT = "no model: the parameters given make no valid solid; mend them"
     LEFT_OUT = "no model: left out, as its override says"
@@ -39,6 +40,7 @@ class Doubt(Enum):
     ASSUMED_GROUND = "its ground is assumed"
     POINTS_OF_OTHER_CLASSES = "points of other classes lie high above the ground"
     BARE_GROUND = "its ground lies bare"
+    BARE_GROUND_INSIDE = "of bare ground inside its footprint"
     GROUND_UNDER_ROOF = "ground points lie under the roof"
 
     @property

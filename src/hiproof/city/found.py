@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import shapely
@@ -17,11 +17,18 @@ FOOTPRINT_ODDS = 0.7
 
 @dataclass(frozen=True)
 class FoundRoof:
-    """`points` (n, 3) of the roof; `remark` says what hides it, `is_seen` whether enough of it is there to be modelled."""
+    """`points` (n, 3) of the roof; `remark` says what hides it, `is_seen` whether enough of it is there to be modelled;
+    `ground` (m, 3) are points on the ground inside the outline."""
 
     points: np.ndarray
     remark: str = ""
     is_seen: bool = True
+    ground: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+
+    @property
+    def is_ground(self) -> bool:
+        """Whether the points that are no roof are the ground."""
+        return self.remark.endswith("ground")
 
 
 def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False) -> FoundRoof:
@@ -42,13 +49,14 @@ def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_
     is_roof[is_high] = roof_points(near[is_high], FOOTPRINT_ODDS if is_asked_for else 0.0)
     chosen, _ = one_a_voxel(near[inside])
     roof, high = is_roof[inside][chosen].mean(), is_high[inside][chosen].mean()
+    ground = near[inside & ~is_high]
     what = "leaves" if high > 0.5 * (1 + roof) else "ground"
     if roof < HARDLY:
-        return FoundRoof(near[inside], f"no roof seen: its points are {what}", False)
+        return FoundRoof(near[inside], f"no roof seen: its points are {what}", False, ground)
     if roof < MOSTLY:
         remark = f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, the rest {what}"
-        return FoundRoof(near[inside & is_roof], remark)
-    return FoundRoof(near[inside & is_roof])
+        return FoundRoof(near[inside & is_roof], remark, ground=ground)
+    return FoundRoof(near[inside & is_roof], ground=ground)
 
 
 def found_alone(near: np.ndarray, area: shapely.Geometry) -> FoundRoof:

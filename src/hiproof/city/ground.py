@@ -85,7 +85,7 @@ class LowestAround:
     Where ten cells or more are known the second lowest is taken: one low point is noise, two are ground.
     """
 
-    source = "lowest points around the building"
+    source, is_guess = "lowest points around the building", True
 
     def __init__(self, cells: Cells, box: np.ndarray):
         self.cells, self.box = cells, box
@@ -101,6 +101,7 @@ class WhereSeen:
 
     def __init__(self, terrain: Terrain, is_seen: Callable[[], bool]):
         self.terrain, self.is_seen, self.source = terrain, is_seen, terrain.source
+        self.is_guess = getattr(terrain, "is_guess", False)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """The terrain's height (n,) at `xy_world` (n, 2), NaN where it knows none."""

@@ -45,6 +45,13 @@ class OtherPoints:
         return min(1.0, len(cells) * CELL_M2 / self.area.area)
 
 
+def bare_ground(points: OtherPoints) -> np.ndarray:
+    """The ground points (k, 3) in whose cells nothing of another class lies high: no leaves, no roof without a class."""
+    if not len(points.high):
+        return points.ground
+    return points.ground[~np.isin(cell_numbers(points.ground), cells_of(points.high))]
+
+
 def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
     """The detail of a building without points of the building `classes`, empty where nothing else was seen either."""
     bare = cells_of(points.ground)
@@ -103,5 +110,10 @@ def within(area: shapely.Geometry, points: np.ndarray) -> np.ndarray:
 
 def cells_of(points: np.ndarray) -> np.ndarray:
     """The whole-metre cells (k,) that points (n, 3) lie in, each once, as one number."""
+    return np.unique(cell_numbers(points))
+
+
+def cell_numbers(points: np.ndarray) -> np.ndarray:
+    """The whole-metre cell (n,) of each of the points (n, 3), as one number."""
     column, row = np.floor(points[:, :2]).astype(np.int64).T
-    return np.unique(column * ROWS + row)
+    return column * ROWS + row

@@ -35,7 +35,7 @@ from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_alone, found_roof
 from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
-from .other_classes import OtherPoints, ground_under_roof, roof_of_other_classes, why_no_points
+from .other_classes import OtherPoints, bare_ground, ground_under_roof, roof_of_other_classes, why_no_points
 from .outlines import row_outline
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, job_of_footprint, load_plan, neighbourhood
@@ -141,13 +141,27 @@ class Surroundings:
         box = neighbourhood(job, self.plan.terrain_reach_m)
         return doubt_of_terrain(self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area))
 
+    def other_points(self, job: Job) -> OtherPoints:
+        """What lies inside the building's area beside the points of its class."""
+        box = neighbourhood(job, 0.0)
+        terrain = TerrainChain(self.grounds_of(job))
+        return OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
+
+    def bare(self, job: Job, found: FoundRoof) -> np.ndarray:
+        """Points (n, 3) of bare ground inside the building's area: those of the ground class where nothing of another class
+        stands over them, and those that were told from the roof by their height."""
+        if job.area.is_empty or job.footprint is None:
+            return found.ground
+        if self.plan.settings.read.by_class:
+            return bare_ground(self.other_points(job))
+        classified = self.ground.inside(neighbourhood(job, 0.0))
+        return np.concatenate([found.ground, classified])
+
     def looked_at(self, building: Building, job: Job, roof: np.ndarray) -> Building:
         """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
         if not self.plan.settings.read.by_class or job.area.is_empty:
             return building
-        box = neighbourhood(job, 0.0)
-        terrain = TerrainChain(self.grounds_of(job))
-        points = OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
+        points = self.other_points(job)
         if building.status is Status.NO_POINTS:
             why = why_no_points(points, self.plan.settings.read.building_classes)
             return dataclasses.replace(building, detail=why) if why else building
@@ -229,17 +243,13 @@ def solve_one(
     try:
         job, moved = surroundings.moved(job)
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
-        if not found.is_seen and override is None:
-            return fragments(not_seen(job, found.remark), plan.names_of(job), plan.head)
+        if not found.is_seen and override is None and not (found.is_ground and keeps_empty(plan)):
+            return fragments(not_seen(job, found), plan.names_of(job), plan.head)
         points = without_repeats(found.points)  # first of all: a footprint is put where points are many
         used = thin_to_count(points, most)
-        known = (
-            used,
-            job.footprint,
-            surroundings.terrain_of(job),
-            plan.settings.replace({"reconstruct": {"align": "off"}}),
-        )
-        building = reconstruct(*known, id=job.id) if override is None else overridden(override, *known, id=job.id)
+        aligned = plan.settings.replace({"reconstruct": {"align": "off"}})
+        known = used, job.footprint, surroundings.terrain_of(job), aligned, job.id, surroundings.bare(job, found)
+        building = reconstruct(*known) if override is None else overridden(override, *known)
         if len(used) < len(points):
             building = told_of_thinning(building, len(used), len(points))
         building = remarked(remarked(building, moved), found.remark)
@@ -285,9 +295,15 @@ def doubt_of_ground(building: Building) -> str:
     return f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over ground are guesses"
 
 
-def not_seen(job: Job, detail: str) -> Building:
+def keeps_empty(plan: WorkPlan) -> bool:
+    """Whether a footprint on which nothing stands is to have a model."""
+    return plan.settings.reconstruct.empty_footprints == "model"
+
+
+def not_seen(job: Job, found: FoundRoof) -> Building:
     """A building whose outline holds no roof, as far as its points tell."""
-    return with_input(Building(job.id, Status.NO_ROOF, detail), job)
+    status = Status.NO_BUILDING if found.is_ground and job.footprint else Status.NO_ROOF
+    return with_input(Building(job.id, status, found.remark), job)
 
 
 def with_input(building: Building, job: Job) -> Building:

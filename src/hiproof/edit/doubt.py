@@ -15,7 +15,7 @@ POOR_SHARE = 0.9  # of points within 0.2 m of the roof
 CLOSE_CALL = 0.2  # by which the most probable type leads
 LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
 LOOSE_M = 0.3  # standard deviation of a part that few points support
-UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT)
+UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT, Status.NO_BUILDING)
 REMARKED = 0.3  # for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
 
 
@@ -51,7 +51,7 @@ def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
     """An outcome that the run itself calls doubtful."""
     unsure = {status.code: status for status in UNSURE}
     status = unsure.get(record.get("status", ""))
-    return None if status is None else (0.5, status.value.split(":")[0].split(",")[0])
+    return None if status is None else (0.5, status.value.removeprefix("no model: ").split(":")[0].split(",")[0])
 
 
 def remarked(record: Mapping[str, Any]) -> tuple[float, str] | None:

@@ -12,6 +12,9 @@ union          `fit_building`: a roof as a union of few volumes
 outline        the outline of a building that comes without one
 align          how far a footprint lies beside its roof
 registration   how far all footprints of a data set do
+site           a footprint against the ground: the two that follow
+bare_ground    yards and lost wings inside a footprint, cut out
+standing       whether anything stands on a footprint
 
 `fit_roof` is imported on first use, because it brings the compiler along.
 """

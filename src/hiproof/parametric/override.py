@@ -192,6 +192,7 @@ def overridden(
     terrain: Any = None,
     settings: Settings | None = None,
     id: str = "building",
+    ground: np.ndarray | None = None,
 ) -> Building:
     """The building reconstructed as its override says; arguments and outcome as of `hiproof.reconstruct`."""
     points, settings = as_xyz(points), settings or Settings()
@@ -202,7 +203,7 @@ def overridden(
         if override.parts is not None or override.block_height is not None:
             found = as_given(override, points, building, terrain, settings)
         else:
-            found = fitted_within(override, points, footprint, terrain, settings, id)
+            found = fitted_within(override, points, footprint, terrain, settings, id, ground)
     except HiproofError as error:
         found = dataclasses.replace(building, status=Status.NOT_BUILT, detail=str(error))
     if lies_under(found, override.z_ground):
@@ -294,13 +295,16 @@ def fitted_within(
     terrain: Any,
     settings: Settings,
     id: str,
+    ground: np.ndarray | None,
 ) -> Building:
     """The building fitted with what is given held."""
     from ..reconstruct import reconstruct
 
     types = override.types or ((override.type,) if override.type else ())
     changes = {"types": types} if types else {}
-    building = reconstruct(points, footprint, terrain, settings.replace({"fit": changes}), id)
+    # whoever says how a building is says that it stands
+    settings = settings.replace({"fit": changes, "reconstruct": {"empty_footprints": "model"}})
+    building = reconstruct(points, footprint, terrain, settings, id, ground)
     if building.built is None:
         return building
     changed = False

@@ -41,6 +41,17 @@ class TerrainChain:
         """Height (n,) at `xy_world` (n, 2), NaN where none knows."""
         return self.heights_and_sources(xy_world)[0]
 
+    def known_heights(self, xy_world: np.ndarray, fewest: int) -> np.ndarray:
+        """Heights (n,) of the first terrain that knows so many of `xy_world` (n, 2) and does not guess (by a true `is_guess`);
+        NaN where there is none."""
+        for terrain in self.terrains:
+            heights = (
+                np.full(len(xy_world), np.nan) if getattr(terrain, "is_guess", False) else terrain.height_at(xy_world)
+            )
+            if np.isfinite(heights).sum() >= fewest:
+                return heights
+        return np.full(len(xy_world), np.nan)
+
     def heights_and_sources(self, xy_world: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
         """Heights (n,) and the sources that answered at least once, by preference: what a building's output names."""
         xy = np.asarray(xy_world, float)[:, :2]

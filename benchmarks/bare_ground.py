@@ -1,0 +1,349 @@
+"""Is bare ground inside footprints found, and are footprints without a building, and are sound buildings left alone?
+
+usage: python -m benchmarks.bare_ground [--parity even|odd] [--count 200] [--densities 2 5 15]
+
+Houses are scanned by simulation over sloping ground. Those with a yard of 10 to 60 m2 that is no hole in the footprint (in
+the middle, at a side, at a corner where a wing was pulled down) should have it cut out; sound ones of many kinds should not:
+glass roofs, passages, canopies, trees, dormers, lost points, footprints half a metre off, low sheds. Footprints over bare
+ground with rubble, bushes and trees should be found to have no building; houses, sheds and carports from 2 m on, green
+roofs, houses on slopes, and decks of garages below ground should not (the last are level with the ground, and are). Each kind
+is printed by density, with the classes of real clouds (3 % of them wrong) and without classes. Constants are chosen on even
+seeds and reported on odd ones.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from hiproof.city.found import found_roof
+from hiproof.fit import site as fit_site
+from hiproof.frames import LocalFrame
+from hiproof.read.thin import thin_to_grid
+from hiproof.settings import Settings
+from hiproof.simulate.relief import Plane
+from hiproof.simulate.scanner import Scan, ScanSettings, scan_scene
+from hiproof.simulate.scene import SOURCE_GROUND, SOURCE_ROOF, SOURCE_TREE, SOURCE_WALL, Body, Defects, scene_of
+from hiproof.simulate.shapes import box
+
+AROUND_M = 9.0  # of ground that is scanned around a footprint
+WRONG_CLASS = 0.03  # share of roof and ground points that have another class
+
+
+@dataclass
+class Site:
+    """A footprint, what stands on it and around it; `true` is the part of the footprint that is built on."""
+
+    footprint: shapely.Polygon
+    true: shapely.Geometry
+    bodies: list[Body]
+    crowns: np.ndarray = field(default_factory=lambda: np.empty((0, 5)))
+    slope: Plane = field(default_factory=Plane)
+    change: Callable[[np.random.Generator, Scan], Scan] | None = None
+    defects: Defects = field(default_factory=Defects.none)
+
+
+def rectangle_body(rect: tuple[float, float, float, float], eave: float, rise: float, ground: Plane) -> Body:
+    """A house of that plan (xmin, ymin, xmax, ymax): flat, or a gable along its longer side."""
+    x0, y0, x1, y1 = rect
+    centre, size = np.array([(x0 + x1) / 2, (y0 + y1) / 2]), (x1 - x0, y1 - y0)
+    kappa = 0.0 if size[0] >= size[1] else math.pi / 2
+    z = float(ground.height_at(centre)) + eave
+    return Body(box(centre, (max(size), min(size)), z + rise, kappa, rise))
+
+
+def random_slope(rng: np.random.Generator, steepest: float = 0.06) -> Plane:
+    return Plane(*rng.uniform(-steepest, steepest, 2))
+
+
+def house(rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0)) -> tuple[np.ndarray, float, float]:
+    """Size (2,), eave and rise of a house."""
+    size = np.array([rng.uniform(10.0, 20.0), rng.uniform(9.0, 16.0)])
+    return size, rng.uniform(*eave), rng.choice([0.0, rng.uniform(1.0, 3.5)])
+
+
+def with_yard(rng: np.random.Generator, place: str) -> Site:
+    """A house around a yard of 10 to 60 m2: `place` is court, side or corner."""
+    size, eave, rise = house(rng, (2.8, 7.0))
+    area, ratio = rng.uniform(10.0, 60.0), rng.uniform(0.6, 1.7)
+    yard = np.minimum([math.sqrt(area * ratio), math.sqrt(area / ratio)], size - (4.5 if place == "court" else 3.0))
+    inner = rng.uniform(2.0, np.maximum(size - yard - 2.0, 2.0))
+    low = inner * {"court": (1.0, 1.0), "side": (1.0, 0.0), "corner": (0.0, 0.0)}[place]
+    (a, b), (c, d), (w, h) = low, low + yard, size
+    blocks = [(0, d, w, h), (0, 0, a, d), (c, 0, w, d), (a, 0, c, b)]
+    ground = random_slope(rng)
+    bodies = [
+        rectangle_body(r, eave + rng.uniform(-0.5, 0.5), rise if min(r[2] - r[0], r[3] - r[1]) > 4 else 0.0, ground)
+        for r in blocks
+        if r[2] - r[0] > 0.05 and r[3] - r[1] > 0.05
+    ]
+    footprint = shapely.box(0, 0, w, h)
+    return Site(footprint, footprint - shapely.box(a, b, c, d), bodies, slope=ground)
+
+
+def plain(rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0), steep: float = 0.06, **more) -> Site:
+    size, eave_m, rise = house(rng, eave)
+    footprint, ground = shapely.box(0, 0, *size), random_slope(rng, steep)
+    return Site(footprint, footprint, [rectangle_body((0, 0, *size), eave_m, rise, ground)], slope=ground, **more)
+
+
+def lost_points(rng: np.random.Generator) -> Site:
+    return plain(rng, defects=Defects(0, 0, 0, 0, 0, missing_strip=0.7, partial=0.7, swath_edge=0.3, outliers=0.01))
+
+
+def dormers(rng: np.random.Generator) -> Site:
+    """Boxes on a roof."""
+    site = plain(rng)
+    x0, y0, x1, y1 = site.footprint.bounds
+    for _ in range(rng.integers(1, 4)):
+        at = rng.uniform((x0 + 2, y0 + 2), (x1 - 2, y1 - 2))
+        top = float(site.bodies[0].piece.height_at(at[None])[0]) + rng.uniform(0.5, 1.8)
+        site.bodies.append(Body(box(at, tuple(rng.uniform(1.0, 3.0, 2)), top, 0.0)))
+    return site
+
+
+def sunk(site: Site, area: shapely.Geometry, share: float) -> Site:
+    """The site where of the roof points over `area` a `share` goes through it and meets the ground."""
+
+    def change(rng: np.random.Generator, scan: Scan) -> Scan:
+        inside = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
+        through = inside & (rng.random(len(scan)) < share)
+        points, source = scan.points.copy(), scan.source.copy()
+        points[through, 2] = site.slope.height_at(points[through, :2]) + rng.normal(0, 0.03, through.sum())
+        source[through] = SOURCE_GROUND
+        return Scan(points, scan.label, source)
+
+    site.change = change
+    return site
+
+
+def glass(rng: np.random.Generator) -> Site:
+    """A glass roof over a court: most of the light goes through, and frames and some panes return."""
+    site = plain(rng)
+    x0, y0, x1, y1 = site.footprint.bounds
+    size = rng.uniform(3.0, 7.0, 2)
+    low = rng.uniform((x0 + 1, y0 + 1), np.maximum((x1, y1) - size - 1, (x0 + 1.1, y0 + 1.1)))
+    return sunk(site, shapely.box(*low, *(low + size)), rng.uniform(0.3, 0.85))
+
+
+def passage(rng: np.random.Generator) -> Site:
+    """A way through a house, whose ground is seen from aslant for some metres at either end, under the roof."""
+    site = plain(rng)
+    x0, y0, x1, y1 = site.footprint.bounds
+    at, width, deep = rng.uniform(x0 + 2, x1 - 5), rng.uniform(2.5, 4.0), rng.uniform(1.0, 2.5)
+    ends = shapely.union(shapely.box(at, y0, at + width, y0 + deep), shapely.box(at, y1 - deep, at + width, y1))
+    return with_ground_under(site, ends, rng.uniform(0.3, 0.8))
+
+
+def canopy(rng: np.random.Generator) -> Site:
+    """A roof that reaches over a yard without walls: ground is seen below it along the open side."""
+    site = plain(rng, (2.3, 4.0))
+    x0, y0, x1, _ = site.footprint.bounds
+    return with_ground_under(site, shapely.box(x0, y0, x1, y0 + rng.uniform(1.0, 3.0)), rng.uniform(0.2, 0.7))
+
+
+def with_ground_under(site: Site, area: shapely.Geometry, share: float) -> Site:
+    """The site with ground points under its roof over `area`, a `share` of the roof's density."""
+
+    def change(rng: np.random.Generator, scan: Scan) -> Scan:
+        above = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
+        seen = scan.chosen(above & (rng.random(len(scan)) < share))
+        xy = seen.points[:, :2] + rng.normal(0, 0.3, (len(seen), 2))
+        points = np.column_stack([xy, site.slope.height_at(xy) + rng.normal(0, 0.03, len(xy))])
+        source = np.concatenate([scan.source, np.full(len(seen), SOURCE_GROUND, np.int8)])
+        return Scan(np.concatenate([scan.points, points]), np.concatenate([scan.label, seen.label]), source)
+
+    site.change = change
+    return site
+
+
+def crowns_around(rng: np.random.Generator, footprint: shapely.Polygon, count: int, inside: bool) -> np.ndarray:
+    x0, y0, x1, y1 = footprint.bounds
+    rows = []
+    for _ in range(count):
+        at = rng.uniform((x0, y0), (x1, y1)) if inside else rng.choice([(x0, y0), (x1, y1), (x0, y1), (x1, y0)])
+        radius, half = rng.uniform(1.0, 3.5), rng.uniform(1.0, 4.0)
+        rows.append((*(at + rng.normal(0, 1, 2)), rng.uniform(0.5, 4.0) + half, radius, half))
+    return np.array(rows).reshape(-1, 5)
+
+
+def under_trees(rng: np.random.Generator) -> Site:
+    """A house whose footprint is too large by up to 1.2 m at a side, with trees over its corners."""
+    site = plain(rng)
+    x0, y0, x1, y1 = site.footprint.bounds
+    wide = shapely.box(x0, y0, x1 + rng.uniform(0.3, 1.2), y1)
+    return Site(wide, site.footprint, site.bodies, crowns_around(rng, wide, 3, False), site.slope)
+
+
+def beside(rng: np.random.Generator) -> Site:
+    """A footprint that lies 0.3 to 0.9 m beside its house."""
+    site = plain(rng)
+    shift = rng.choice([-1, 1], 2) * rng.uniform(0.2, 0.65, 2)
+    moved = shapely.transform(site.footprint, lambda xy: xy + shift)
+    return Site(moved, moved & site.footprint, site.bodies, slope=site.slope)
+
+
+def gone(rng: np.random.Generator, steep: float = 0.06) -> Site:
+    """Ground where a house stood, with heaps and bushes on up to half of it, and up to two trees."""
+    site = plain(rng, steep=steep)
+    x0, y0, x1, y1 = site.footprint.bounds
+    bodies = []
+    for _ in range(rng.integers(0, 6)):
+        at, size = rng.uniform((x0, y0), (x1, y1)), rng.uniform(1.0, 4.0, 2)
+        z = float(site.slope.height_at(at)) + rng.uniform(0.3, 2.5)
+        bodies.append(Body(box(at, tuple(size), z, rng.uniform(0, 3)), SOURCE_WALL, SOURCE_WALL))
+    trees = crowns_around(rng, site.footprint, int(rng.integers(0, 3)), True)
+    return Site(site.footprint, shapely.Polygon(), bodies, trees, site.slope)
+
+
+def small(rng: np.random.Generator, height: tuple[float, float], share_below: float = 0.0) -> Site:
+    """A shed or, with ground seen below it, a carport of 10 to 40 m2."""
+    size, ground = rng.uniform((3.0, 3.3), (5.5, 7.0)), random_slope(rng)
+    footprint = shapely.box(0, 0, *size)
+    body = rectangle_body((0, 0, *size), rng.uniform(*height), rng.choice([0.0, 0.4]), ground)
+    site = Site(footprint, footprint, [body], slope=ground)
+    return with_ground_under(site, footprint, share_below * rng.random()) if share_below else site
+
+
+def green(rng: np.random.Generator) -> Site:
+    """A low flat roof with plants on it: heights scatter by up to 0.3 m."""
+    site = plain(rng, (2.2, 4.0))
+
+    def change(rng: np.random.Generator, scan: Scan) -> Scan:
+        roof = scan.source == SOURCE_ROOF
+        return Scan(scan.points + np.outer(roof * rng.exponential(0.15, len(scan)), (0, 0, 1)), scan.label, scan.source)
+
+    site.change = change
+    return site
+
+
+def dug_in(rng: np.random.Generator) -> Site:
+    """A house on a slope of up to 35 %, its eaves level: uphill they are 2 m lower above the ground."""
+    return plain(rng, (3.5, 6.0), 0.35)
+
+
+def garage_deck(rng: np.random.Generator) -> Site:
+    """The roof of a garage below ground, 0 to 1.2 m above it."""
+    return plain(rng, (0.0, 1.2))
+
+
+def block(rng: np.random.Generator) -> Site:
+    """A closed block of houses around a yard of a third to two thirds of its plan."""
+    (w, h), deep, ground, eave = (
+        rng.uniform(24.0, 40.0, 2),
+        rng.uniform(4.0, 9.0),
+        random_slope(rng),
+        rng.uniform(4.0, 9.0),
+    )
+    rows = [(0, 0, w, deep), (0, h - deep, w, h), (0, deep, deep, h - deep), (w - deep, deep, w, h - deep)]
+    footprint = shapely.box(0, 0, w, h)
+    bodies = [rectangle_body(one, eave, rng.choice([0.0, 2.0]), ground) for one in rows]
+    return Site(footprint, footprint - shapely.box(deep, deep, w - deep, h - deep), bodies, slope=ground)
+
+
+YARDS = {f"yard: {place}": (lambda rng, p=place: with_yard(rng, p)) for place in ("court", "side", "corner")}
+YARDS["yard of a block"] = block
+SOUND = {
+    "plain": plain, "lost points": lost_points, "dormers": dormers, "glass roof": glass, "passage": passage,
+    "canopy": canopy, "under trees": under_trees, "footprint beside": beside, "green roof": green, "slope": dug_in,
+    "shed 1.8-2.5 m": lambda rng: small(rng, (1.8, 2.5)), "carport": lambda rng: small(rng, (2.0, 2.5), 0.5),
+}  # fmt: skip
+GONE = {"gone": gone, "gone, slope to 25 %": lambda rng: gone(rng, 0.25), "garage deck": garage_deck}
+
+
+def scanned(site: Site, density: float, rng: np.random.Generator) -> Scan:
+    settings = ScanSettings(density=density, margin_m=0.0, defects=site.defects)
+    scene = scene_of(site.bodies, site.crowns, site.slope)
+    scan = scan_scene(scene, site.footprint.buffer(AROUND_M, quad_segs=2), 3.0, rng, settings)
+    return site.change(rng, scan) if site.change else scan
+
+
+def with_classes(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
+    """As of a cloud whose roofs, ground and trees have classes, few of them wrong."""
+    right = rng.random(len(scan)) >= WRONG_CLASS
+    roof, ground = (scan.points[(scan.source == source) & right] for source in (SOURCE_ROOF, SOURCE_GROUND))
+    leaves = np.unique(np.floor(scan.points[scan.source == SOURCE_TREE, :2]), axis=0)
+    ground = thin_to_grid(ground, 1.0)
+    bare = ~(np.floor(ground[:, None, :2]) == leaves[None]).all(axis=2).any(axis=1)
+    return looked_at(site, roof, ground[bare])
+
+
+def without_classes(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
+    """As of a cloud without classes, whose roofs are found by shape."""
+    height = scan.points[:, 2] - site.slope.height_at(scan.points[:, :2])
+    found = found_roof(scan.points, site.footprint, height, True)
+    if not found.is_seen:
+        return fit_site.Site(found.points, site.footprint, found.remark, found.is_ground)
+    return looked_at(site, found.points, found.ground)
+
+
+def of_one_class(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
+    """As of a cloud whose only class is said to be the building class."""
+    return looked_at(site, scan.points, np.zeros((0, 3)))
+
+
+def looked_at(site: Site, roof: np.ndarray, ground: np.ndarray) -> fit_site.Site:
+    inside = shapely.intersects_xy(site.footprint, roof[:, 0], roof[:, 1])
+    if not inside.any():
+        return fit_site.Site(roof[inside], site.footprint, "no points")
+    return fit_site.look_at_ground(
+        roof[inside], site.footprint, ground, LocalFrame(np.zeros(3)), Known(site.slope), Settings()
+    )
+
+
+@dataclass(frozen=True)
+class Known:
+    """The ground of a site as a terrain."""
+
+    slope: Plane
+    source: str = "the site's ground"
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        return self.slope.height_at(xy[:, :2])
+
+
+WAYS = {"with classes": with_classes, "without classes": without_classes, "one class": of_one_class}
+
+
+def row(make: Callable, key: int, density: float, seeds: range) -> str:
+    """Of a kind of site by each way: share without a building, share with bare ground cut, error of the area left."""
+    found: dict[str, list] = {way: [] for way in WAYS}
+    for seed in seeds:
+        rng = np.random.default_rng([seed, key, round(10 * density)])
+        site = make(rng)
+        scan = scanned(site, density, rng)
+        for way, look in WAYS.items():
+            seen = look(site, scan, rng)
+            is_cut = not seen.is_empty and seen.outline.area < 0.999 * site.footprint.area
+            off = 0.0 if seen.is_empty or site.true.is_empty else abs(seen.outline.area / site.true.area - 1)
+            found[way].append((seen.is_empty or seen.remark == "no points", is_cut, off))
+    text = []
+    for rows in found.values():
+        empty, cut, off = np.array(rows, float).T
+        errors = f"{100 * np.median(off):4.1f} {100 * np.quantile(off, 0.9):4.1f}"
+        text.append(f"{100 * empty.mean():5.1f} {100 * cut.mean():5.1f} {errors}")
+    return " | ".join(text)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--parity", choices=("even", "odd"), default="odd")
+    parser.add_argument("--count", type=int, default=200, help="sites of each kind and density")
+    parser.add_argument("--densities", type=float, nargs="+", default=[2.0, 5.0, 15.0])
+    parser.add_argument("--kinds", default="", help="only kinds whose name holds this")
+    a = parser.parse_args()
+    seeds = range(int(a.parity == "odd"), 2 * a.count, 2)
+    print("% without a building, % with bare ground cut, error of the area left (median, 90th percentile, %)")
+    print(f"{'kind':20s}  density | {' | '.join(f'{way:21s}' for way in WAYS)}")
+    for key, (name, make) in enumerate((YARDS | SOUND | GONE).items()):
+        for density in a.densities if a.kinds in name else ():
+            print(f"{name:20s} {density:5g}/m2 | {row(make, key, density, seeds)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
