@@ -45,21 +45,24 @@ ADDRESS = re.compile(
 
 
 class Secrets:
-    """Secrets of the addresses seen so far, with the pattern that finds them in a text."""
+    """Secrets of the addresses seen so far, in all forms in which they may be written."""
 
     def __init__(self) -> None:
         self.known: set[str] = set()
-        self.pattern: re.Pattern | None = None
+        self.forms: dict[str, str] = {}  # by what they are in lower case
 
     def add(self, secrets: Iterable[str]) -> None:
         new = set(secrets) - self.known
-        if new:
-            self.known |= new
-            forms = {form for secret in self.known for form in forms_of(secret)}
-            self.pattern = re.compile("|".join(map(pattern_of, sorted(forms, key=len, reverse=True))), re.IGNORECASE)
+        self.known |= new
+        self.forms |= {form.lower(): form for secret in new for form in forms_of(secret)}
 
     def hide(self, text: str) -> str:
-        return text if self.pattern is None else self.pattern.sub(HIDDEN, text)
+        lowered = text.lower()
+        held = (form for low, form in self.forms.items() if low in lowered)
+        found = sorted(held, key=len, reverse=True)
+        if not found:
+            return text
+        return re.sub("|".join(pattern_of(form) for form in found), HIDDEN, text, flags=re.IGNORECASE)
 
 
 SECRETS = Secrets()
