@@ -19,6 +19,7 @@ import shapely
 
 from hiproof import reconstruct
 from hiproof.evaluate.layers import FEWEST_POINTS, two_surfaces, unseen_share
+from hiproof.evaluate.verdict import MOST_UNSEEN
 from hiproof.settings import Settings
 
 from .delft import asked_of
@@ -67,7 +68,7 @@ def told(cases: Iterable[Case], change: Callable[[Case], np.ndarray]) -> str:
         share, apart_m = two_surfaces(local, building.roof)
         count, surfaces = count + 1, surfaces + (share > 0)
         apart += [apart_m] if share else []
-        unseen += unseen_share(local, building.roof.outline) > 0
+        unseen += unseen_share(local, building.roof.outline) > MOST_UNSEEN
     far = f", {np.median(apart):.2f} m apart" if apart else ""
     return f"{count} buildings, two surfaces {surfaces}{far}, without points {unseen}"
 

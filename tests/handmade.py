@@ -7,7 +7,7 @@ import shapely
 
 from hiproof.frames import LocalFrame
 from hiproof.model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Quality, Roof, Solid
-from hiproof.status import Status
+from hiproof.status import Grade, Status
 
 RD_ORIGIN = np.array([85000.0, 446000.0, 0.0])
 
@@ -69,6 +69,7 @@ def modelled(
     )
     values = {
         "quality": Quality(points=321, density=4.5, psd_mean=0.05, rmse=0.06, share_within_20cm=0.99),
+        "grade": Grade.GOOD,
         "z_ground": float(origin[2]),
         "ground_source": "ground class",
         "types": {kinds[0]: 0.97},

@@ -61,7 +61,7 @@ def write_parameters_of_each_kind(path: Path) -> Path:
     path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *buildings]))
     record = {
         "inputs": {"clouds": ["gone.laz"], "bbox": [0, 0, 1, 1]},
-        "settings": {"reconstruct": {"poor_share": 0.5}},
+        "settings": {"reconstruct": {"align": "auto"}},
     }
     (path.parent / "run.json").write_text(json.dumps(record))
     return path

@@ -19,7 +19,7 @@ from hiproof.compose import check_solid
 from hiproof.errors import InputError, InputWarning
 from hiproof.parametric.override import overridden, override_of
 from hiproof.settings import Settings
-from hiproof.status import Status
+from hiproof.status import Grade, Status
 from hiproof.write.parameters import building_record
 from run_records import by_id, records
 from tiny_town import make_town, write_cloud, write_footprints
@@ -53,7 +53,7 @@ def test_a_type_is_obeyed_and_the_rest_fitted(scanned):
 def test_a_ridge_is_obeyed_and_the_contradiction_is_said(scanned):
     house = obeyed(scanned, ridge_height=12.0)
     assert house.solid.vertices[:, 2].max() == pytest.approx(12.0, abs=0.01)
-    assert house.status is Status.POOR_FIT and "overridden: ridge_height 12.0" in house.detail
+    assert house.grade is Grade.POOR and "overridden: ridge_height 12.0" in house.detail
     assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith("ridge_height 8.0 (seen, anna)")
 
 

@@ -6,7 +6,7 @@ import shapely
 import shapely.affinity
 
 import hiproof
-from hiproof import NoModelError, Status
+from hiproof import Grade, NoModelError, Status
 from hiproof.compose import check_solid, volume
 from hiproof.settings import Settings
 from hiproof.stages import candidates
@@ -237,7 +237,9 @@ def test_a_part_that_cannot_be_composed_is_given_up_and_not_the_roof(monkeypatch
 def test_a_cloud_that_is_no_roof_is_called_poor():
     rng = np.random.default_rng(5)
     points = np.column_stack([rng.uniform((0, 0), (12, 8), (300, 2)), rng.uniform(0, 15, 300)])
-    assert hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN).status is Status.POOR_FIT
+    building = hiproof.reconstruct(points, FOOTPRINT, settings=PLAIN)
+    assert building.grade is Grade.POOR and building.status is Status.MODELLED
+    assert "of its points lie within 0.2 m" in building.detail
 
 
 @pytest.mark.parametrize("objective", ["likelihood", "paper"])
@@ -268,9 +270,10 @@ def test_parts_that_became_flat_although_not_asked_for_are_told():
     assert {part.type for part in building.parts} <= {"flat", "hip"}
     assert building.detail == "1 of 1 part made flat: none of the types asked for (hip) explains the points there"
     poor = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=asked)
-    assert poor.status is Status.POOR_FIT
-    assert poor.detail.startswith("only ") and poor.detail.endswith("(hip) explains the points there")
-    assert hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN).detail == ""
+    assert poor.grade is Grade.POOR
+    assert "(hip) explains the points there; only " in poor.detail
+    good = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
+    assert (good.detail, good.grade) == ("", Grade.GOOD)
 
 
 def test_a_footprint_with_attributes_keeps_them():

@@ -50,6 +50,7 @@ _HOME = {
     "Solid": "model",
     "Quality": "model",
     "Settings": "settings",
+    "Grade": "status",
     "Status": "status",
     "HiproofError": "errors",
     "InputError": "errors",

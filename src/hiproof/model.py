@@ -16,7 +16,7 @@ import shapely
 
 from .errors import InputError, NoModelError
 from .frames import METRES, LocalFrame, Units
-from .status import Status
+from .status import Grade, Status
 
 if TYPE_CHECKING:
     from .settings import ComposeSettings
@@ -255,7 +255,8 @@ class Building:
     """Everything known of one building after reconstruction; `solid` and `terrain_intersection` in world coordinates.
 
     `built` is its model, None when `status.is_model` is false; `model`, `roof` and `solid` are there without asking, or raise
-    NoModelError. `detail` is the sentence that explains the status for this building; `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
+    NoModelError. `detail` is the sentence that explains the status for this building. `grade` says how good the model
+    is by its points, None where it was not measured. `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
     lines. `recognised` are the network's probabilities by roof type, `types` those after the fits, where a choice was made. `footprint` (world) and `attributes`
     are the input's own; `shift` (m) is how far the footprint was moved onto its roof.
     """
@@ -274,6 +275,7 @@ class Building:
     footprint: shapely.Polygon | None = None
     attributes: dict[str, Any] = field(default_factory=dict)
     shift: tuple[float, float] = (0.0, 0.0)
+    grade: Grade | None = None
 
     @property
     def model(self) -> Model:
@@ -352,17 +354,15 @@ the footprint; add a cloud that covers it); `built` is None there
 
         return without_part(self, index)
 
-    def refit(
-        self, points: np.ndarray, fixed: dict[int, tuple[str, ...]] | None = None, settings: Any = None
-    ) -> Building:
+    def refit(self, points: np.ndarray, fixed: dict[int, tuple[str, ...]] | None = None) -> Building:
         """The building with all heights, pitches and inner lengths of its parts fitted to `points` (n, 3) world metres.
 
         Types, rectangles and what `fixed` names (parameters by part, "z" the position's height) stay as they are. The
-        quality is measured on the points, and poor as `settings` say. Raises FitError for fewer than three points inside the outline.
+        quality and grade are measured on the points. Raises FitError for fewer than three points inside the outline.
         """
         from .parametric.refit import refit
 
-        return refit(self, points, fixed, settings)
+        return refit(self, points, fixed)
 
     def _repr_html_(self) -> str:
         """A small view in a notebook, turned by dragging; it asks nothing of the network."""

@@ -25,6 +25,7 @@ def reconstruct(
     settings: Settings | None = None,
     id: str = "building",
     ground: np.ndarray | None = None,
+    unused: np.ndarray | None = None,
 ) -> Building:
     """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits).
 
@@ -33,6 +34,8 @@ def reconstruct(
     beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
     `hiproof.Terrain`; without one the ground is assumed below the lowest point, or at the foot of walls that are seen.
     ground: (m, 3) ground points in and around the footprint, by which bare ground inside it is cut out (`footprint_trust`).
+    unused: further points (m, 3) of the building that are not fitted, thinned out or of a noise class; the verdict on the
+    model names them where they lie together off the roof.
     What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError
     for points of another shape, for a footprint, a terrain or settings of another kind, and for settings that ask the network
     where the extra `network` is not installed.
@@ -64,7 +67,7 @@ def reconstruct(
     roof = Roof(fitted.parts, fitted.outline, frame)
     base = stages.find_ground(fitted.outline, points, frame, terrain, roof)
     roof, solid, fitted = stages.solid_or_simpler(roof, points, base, fitted, settings)
-    building = stages.judge(building, roof, solid, points, fitted, base, settings)
+    building = stages.judge(building, roof, solid, points, fitted, base, settings, unused)
     for text in (of_footprint, site.remark):
         building = stages.remarked(building, text)
     return building

@@ -170,7 +170,6 @@ class ReconstructSettings:
         choices=("skip", "model"),
         option="--empty-footprints",
     )
-    poor_share: float = setting(0.5, "a model with a smaller share of points within 0.2 m is called poor", "", 0.0, 1.0)
 
 
 @dataclass(frozen=True)

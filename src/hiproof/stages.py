@@ -14,7 +14,7 @@ import shapely
 from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
 from .log import counted
-from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid
+from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid, as_xyz
 from .read.plausible import is_plausible
 from .rings import enclosed
 from .settings import Settings
@@ -474,40 +474,52 @@ def judge(
     fitted: Fitted,
     ground: Ground,
     settings: Settings,
+    unused: np.ndarray | None = None,
 ) -> Building:
-    """The finished building: quality measured on its solid, an honest status and what is in doubt, everything back in the
-    world's frame."""
+    """The finished building: quality measured on its solid, an honest status, the verdict and what is in doubt, everything back
+    in the world's frame."""
     from .compose.settle import settled_building
     from .evaluate.metrics import quality, well_inside
 
     if solid is None:
         return dataclasses.replace(building, status=fitted.status, detail=fitted.detail)
     inner = well_inside(points, roof.outline)
-    measured = quality(solid, points, roof.outline, inner)
-    status, detail = fitted.status, fitted.detail
-    if status is Status.MODELLED and measured.share_within_20cm < settings.reconstruct.poor_share:
-        share = 100 * measured.share_within_20cm
-        poor = f"only {share:.0f} % of its points inside the outline lie within 0.2 m of the roof"
-        status, detail = Status.POOR_FIT, f"{poor}; {detail}" if detail else poor
-    judged = dataclasses.replace(
+    measured = dataclasses.replace(
         building,
-        status=status,
-        detail=detail,
+        status=fitted.status,
+        detail=fitted.detail,
         built=Model(roof, solid.moved(roof.frame.origin), settings.compose),
-        quality=measured,
+        quality=quality(solid, points, roof.outline, inner),
         z_ground=ground.z,
         ground_source=ground.source,
         terrain_intersection=ground.intersection,
         objective=fitted.objective,
         types=fitted.types,
     )
-    return cautioned(settled_building(judged), points, inner)
+    return cautioned(graded(settled_building(measured), points, unused_within(roof, unused)), points, inner)
+
+
+def unused_within(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
+    """Those of the `unused` world points (m, 3) that are finite and inside a roof's outline, in the roof's frame."""
+    if unused is None:
+        return np.zeros((0, 3))
+    local = roof.frame.to_local(finite(as_xyz(unused)))
+    return local.compress(shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1]), axis=0)
+
+
+def graded(building: Building, points: np.ndarray, unused: np.ndarray | None = None) -> Building:
+    """The building with the verdict on its model by its `points` (n, 3), in the roof's frame, and by those that its fit left
+    `unused` (m, 3)."""
+    from .evaluate.verdict import verdict_of
+
+    grade, reasons = verdict_of(building.model, points, unused)
+    return remarked(dataclasses.replace(building, grade=grade), "; ".join(reasons))
 
 
 def cautioned(building: Building, points: np.ndarray, inner: Inner) -> Building:
     """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in the roof's frame and those well
-    `inner`, places without any, or two surfaces one over the other."""
-    from .evaluate.layers import two_surfaces, unseen_share
+    `inner`, two surfaces one over the other."""
+    from .evaluate.layers import two_surfaces
 
     roof = [building.solid.vertices[list(ring), 2] for face in building.solid.of_kind(ROOF) for ring in face.rings]
     sunk = building.z_ground - float(np.concatenate(roof).min())
@@ -515,11 +527,6 @@ def cautioned(building: Building, points: np.ndarray, inner: Inner) -> Building:
         building = remarked(
             building,
             f"the ground ({building.ground_source}) lies {sunk:.1f} {Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
-        )
-    unseen = unseen_share(points, building.roof.outline)
-    if unseen:
-        building = remarked(
-            building, f"{100 * unseen:.0f} % {Doubt.PLACES_WITHOUT_POINTS.value}; the roof there is a guess"
         )
     share, apart_m = two_surfaces(points, building.roof, inner)
     if share:

@@ -6,8 +6,7 @@ from enum import Enum
 class Status(Enum):
     """Outcome of one building. `is_model` tells whether a solid exists."""
 
-    MODELLED = "modelled: the roof follows its points"
-    POOR_FIT = "modelled, but poorly: many of its points lie away from the roof; look at it before you use it"
+    MODELLED = "modelled"
     SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a simpler one stands in for it"
     FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
@@ -28,11 +27,27 @@ class Status(Enum):
         return self.name.lower()
 
 
+class Grade(Enum):
+    """How good a model is, told from its points (evaluate/verdict.py)."""
+
+    GOOD = "the roof follows its points"
+    FAIR = "some of its points speak against the roof"
+    POOR = "look at the building before you use it"
+
+    @property
+    def code(self) -> str:
+        """Stable lower-case name for files and tables."""
+        return self.name.lower()
+
+
 class Doubt(Enum):
     """What the detail of a building may leave to doubt, by the words that stand in it; a run counts them at its end."""
 
     TWO_SURFACES = "points lie on two surfaces"
     PLACES_WITHOUT_POINTS = "of its outline hold no points"
+    POINTS_ABOVE = "above the model"
+    POINTS_BELOW = "below the model"
+    UNSUPPORTED = "stand on hardly any point"
     GROUND_ABOVE_EAVES = "m above its eaves"
     TERRAIN_UNLIKE_GROUND_POINTS = "the ground points around it"
     TERRAIN_WITHOUT_HEIGHTS = "holds values that are no heights"

@@ -98,7 +98,8 @@ def test_the_most_doubtful_come_first(desk):
 @pytest.mark.parametrize(
     ("said", "reason"),
     [
-        ({"status": "poor_fit"}, "modelled"),
+        ({"quality": "poor"}, "poor"),
+        ({"status": "flat_fallback"}, "flat block"),
         ({"detail": "modelled; over 60 % of its area points lie on two surfaces, 0.4 m apart"}, "two surfaces"),
         (
             {

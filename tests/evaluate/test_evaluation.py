@@ -149,7 +149,7 @@ def test_rows_survive_csv_and_json(run):
 
 def test_nothing_to_summarise():
     assert summarise([]) == {"all": {"buildings": 0}}
-    assert to_csv([]).startswith("id,type,status,points")
+    assert to_csv([]).startswith("id,type,status,quality,points")
 
 
 def test_a_building_without_a_model_misses_all_its_points():

@@ -72,7 +72,7 @@ def test_a_building_says_that_its_points_lie_on_two_surfaces():
 @given(SEEDS, st.floats(2.0, 20.0), st.floats(0.5, 0.6))
 def test_a_part_without_points_is_told_of_whatever_their_density(seed, density, cut):
     roof, points = compound(seed, density)
-    assert unseen_share(points, roof.outline) == 0.0
+    assert unseen_share(points, roof.outline) < 0.03  # by chance one place in a thousand
     seen = points[points[:, 0] > np.quantile(points[:, 0], cut)]
     assume(len(seen) >= 30)  # fewer may be near all of a small roof
     assert 0.2 < unseen_share(seen, roof.outline) < cut + 0.2

@@ -13,7 +13,7 @@ import typer
 
 from hiproof.cli.report import report
 from hiproof.errors import HiproofError
-from hiproof.evaluate.report import embedded, report_html
+from hiproof.evaluate.report import embedded, report_html, worst_indices
 from hiproof.evaluate.report_data import report_data
 from hiproof.evaluate.report_pictures import RESIDUAL_STOPS, building_pictures, histogram, residual_bins
 from hiproof.evaluate.run import evaluate_run
@@ -46,7 +46,7 @@ for (const kind of ["pointerdown", "pointerup"]) viewer.canvas.dispatchEvent(new
   { clientX: box.left + at[0], clientY: box.top + at[1], button: 0, buttons: 1, pointerId: 1 }));
 say.afterSceneClick = details();
 const before = document.querySelector('#map [data-building="0"]').getAttribute("fill");
-for (const value of ["residual", "status", "type"]) {
+for (const value of ["residual", "quality", "status", "type"]) {
   const mode = document.getElementById("mode"); mode.value = value; mode.dispatchEvent(new Event("change"));
   say[value] = document.querySelector('#map [data-building="0"]').getAttribute("fill");
 }
@@ -150,6 +150,18 @@ def test_roofs_are_coloured_by_their_parts(run):
     assert {types[k - 1] for k in roof[owner == 1] if k} == {"flat"}
     pictures = building_pictures(solid, np.empty((0, 3)), np.empty(0), parts)
     assert all(f'fill="{type_colour(kind)}"' in pictures for kind in ("gable", "hip"))
+
+
+def test_poor_models_are_the_worst_whatever_their_share(run):
+    """The block fits its points worse than the gable; the verdicts decide before that."""
+    grades = {"house-1": "poor", "block 2": "good"}
+    models = tuple(replace(m, attributes=m.attributes | {"hiproof_quality": grades.get(m.id)}) for m in run.models)
+    judged = replace(run, models=models)
+    assert [run.models[index].id for index in worst_indices(run)] == ["block 2", "house-1"]
+    assert [run.models[index].id for index in worst_indices(judged)] == ["house-1", "block 2"]
+    page = report_html(judged)
+    assert "<td>1</td><td>poor: look at the building before you use it</td>" in page
+    assert report_data(judged, [None] * len(models))["buildings"][0]["quality"] == "poor"
 
 
 def test_names_from_the_data_cannot_become_markup(run):

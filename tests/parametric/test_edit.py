@@ -13,7 +13,7 @@ from hiproof.parametric.building import with_model
 from hiproof.primitives import CATALOGUE
 from hiproof.settings import ComposeSettings
 from hiproof.simulate import random_building
-from hiproof.status import Status
+from hiproof.status import Grade, Status
 from hiproof.write.parameters import building_record
 from parametric_house import gable_house
 
@@ -181,7 +181,7 @@ def test_a_refit_keeps_what_is_held(gable):
 def test_a_wrong_type_fits_poorly_and_says_so(gable):
     points = sampled(gable.with_part(0, ridge_height=14.0), np.random.default_rng(2))
     flat = gable.with_part(0, type="flat").refit(points)
-    assert flat.status is Status.POOR_FIT and "%" in flat.detail
+    assert flat.grade is Grade.POOR and "%" in flat.detail
 
 
 def test_an_edit_is_what_is_written_of_it(gable):

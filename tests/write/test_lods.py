@@ -25,10 +25,9 @@ from hiproof.view.loading import database_rows
 from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
 from hiproof.write.citygml import NAMESPACES, CityGMLWriter
 from hiproof.write.citygml3 import CityGML3Writer
-from hiproof.write.colours import type_colours
 from hiproof.write.postgis import polyhedral_wkt
 from hiproof.write.roof_codes import CODE_SPACES
-from hiproof.write.styles import TABLE, TYPE_COLUMN
+from hiproof.write.styles import STYLES, TABLE
 
 ALL = ("0", "1.2", "1.3", "2.2")
 WHOLE = WriteSettings(lods=ALL)
@@ -205,11 +204,12 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
         assert file.execute("pragma user_version").fetchone() == (10200,)
         styles = file.execute(f"select f_table_name, f_geometry_column, useAsDefault, styleQML from {TABLE}").fetchall()
     layers = {name: geometry for name, geometry in pyogrio.list_layers(tmp_path / "a.gpkg") if name != TABLE}
-    assert [row[:3] for row in styles] == [(name, "geom", 1) for name in layers] and list(layers) == list(TYPE_COLUMN)
-    for name, _, _, qml in styles:
+    assert [row[:3] for row in styles] == [(style.layer, "geom", int(style.is_default)) for style in STYLES]
+    assert [style.layer for style in STYLES if style.is_default] == list(layers)
+    for (name, _, _, qml), style in zip(styles, STYLES, strict=True):
         renderer = etree.fromstring(qml.encode()).find("renderer-v2")
         assert renderer.get("attr") in pyogrio.read_info(tmp_path / "a.gpkg", layer=name)["fields"]
-        assert len(renderer.findall("symbols/symbol")) == len(type_colours())
+        assert len(renderer.findall("symbols/symbol")) == len(style.colours)
 
 
 @pytest.mark.parametrize(("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)])

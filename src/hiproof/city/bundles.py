@@ -44,7 +44,7 @@ from .terrain_check import TerrainModel
 
 FOLDER, FACTS = "failures", "failure.json"
 MOST_BUNDLES = 20  # Bundles of a run: more failures have the same few causes, and take space.
-CLASSES = dict(zip(KINDS, (6, 2, 1), strict=True))  # ASPRS classes by the kind of points.
+CLASSES = dict(zip(KINDS, (6, 2, 1, 18), strict=True))  # ASPRS classes by the kind of points.
 EXACT = ("exact_x", "exact_y", "exact_z")  # Extra dimensions (float64); LAZ rounds to SCALE_M.
 SCALE_M = 0.001  # Steps (m) of the LAZ coordinates; enough to look at.
 MARGIN_M = 2.0  # Points so far beyond a building's reach complete its outermost ground cells.
@@ -201,6 +201,7 @@ def cropped(points: dict[str, np.ndarray], plan: WorkPlan, job: Job) -> dict[str
         "roof": max(plan.around_m, ROOF_REACH_M),
         "ground": plan.terrain_reach_m,
         "low": plan.terrain_reach_m,
+        "noise": plan.around_m,
     }
     found = {}
     for kind, xyz in points.items():

@@ -21,7 +21,7 @@ create table if not exists task (
     name text primary key, kind text, position integer, buildings integer, state text default 'open',
     losses integer default 0, message text default '', finished real);
 create table if not exists building (
-    position integer primary key, id text, task text, status text, type text, detail text, share real, psd real,
+    position integer primary key, id text, task text, status text, quality text, type text, detail text, share real, psd real,
     seconds real);
 create table if not exists override (position integer primary key, digest text);
 create table if not exists output (name text primary key, bytes integer, digest text);
@@ -46,6 +46,7 @@ class Outcome(NamedTuple):
     position: int
     id: str
     status: str
+    quality: str | None
     type: str | None
     detail: str
     share: float | None
@@ -199,7 +200,7 @@ class Ledger:
 
     def put_outcomes(self, task: str, outcomes: Iterable[Outcome]) -> None:
         rows = [(position, id, task, *rest) for position, id, *rest in outcomes]
-        self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
 
     def outcomes(self) -> dict[int, Outcome]:
         """What came of the buildings that were solved, by position."""
@@ -211,7 +212,7 @@ class Ledger:
         return list(map(Task._make, self.database.execute(sql)))
 
     def counts(self, column: str) -> dict[str, int]:
-        """Buildings by `column` ("status" or "type"), most frequent first."""
+        """Buildings by `column` ("status", "quality" or "type"), most frequent first."""
         sql = f"select {column}, count(*) from building group by 1 order by 2 desc, 1"
         return {key: number for key, number in self.database.execute(sql) if key is not None}
 

@@ -59,6 +59,7 @@ class Summary:
     units: Units = METRES
     doubts: dict[Doubt, int] = field(default_factory=dict)
     bundles: Path | None = None  # where the input of failed buildings is kept
+    by_quality: dict[str, int] = field(default_factory=dict)
 
     @property
     def exit_code(self) -> int:
@@ -267,6 +268,7 @@ def summarise(request: Request, plan: WorkPlan, ledger: Ledger, clock: Clock) ->
         units=plan.head.units.gml,
         doubts=ledger.doubts(),
         bundles=bundles_of(Path(request.out)),
+        by_quality=ledger.counts("quality"),
     )
 
 
@@ -308,6 +310,7 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "processes": request.processes,
         "buildings": summary.buildings,
         "by_status": summary.by_status,
+        "by_quality": summary.by_quality,
         "by_type": summary.by_type,
         "median_psd_m": summary.median_psd,
         "mean_share_within_20cm": summary.mean_share,

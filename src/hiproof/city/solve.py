@@ -23,7 +23,7 @@ from ..parametric.override import Override, overridden
 from ..read.assign import PointGrid, grown
 from ..read.raster import RasterTerrain
 from ..read.terrain import Terrain, TerrainChain, read_terrain
-from ..read.thin import thin_to_count, without_repeats
+from ..read.thin import hashes, thin_to_count, without_repeats
 from ..reconstruct import reconstruct
 from ..stages import distinct, largest_polygon, remarked, shift_remark
 from ..status import Doubt, Status
@@ -53,8 +53,8 @@ class Surroundings:
     """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
 
     def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
-        self.roof, self.model, self.plan = points["roof"], model, plan
-        self.grid = PointGrid(self.roof)
+        self.roof, self.noise, self.model, self.plan = points["roof"], points["noise"], model, plan
+        self.grid, self.noise_grid = PointGrid(self.roof), PointGrid(self.noise)
         self.ground = ground_cells(points["ground"])
         self.low = Cells(lowest_in_cells(points["low"]))
         self.shifts: dict[int, Shift] = {}
@@ -97,6 +97,14 @@ class Surroundings:
             return found_alone(near, job.area)
         height = near[:, 2] - self.ground_to_leave_out(job).height_at(near)
         return found_roof(near, job.area, height, job.footprint is not None)
+
+    def noise_over(self, job: Job, roof: np.ndarray) -> np.ndarray:
+        """Points (m, 3) of noise classes in the job's area that lie higher than half of its `roof` points (n, 3): where they are many
+        they are a spire, not birds."""
+        if job.area.is_empty or not len(roof) or not len(self.noise):
+            return np.zeros((0, 3))
+        noise = self.noise.take(self.noise_grid.within(job.area, self.plan.around_m), axis=0)
+        return without_repeats(noise[noise[:, 2] > np.median(roof[:, 2])])
 
     def points_near(self, job: Job, reach_m: float) -> np.ndarray:
         """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the building, each once."""
@@ -247,9 +255,7 @@ def solve_one(
             return fragments(not_seen(job, found), plan.names_of(job), plan.head)
         points = without_repeats(found.points)  # first of all: a footprint is put where points are many
         used = thin_to_count(points, most)
-        aligned = plan.settings.replace({"reconstruct": {"align": "off"}})
-        known = used, job.footprint, surroundings.terrain_of(job), aligned, job.id, surroundings.bare(job, found)
-        building = reconstruct(*known) if override is None else overridden(override, *known)
+        building = modelled(job, points, used, found, surroundings, override)
         if len(used) < len(points):
             building = told_of_thinning(building, len(used), len(points))
         building = remarked(remarked(building, moved), found.remark)
@@ -279,6 +285,31 @@ def recorded_terrain(
     again.model = recorder = TerrainRecorder(surroundings.model)
     solve_one(plan, job, again, override)
     return recorder
+
+
+def modelled(
+    job: Job,
+    points: np.ndarray,
+    used: np.ndarray,
+    found: FoundRoof,
+    surroundings: Surroundings,
+    override: Override | None,
+) -> Building:
+    """The building fitted to the `used` of its `points` (n, 3) and judged by all, noise over it included; or as its override says."""
+    aligned = surroundings.plan.settings.replace({"reconstruct": {"align": "off"}})
+    bare = surroundings.bare(job, found)
+    known = used, job.footprint, surroundings.terrain_of(job), aligned, job.id, bare
+    if override is not None:
+        return overridden(override, *known)
+    unused = np.concatenate([thinned_out(points, used), surroundings.noise_over(job, points)])
+    return reconstruct(*known, unused=unused)
+
+
+def thinned_out(points: np.ndarray, used: np.ndarray) -> np.ndarray:
+    """Those of `points` (n, 3), each once, that are not among the `used` (m, 3)."""
+    if len(used) == len(points):
+        return points[:0]
+    return points[~np.isin(hashes(points), hashes(used))]
 
 
 def told_of_thinning(building: Building, used: int, count: int) -> Building:
@@ -334,5 +365,5 @@ def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
 def outcome_of(position: int, building: Building, seconds: float) -> Outcome:
     quality = building.quality
     share, psd = (float(v) if np.isfinite(v) else None for v in (quality.share_within_20cm, quality.psd_mean))
-    status = building.status.code
-    return Outcome(position, building.id, status, building.type, building.detail, share, psd, seconds)
+    status, grade = building.status.code, None if building.grade is None else building.grade.code
+    return Outcome(position, building.id, status, grade, building.type, building.detail, share, psd, seconds)

@@ -1,8 +1,8 @@
 """Read each point file once, in chunks, and leave for each work tile the points its buildings may need.
 
 Roof points are those of the building classes in the whole-metre box of a building; terrain points those of the ground
-classes in the wider box around it; of all others (noise excepted) the lowest a cell is kept, in case there is no ground
-class. What a building gets out of them depends on its own area alone, not on tiles, files or chunks.
+classes in the wider box around it; of all others the lowest a cell is kept, in case there is no ground class, and of
+noise what lies where roof points may, in case it is a spire. What a building gets out of them depends on its own area alone, not on tiles, files or chunks.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from .overrides import REDO, load_redo
 from .plan import PLAN_FILE, WorkPlan, load_plan
 
 NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
-KINDS = ("roof", "ground", "low")
+KINDS = ("roof", "ground", "low", "noise")
 ROOF, GROUND, OTHER, NOISE = range(4)  # kinds of points, by what a work tile needs them for
 SQUARE_M = 50.0  # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
 HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
@@ -138,6 +138,7 @@ class Gatherer:
             kind = kinds[candidates]
             self.keep(tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0))
             self.keep(tile, "ground", cloud.xyz.take(candidates[(kind == GROUND) & (bits & 2 > 0)], axis=0))
+            self.keep(tile, "noise", cloud.xyz.take(candidates[(kind == NOISE) & (bits & 1 > 0)], axis=0))
             low = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
             self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(low, axis=0)))
         if self.held > HELD_POINTS:
@@ -253,7 +254,7 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
 
 
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
-    """Points (n, 3) of a work tile from all files, by kind: "roof", "ground", "low"."""
+    """Points (n, 3) of a work tile from all files, by kind: "roof", "ground", "low", "noise"."""
     # a name that starts with a dot is what a killed worker left unfinished
     files = sorted(path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith("."))
     found: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in KINDS}

@@ -46,7 +46,7 @@ def build(
     Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid solid, or unusable input.
     """
     from ..parametric.run import build_file
-    from .running import Bar
+    from .running import Bar, graded_words
 
     with Bar() as bar:
         built = build_file(parameters, out, lambda done: bar.update("build", done, None), changes)
@@ -56,5 +56,7 @@ def build(
         f"{counted(built.buildings, 'building')}: "
         + ", ".join(f"{n} {code}" for code, n in built.by_status.most_common())
     )
+    if built.by_quality:
+        typer.echo("quality: " + graded_words(built.by_quality))
     typer.echo("models: " + ", ".join(map(str, built.models)))
     raise typer.Exit(built.exit_code)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
 from ..city.run import Request, Summary, reconstruct_area
 from ..compiled import news
 from ..log import counted
-from ..status import Status
+from ..status import Grade, Status
 
 
 def run_request(request: Request) -> int:
@@ -54,6 +54,15 @@ class Bar:
         self.bar.update(self.tasks[step], completed=done, total=total)
 
 
+def graded_words(by_quality: Mapping[str, int]) -> str:
+    """How many models are good, fair and poor.
+
+    >>> graded_words({"poor": 2, "good": 97})
+    '97 good, 0 fair, 2 poor'
+    """
+    return ", ".join(f"{by_quality.get(grade.code, 0)} {grade.code}" for grade in Grade)
+
+
 def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> None:
     """The table at the end: buildings by status and by type, figures, time, and every failure by name."""
     from rich.console import Console
@@ -66,6 +75,8 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
     for code, number in summary.by_status.items():
         table.add_row(str(number), Status[code.upper()].value)
     show(table)
+    if summary.by_quality:
+        show("quality: " + graded_words(summary.by_quality))
     if summary.by_type:
         show("roof types: " + ", ".join(f"{number} {name}" for name, number in summary.by_type.items()))
     if summary.median_psd is not None:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from ..errors import InputError
+from .running import graded_words
 
 if TYPE_CHECKING:
     from ..city.ledger import Ledger
@@ -47,6 +48,8 @@ def describe(ledger: Ledger) -> list[str]:
         left = f", about {(total - finished) / rate:.0f} s left" if finished < total and rate else ""
         lines.append(f"throughput: {rate:.1f} buildings a second{left}")
     lines += [f"{number} {status}" for status, number in ledger.counts("status").items()]
+    if graded := ledger.counts("quality"):
+        lines.append(f"quality: {graded_words(graded)}")
     lines += [f"failed: {task.name}: {task.message}" for task in tasks if task.state == "failed"]
     lines += [f"internal error: building {id}: {detail}" for id, detail in ledger.failures()]
     lines.append("finished" if ledger.get("merged") == "yes" else "not finished: the same command goes on")

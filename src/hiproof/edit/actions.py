@@ -44,11 +44,11 @@ def edited(record: Record, asked: Any, points: np.ndarray, settings: Settings, i
     found = dataclasses.replace(found, quality=Quality())  # no figure of the earlier model stays
     found = fitted_again(found) if action == "refit" else found
     local = found.roof.frame.to_local(points)
-    return measured(found, local, settings) if is_measured and len(local) else found
+    return measured(found, local) if is_measured and len(local) else found
 
 
 def by_hand(record: Record) -> dict[str, Any]:
-    return {**record, "status": Status.MODELLED.code, "detail": BY_HAND}
+    return {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}
 
 
 def shown(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:

@@ -8,14 +8,14 @@ from typing import Any
 
 from ..log import counted
 from ..status import Doubt as Remark
-from ..status import Status
+from ..status import Grade, Status
 from ..write.attribute_list import ANGLES
 
-POOR_SHARE = 0.9  # of points within 0.2 m of the roof
+UNSURE_GRADES = {Grade.FAIR.code: 0.5, Grade.POOR.code: 1.0}  # and how much each adds
 CLOSE_CALL = 0.2  # by which the most probable type leads
 LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
 LOOSE_M = 0.3  # standard deviation of a part that few points support
-UNSURE = (Status.POOR_FIT, Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT, Status.NO_BUILDING)
+UNSURE = (Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT, Status.NO_BUILDING)
 REMARKED = 0.3  # for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
 
 
@@ -30,21 +30,27 @@ class Doubt:
 def doubt_of(record: Mapping[str, Any]) -> Doubt:
     """The doubt about a building, from its object in parameters.jsonl.
 
-    >>> doubt_of({"status": "modelled", "parts": [], "residuals": {"share_within_20cm": 0.6}})
-    Doubt(amount=0.4, reasons=('60 % within 0.2 m',))
+    >>> doubt_of({"status": "modelled", "quality": "poor", "parts": [], "residuals": {"share_within_20cm": 0.6}})
+    Doubt(amount=1.4, reasons=('poor',))
     """
-    found = [poor_share(record), unsure_status(record), remarked(record), unexplained(record)]
+    found = [share_off(record), unsure_grade(record), unsure_status(record), remarked(record), unexplained(record)]
     found += [loose_parts(record), close_call(record)]
     told = [pair for pair in found if pair is not None]
     return Doubt(round(sum(amount for amount, _ in told), 4), tuple(reason for _, reason in told if reason))
 
 
-def poor_share(record: Mapping[str, Any]) -> tuple[float, str] | None:
+def share_off(record: Mapping[str, Any]) -> tuple[float, str] | None:
     """Points away from the roof; buildings that fit well are still sorted by it."""
     share = (record.get("residuals") or {}).get("share_within_20cm")
     if share is None:
         return None
-    return 1.0 - share, f"{100 * share:.0f} % within 0.2 m" if share < POOR_SHARE else ""
+    return 1.0 - share, ""
+
+
+def unsure_grade(record: Mapping[str, Any]) -> tuple[float, str] | None:
+    """A verdict that is not good; the detail says why."""
+    grade = record.get("quality")
+    return (UNSURE_GRADES[grade], grade) if grade in UNSURE_GRADES else None
 
 
 def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:

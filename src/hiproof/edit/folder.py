@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..evaluate.run import run_record
 from ..parametric.file import DAMAGED, head_of, object_of, objects
 from ..parametric.record import refuse_other_kinds
 from ..read.damage import LeftOut, excerpt
@@ -77,9 +76,7 @@ class RunFolder:
 
 def settings_of(folder: Path, head: FileHead) -> Settings:
     """How the run composed its solids and what it called poor, as far as its files tell."""
-    judged = (run_record(folder).get("settings") or {}).get("reconstruct") or {}
-    poor = {"poor_share": judged["poor_share"]} if "poor_share" in judged else {}
-    return replace(Settings(), compose=head.compose).replace({"reconstruct": poor})
+    return replace(Settings(), compose=head.compose)
 
 
 def read_rows(path: Path) -> tuple[FileHead, list[Row]]:

@@ -23,6 +23,9 @@ from ..write.values import rounded
 from .metrics import iou, plan_outline, quality, share_near, well_inside
 from .models import BuildingModel
 
+TEXTS = ("id", "type", "status", "quality", "ref_id")
+"""Columns that are no figures."""
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -47,10 +50,11 @@ class BuildingFigures:
     quality: Quality = field(default_factory=Quality)
     volume_m3: float = float("nan")
     comparison: Comparison | None = None
+    grade: str = ""
 
     def row(self) -> dict[str, Any]:
         """One flat record, the comparison's columns prefixed with `ref_`."""
-        row = {"id": self.id, "type": self.type, "status": self.status, **asdict(self.quality)}
+        row = {"id": self.id, "type": self.type, "status": self.status, "quality": self.grade, **asdict(self.quality)}
         row["volume_m3"] = self.volume_m3
         if self.comparison is not None:
             row |= {f"ref_{name.removeprefix('reference_')}": v for name, v in asdict(self.comparison).items()}
@@ -81,6 +85,7 @@ def evaluate_building(
         quality(solid, local, outline),
         roof_figures(solid).volume_m3 if solid.of_kind(ROOF) else float("nan"),
         None if reference is None or reference.solid is None else compare(model.solid, reference.id, reference.solid),
+        model.grade,
     )
 
 
@@ -160,7 +165,7 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
 def figure_names(rows: Sequence[dict[str, Any]]) -> list[str]:
     """Numeric columns, in the order of the fullest row."""
     names = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
-    return [name for name in names if name not in ("id", "type", "status", "ref_id")]
+    return [name for name in names if name not in TEXTS]
 
 
 def to_csv(figures: Sequence[BuildingFigures]) -> str:
@@ -168,7 +173,7 @@ def to_csv(figures: Sequence[BuildingFigures]) -> str:
     rows = [f.row() for f in figures]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     if not columns:
-        columns = dict.fromkeys(["id", "type", "status", *(f.name for f in fields(Quality))])
+        columns = dict.fromkeys(["id", "type", "status", "quality", *(f.name for f in fields(Quality))])
     text = io.StringIO()
     writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
     writer.writeheader()

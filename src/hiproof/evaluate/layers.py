@@ -34,20 +34,17 @@ SMALLER_GROUP = 0.2
 LEAST_SHARE = 0.4
 """Share of the points in cells of two surfaces above which it is said: in single roofs of Delft up to 0.35."""
 
-FEWEST_OF_ALL, MOST_OF_ALL, PLACES = 12, 200, 120
-"""Points below which nothing is said of places without any, points that are enough to say it, and places that are asked."""
+MOST_OF_ALL, PLACES = 200, 120
+"""Points that are enough to say where there are any, and places that are asked."""
 
 REACH = 1.5
 """Distances between points, were they even, within which a place has one: by chance one place in a thousand has none."""
 
-LEAST_GAP = 0.2
-"""Share of the outline without points above which it is said: none of Delft's or the towns' reach it, half of an outline cut off does."""
-
 
 def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the outline that none of the `points` (n, 2 or 3) are near, whatever their density; 0 where it is small."""
-    if len(points) < FEWEST_OF_ALL:
-        return 0.0
+    """Share of the outline that none of the `points` (n, 2 or 3) are near, whatever their density."""
+    if not len(points):
+        return 1.0
     some = points[np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2]
     places = places_in(outline)
     x, y = some.T.copy()  # side by side they are told from the places in a third of the time
@@ -55,8 +52,7 @@ def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
     gap *= gap  # in place: these are the largest arrays of a building
     north *= north
     gap += north
-    share = np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(some)) if len(places) else 0.0
-    return float(share) if share > LEAST_GAP else 0.0
+    return float(np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(some))) if len(places) else 0.0
 
 
 def places_in(outline: shapely.Polygon) -> np.ndarray:

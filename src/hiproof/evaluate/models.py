@@ -57,6 +57,11 @@ class BuildingModel:
             return "damaged"
         return self.text("hiproof_status") or ("modelled" if self.solid is not None else "no_model")
 
+    @property
+    def grade(self) -> str:
+        """Code of the verdict on the model, empty where there is none."""
+        return self.text(f"{OWN}quality")
+
     def text(self, name: str) -> str:
         """An attribute that is text, else ""."""
         value = self.attributes.get(name)

@@ -17,7 +17,7 @@ import numpy as np
 from .. import __version__
 from ..log import counted
 from ..masking import masked_values
-from ..status import Status
+from ..status import Grade, Status
 from .evaluation import summarise
 from .metrics import psd
 from .report_data import places_on_map, report_data
@@ -59,6 +59,7 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
         "style": asset("report.css"),
         "lead": lead(run, len(shown)),
         "statuses": status_table(run),
+        "qualities": grade_table(run),
         "figures": figure_table(run),
         "distributions": distributions(run),
         "worst": worst_buildings(run, worst, shown),
@@ -102,6 +103,17 @@ def status_table(run: EvaluatedRun) -> str:
     return f"<table><tr><th>buildings</th><th>outcome</th></tr>{rows}</table>"
 
 
+def grade_table(run: EvaluatedRun) -> str:
+    """How many models are good, fair and poor; empty for models without a verdict."""
+    counts = Counter(model.grade for model in run.models)
+    rows = "".join(
+        f"<tr><td>{counts[grade.code]}</td><td>{grade.code}: {escape(grade.value)}</td></tr>"
+        for grade in Grade
+        if counts[grade.code]
+    )
+    return f"<table><tr><th>models</th><th>quality</th></tr>{rows}</table>" if rows else ""
+
+
 def sentence(code: str) -> str:
     status = Status.__members__.get(code.upper())
     return status.value if status else code
@@ -123,10 +135,12 @@ def distributions(run: EvaluatedRun) -> str:
 
 
 def worst_indices(run: EvaluatedRun) -> list[int]:
-    """The twenty models that explain the least of their points, facades aside (of equals the larger RMSE first)."""
+    """Twenty models, the poor ones first, then those that explain the least of their points (of equals the larger RMSE first)."""
+    worst_first = [grade.code for grade in reversed(Grade)]
+    grades = np.array([worst_first.index(m.grade) if m.grade in worst_first else len(worst_first) for m in run.models])
     rmse = np.array([figures.quality.rmse for figures in run.figures], float)
     share = np.array([figures.quality.share_within_20cm for figures in run.figures], float)
-    return [int(i) for i in np.lexsort((-rmse, share)) if np.isfinite(rmse[i])][:WORST]
+    return [int(i) for i in np.lexsort((-rmse, share, grades)) if np.isfinite(rmse[i])][:WORST]
 
 
 def shown_indices(run: EvaluatedRun, worst: list[int], most: int) -> list[int]:
@@ -154,7 +168,7 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
         model.solid.moved(-origin), points - origin, psd(model.solid, points), model.part_types
     )
     text = (
-        f"<b>{escape(model.id)}</b> {escape(model.roof_type)}, {100 * quality.share_within_20cm:.0f} % of the points "
+        f"<b>{escape(model.id)}</b> {escape(model.grade)} {escape(model.roof_type)}, {100 * quality.share_within_20cm:.0f} % of the points "
         f"inside the outline within 0.2 m of the roof; RMSE of all, facades included, {quality.rmse:.2f} m"
     )
     return f'<figure class="worst" data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'

@@ -9,8 +9,9 @@ import numpy as np
 import shapely
 
 from ..status import Status
-from ..write.colours import WALL_COLOUR, type_colour
+from ..write.colours import GRADE_COLOURS, UNKNOWN_COLOUR, WALL_COLOUR, type_colour
 from ..write.page_mesh import packed, solid_mesh
+from .evaluation import TEXTS
 from .metrics import plan_outline, psd
 from .models import BuildingModel
 from .report_pictures import RESIDUAL_STOPS
@@ -20,13 +21,10 @@ POINTS_PER_BUILDING = 150  # points drawn of a building; enough to see where a r
 MOST_POINTS = 600_000  # points in the page, 7 MB: what a browser still opens at once
 STATUS_COLOURS = {
     "modelled": "#2a9d5c",
-    "sparse": "#93c54b",
-    "poor_fit": "#f08a4b",
     "simplified": "#e6b800",
     "flat_fallback": "#7b3fa0",
     "internal_error": "#000000",
 }
-NO_MODEL_COLOUR = "#b5b5b5"
 
 
 def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
@@ -40,7 +38,8 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
         "colours": {
             "wall": WALL_COLOUR,
             "type": {name: type_colour(name) for name in types},
-            "status": {name: STATUS_COLOURS.get(name, NO_MODEL_COLOUR) for name in statuses},
+            "status": {name: STATUS_COLOURS.get(name, UNKNOWN_COLOUR) for name in statuses},
+            "quality": GRADE_COLOURS,
             "residual": [list(stop) for stop in RESIDUAL_STOPS],
         },
         "mesh": mesh_data(run, types, origin),
@@ -65,11 +64,12 @@ def building_data(
     residual: Any = figures.quality.psd_mean
     if not np.isfinite(residual):
         residual = model.attributes.get("hiproof_psd_mean")
-    measured = {name: value for name, value in figures.row().items() if name not in ("id", "type", "status")}
+    measured = {name: value for name, value in figures.row().items() if name not in TEXTS}
     return {
         "id": model.id,
         "type": model.roof_type,
         "status": model.status,
+        "quality": model.grade,
         "outcome": status.value if status else model.status,
         "residual": finite(residual),
         "measured": {name: finite(value) for name, value in measured.items() if finite(value) is not None},

@@ -34,7 +34,6 @@ RECORD: dict[tuple[str, ...], Any] = {
     ("settings", "write"): dict,
     ("settings", "write", "out_crs"): str,
     ("settings", "reconstruct"): dict,
-    ("settings", "reconstruct", "poor_share"): NUMBER,
     ("inputs",): dict,
     ("inputs", "clouds"): list,
     ("inputs", "footprints"): str,

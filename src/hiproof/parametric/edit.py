@@ -65,7 +65,9 @@ def without_part(building: Building, index: int) -> Building:
 
 def built(building: Building, record: dict[str, Any]) -> Building:
     """The building of a changed record, composed as `building` was: no figure of the earlier model stays."""
-    found = build({**record, "status": Status.MODELLED.code, "detail": BY_HAND}, building.model.compose)
+    found = build(
+        {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}, building.model.compose
+    )
     return dataclasses.replace(
         found,
         quality=Quality(points=building.quality.points, density=building.quality.density),

@@ -260,7 +260,7 @@ def as_given(override: Override, points: np.ndarray, building: Building, terrain
         footprint=made.footprint if building.footprint is None else building.footprint,
         shift=building.shift,
     )
-    made = measured(made, local, settings) if len(local) else made
+    made = measured(made, local) if len(local) else made
     return stages.remarked(made, of_footprint)
 
 
@@ -315,22 +315,23 @@ def fitted_within(
     if override.type and building.parts[main].type != override.type:
         building, changed = building.with_part(main, type=override.type), True
     if changed:
-        building = refitted(building, points, {}, settings)
+        building = refitted(building, points, {})
     if override.fixed:
         building = building.with_part(main, **override.fixed)
         held = {main: (*building.parts[main].parameters, "z")}
-        building = refitted(building, points, held, settings)
+        building = refitted(building, points, held)
     if override.z_ground is not None:
         record = building_record(building) | {"z_ground": override.z_ground, "ground_source": "override"}
         again = built(building, record)
         detail = stages.without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
-        building = dataclasses.replace(again, quality=building.quality, status=building.status, detail=detail)
+        again = dataclasses.replace(again, quality=building.quality, grade=building.grade)
+        building = dataclasses.replace(again, status=building.status, detail=detail)
     return building
 
 
-def refitted(building: Building, points: np.ndarray, held: dict[int, tuple[str, ...]], settings: Settings) -> Building:
+def refitted(building: Building, points: np.ndarray, held: dict[int, tuple[str, ...]]) -> Building:
     """The building fitted again; as it is where its points are too few."""
     try:
-        return building.refit(points, held, settings)
+        return building.refit(points, held)
     except FitError:
         return building

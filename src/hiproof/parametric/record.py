@@ -18,7 +18,7 @@ from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
 from ..read.damage import excerpt
 from ..rings import enclosed
-from ..status import Status
+from ..status import Grade, Status
 from ..write.attribute_list import PARAMETERS, PART
 
 WIDEST_M = 1e5  # of any number of a part, and of heights
@@ -48,6 +48,7 @@ def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
         status=status,
         detail=text_at(record, "detail") if status.code == record.get("status") else "",
         quality=quality_of(record),
+        grade=grade_of(record),
         z_ground=settled(ground, PLAN_DIGITS),
         ground_source=text_at(record, "ground_source"),
         terrain_intersection=tuple(lines_of(record)),
@@ -179,6 +180,14 @@ def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:
         for line in as_list(record.get("terrain_line") or [], "terrain_line")
     ]
     return [rounded(line, PLAN_DIGITS) for line in lines if len(line)]
+
+
+def grade_of(record: Mapping[str, Any]) -> Grade | None:
+    """The verdict told, None where there is none."""
+    code, known = text_at(record, "quality"), {grade.code: grade for grade in Grade}
+    if code and code not in known:
+        raise InputError(f"expected a quality ({', '.join(known)}), got {code!r:.40}; leave it as the run wrote it")
+    return known.get(code)
 
 
 def quality_of(record: Mapping[str, Any]) -> Quality:

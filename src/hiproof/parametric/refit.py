@@ -8,7 +8,6 @@ parameters, so a column of the Jacobian asks one part again. The result is never
 from __future__ import annotations
 
 import dataclasses
-import math
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -19,8 +18,6 @@ from ..compose.settle import pieces_of
 from ..errors import FitError, InputError
 from ..model import Building, Part, Roof, as_xyz
 from ..primitives.parameters import SIDED
-from ..settings import Settings
-from ..status import Status
 from ..write.parameters import building_record
 from .edit import built
 
@@ -52,12 +49,11 @@ def refit(
     building: Building,
     points: np.ndarray,
     fixed: Mapping[int, Collection[str]] | None = None,
-    settings: Settings | None = None,
 ) -> Building:
     """The building with its parts fitted to `points` again; see `Building.refit`."""
     record, local = building_record(building), within(building.roof, points)
     parts = refitted_parts(building.roof, record["parts"], local, fixed or {})
-    return measured(fitted_again(built(building, {**record, "parts": parts})), local, settings or Settings())
+    return measured(fitted_again(built(building, {**record, "parts": parts})), local)
 
 
 def fitted_again(building: Building) -> Building:
@@ -280,16 +276,12 @@ def with_values(part: dict[str, Any], values: Mapping[str, float], sigma: dict[s
     return {**part, "parameters": parameters, "position": [x, y, z], "sigma": sigma}
 
 
-def measured(building: Building, points_local: np.ndarray, settings: Settings) -> Building:
+def measured(building: Building, points_local: np.ndarray) -> Building:
     """The building with its quality on `points_local` (n, 3), and what that says of it."""
     from ..compose.settle import settled_building
     from ..evaluate.metrics import quality
+    from ..stages import graded
 
     roof = building.roof
     found = quality(building.solid.moved(-roof.frame.origin), points_local, roof.outline)
-    share = found.share_within_20cm
-    if math.isfinite(share) and share < settings.reconstruct.poor_share:
-        status, detail = Status.POOR_FIT, f"only {100 * share:.0f} % of its points lie within 0.2 m of the roof given"
-    else:
-        status, detail = Status.MODELLED, building.detail
-    return settled_building(dataclasses.replace(building, quality=found, status=status, detail=detail))
+    return graded(settled_building(dataclasses.replace(building, quality=found)), points_local)

@@ -46,6 +46,7 @@ class Built:
 
     models: list[Path] = field(default_factory=list)
     by_status: Counter = field(default_factory=Counter)
+    by_quality: Counter = field(default_factory=Counter)
     by_type: Counter = field(default_factory=Counter)
     not_built: list[tuple[str, str]] = field(default_factory=list)
 
@@ -62,6 +63,8 @@ class Built:
 
     def count(self, building: Building) -> None:
         self.by_status[building.status.code] += 1
+        if building.grade:
+            self.by_quality[building.grade.code] += 1
         if building.type:
             self.by_type[building.type] += 1
         if building.status in (Status.NOT_BUILT, Status.INTERNAL_ERROR) and len(self.not_built) < MOST_TOLD:
@@ -175,6 +178,7 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         "crs": None if head.crs is None else head.crs.to_wkt(),
         "buildings": built.buildings,
         "by_status": dict(built.by_status),
+        "by_quality": dict(built.by_quality),
         "by_type": dict(built.by_type),
         "not_built": [list(pair) for pair in built.not_built],
     }

@@ -8,7 +8,7 @@ from typing import Any
 from ..primitives.cants import MEASURES, MOST_CANTS
 from ..primitives.catalogue import CATALOGUE
 from ..read.crs import NAMED_UNITS
-from ..status import Status
+from ..status import Grade, Status
 from ..write.attribute_list import HEAD, PARAMETERS, PART, Attribute
 from ..write.parameters import VERSION
 
@@ -32,6 +32,7 @@ HEAD_KINDS = {
 BUILDING_KINDS = {
     "id": TEXT,
     "status": {"enum": [status.code for status in Status]},
+    "quality": {"enum": [*(grade.code for grade in Grade), None]},
     "detail": TEXT,
     "type": TEXT_OR_NULL,
     "origin": {"anyOf": [PLACE, {"type": "null"}]},

@@ -47,7 +47,8 @@ def database_rows(folder: Path, damaged: Damaged = refuse) -> Iterator[Row]:
         elif not model.is_damaged:
             seen.add(model.id)
             status, roof_type = (model.text(f"{OWN}{name}") or None for name in ("status", "roof_type"))
-            yield Row(model.id, status, roof_type, model.attributes, model.solid, model.part_types, units)
+            told = model.attributes, model.solid, model.part_types, units, model.grade or None
+            yield Row(model.id, status, roof_type, *told)
 
 
 def srid_of(header: dict[str, Any]) -> int:

@@ -66,9 +66,14 @@ OF_PARTS = (
 )
 """Those that building parts have of their own."""
 
+QUALITY = Attribute(
+    "quality", "text", "", "how good the model is by its points: good, fair or poor; null where it was not measured"
+)
+
 HIPROOF = (
-    Attribute("status", "text", "", "what came of the building: modelled, poor_fit, simplified, ..."),
-    Attribute("detail", "text", "", "the status as a sentence about this building"),
+    Attribute("status", "text", "", "what came of the building: modelled, simplified, flat_fallback, ..."),
+    QUALITY,
+    Attribute("detail", "text", "", "the status as a sentence about this building, and what speaks against the model"),
     Attribute(
         "roof_type", "text", "", "type of the part that shows the largest area: a name of the catalogue, or free"
     ),
@@ -134,6 +139,7 @@ BUILDING_PART = (
 PARAMETERS = (
     Attribute("id", "text", "", "the building's id"),
     Attribute("status", "text", "", "as hiproof_status"),
+    Attribute("quality", "text", "", "as hiproof_quality"),
     Attribute("detail", "text", "", "as hiproof_detail"),
     Attribute(
         "type", "text", "", "type of the part that shows the largest area; `hiproof build` reads those of the parts"
@@ -260,6 +266,7 @@ EVALUATION = (
     Attribute("id", "text", "", "the building's id"),
     Attribute("type", "text", "", "its roof type"),
     Attribute("status", "text", "", "as hiproof_status"),
+    Attribute("quality", "text", "", "as hiproof_quality"),
     Attribute("points", "count", "", "points of the clouds given inside the outline"),
     Attribute("density", "number", "1/m2", "points by area of the outline"),
     Attribute("psd_mean", "number", "m", "mean distance of the points from the roof, facade points included"),
@@ -285,6 +292,7 @@ EVALUATION = (
 POSTGIS_BUILDINGS = (
     Attribute("id", "text", "", "the building's id"),
     Attribute("status", "text", "", "as hiproof_status"),
+    Attribute("quality", "text", "", "as hiproof_quality"),
     Attribute("roof_type", "text", "", "as hiproof_roof_type"),
     Attribute("attributes", "object", "", "all attributes of the building (jsonb)"),
     Attribute("geom", "geometry", "of the CRS", "the solid as a polyhedral surface of triangles"),

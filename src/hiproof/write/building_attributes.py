@@ -91,6 +91,7 @@ def hiproof_attributes(building: Building, figures: RoofFigures | None = None, u
     recognised = max(building.recognised, key=building.recognised.__getitem__, default=None)
     return {
         "status": building.status.code,
+        "quality": None if building.grade is None else building.grade.code,
         "detail": building.detail or building.status.value,
         "roof_type": kind,
         "roof_type_probability": None if probability is None else rounded(probability),

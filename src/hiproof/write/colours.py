@@ -8,6 +8,7 @@ UNKNOWN_COLOUR = "#b5b5b5"
 NO_TYPES = {"free": "#a3785f", "unknown": UNKNOWN_COLOUR}
 WALL_COLOUR = "#e8e2d6"
 GROUND_COLOUR = "#8c8c84"
+GRADE_COLOURS = {"good": "#2a9d5c", "fair": "#e6b800", "poor": "#d1495b"}
 
 
 def type_colours() -> dict[str, str]:

@@ -107,6 +107,7 @@ def building_record(building: Building) -> dict[str, Any]:
     return {
         "id": plain_text(building.id),
         "status": building.status.code,
+        "quality": None if building.grade is None else building.grade.code,
         "detail": building.detail or building.status.value,
         "type": building.type,
         "origin": None if roof is None else numbers(roof.frame.origin),

@@ -36,7 +36,8 @@ KINDS = {"number": "double precision", "text": "text"}  # of columns from `area_
 MEASURES = ", ".join(f"{a.name} {KINDS[a.kind]}" for a in PARTS_LAYER[3:])
 SCHEMA = """
 create table if not exists {buildings} (
-    id text primary key, status text, roof_type text, attributes jsonb, geom geometry(PolyhedralSurfaceZ, {srid}));
+    id text primary key, status text, quality text, roof_type text, attributes jsonb, geom geometry(PolyhedralSurfaceZ, {srid}));
+alter table {buildings} add column if not exists quality text;
 create table if not exists {roofs} (
     building_id text references {buildings} (id) on delete cascade, number integer, part integer, type text,
     slope_deg double precision, azimuth_deg double precision, area_m2 double precision,
@@ -63,6 +64,7 @@ class Row:
     solid: Solid | None
     part_types: Mapping[int, str]
     units: Units = METRES
+    quality: str | None = None
 
 
 def load_rows(
@@ -131,8 +133,9 @@ def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> No
     """Insert buildings together with their roof surfaces."""
     geometry = f"ST_GeomFromEWKT('SRID={srid};' || %s::text)"
     cursor.executemany(
-        f"insert into {names['buildings']} values (%s, %s, %s, %s, {geometry})",
-        [(r.id, r.status, r.roof_type, json.dumps(r.attributes), polyhedral_wkt(r)) for r in rows],
+        f"insert into {names['buildings']} (id, status, quality, roof_type, attributes, geom)"
+        f" values (%s, %s, %s, %s, %s, {geometry})",
+        [(r.id, r.status, r.quality, r.roof_type, json.dumps(r.attributes), polyhedral_wkt(r)) for r in rows],
     )
     cursor.executemany(
         f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, %s, {geometry})",

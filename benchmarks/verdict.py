@@ -1,0 +1,187 @@
+"""How often is the verdict on a model right?
+
+usage: python -m benchmarks.verdict [--sources compounds essen ...] [--most 40] [--parity even|odd]
+           [--densities 1 2 5 15] [--with-footprints | --without-footprints] [--wrong N]
+
+Cases (benchmarks/verdict_cases.py) are reconstructed and compared with their truth on a raster. A
+model is sound if
+
+    the RMSE of the distance between the true surface and the model's, walls included, both ways, is
+    under 0.2 m, and
+    no level is missing or invented: nowhere does a patch lie 0.5 m or more above, below or beside
+    the truth that is 2 m2 and 2 % of the outline large and 1 m wide.
+
+Without a footprint nothing tells that a building goes on where it has no points, so the truth ends
+with them. Printed by density, area, source and defect: cases; the share of sound models; how many
+are called good, fair and poor, and the share of sound ones among each; and how many of the sound
+ones are called good. `--wrong` names cases that are called good and are not sound. The limits of
+evaluate/verdict.py were chosen on even buildings.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import shapely
+from scipy import ndimage
+
+from hiproof import reconstruct
+from hiproof.evaluate.distance import point_surface_distances
+from hiproof.model import ROOF, WALL, Building, Solid
+from hiproof.rings import ring_normal
+from hiproof.status import Grade
+
+from .towns import STEEPEST
+from .verdict_cases import PLACES, Case, cases
+
+SOUND_RMSE_M = 0.2
+LEVEL_M, LEVEL_M2, LEVEL_SHARE, LEVEL_WIDTH_M = 0.5, 2.0, 0.02, 1.0
+RASTER_M, MOST_PLACES = 0.25, 6000
+AREAS_M2 = (0.0, 80.0, 200.0, np.inf)
+
+Polygons = list[list[np.ndarray]]
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A case and its model's verdict, with the truth: RMSE of the surface (m) and number of wrong levels."""
+
+    case: Case
+    grade: Grade | None
+    detail: str
+    rmse: float
+    wrong_levels: int
+
+    @property
+    def is_sound(self) -> bool:
+        return self.rmse < SOUND_RMSE_M and self.wrong_levels == 0
+
+
+def polygons_of(solids: Iterable[Solid], kinds: tuple[str, ...]) -> Polygons:
+    """Faces of `kinds` as lists of rings (m, 3)."""
+    return [[solid.vertices[list(r)] for r in f.rings] for solid in solids for f in solid.faces if f.kind in kinds]
+
+
+def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
+    outer, *holes = (ring[:, :2] for ring in rings)
+    return shapely.make_valid(shapely.Polygon(outer, holes))
+
+
+def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
+    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none; upright ones do not count."""
+    z = np.full(len(xy), -np.inf)
+    for rings in polygons:
+        normal, centre = ring_normal(rings[0]), rings[0].mean(axis=0)
+        if abs(normal[2]) <= STEEPEST * np.linalg.norm(normal):
+            continue
+        plan = plan_of(rings)
+        shapely.prepare(plan)
+        inside = shapely.contains_xy(plan, xy[:, 0], xy[:, 1])
+        own = centre[2] - (xy[inside] - centre[:2]) @ normal[:2] / normal[2]
+        z[inside] = np.maximum(z[inside], own)
+    return np.where(np.isfinite(z), z, np.nan)
+
+
+def compared(case: Case, building: Building) -> tuple[float, int]:
+    """RMSE (m) between the true surface and the model's, and the number of levels that are missing or invented."""
+    origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
+    true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
+    area = shapely.transform(case.truth_area, lambda xy: xy - origin[:2])
+    everywhere = shapely.union_all([area, *map(plan_of, polygons_of(model, (ROOF,)))])
+    step = max(RASTER_M, float(np.sqrt(everywhere.area / MOST_PLACES)))
+    west, south, east, north = everywhere.bounds
+    x, y = np.meshgrid(np.arange(west + step / 2, east, step), np.arange(south + step / 2, north, step), indexing="ij")
+    xy = np.column_stack([x.ravel(), y.ravel()])
+    z_true, z_model = heights(polygons_of(true, (ROOF,)), xy), heights(polygons_of(model, (ROOF,)), xy)
+    z_true[~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
+    gaps = [
+        point_surface_distances(np.column_stack([xy, z])[np.isfinite(z)], polygons_of(other, (ROOF, WALL)))
+        for z, other in ((z_true, model), (z_model, true))
+    ]
+    is_off = (np.isfinite(z_true) != np.isfinite(z_model)) | (np.abs(z_true - z_model) >= LEVEL_M)
+    wrong = patches(is_off.reshape(x.shape), step, max(LEVEL_M2, LEVEL_SHARE * case.truth_area.area))
+    return float(np.sqrt(np.mean(np.concatenate(gaps) ** 2))), wrong
+
+
+def patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
+    """Patches of a raster (rows, columns) that are LEVEL_WIDTH_M wide and `least_m2` large."""
+    width = max(2, round(LEVEL_WIDTH_M / step))
+    wide = ndimage.binary_opening(np.pad(is_off, width), np.ones((width, width)))
+    labels, count = ndimage.label(wide)
+    sizes = ndimage.sum_labels(wide, labels, np.arange(1, count + 1)) * step**2
+    return int(np.count_nonzero(sizes >= least_m2))
+
+
+def outcomes(
+    sources: list[str], most: int, densities: list[float], footprints: tuple[bool, ...], parity: str
+) -> Iterator[Outcome]:
+    """All cases, reconstructed and compared; a building without a model is left out."""
+    for source in sources:
+        for with_footprints in footprints:
+            for density in densities:
+                for case in cases(source, most, density, with_footprints, parity):
+                    building = reconstruct(case.points, case.footprint, id=case.id)
+                    if building.built is not None:
+                        yield Outcome(case, building.grade, building.detail, *compared(case, building))
+
+
+def line(name: str, found: list[Outcome]) -> str:
+    """A row of a table about some outcomes."""
+    sound = [outcome for outcome in found if outcome.is_sound]
+    cells = [f"{name:24}", f"{len(found):5d}", f"{len(sound) / len(found):6.3f}"]
+    for grade in Grade:
+        called = [outcome for outcome in found if outcome.grade is grade]
+        right = f"{np.mean([outcome.is_sound for outcome in called]):6.3f}" if called else "     -"
+        cells.append(f"{len(called) / len(found):6.3f} {right}")
+    kept = f"{np.mean([outcome.grade is Grade.GOOD for outcome in sound]):6.3f}" if sound else "     -"
+    return " | ".join([*cells, kept])
+
+
+def table(found: list[Outcome]) -> str:
+    """Rows for all outcomes, and by density, area, source and defect."""
+    groups: dict[str, Callable[[Outcome], bool]] = {"all": lambda outcome: True}
+    groups |= {f"{d:g} points/m2": lambda o, d=d: o.case.density == d for d in sorted({o.case.density for o in found})}
+    for low, high in pairwise(AREAS_M2):
+        groups[f"{low:g} to {high:g} m2"] = lambda o, low=low, high=high: low <= o.case.area_m2 < high
+    groups |= {s: lambda o, s=s: o.case.source == s for s in dict.fromkeys(o.case.source for o in found)}
+    groups |= {f"defect: {d}": lambda o, d=d: o.case.defect == d for d in dict.fromkeys(o.case.defect for o in found)}
+    head = f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
+    rows = ((name, [o for o in found if belongs(o)]) for name, belongs in groups.items())
+    return "\n".join([head, *(line(name, own) for name, own in rows if own)])
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--sources", nargs="+", default=["compounds", *sources()], choices=["compounds", *sources()])
+    parser.add_argument("--most", type=int, default=40, help="buildings of each source")
+    parser.add_argument(
+        "--densities", type=float, nargs="+", default=[1.0, 2.0, 5.0, 15.0], help="points a square metre"
+    )
+    parser.add_argument("--parity", choices=("even", "odd"), default="odd")
+    parser.add_argument("--with-footprints", action="store_true", help="cases with footprints alone")
+    parser.add_argument("--without-footprints", action="store_true", help="cases without footprints alone")
+    parser.add_argument("--wrong", type=int, default=0, help="name so many cases called good that are not sound")
+    a = parser.parse_args()
+    footprints = (True,) if a.with_footprints else (False,) if a.without_footprints else (True, False)
+    found = list(outcomes(a.sources, a.most, a.densities, footprints, a.parity))
+    for with_footprints in footprints:
+        own = [outcome for outcome in found if (outcome.case.footprint is not None) == with_footprints]
+        print(f"{a.parity} buildings, with{'' if with_footprints else 'out'} footprints\n{table(own)}\n", flush=True)
+    wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
+    for o in wrong[: a.wrong]:
+        known = "with" if o.case.footprint is not None else "without"
+        print(f"{o.case.source} {o.case.id} {o.case.density:g}/m2 {known} footprint, {o.case.defect}: RMSE {o.rmse:.2f} m,"
+              f" wrong levels {o.wrong_levels}")  # fmt: skip
+
+
+def sources() -> list[str]:
+    """The towns whose buildings are scanned, where their truth is here."""
+    return [name for name, path in PLACES.items() if path.is_file()]
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,228 @@
+"""Roofs whose truth is known, scanned by simulation, with what goes wrong with clouds and footprints.
+
+A case is a simulated compound or a building of a real town, its points at one density, and the
+footprint given, None for a run without footprints. A quarter of the cases is faultless, a quarter
+has the scanner's own defects, and the others have one of DEFECTS each. Everything is drawn by the
+building's id and the density, so a case is always the same.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import shapely
+
+from hiproof.compose import compose
+from hiproof.model import Solid
+from hiproof.simulate import COMPOUND_KINDS, SOURCES, ScanSettings, random_compound, scan, scan_solids
+from hiproof.simulate.scene import Defects
+
+from .towns import TOWNS, TrueBuilding, read_town
+
+PLACES = {name: TOWNS[name] for name in ("essen", "nrw_5657", "denhaag", "rotterdam", "vienna")}
+MOST_SEEN = 1500  # points that tell where a roof is seen
+SCANNER = replace(Defects.none(), missing_strip=0.2, partial=0.15, swath_edge=0.2, outliers=0.004)
+CLUTTERED = replace(SCANNER, chimney=0.5, antenna=0.2, tree=0.3)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A building to model: `solids` are its truth, within `truth_area` where the footprint asks for a part of it alone."""
+
+    source: str
+    id: str
+    density: float
+    defect: str
+    solids: tuple[Solid, ...]
+    truth_area: shapely.Geometry
+    footprint: shapely.Polygon | None
+    points: np.ndarray
+
+    @property
+    def area_m2(self) -> float:
+        return float(self.truth_area.area)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Points (n, 3) and the footprint of a building, as a defect changes them; `asked` is the true area asked for."""
+
+    points: np.ndarray
+    footprint: shapely.Polygon
+    asked: shapely.Geometry
+    z_ground: float
+
+
+Defect = Callable[[Scene, np.random.Generator], Scene]
+
+
+def direction(rng: np.random.Generator) -> np.ndarray:
+    """A level unit vector (2,) drawn by chance."""
+    angle = rng.uniform(-np.pi, np.pi)
+    return np.array([np.cos(angle), np.sin(angle)])
+
+
+def with_hole(scene: Scene, rng: np.random.Generator) -> Scene:
+    """No points on one side of a line: 15 to 60 % of them are missing."""
+    along = scene.points[:, :2] @ direction(rng)
+    return replace(scene, points=scene.points[along < np.quantile(along, rng.uniform(0.4, 0.85))])
+
+
+def under_leaves(scene: Scene, rng: np.random.Generator) -> Scene:
+    """A crown over a tenth to a half of the roof: seven points in ten lie in its leaves."""
+    middle = shapely.get_coordinates(scene.footprint)[rng.integers(4)]
+    away = np.hypot(*(scene.points[:, :2] - middle).T)
+    caught = (away < np.quantile(away, rng.uniform(0.1, 0.5))) & (rng.random(len(away)) < 0.7)
+    points = scene.points.copy()
+    points[caught, 2] += rng.uniform(0.3, 6.0, int(caught.sum()))
+    return replace(scene, points=points)
+
+
+def facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np.ndarray:
+    """So many points (count, 3) on the two sides of the outline that face the scanner."""
+    seen_from = direction(rng)
+    corners = shapely.get_coordinates(shapely.orient_polygons(scene.footprint).exterior)
+    edges = np.diff(corners, axis=0)
+    outwards = np.column_stack([edges[:, 1], -edges[:, 0]])
+    weight = np.maximum(outwards @ seen_from, 0.0)
+    side = rng.choice(len(edges), count, p=weight / weight.sum())
+    xy = corners[side] + rng.random((count, 1)) * edges[side]
+    xy -= outwards[side] / np.hypot(*outwards[side].T)[:, None] * np.abs(rng.normal(0.0, 0.06, (count, 1)))
+    top = np.quantile(scene.points[:, 2], 0.1)
+    return np.column_stack([xy, rng.uniform(scene.z_ground + 0.5, max(top, scene.z_ground + 1.0), count)])
+
+
+def with_facades(scene: Scene, rng: np.random.Generator) -> Scene:
+    """A fifth to twice as many points on walls as on the roof."""
+    count = int(len(scene.points) * rng.uniform(0.2, 2.0)) + 1
+    return replace(scene, points=np.concatenate([scene.points, facade_points(scene, rng, count)]))
+
+
+def walls_alone(scene: Scene, rng: np.random.Generator) -> Scene:
+    """Points on two walls and none on the roof."""
+    return replace(scene, points=facade_points(scene, rng, len(scene.points)))
+
+
+def shifted(scene: Scene, rng: np.random.Generator) -> Scene:
+    """A footprint 0.4 to 1.5 m beside its building."""
+    shift = direction(rng) * rng.uniform(0.4, 1.5)
+    return replace(scene, footprint=shapely.transform(scene.footprint, lambda xy: xy + shift))
+
+
+def too_wide(scene: Scene, rng: np.random.Generator) -> Scene:
+    """A footprint that takes in a yard beside its building."""
+    west, south, east, north = scene.footprint.bounds
+    shift = direction(rng) * rng.uniform(0.1, 0.5) * np.array([east - west, north - south])
+    wider = shapely.union_all([scene.footprint, shapely.transform(scene.footprint, lambda xy: xy + shift)])
+    return replace(scene, footprint=max(shapely.get_parts(wider), key=shapely.area))
+
+
+def part_alone(scene: Scene, rng: np.random.Generator) -> Scene:
+    """A footprint of one half of the building, as cadastres cut them; the other half is not asked for."""
+    west, south, east, north = scene.footprint.bounds
+    middle = rng.uniform(0.3, 0.7) * (east - west) + west
+    half = shapely.intersection(scene.footprint, shapely.box(west, south, middle, north))
+    polygons = [part for part in shapely.get_parts(half) if part.geom_type == "Polygon"]
+    half = max(polygons, key=shapely.area)
+    return replace(scene, footprint=half, asked=half)
+
+
+def noisy(scene: Scene, rng: np.random.Generator) -> Scene:
+    """Heights with a further noise of 0.05 to 0.3 m."""
+    noise = rng.normal(0.0, rng.uniform(0.05, 0.3), len(scene.points))
+    return replace(scene, points=scene.points + np.outer(noise, (0.0, 0.0, 1.0)))
+
+
+OF_POINTS: dict[str, Defect] = {
+    "hole": with_hole,
+    "leaves": under_leaves,
+    "facades": with_facades,
+    "walls alone": walls_alone,
+    "noise": noisy,
+}
+OF_FOOTPRINTS: dict[str, Defect] = {"shifted": shifted, "too wide": too_wide, "part alone": part_alone}
+DEFECTS = OF_POINTS | OF_FOOTPRINTS
+SOUND = ("none", "scanner")
+
+
+def seeded(*words: object) -> np.random.Generator:
+    """A generator drawn by `words`."""
+    return np.random.default_rng(zlib.crc32(" ".join(map(str, words)).encode()))
+
+
+def compound(seed: int) -> tuple[TrueBuilding, Callable[[np.random.Generator, ScanSettings], np.ndarray]]:
+    """A simulated compound as a true building, and what scans it."""
+    rng = np.random.default_rng([seed, 7])
+    building = random_compound(rng, COMPOUND_KINDS[seed // 2 % len(COMPOUND_KINDS)])
+    solid = compose(building.roof, 0.0)
+
+    def scanned(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
+        cloud = scan(building, rng, settings)
+        return cloud.points[cloud.source != SOURCES.index("ground")]
+
+    origin = building.roof.frame.origin
+    return TrueBuilding(f"compound-{seed}", {"a": solid.moved(origin)}, building.footprint), scanned
+
+
+def of_town(building: TrueBuilding) -> Callable[[np.random.Generator, ScanSettings], np.ndarray]:
+    """What scans a building of a town."""
+
+    def scanned(rng: np.random.Generator, settings: ScanSettings) -> np.ndarray:
+        cloud = scan_solids(list(building.solids.values()), rng, settings)
+        return cloud.points[cloud.source != SOURCES.index("ground")]
+
+    return scanned
+
+
+def buildings(source: str, most: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
+    """Number, truth and scanner of at most so many buildings of a source, evenly chosen, as many even as odd ones."""
+    if source == "compounds":
+        yield from ((seed, *compound(seed)) for seed in range(most))
+        return
+    town = read_town(Path(PLACES[source]))
+    step = max(1, len(town) // most)
+    for number, building in enumerate(town[::step][:most]):
+        yield number, building, of_town(building)
+
+
+def where_seen(scene: Scene, density: float) -> shapely.Geometry:
+    """The true area as far as it has points: half a distance between points around them, gaps between them closed."""
+    apart, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
+    apart = max(apart, (scene.asked.area / max(len(points), 1)) ** 0.5)
+    seen = shapely.multipoints(points[:, :2]).buffer(1.5 * apart, quad_segs=3).buffer(-apart, quad_segs=3)
+    found = shapely.intersection(scene.asked, seen)
+    return scene.asked if found.is_empty else found
+
+
+def cases(source: str, most: int, density: float, with_footprints: bool, parity: str) -> Iterator[Case]:
+    """The cases of even or odd buildings of a source at one density.
+
+    Of four buildings one has no defect, one those of the scanner, two have others.
+    """
+    others = list(DEFECTS if with_footprints else OF_POINTS)
+    for number, building, scanned in buildings(source, most):
+        if number % 2 != ("even", "odd").index(parity):
+            continue
+        rng = seeded(building.id, density, with_footprints)
+        kind = number // 2 % 4
+        defect = SOUND[kind] if kind < 2 else others[int(rng.integers(len(others)))]
+        own = Defects.none() if defect == "none" else CLUTTERED if source == "compounds" else SCANNER
+        points = scanned(rng, ScanSettings(density=density, defects=own))
+        z_ground = min(float(solid.vertices[:, 2].min()) for solid in building.solids.values())
+        scene = Scene(points, building.footprint, building.footprint, z_ground)
+        if len(points) >= 10 and defect in DEFECTS:
+            scene = DEFECTS[defect](scene, rng)
+        yield Case(
+            source,
+            building.id,
+            density,
+            defect,
+            tuple(building.solids.values()),
+            scene.asked if with_footprints else where_seen(scene, density),
+            scene.footprint if with_footprints else None,
+            scene.points,
+        )

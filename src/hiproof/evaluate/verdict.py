@@ -1,0 +1,217 @@
+"""How good is a model? Its points tell: good, fair or poor, and what speaks against it.
+
+A point off the roof that lies on one of the model's walls is a facade return and counts neither
+way. All other points are roof points. Five findings speak against a model:
+
+    off the roof    many roof points lie more than 0.2 m above or below it
+    unseen          no roof point lies near a part of the outline
+    above, below    points lie off the roof together: a level or a tower that the model lacks
+    unsupported     a part of the roof has hardly any point: the model may have invented a level
+
+Any of them makes a model fair, and one beyond its second limit makes it poor. benchmarks/verdict.py
+chose the limits on one half of its cases and measured on the other half how often a good model is
+one.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from ..fit.union.shown import highest_of
+from ..log import counted
+from ..model import WALL, Model
+from ..status import Doubt, Grade
+from .distance import point_surface_distances
+from .layers import unseen_share
+from .metrics import FACADE_M, NEAR_M
+
+LEAST_NEAR, POOR_NEAR = 0.9, 0.6
+"""Share of the roof points within NEAR_M of the roof, below which a model is fair, and poor."""
+
+MOST_UNSEEN, POOR_UNSEEN = 0.1, 0.4
+"""Share of the outline without roof points, above which a model is fair, and poor."""
+
+LEVEL_M, LEVEL_M2 = 0.5, 2.0
+"""Height off the roof and area of points that are a level: what a person would draw as one."""
+
+TALL_M = 3.0
+"""Height (m) off the roof from which a cluster counts whatever its area; chimneys are lower."""
+
+FEWEST_IN_CLUSTER = 5
+"""Points of a cluster: birds, and echoes that come late, are fewer in one place."""
+
+LINK_SPACINGS, LINK_M = 1.5, 1.0
+"""Side of the plan cells of a cluster, which touch: distances between points, were they even, and
+metres at least."""
+
+POOR_CLUSTER = 0.2
+"""Share of the outline that a cluster covers, above which a model is poor."""
+
+FEWEST_ON_PART, SMALL_PART_M2 = 3, 1.0
+"""Roof points near a part that shows more than so many m2; with fewer its height is a guess."""
+
+POOR_UNSUPPORTED = 0.3
+"""Share of the outline under parts on fewer points, above which a model is poor."""
+
+
+class Cluster(NamedTuple):
+    """Points that lie off the roof together: how many, how far off the farthest lies, and the area
+    that they stand for."""
+
+    points: int = 0
+    height_m: float = 0.0
+    area_m2: float = 0.0
+
+
+class Evidence(NamedTuple):
+    """What the points say of a model: the number of roof points, shares of these and of the outline,
+    clusters, and the area of parts on few points."""
+
+    points: int
+    near: float
+    unseen: float
+    above: Cluster
+    below: Cluster
+    unsupported_m2: float
+    area_m2: float
+
+
+class Verdict(NamedTuple):
+    """The grade of a model and what speaks against it, in words; nothing against a good one."""
+
+    grade: Grade
+    reasons: tuple[str, ...] = ()
+
+
+def verdict_of(model: Model, points: np.ndarray, unused: np.ndarray | None = None) -> Verdict:
+    """The verdict on a model by its `points` (n, 3) inside the outline, in the frame of its roof.
+
+    `unused` (m, 3) are further points that were thinned out or called noise. They count where they
+    lie together off the roof.
+    """
+    return judged(evidence_of(model, points, np.zeros((0, 3)) if unused is None else unused))
+
+
+def judged(evidence: Evidence) -> Verdict:
+    """The verdict by the evidence.
+
+    >>> judged(Evidence(100, 0.99, 0.0, Cluster(41, 30.2, 6.0), Cluster(), 0.0, 80.0)).reasons
+    ('41 points up to 30 m above the model',)
+    """
+    findings = [*share_findings(evidence), *cluster_findings(evidence), *part_findings(evidence)]
+    if not findings:
+        return Verdict(Grade.GOOD)
+    is_poor = any(poor for poor, _ in findings)
+    return Verdict(Grade.POOR if is_poor else Grade.FAIR, tuple(reason for _, reason in findings))
+
+
+Finding = tuple[bool, str]
+"""Whether it makes a model poor, and the finding in words."""
+
+
+def share_findings(evidence: Evidence) -> list[Finding]:
+    """Points off the roof, and places without points."""
+    found = []
+    if not evidence.points:
+        found.append((True, "all its points lie on its walls, none on its roof"))
+    elif evidence.near < LEAST_NEAR:
+        share = math.floor(100 * evidence.near)
+        found.append((evidence.near < POOR_NEAR, f"only {share} % of its points lie within 0.2 m of the roof"))
+    if evidence.unseen > MOST_UNSEEN:
+        share = round(100 * evidence.unseen)
+        words = f"{share} % {Doubt.PLACES_WITHOUT_POINTS.value}; the roof there is a guess"
+        found.append((evidence.unseen > POOR_UNSEEN, words))
+    return found
+
+
+def cluster_findings(evidence: Evidence) -> list[Finding]:
+    """Points that lie off the roof together."""
+    sides = ((evidence.above, Doubt.POINTS_ABOVE), (evidence.below, Doubt.POINTS_BELOW))
+    return [
+        (
+            cluster.area_m2 > POOR_CLUSTER * evidence.area_m2,
+            f"{counted(cluster.points, 'point')} up to {cluster.height_m:.{0 if cluster.height_m >= 10 else 1}f} m"
+            f" {doubt.value}",
+        )
+        for cluster, doubt in sides
+        if cluster.points
+    ]
+
+
+def part_findings(evidence: Evidence) -> list[Finding]:
+    """Parts of the roof on hardly any point."""
+    area, share = evidence.unsupported_m2, evidence.unsupported_m2 / evidence.area_m2
+    return [(share > POOR_UNSUPPORTED, f"{area:.0f} m² of its roof {Doubt.UNSUPPORTED.value}")] if area else []
+
+
+def evidence_of(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidence:
+    """What `points` (n, 3) and `unused` ones (m, 3) say of a model; see `verdict_of`."""
+    roof, everything = model.roof, np.concatenate([points, unused])
+    z_roof, part = highest_of(roof.parts, everything[:, :2])
+    dz = everything[:, 2] - z_roof
+    on_roof = np.abs(dz) < NEAR_M
+    is_off = ~on_roof
+    is_off[is_off] = point_surface_distances(everything[is_off], wall_rings(model)) >= FACADE_M
+    counts, area_m2 = on_roof | is_off, roof.outline.area
+    used = np.arange(len(everything)) < len(points)
+    roof_points = points[counts[used]]
+    support = np.bincount(part[on_roof & used], minlength=len(roof.parts))
+    shown_m2 = np.array(model.shown_m2)
+    is_guess = (shown_m2 > SMALL_PART_M2) & (support < FEWEST_ON_PART)
+    spacing_m = math.sqrt(area_m2 / max(np.count_nonzero(counts), 1))
+    clusters = [
+        largest_cluster(everything[far], np.abs(dz[far]), spacing_m)
+        for far in (is_off & (dz > LEVEL_M) & np.isfinite(dz), is_off & (dz < -LEVEL_M))
+    ]
+    return Evidence(
+        points=len(roof_points),
+        near=float(on_roof[used].sum() / max(len(roof_points), 1)),
+        unseen=unseen_share(roof_points, roof.outline),
+        above=clusters[0],
+        below=clusters[1],
+        unsupported_m2=float(shown_m2[is_guess].sum()),
+        area_m2=area_m2,
+    )
+
+
+def wall_rings(model: Model) -> list[list[np.ndarray]]:
+    """The walls of a model as lists of rings (m, 3), in the frame of its roof."""
+    vertices = model.solid.vertices - model.roof.frame.origin
+    return [[vertices[list(ring)] for ring in face.rings] for face in model.solid.of_kind(WALL)]
+
+
+def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) -> Cluster:
+    """The largest cluster, tall or a level, of points (n, 3) so far off a roof (n,); empty if there is none.
+
+    Tall and lower points are apart, so that a bird over a chimney makes no tower of it.
+    """
+    found, is_tall = Cluster(), height_m >= TALL_M
+    for band, least_m2 in ((is_tall, 0.0), (~is_tall, LEVEL_M2)):
+        heights = height_m[band]
+        for members in clusters_in_plan(points[band], max(LINK_SPACINGS * spacing_m, LINK_M)):
+            cluster = Cluster(len(members), float(heights[members].max()), len(members) * spacing_m**2)
+            if cluster.points >= FEWEST_IN_CLUSTER and cluster.area_m2 >= least_m2:
+                found = max(found, cluster)
+    return found
+
+
+def clusters_in_plan(points: np.ndarray, cell_m: float) -> list[list[int]]:
+    """Indices of points (n, 3), in groups whose plan cells touch, at corners too."""
+    members: dict[tuple[int, int], list[int]] = {}
+    for index, (column, row) in enumerate(np.floor(points[:, :2] / cell_m).astype(int).tolist()):
+        members.setdefault((column, row), []).append(index)
+    groups = []
+    while members:
+        (column, row), group = members.popitem()
+        waiting = [(column, row)]
+        while waiting:
+            column, row = waiting.pop()
+            around = ((column + i, row + j) for i in (-1, 0, 1) for j in (-1, 0, 1))
+            for cell in [cell for cell in around if cell in members]:
+                group += members.pop(cell)
+                waiting.append(cell)
+        groups.append(group)
+    return groups

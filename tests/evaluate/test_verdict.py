@@ -1,0 +1,139 @@
+"""The verdict: good where the points lie on the model, no better than fair where they speak against it, whatever hides that."""
+
+import json
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hiproof
+from hiproof import Grade
+from hiproof.city.ledger import Ledger
+from hiproof.city.request import Request
+from hiproof.city.run import reconstruct_area
+from hiproof.cli.running import graded_words
+from hiproof.cli.status import describe
+from hiproof.compose import compose
+from hiproof.evaluate.verdict import verdict_of
+from hiproof.model import Model
+from hiproof.settings import Settings
+from hiproof.simulate import random_compound
+from points_of_roofs import sampled
+from tiny_town import make_town, write_cloud, write_footprints
+
+OUTLINE = shapely.box(0.0, 0.0, 12.0, 9.0)
+
+
+def block(height=6.0, outline=OUTLINE):
+    """A flat block over an outline, as a person would write it."""
+    ring = shapely.get_coordinates(outline.exterior)[:-1].tolist()
+    west, south, east, north = outline.bounds
+    sizes = {"width": north - south, "length": east - west}
+    part = {"type": "flat", "parameters": sizes, "position": [(west + east) / 2, (south + north) / 2, height]}
+    record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": [part]}
+    return hiproof.build(record).model
+
+
+def on_block(count=600, height=6.0, seed=0):
+    rng = np.random.default_rng(seed)
+    return np.column_stack([rng.uniform((0, 0), (12, 9), (count, 2)), height + rng.normal(0.0, 0.03, count)])
+
+
+def cluster(count, height, around=(6.0, 5.0), width=2.5):
+    rng = np.random.default_rng(1)
+    xy = np.array(around) + rng.uniform(-width / 2, width / 2, (count, 2))
+    return np.column_stack([xy, np.linspace(6.0 + 0.9 * height, 6.0 + height, count)])
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(0, 2**32 - 1), st.floats(2.0, 20.0))
+def test_the_true_roof_is_good(seed, density):
+    roof = random_compound(np.random.default_rng(seed)).roof
+    points = sampled(lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, 0.03, seed)
+    model = Model(roof, compose(roof, 0.0).moved(roof.frame.origin))
+    assert verdict_of(model, points).grade is Grade.GOOD
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.floats(0.4, 20.0), st.sampled_from([-1.0, 1.0]))
+def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
+    """Those off lie near the outline of a narrow building, where a share of inner points does not see them."""
+    narrow = shapely.box(0.0, 0.0, 12.0, 1.4)
+    points = np.random.default_rng(2).uniform((0, 0), (12, 1.4), (400, 2))
+    off = (np.arange(400) % 5 < 3) * side * off_m
+    found = verdict_of(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + off]))
+    assert found.grade is Grade.POOR and any("% of its points lie within 0.2 m" in reason for reason in found.reasons)
+
+
+def test_facade_points_say_nothing_of_a_roof():
+    along, height = np.random.default_rng(3).uniform((0, 0.5), (12, 5.9), (900, 2)).T
+    walls = np.column_stack([along, np.full(900, 0.05), height])
+    assert verdict_of(block(), np.concatenate([on_block(), walls])) == (Grade.GOOD, ())
+
+
+@pytest.mark.parametrize("with_footprint", [True, False])
+def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
+    rng = np.random.default_rng(4)
+    south = np.column_stack([rng.uniform(0, 12, 300), rng.uniform(0, 0.1, 300), rng.uniform(0, 6, 300)])
+    west = np.column_stack([rng.uniform(0, 0.1, 200), rng.uniform(0, 9, 200), rng.uniform(0, 6, 200)])
+    building = hiproof.reconstruct(np.concatenate([south, west]), OUTLINE if with_footprint else None)
+    assert building.grade is Grade.POOR
+    assert "follows" not in building.detail and "% of its" in building.detail
+
+
+@pytest.mark.parametrize("count", [5, 41, 296])
+@pytest.mark.parametrize("height", [4.0, 30.0])
+def test_points_far_above_a_model_are_named(count, height):
+    found = verdict_of(block(), np.concatenate([on_block(3000), cluster(count, height, width=1.5)]))
+    assert found.grade is not Grade.GOOD
+    assert f"{count} points up to {height:.{1 if height < 10 else 0}f} m above the model" in found.reasons
+
+
+def test_birds_and_a_chimney_do_not_count():
+    birds = np.column_stack([np.linspace(1, 11, 6), np.linspace(1, 8, 6), np.full(6, 30.0)])
+    chimney = cluster(20, 1.2, width=0.9)
+    assert verdict_of(block(), np.concatenate([on_block(3000), birds, chimney])).grade is Grade.GOOD
+
+
+def test_points_of_a_courtyard_that_the_outline_lacks_are_named():
+    points = on_block(1500)
+    yard = (abs(points[:, 0] - 6) < 1.5) & (abs(points[:, 1] - 4.5) < 1.5)
+    points[yard, 2] -= 4.0
+    found = verdict_of(block(), points)
+    assert found.grade is not Grade.GOOD
+    assert any(reason.endswith("m below the model") for reason in found.reasons)
+
+
+def test_half_a_building_without_points_is_poor_and_a_tenth_is_not():
+    points = on_block(800)
+    assert verdict_of(block(), points[points[:, 0] < 6.0]).grade is Grade.POOR
+    assert verdict_of(block(), points[points[:, 0] < 11.0]).grade is not Grade.POOR
+
+
+def run_over_spire(folder, code, most=20_000):
+    """What the run writes of a house over whose middle 60 points of class `code` rise to 30 m."""
+    town = make_town(1, density=40.0)
+    west, south, east, north = town.footprints["house-0"].bounds
+    rng = np.random.default_rng(5)
+    spire = np.column_stack(
+        [rng.uniform(-0.6, 0.6, (60, 2)) + ((west + east) / 2, (south + north) / 2), np.linspace(15, 32, 60)]
+    )
+    classes = np.append(town.classification, np.full(60, code, np.uint8))
+    cloud = write_cloud(folder / "cloud.laz", np.concatenate([town.xyz, spire]), classes)
+    footprints = write_footprints(folder / "footprints.geojson", town.footprints)
+    settings = Settings.from_dict({"city": {"max_points_a_building": most}})
+    summary = reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), settings=settings))
+    (row,) = hiproof.read_parameters(folder / "out" / "parameters.jsonl")
+    return row, summary
+
+
+@pytest.mark.parametrize(("code", "most"), [(6, 20_000), (6, 1000), (18, 20_000)])
+def test_neither_thinning_nor_a_class_of_noise_hides_a_spire(tmp_path, code, most):
+    row, summary = run_over_spire(tmp_path, code, most)
+    lines = describe(Ledger(tmp_path / "out" / ".hiproof" / "ledger.sqlite", read_only=True))
+    assert f"quality: {graded_words({row['quality']: 1})}" in lines
+    assert row["quality"] != "good" and "m above the model" in row["detail"]
+    assert summary.by_quality == {row["quality"]: 1}
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["by_quality"] == {row["quality"]: 1}
