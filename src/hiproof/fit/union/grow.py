@@ -18,7 +18,6 @@ BASE_QUANTILE = 0.02  # of the heights at which the base lies: below all roofs b
 MOST_SLOPES = 5  # slopes tried for new ends and ties; they cover what the candidates have
 # of all moves: before a place is grown anew, where no candidate helps, at the end
 STARTING_ROUNDS, STUCK_ROUNDS, FINAL_ROUNDS = 2, 2, 3
-MOST_REGROWN = 3  # volumes, those that grew first: of 40 that were better anew none had grown later
 
 
 def grow(scene: Scene, effort: Effort = HOUSE) -> tuple[np.ndarray, float]:
@@ -47,7 +46,7 @@ def regrown(
     The volume that gains most by itself comes first, and what follows is fitted in around it: two hips of one pitch begin as one
     volume over both. Without it the others take the places that are theirs.
     """
-    k, scene = min(len(volumes) - 1, MOST_REGROWN), ground.scene
+    k, scene = min(len(volumes) - 1, effort.regrown), ground.scene
     while k > 0 and len(volumes) > 2:
         trial = without(volumes, k)
         trial, found = improve(trial, scene, objective(trial, scene, np.inf), ground.slopes, STARTING_ROUNDS)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from .block import SETTLE_POINTS, SETTLE_REACH_M, search_block
+from .block import SETTLE_POINTS, SETTLE_REACH_M, find_in_block, search_block
 from .blocks import BLOCK_M2, HeightRaster, cheapest_cut
 from .box import Box, clip_to_box
 from .edges import move_edges
@@ -27,10 +27,11 @@ LEAST_HALF_M2 = 1.0  # of outline on either side of a cut
 def find_in_windows(plan: Plan, outline: shapely.Polygon, scene: Scene) -> np.ndarray:
     """Find the volumes (k, COLUMNS) of a large roof, whose points and outline are those of `scene`."""
     whole = Whole(scene, plan, outline)
+    if whole.area <= BLOCK_M2:  # a roof of one block is searched as a house, and keeps its base
+        return forget_settled(find_in_block(whole, whole.box)[0])
     search_box(whole, HeightRaster(whole), whole.box, whole.area)
-    if whole.area > BLOCK_M2:
-        grow_at_places(whole)
-        settle_each(whole)
+    grow_at_places(whole)
+    settle_each(whole)
     return forget_settled(whole.volumes)
 
 

@@ -55,7 +55,7 @@ def find_volumes(
     evidence = [evidence_per_unit(plan.density * share, outline.area, settings) for share in (len(few) / count, 1.0)]
     angles = directions_of(outline, plan)
     every = scene_of(plan, outline, angles, evidence[1], settings.tolerance_m, allowed_shapes(types))
-    if outline.area > LARGE_M2:
+    if outline.area > LARGE_M2 and count > SEARCH_POINTS:  # else a house's search sees every point
         whole = Whole(every, plan, outline)
         volumes = run_in_groups(trim_and_run_on, find_in_windows(plan, outline, every), whole)
         return volumes, objective(volumes, every, np.inf), every
