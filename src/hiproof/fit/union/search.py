@@ -27,20 +27,20 @@ SETTLE_REACH_M = 0.7  # m that edges may move when all points settle them
 DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
 COMMON_HOUSE_M2 = 60.0  # up to LARGE_M2, larger roofs ask more of each volume
 LARGE_M2 = 200.0  # of outline: larger roofs are searched in windows, at a price that does not grow with their area
-# Points/m2 from which on structure of a large roof has a house's price, and how much dearer it is at most on sparser
-# clouds: Vienna, Rotterdam and Delft want 1.4 times a house's price at 5 points/m2 and once at 15.
-LARGE_DENSITY, LARGE_FACTOR = 10.0, 1.41
+# Points that a unit of a large roof's structure must explain at least, times those of a house: of many places some
+# gain a point or two by chance. At 2 points/m2 The Hague draws too much for less.
+LARGE_POINTS = 1.77
 # What a person would leave out of low-pitched roofs: differences up to LENIENT_M (more on large roofs).
 LENIENT_M, LENIENT_MORE_M, LENIENT_SOFT_M, LENIENT_SLOPE = 0.1, 0.04, 0.18, 0.15
 
 
 def evidence_per_unit(density: float, area_m2: float, settings) -> float:
     """Points that one unit of structure must explain: those of an area that grows with the roof's, and never too few."""
-    factor = math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
-    if area_m2 > LARGE_M2:
-        factor = min(max(math.sqrt(LARGE_DENSITY / density), 1.0), LARGE_FACTOR)
+    large = area_m2 > LARGE_M2
+    factor = 1.0 if large else math.sqrt(max(area_m2 / COMMON_HOUSE_M2, 1.0))
+    points = settings.evidence_points * (LARGE_POINTS if large else 1.0)
     share = settings.evidence_area_m2 * factor
-    return float(max(settings.evidence_points, share * density)) * DETAIL_FACTOR[settings.detail]
+    return float(max(points, share * density)) * DETAIL_FACTOR[settings.detail]
 
 
 def find_volumes(
