@@ -16,7 +16,7 @@ from hiproof.status import Status
 DEADLY = "house-2"
 
 
-def counted(points, footprint, terrain, settings, id):
+def counted(points, footprint, terrain, settings, id, ground=None, unused=None):
     """No roof, but everything that a building's neighbours, tile or files could change: its points and its ground."""
     points = np.unique(points, axis=0)
     corner = np.array([footprint.polygon.bounds[:2]])
@@ -40,7 +40,7 @@ def solve_quickly(folder, tile, terrain=None, avoid=()):
 def solve_killed_once(folder, tile, terrain=None, avoid=()):
     """The worker that first comes to the deadly building is killed, as if from outside."""
 
-    def reconstruct(points, footprint, terrain, settings, id):
+    def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None):
         mark = Path(folder) / "killed"
         if id == DEADLY and not mark.exists():
             mark.touch()
@@ -53,7 +53,7 @@ def solve_killed_once(folder, tile, terrain=None, avoid=()):
 def solve_deadly(folder, tile, terrain=None, avoid=()):
     """One building kills every worker that tries it."""
 
-    def reconstruct(points, footprint, terrain, settings, id):
+    def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None):
         if id == DEADLY:
             os.kill(os.getpid(), signal.SIGKILL)
         return counted(points, footprint, terrain, settings, id)
@@ -64,7 +64,7 @@ def solve_deadly(folder, tile, terrain=None, avoid=()):
 def solve_hungry(folder, tile, terrain=None, avoid=()):
     """One building wants more memory than the worker may have."""
 
-    def reconstruct(points, footprint, terrain, settings, id):
+    def reconstruct(points, footprint, terrain, settings, id, ground=None, unused=None):
         if id == DEADLY:
             import resource  # Windows has none
 

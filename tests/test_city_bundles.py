@@ -31,11 +31,11 @@ def fail_for(monkeypatch):
     """A function that lets the fit of some buildings fail, with the sum of their points in the message."""
 
     def set_failing(*ids):
-        def failing(points, footprint, terrain, settings, id, ground):
+        def failing(points, footprint, terrain, settings, id, ground, unused):
             if id in ids:
                 corner = np.array([footprint.polygon.bounds[:2]]) if footprint else points[:1, :2]
                 raise KeyError(f"{len(points)} points, {points.sum():.9f}, {terrain.height_at(corner)[0]:.9f}")
-            return reconstruct(points, footprint, terrain, settings, id, ground)
+            return reconstruct(points, footprint, terrain, settings, id, ground, unused)
 
         monkeypatch.setattr(solve, "reconstruct", failing)
 
