@@ -77,7 +77,7 @@ CONFIGURATIONS = {
     "no CUDA": ('[segment]\ndevice = "cuda"', [], "expected a CUDA device"),
     "CRS in degrees": ('[read]\ncrs = "EPSG:4326"', [], "projected CRS, got WGS 84 in degrees"),
     "CRS in degrees as an option": ("", ["--crs", "EPSG:4326"], "projected CRS, got WGS 84 in degrees"),
-    "CRS of heights": ("", ["--crs", "EPSG:5709"], "one of heights alone"),
+    "CRS of heights": ("", ["--crs", "EPSG:5709"], RUNS),
     "CRS that nobody knows": ("", ["--crs", "EPSG:99999999"], 'such as "EPSG:7415"'),
     "CRS that is noise": ("", ["--crs", "\x01 {{}}"], 'such as "EPSG:7415"'),
     "CRS": ("", ["--crs", "EPSG:7415"], RUNS),
@@ -104,7 +104,7 @@ def test_warnings_are_sentences_without_their_place_in_the_source(capsys):
 
 def test_workers_warn_in_sentences_too(capfd):
     executor = Processes(1)
-    list(executor.run(warnings.warn, [("3 points were left out",)]))
+    list(executor.run(warnings.warn, [("3 points were left out", InputWarning)]))
     executor.close()
     assert capfd.readouterr().err == "hiproof: 3 points were left out\n"
 

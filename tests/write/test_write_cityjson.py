@@ -158,7 +158,7 @@ def test_not_a_number_never_reaches_the_file(tmp_path):
     strange = {"a": float("nan"), "b": np.float64("inf"), "c": np.datetime64("NaT"), "d": {1: 2}, "e": b"\xff"}
     _, feature = sequence(tmp_path, [modelled(box(), attributes=strange, z_ground=float("nan"))])
     attributes = feature["CityObjects"]["a"]["attributes"]
-    assert [attributes[name] for name in "abcde"] == [None, None, None, "{1: 2}", "\ufffd"]
+    assert [attributes[name] for name in "abcde"] == [None, None, None, '{"1": 2}', "\ufffd"]
     assert attributes["rf_h_ground"] == 0.0
 
 
