@@ -1,0 +1,44 @@
+"""Laws of the documentation's language: short pages, short sentences, lines that fit."""
+
+import re
+
+import pytest
+
+from prose import PAGES, ROOT, lengths, long_lines, sentences
+
+MOST_WORDS = {"README.md": 700, "ARCHITECTURE.md": 900, "CHANGELOG.md": 400}
+LONGEST_SENTENCE = 40  # words
+MADE = {"attributes.md"}  # by `hiproof attributes`: its lines list files
+README_MEAN, README_P90, DOCS_P90 = 16, 26, 28  # words of a sentence
+
+every_page = pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+
+
+@pytest.mark.parametrize("name", MOST_WORDS)
+def test_a_front_page_is_short(name):
+    assert len((ROOT / name).read_text(encoding="utf-8").split()) <= MOST_WORDS[name]
+
+
+@every_page
+def test_no_sentence_is_long(page):
+    text = page.read_text(encoding="utf-8")
+    assert [part for part in sentences(text) if len(part.split()) > LONGEST_SENTENCE] == []
+
+
+@every_page
+def test_lines_fit(page):
+    assert page.name in MADE or long_lines(page.read_text(encoding="utf-8")) == []
+
+
+def test_sentences_are_short_on_the_whole():
+    words = lengths((ROOT / "README.md").read_text(encoding="utf-8"))
+    assert words.mean() <= README_MEAN and sorted(words)[int(0.9 * len(words))] <= README_P90
+    docs = [lengths(page.read_text(encoding="utf-8")) for page in PAGES if page.parent.name == "docs"]
+    every = sorted(n for page in docs for n in page)
+    assert every[int(0.9 * len(every))] <= DOCS_P90
+
+
+def test_prose_is_told_from_code_and_tables():
+    text = "# A title\n\nOne two. Three four\nfive.\n\n- item one\n- item two\n\n| a | b |\n\n    code here\n"
+    assert sentences(text) == ["One two.", "Three four five.", "- item one", "- item two"]
+    assert not re.search("code|title|\\|", " ".join(sentences(text)))
