@@ -22,7 +22,8 @@ HEAD = """# Roof types and their parameters
 - `end_height` is the height that a corner's end would reach at the left.
 - A gable with its ridge off the middle also has a `ridge_offset` (m, towards the back).
 - A roof that is less regular than its type gives each side's own values, such as `pitch_front` and
-  `eave_front`, and the `height` of a level top. See [the parameters](parameters.md#irregular-parts).
+  `eave_front`, and the `height` of a level top.
+  See [the parameters](parameters.md#irregular-parts).
 """
 
 
