@@ -58,7 +58,7 @@ def write_parameters_of_each_kind(path: Path) -> Path:
         {"id": "lost", "status": "no_points", "detail": "no points", "parts": [], "attributes": {}},
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *buildings]))
+    path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *buildings]), encoding="utf-8")
     record = {
         "inputs": {"clouds": ["gone.laz"], "bbox": [0, 0, 1, 1]},
         "settings": {"reconstruct": {"align": "auto"}},
