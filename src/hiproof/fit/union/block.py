@@ -14,7 +14,7 @@ from .volumes import U0, V1, roof_heights
 from .whole import Whole
 from .window import end_at_border, forget_settled, open_window
 
-# A block's points: those that structure is looked for in, and those that settle it. 4 and 7.5 per square metre of the
+# A block's points: those that structure is looked for in, and those that settle it. 2.7 and 5 per square metre of the
 # largest block; with a house's 600 points dormers and annexes of blocks stay unseen.
 SEARCH_POINTS, SETTLE_POINTS = 1600, 3000
 SETTLE_REACH_M = 0.7  # m that edges may move when more points settle them

@@ -12,7 +12,9 @@ import numpy as np
 from .box import Box
 from .whole import Whole
 
-BLOCK_M2 = 400.0  # of outline in a block at most; with blocks of 200 m2 Vienna loses 1 to 3 points
+# Outline in a block at most (m2). Blocks of 400 m2 cut saw-tooth halls through their teeth (17 of 20
+# right at 5 points/m2, all with 600), and Vienna has 81.8 % of its edges in place of 83.2.
+BLOCK_M2 = 600.0
 RASTER_M, RASTER_SPACINGS = 0.6, 1.2  # m of a cell of the heights that cuts look at, and spacings of points
 LEAST_STEP_M, WHOLE_STEP_M, OVER_STEP = 0.3, 1.0, 0.1  # a step that counts; one that makes a cut as cheap as it gets
 FIXED_M = 1.0  # metres that each cut costs besides

@@ -21,7 +21,7 @@ SQUARE_M, AROUND = (
     2,
 )  # m of a square in which unexplained points are counted, and squares around one that count too
 WORTH_UNITS = 4.0  # units that the unexplained points of a place must be worth
-PLACES_A_BLOCK = 2.0  # tried at most, for each block's area: a bound on time, the rest stays as it is
+PLACES_A_BLOCK = 3.0  # tried at most, for each block's area: a bound on time, the rest stays as it is
 WINDOW_M, WINDOW_POINTS = 20.0, 1200  # m of a side of a place's window, and its points at most
 
 
