@@ -8,11 +8,11 @@ import numpy as np
 import shapely
 
 from .allowed import allowed_shapes
+from .block import settle_all
 from .groups import run_in_groups
 from .grow import grow
 from .improve import simplify
 from .large import find_in_windows
-from .moves import move_all_edges, refit_each
 from .objective import objective
 from .plan import Plan
 from .run_on import run_on
@@ -21,7 +21,6 @@ from .trim import trim
 from .whole import Whole
 
 SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
-SETTLE_REACH_M = 0.7  # m that edges may move when all points settle them
 # Price of structure by detail: the ends of the curve of share against parts that `benchmarks.curve` draws. Below a half every
 # chimney is a part, above four even wings go.
 DETAIL_FACTOR = {"fine": 0.5, "full": 1.0, "main": 4.0}
@@ -66,10 +65,10 @@ def find_volumes(
         return volumes, objective(volumes, every, np.inf), every
     scene = seen_through(every, few, evidence[0])
     volumes, _ = grow(scene)
-    volumes, value = settled_on_all(volumes, every)
+    volumes, value = settle_all(volumes, every)
     lenient = lenient_scene(scene, outline.area)
     volumes, _ = simplify(volumes, lenient, objective(volumes, lenient, np.inf), LENIENT_SLOPE)
-    volumes, value = settled_on_all(volumes, every)
+    volumes, value = settle_all(volumes, every)
     volumes, value = trim(volumes, every, value)
     volumes, value = run_on(volumes, every, value)
     return volumes, value, every
@@ -79,13 +78,6 @@ def trim_and_run_on(volumes: np.ndarray, scene: Scene, _: object = None) -> np.n
     """Draw hidden edges in, and let ends that stand out of a neighbour run on into it."""
     volumes, value = trim(volumes, scene, objective(volumes, scene, np.inf))
     return run_on(volumes, scene, value)[0]
-
-
-def settled_on_all(volumes: np.ndarray, scene: Scene) -> tuple[np.ndarray, float]:
-    """The volumes refitted and their edges moved a little on every point."""
-    volumes, value = refit_each(volumes, scene, objective(volumes, scene, np.inf))
-    value = move_all_edges(volumes, scene, value, SETTLE_REACH_M)
-    return refit_each(volumes, scene, value)
 
 
 def lenient_scene(scene: Scene, area_m2: float) -> Scene:
