@@ -118,7 +118,7 @@ def collect_tracebacks() -> Iterator[dict[str, str]]:
     original, errors = solve.failed, {}
 
     def failed(plan, job, detail):
-        errors[job.id] = traceback.format_exc()
+        errors[job.id] = job.error.trace if job.error else traceback.format_exc()
         return original(plan, job, detail)
 
     solve.failed = failed

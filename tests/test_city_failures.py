@@ -3,15 +3,19 @@
 import numpy as np
 import pytest
 import shapely
+from typer.testing import CliRunner
 
 from hiproof import stages
 from hiproof.city import solve
+from hiproof.city.bundles import folder_name
 from hiproof.city.run import Request, reconstruct_area
+from hiproof.classify import buildings, split
+from hiproof.cli.app import app
 from hiproof.model import Footprint
 from hiproof.status import Status
 from hiproof.write import citygml, cityjson, parameters, run_files
 from run_records import by_id
-from tiny_town import make_town, write_town
+from tiny_town import make_town, write_cloud, write_town
 
 HOUSES = 20
 STAGES = (
@@ -41,6 +45,12 @@ WRITERS = (
 def town(tmp_path_factory):
     """Paths of the cloud and the footprints of twenty houses."""
     return [str(path) for path in write_town(tmp_path_factory.mktemp("town"), make_town(HOUSES, density=3.0))]
+
+
+@pytest.fixture(scope="module")
+def small_town(tmp_path_factory):
+    """The path of the cloud of four houses."""
+    return [str(path) for path in write_town(tmp_path_factory.mktemp("small"), make_town(4, density=2.0))]
 
 
 def run(town, out, with_footprints):
@@ -114,3 +124,66 @@ def test_an_outline_that_cannot_be_written_leaves_the_id_and_the_message(monkeyp
     building, texts = solve.failed(plan, job, "ValueError: first")
     assert (building.id, building.detail, building.footprint) == ("a", "ValueError: first", None)
     assert b"ValueError: first" in texts["parameters"].text
+
+
+def fail_at(monkeypatch, owner, name, xy):
+    """Let a function of points (n, 3) raise where their box holds the place `xy`."""
+    original = getattr(owner, name)
+
+    def raising(xyz, *rest):
+        low, high = xyz[:, :2].min(axis=0), xyz[:, :2].max(axis=0)
+        if (low <= xy).all() and (xy <= high).all():
+            raise ZeroDivisionError("division by zero")
+        return original(xyz, *rest)
+
+    monkeypatch.setattr(owner, name, raising)
+
+
+def repeat_failure(out, id):
+    """Run `hiproof repro` for the building `id`; return its exit code and output."""
+    result = CliRunner().invoke(app, ["repro", str(out / "failures" / folder_name(id)), "--out", str(out / "again")])
+    return result.exit_code, result.output
+
+
+@pytest.mark.parametrize("stage", ["told_apart", "cell_area"])
+def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(small_town, stage, tmp_path, monkeypatch):
+    run(small_town, tmp_path / "undisturbed", with_footprints=False)
+    expected = by_id(tmp_path / "undisturbed")
+    victim = list(expected)[2]
+    with monkeypatch.context() as patch:
+        fail_at(patch, split, stage, np.array(victim.split("_")[1:], float) + 0.5)
+        summary = run(small_town, tmp_path / "disturbed", with_footprints=False)
+        code, output = repeat_failure(tmp_path / "disturbed", victim)
+    found = by_id(tmp_path / "disturbed")
+    assert summary.exit_code == 1
+    assert list(found) == list(expected)
+    assert {id for id in found if found[id] != expected[id]} == {victim}
+    assert found[victim]["status"] == "internal_error"
+    assert found[victim]["detail"].startswith("ZeroDivisionError: division by zero (test_city_failures.py:")
+    trace = (tmp_path / "disturbed/failures" / folder_name(victim) / "traceback.txt").read_text()
+    assert "in houses_of" in trace
+    assert code == 1
+    assert "ZeroDivisionError" in output
+    code, output = repeat_failure(tmp_path / "disturbed", victim)
+    assert code == 0
+    assert by_id(tmp_path / "disturbed/again")[victim]["status"] == "modelled"
+
+
+def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkeypatch):
+    """The roofs of a cloud without classes are found in squares of 250 m."""
+    scene = make_town(17, density=3.0)
+    cloud = str(write_cloud(tmp_path / "cloud.laz", scene.xyz, np.ones(len(scene.xyz), np.uint8)))
+    run([cloud], tmp_path / "undisturbed", with_footprints=False)
+    expected = by_id(tmp_path / "undisturbed")
+    x = {id: float(id.split("_")[1]) for id in expected}
+    border = 250.0 * np.ceil(min(x.values()) / 250.0)
+    fail_at(monkeypatch, buildings, "classes_of_square", np.array([border + 60.0, scene.xyz[:, 1].mean()]))
+    summary = run([cloud], tmp_path / "disturbed", with_footprints=False)
+    found = by_id(tmp_path / "disturbed")
+    failed = {id for id, row in found.items() if row["status"] == "internal_error"}
+    assert summary.exit_code == 1
+    assert len(failed) == 1
+    others = found.keys() - failed
+    assert others >= {id for id in expected if x[id] < border - 10.0}
+    assert all(float(id.split("_")[1]) < border for id in others)
+    assert repeat_failure(tmp_path / "disturbed", failed.pop())[0] == 1

@@ -3,6 +3,10 @@
 Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or another process.
 """
 
+import traceback
+from pathlib import Path
+from typing import NamedTuple
+
 from .masking import masked
 
 
@@ -53,6 +57,27 @@ def is_interrupt(error: BaseException) -> bool:
     while isinstance(cause, SystemError):
         cause = cause.__cause__
     return isinstance(cause, KeyboardInterrupt)
+
+
+class ErrorReport(NamedTuple):
+    """What is kept of an unexpected error: one line with its place in the code, and the traceback."""
+
+    detail: str
+    trace: str
+
+
+def report_error(error: Exception) -> ErrorReport:
+    """Describe an error that one building or one place has alone.
+
+    MemoryError and Ctrl-C are raised again: they are not the fault of the building.
+    """
+    if isinstance(error, MemoryError):
+        raise error
+    if is_interrupt(error):
+        raise KeyboardInterrupt from error
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    detail = f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})"
+    return ErrorReport(detail, "".join(traceback.format_exception(error)))
 
 
 class HiproofWarning(UserWarning):

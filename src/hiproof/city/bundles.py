@@ -7,7 +7,8 @@ A bundle is a folder `failures/NAME` in the output folder of a run:
     footprint.geojson  its outline in world metres, without the attributes of the input
     settings.toml      the settings of the run
     terrain.csv        heights of the terrain model where they were looked up, if there is one
-    failure.json       the id, the version, the reference system and the building's override
+    failure.json       the id, the version, the reference system, the building's override, and the
+                       error that ended the search for buildings there, if one did
     traceback.txt      what went wrong
 
 A run keeps at most 20. They go when the buildings are solved, or when the run begins anew.
@@ -30,7 +31,7 @@ import numpy as np
 import shapely
 
 from .. import __version__
-from ..errors import InputError, is_interrupt
+from ..errors import ErrorReport, InputError, is_interrupt
 from ..log import LOGGER
 from ..masking import masked, masked_values
 from ..model import Footprint
@@ -178,6 +179,7 @@ def save_bundle(
             "cityjson_translate": plan.translate.tolist(),
             "terrain": None if terrain is None else terrain.source,
             "override": override_record(root, job),
+            "error": job.error,
         }
         (beside / FACTS).write_text(json.dumps(masked_values(facts), indent=1) + "\n", encoding="utf-8")
 
@@ -272,7 +274,7 @@ def load_bundle(
         geometry = feature["geometry"]
         area = shapely.Polygon() if geometry is None else shapely.geometry.shape(geometry)
         footprint = Footprint(facts["id"], area, {}) if facts["has_footprint"] else None
-        job = Job(0, facts["id"], area, footprint)
+        job = Job(0, facts["id"], area, footprint, facts["error"] and ErrorReport(*facts["error"]))
         names, translate = (
             (str(facts["names"][0]), str(facts["names"][1])),
             np.array(facts["cityjson_translate"], float),

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import warnings
 
-import shapely
-
 from ..errors import InputError, InputWarning
 from ..log import counted
 from ..model import PointCloud
@@ -25,8 +23,7 @@ def jobs_from_cloud(clouds: tuple[str, ...], settings: Settings) -> tuple[tuple[
         said = f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks like ground"
         warnings.warn(said, InputWarning)
         settings = with_read(settings, roofs="alone")
-    areas = [(building.id, shapely.make_valid(building.area)) for building in found]
-    return tuple(Job(i, id, area, None) for i, (id, area) in enumerate(areas)), settings
+    return tuple(Job(i, one.id, one.area, None, one.error) for i, one in enumerate(found)), settings
 
 
 def readable_points(clouds: tuple[str, ...], settings: Settings) -> PointCloud:

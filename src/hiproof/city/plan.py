@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..errors import InputError, OutputError
+from ..errors import ErrorReport, InputError, OutputError
 from ..fit.registration import Registration
 from ..frames import Units
 from ..model import Footprint
@@ -40,12 +40,14 @@ class Job:
     """One building asked for. `area` is the plan polygon whose points belong to it (world); `footprint` None: estimate.
 
     A footprint stays as the file has it. Its area is moved by its `shift`, and is simpler where it has thousands of vertices.
+    `error` is what ended the search for buildings there: it is an internal error without being solved.
     """
 
     index: int
     id: str
     area: shapely.Polygon
     footprint: Footprint | None
+    error: ErrorReport | None = None
 
 
 @dataclass(frozen=True)
@@ -139,7 +141,7 @@ class WorkPlan:
             file.write(json.dumps(whole) + "\n")
             for job, area in zip(self.jobs, areas, strict=True):
                 attributes = job.footprint.attributes if job.footprint else None
-                file.write(json.dumps([job.id, area, attributes], default=str) + "\n")
+                file.write(json.dumps([job.id, area, attributes, job.error], default=str) + "\n")
 
     @staticmethod
     def load(path: Path) -> WorkPlan:
@@ -147,7 +149,7 @@ class WorkPlan:
         try:
             with path.open(encoding="utf-8") as file:
                 whole, rows = json.loads(file.readline()), [json.loads(line) for line in file]
-            areas = shapely.from_wkb([area for _, area, _ in rows])
+            areas = shapely.from_wkb([row[1] for row in rows])
             registration = whole["registration"] and Registration.from_dict(whole["registration"])
             shift = registration.shift if registration else (0.0, 0.0)
             return WorkPlan(
@@ -168,10 +170,10 @@ class WorkPlan:
 
 
 def job_of_row(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
-    """A building of the plan's file: [id, area, attributes], the last null where there is no footprint."""
-    id, _, attributes = row
+    """A building of the plan's file: [id, area, attributes, error]; no attributes without a footprint."""
+    id, _, attributes, error = row
     if attributes is None:
-        return Job(index, id, area, None)
+        return Job(index, id, area, None, error and ErrorReport(*error))
     return job_of_footprint(index, Footprint(id, area, attributes), shift)
 
 

@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
-from ..model import Building
+import numpy as np
+import shapely
+
+from ..classify.split import split_buildings
+from ..model import Building, PointCloud
 from ..write.run_files import join_fragments
 from .bundles import load_bundle
 from .merge import whole_files
+from .plan import WorkPlan
 from .solve import Surroundings, solve_one
 
 
@@ -18,6 +24,7 @@ def solve_bundle(folder: Path, out: Path) -> tuple[Building, str]:
     InputError for a folder that is no bundle and OutputError for one that cannot be written.
     """
     plan, points, terrain, override = load_bundle(Path(folder))
+    plan = search_again(plan, points)
     traces: list[str] = []
     surroundings = Surroundings(points, terrain, plan)
     building, texts = solve_one(
@@ -25,3 +32,20 @@ def solve_bundle(folder: Path, out: Path) -> tuple[Building, str]:
     )
     join_fragments(whole_files(plan, Path(out)), [texts], plan.head)
     return building, "\n".join(traces)
+
+
+def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
+    """Repeat the search for buildings in the area of the plan's building where it ended in an error.
+
+    `points` (n, 3) by kind are those of the bundle.
+    """
+    (job,), read = plan.jobs, plan.settings.read
+    if job.error is None:
+        return plan
+    kinds = {"roof": read.building_classes[0], "ground": read.ground_classes[0]}
+    xyz = np.concatenate([points[kind] for kind in kinds])
+    classes = np.concatenate([np.full(len(points[kind]), number, np.uint8) for kind, number in kinds.items()])
+    inside = shapely.intersects_xy(job.area, xyz[:, 0], xyz[:, 1])
+    found = split_buildings(PointCloud(xyz[inside], classes[inside]), plan.settings)
+    error = next((building.error for building in found if building.error), None)
+    return dataclasses.replace(plan, jobs=(dataclasses.replace(job, error=error),))

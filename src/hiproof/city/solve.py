@@ -7,16 +7,16 @@ import dataclasses
 import functools
 import threading
 import time
-import traceback
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import shapely
 
-from ..errors import DamagedRaster, is_interrupt
+from ..errors import DamagedRaster, report_error
 from ..fit.align import Shift, find_shift
 from ..frames import Units
+from ..log import LOGGER
 from ..masking import masked
 from ..model import Building
 from ..parametric.override import Override, overridden
@@ -149,27 +149,28 @@ class Surroundings:
         box = neighbourhood(job, self.plan.terrain_reach_m)
         return doubt_of_terrain(self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area))
 
-    def other_points(self, job: Job) -> OtherPoints:
-        """What lies inside the building's area beside the points of its class."""
+    def other_points(self, job: Job) -> OtherPoints | None:
+        """What lies inside the building's area beside the points of its class; None where classes tell no roofs."""
+        if not self.plan.settings.read.by_class or job.area.is_empty:
+            return None
         box = neighbourhood(job, 0.0)
         terrain = TerrainChain(self.grounds_of(job))
         return OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
 
-    def bare(self, job: Job, found: FoundRoof) -> np.ndarray:
+    def bare(self, job: Job, found: FoundRoof, others: OtherPoints | None) -> np.ndarray:
         """Points (n, 3) of bare ground inside the building's area: those of the ground class where nothing of another class
         stands over them, and those that were told from the roof by their height."""
         if job.area.is_empty or job.footprint is None:
             return found.ground
-        if self.plan.settings.read.by_class:
-            return bare_ground(self.other_points(job))
+        if others is not None:
+            return bare_ground(others)
         classified = self.ground.inside(neighbourhood(job, 0.0))
         return np.concatenate([found.ground, classified])
 
-    def looked_at(self, building: Building, job: Job, roof: np.ndarray) -> Building:
+    def looked_at(self, building: Building, points: OtherPoints | None, roof: np.ndarray) -> Building:
         """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
-        if not self.plan.settings.read.by_class or job.area.is_empty:
+        if points is None:
             return building
-        points = self.other_points(job)
         if building.status is Status.NO_POINTS:
             why = why_no_points(points, self.plan.settings.read.building_classes)
             return dataclasses.replace(building, detail=why) if why else building
@@ -248,6 +249,9 @@ def solve_one(
     DamagedRaster, for the terrain model is the run's and not the building's.
     """
     record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
+    if job.error is not None:
+        keep(job, job.error.trace, no_terrain)
+        return failed(plan, job, job.error.detail)
     try:
         job, moved = surroundings.moved(job)
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
@@ -255,24 +259,24 @@ def solve_one(
             return fragments(not_seen(job, found), plan.names_of(job), plan.head)
         points = without_repeats(found.points)  # first of all: a footprint is put where points are many
         used = thin_to_count(points, most)
-        building = modelled(job, points, used, found, surroundings, override)
+        others = surroundings.other_points(job)
+        bare = surroundings.bare(job, found, others)
+        building = modelled(job, points, used, bare, surroundings, override)
         if len(used) < len(points):
             building = told_of_thinning(building, len(used), len(points))
         building = remarked(remarked(building, moved), found.remark)
         building = remarked(building, surroundings.doubt_of_terrain(job))
-        building = remarked(surroundings.looked_at(building, job, points), doubt_of_ground(building))
+        building = remarked(surroundings.looked_at(building, others, points), doubt_of_ground(building))
         building, texts = fragments(building, plan.names_of(job), plan.head)
         if building.status is Status.INTERNAL_ERROR:
             keep(job, building.detail, record_terrain)
         return building, texts
-    except (MemoryError, DamagedRaster):
+    except DamagedRaster:
         raise
     except Exception as error:
-        if is_interrupt(error):
-            raise KeyboardInterrupt from error
-        keep(job, traceback.format_exc(), record_terrain)
-        place = traceback.extract_tb(error.__traceback__)[-1]
-        return failed(plan, job, f"{type(error).__name__}: {error} ({Path(place.filename).name}:{place.lineno})")
+        report = report_error(error)
+        keep(job, report.trace, record_terrain)
+        return failed(plan, job, report.detail)
 
 
 def recorded_terrain(
@@ -291,13 +295,15 @@ def modelled(
     job: Job,
     points: np.ndarray,
     used: np.ndarray,
-    found: FoundRoof,
+    bare: np.ndarray,
     surroundings: Surroundings,
     override: Override | None,
 ) -> Building:
-    """The building fitted to the `used` of its `points` (n, 3) and judged by all, noise over it included; or as its override says."""
+    """The building fitted to the `used` of its `points` (n, 3) and judged by all, noise over it included; or as its override says.
+
+    `bare` (m, 3) are points of bare ground inside its area.
+    """
     aligned = surroundings.plan.settings.replace({"reconstruct": {"align": "off"}})
-    bare = surroundings.bare(job, found)
     known = used, job.footprint, surroundings.terrain_of(job), aligned, job.id, bare
     if override is not None:
         return overridden(override, *known)
@@ -354,11 +360,8 @@ def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
     building = Building(job.id, Status.INTERNAL_ERROR, masked(detail))
     try:
         return fragments(with_input(building, job), plan.names_of(job), plan.head)
-    except MemoryError:
-        raise
     except Exception as error:
-        if is_interrupt(error):
-            raise KeyboardInterrupt from error
+        LOGGER.info("building %s: its outline cannot be written: %s", job.id, report_error(error).detail)
         return fragments(building, plan.names_of(job), plan.head)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from scipy import ndimage
 
@@ -32,10 +34,15 @@ SQUARE = np.ones((3, 3))  # a cell and the eight around it
 REACH_M = 1.0  # and nothing farther from them is part of it
 
 
-def classify(xyz: np.ndarray) -> np.ndarray:
+def raise_error(inside: np.ndarray, error: Exception) -> None:
+    raise error
+
+
+def classify(xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error) -> np.ndarray:
     """Class (n,) uint8 of each point (n, 3) in world metres: BUILDING, GROUND or UNKNOWN.
 
     Points within 40 m decide, and so the answer for a place is much the same whatever else the cloud holds.
+    `on_error` is called with the indices of the points of a square that fails; they stay UNKNOWN.
     """
     classes = np.full(len(xyz), UNKNOWN, np.uint8)
     if not len(xyz):
@@ -45,7 +52,10 @@ def classify(xyz: np.ndarray) -> np.ndarray:
         low = WORK_M * np.array([column, row])
         near = grid.candidates((*(low - BORDER_M), *(low + WORK_M + BORDER_M)))
         own = (np.floor(xyz[near, :2] / WORK_M) == (column, row)).all(axis=1)
-        classes[near[own]] = classes_of_square(xyz[near], cell_m)[own]
+        try:
+            classes[near[own]] = classes_of_square(xyz[near], cell_m)[own]
+        except Exception as error:
+            on_error(near[own], error)
     return classes
 
 

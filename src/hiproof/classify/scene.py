@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..errors import InputError
@@ -12,11 +14,24 @@ from .buildings import BUILDING, classify
 NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noise"}  # by class
 
 
-def roofs_by_shape(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
-    """Ascending indices of the roofs' points. Raises InputError where there are none."""
+def roofs_by_shape(
+    cloud: PointCloud, ground_classes: tuple[int, ...], on_error: Callable[[np.ndarray, Exception], None]
+) -> np.ndarray:
+    """Ascending indices of the roofs' points. Raises InputError where there are none.
+
+    `on_error` is called with the indices of the points of a square in which the search fails.
+    """
     asked = np.flatnonzero(~np.isin(cloud.classes, tuple(NO_ROOFS)))
-    roofs = asked[(classify(cloud.xyz[asked]) == BUILDING) & ~np.isin(cloud.classes[asked], ground_classes)]
-    return some(roofs, cloud, "none of which lies on a smooth surface above the ground")
+    n_failed = 0
+
+    def skip_square(inside: np.ndarray, error: Exception) -> None:
+        nonlocal n_failed
+        n_failed += 1
+        on_error(asked[inside], error)
+
+    classes = classify(cloud.xyz[asked], skip_square)
+    roofs = asked[(classes == BUILDING) & ~np.isin(cloud.classes[asked], ground_classes)]
+    return roofs if n_failed else some(roofs, cloud, "none of which lies on a smooth surface above the ground")
 
 
 def points_that_may_be_roofs(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:

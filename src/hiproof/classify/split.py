@@ -6,11 +6,12 @@ import dataclasses
 import warnings
 from collections import Counter
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 
-from ..errors import InputError, InputWarning
+from ..errors import ErrorReport, InputError, InputWarning, report_error
 from ..log import counted
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
@@ -37,12 +38,22 @@ class FoundBuilding:
     `area` is the union of the cells that hold the group's points, in world metres, less what lies beyond a wall between
     touching houses: all of them lie in it, and none of another group. The roof's outline is the fit's business.
     `is_cut_out`: the cloud holds roofs alone, cut out beforehand, so that all its points but noise count.
+    `error`: an unexpected error while its points were split into houses, or while roofs were looked for among them.
     """
 
     id: str
     index: np.ndarray
     area: shapely.Geometry
     is_cut_out: bool = False
+    error: ErrorReport | None = None
+
+
+class Place(NamedTuple):
+    """Points (ascending indices) of one building with their area; or of a place where the search failed."""
+
+    members: np.ndarray
+    area: shapely.Geometry
+    error: ErrorReport | None = None
 
 
 def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
@@ -52,18 +63,24 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
     known. Houses that touch are told apart where their roofs say so (`settings.read.split_houses`), else they stay together. Groups
     with fewer than `settings.read.split_min_points` points or less than 4 m2 are left out with an InputWarning. Ids name the metre that
     holds the group's middle, not its number, so that they do not depend on what else was read. Raises InputError where no point may be a
-    building's.
+    building's. An unexpected error stays with the group, or the square of the cloud, where it happens.
     """
     read = (settings or Settings()).read
-    roof, is_cut_out = roof_points_of(cloud, read)
-    xy = cloud.xyz[roof, :2]
-    if is_cut_out and is_single(xy):
-        found = named([roof], cloud.xyz, adapted_gap(xy))
-    else:
-        gap_m = read.split_gap_m or adapted_gap(xy)
-        groups = [roof[group] for group in connected_groups(xy, gap_m)]
-        found = named(large_enough(groups, cloud.xyz, read), cloud.xyz, gap_m, read.split_houses)
+    roof, is_cut_out, failed = roof_points_of(cloud, read)
+    found = named([*places_of(roof, cloud.xyz, read, is_cut_out), *failed], cloud.xyz)
     return [dataclasses.replace(one, is_cut_out=is_cut_out) for one in found]
+
+
+def places_of(roof: np.ndarray, xyz: np.ndarray, read: ReadSettings, is_cut_out: bool) -> list[Place]:
+    """Divide the `roof` points (indices) among buildings."""
+    if not len(roof):
+        return []
+    xy = xyz[roof, :2]
+    if is_cut_out and is_single(xy):
+        return houses_or_error(roof, xyz, adapted_gap(xy), split_houses=False)
+    gap_m = read.split_gap_m or adapted_gap(xy)
+    groups = large_enough([roof[group] for group in connected_groups(xy, gap_m)], xyz, read)
+    return [house for group in groups for house in houses_or_error(group, xyz, gap_m, read.split_houses)]
 
 
 def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) -> list[np.ndarray]:
@@ -81,25 +98,29 @@ def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) 
     return large
 
 
-def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool]:
-    """Ascending indices of the points that may be roofs, and whether they are roofs alone, cut out beforehand."""
+def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool, list[Place]]:
+    """Ascending indices of the points that may be roofs, whether they are roofs alone, cut out beforehand, and the places
+    where the search for them failed."""
     if read.roofs == "alone":
-        return points_that_may_be_roofs(cloud, read.ground_classes), True
+        return points_that_may_be_roofs(cloud, read.ground_classes), True, []
     index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
     if index is not None:
-        return index, False
+        return index, False, []
     unclassified, is_chosen = never_classified(cloud), read.building_classes != ReadSettings().building_classes
     if read.roofs == "class" or (read.roofs == "auto" and is_chosen):
         if unclassified is None or not is_single(cloud.xyz[unclassified, :2]):
             raise InputError(without_building_class(cloud, read.building_classes))
-        return unclassified, True
+        return unclassified, True, []
     if unclassified is not None and holds_roofs_alone(cloud.xyz[unclassified]):
-        return unclassified, True
-    roofs = roofs_by_shape(cloud, read.ground_classes)
+        return unclassified, True, []
+    failed: list[Place] = []
+    roofs = roofs_by_shape(
+        cloud, read.ground_classes, lambda index, error: failed.append(failed_place(index, cloud.xyz, error))
+    )
     if read.roofs == "auto":
         said = f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs were found by shape"
         warnings.warn(said, InputWarning)
-    return roofs, False
+    return roofs, False, failed
 
 
 def classes_text(classes: tuple[int, ...]) -> str:
@@ -199,18 +220,32 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     return np.split(order, np.cumsum(np.bincount(group_of, minlength=count))[:-1])
 
 
-def named(groups: list[np.ndarray], xyz: np.ndarray, gap_m: float, split_houses: bool = False) -> list[FoundBuilding]:
-    """Give each group, or each of its houses, its geometry and the id B_<x>_<y> of the metre that holds the middle of its box."""
+def named(places: list[Place], xyz: np.ndarray) -> list[FoundBuilding]:
+    """Give each place the id B_<x>_<y> of the metre that holds the middle of its box."""
     used: Counter[str] = Counter()
     found = []
-    for index, area in (house for group in groups for house in houses_of(group, xyz, gap_m, split_houses)):
+    for index, area, error in places:
         xy = xyz[index, :2]
         x, y = np.floor((xy.min(axis=0) + xy.max(axis=0)) / 2).astype(int)
         id = f"B_{x}_{y}"
         used[id] += 1
         id = id if used[id] == 1 else f"{id}_{used[id]}"
-        found.append(FoundBuilding(id, index, area))
+        found.append(FoundBuilding(id, index, area, error=error))
     return found
+
+
+def houses_or_error(group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool) -> list[Place]:
+    """Divide a group of points into houses, or keep it whole with the error that this ended in."""
+    try:
+        return [Place(index, shapely.make_valid(area)) for index, area in houses_of(group, xyz, gap_m, split_houses)]
+    except Exception as error:
+        return [failed_place(group, xyz, error)]
+
+
+def failed_place(index: np.ndarray, xyz: np.ndarray, error: Exception) -> Place:
+    """The box of the points `index` with the error that happened there."""
+    xy = xyz[index, :2]
+    return Place(index, shapely.box(*xy.min(axis=0), *xy.max(axis=0)), report_error(error))
 
 
 def houses_of(
