@@ -13,7 +13,7 @@ from hiproof.fit.union.cants import finished, walls_of
 from hiproof.fit.union.finish import cost_of, inverse_of, least_squares, weighted_moments
 from hiproof.fit.union.larger import put_together
 from hiproof.fit.union.plan import lay_out_plan
-from hiproof.fit.union.regions import regions_of
+from hiproof.fit.union.regions import Site, regions_of
 from hiproof.fit.union.scene import scene_of
 from hiproof.fit.union.sides import Side, corners_of, sides_of
 from hiproof.fit.union.unite import ends_of
@@ -56,9 +56,8 @@ def test_regions_cover_the_outline_and_nothing_else(seed, base):
     volumes = level_volumes(rng, 1 + seed % 4)
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)
-    regions = regions_of(
-        volumes, finished(volumes, sides, walls_of(outline, plan), scene, {}), sides, plan, outline, scene, base
-    )
+    planes = finished(volumes, sides, walls_of(outline, plan), scene, {})
+    regions = regions_of(volumes, planes, sides, Site(outline, plan, scene, {}), base)
     assert len(regions) == len(volumes)
     polygons = [polygon for own in regions for polygon in own]
     assert all(polygon.is_valid and polygon.area > 0.0 for polygon in polygons)
@@ -75,9 +74,8 @@ def test_what_a_volume_replaces_is_cut_out_of_those_before(seed):
     volumes[-1, REPLACES] = 1.0
     plan, scene = laid_out(rng, outline, volumes)
     sides = sides_of(volumes, ends_of(outline, plan, scene).lines, scene)
-    regions = regions_of(
-        volumes, finished(volumes, sides, walls_of(outline, plan), scene, {}), sides, plan, outline, scene, True
-    )
+    planes = finished(volumes, sides, walls_of(outline, plan), scene, {})
+    regions = regions_of(volumes, planes, sides, Site(outline, plan, scene, {}), True)
     recess = shapely.union_all(regions[-1])
     assert recess.area > 1.0
     assert all(polygon.intersection(recess).area < 1e-3 for own in regions[:-1] for polygon in own)

@@ -42,18 +42,19 @@ def price(state, problem, box=None):
     """Price and corners of a roof, in a window or as a whole."""
     box = problem.outline.envelope if box is None else box
     window = weld.window_of(box, weld.quads_of(state, problem), problem)
-    drawn = weld.draw(state, problem)
-    return weld.price_of(state, weld.owners_beyond(drawn, box), window, problem)
+    whole = weld.window_of(weld.whole_box(problem), weld.quads_of(state, problem), problem)
+    beyond = weld.owners_beyond(weld.draw(state, whole, problem).plans[0], box)
+    return weld.price_of(state, weld.draw(state, window, problem), beyond, window, problem)
 
 
 @pytest.mark.parametrize(("kind", "seed"), [("L", 1), ("dormered", 2), ("two_level", 3), ("T", 4)])
 def test_a_welded_roof_costs_no_more_and_welding_again_changes_nothing(monkeypatch, kind, seed):
     problem, state = before_welding(monkeypatch, kind, seed)
     volumes, outline, plan, scene, agreement, base, *_ = problem
-    sides, planes = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
+    sides, planes, _ = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
     after = state._replace(sides=sides, planes=planes)
     assert price(after, problem) <= price(state, problem)
-    again, _ = weld.weld(volumes, sides, agreement._replace(planes=planes), outline, plan, scene, base)
+    again, *_ = weld.weld(volumes, sides, agreement._replace(planes=planes), outline, plan, scene, base)
     assert again == sides
 
 
@@ -80,13 +81,13 @@ def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):
     """Where a welded side is moved by 2 cm, welding leaves no more corners than there were."""
     problem, state = before_welding(monkeypatch, "dormered", 2)
     volumes, outline, plan, scene, agreement, base, *_ = problem
-    sides, planes = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
+    sides, planes, _ = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
     settled = state._replace(sides=sides, planes=planes)
     for k in range(1, len(volumes)):
         for edge, side in enumerate(sides[k]):
             if not side.anchored and np.isfinite(side.sigma):
                 line = Side(side.at + 0.02, side.lean, False, side.sigma)
                 apart = weld.with_line_moved(volumes, sides, k, edge, line)
-                back, _ = weld.weld(volumes, apart, agreement._replace(planes=planes), outline, plan, scene, base)
+                back, *_ = weld.weld(volumes, apart, agreement._replace(planes=planes), outline, plan, scene, base)
                 moved = state._replace(sides=back, planes=planes)
                 assert price(moved, problem)[1] <= price(settled, problem)[1]

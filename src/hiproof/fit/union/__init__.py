@@ -58,6 +58,7 @@ from ...read.plausible import is_plausible
 from ...settings import Settings
 from .apart import told_apart
 from .bays import with_bays
+from .cants import Known
 from .clamp import clamped
 from .fit import BuildingFit
 from .groups import draw_in_groups, run_in_groups
@@ -67,14 +68,13 @@ from .objective import base_shows
 from .outline import outline_of_points
 from .own import in_own_shapes
 from .plan import Plan, lay_out_plan
-from .regions import besides, places_of, polygons_of, regions_of
+from .regions import Site, besides, places_of, polygons_of
 from .scene import Scene
 from .search import COMMON_HOUSE_M2, evidence_per_unit, find_volumes
 from .shown import highest_of, that_show
 from .slivers import without_slivers, without_specks
 from .unite import Ends, ends_of, ends_within, united
 from .weld import weld
-from .whole import Whole
 
 __all__ = ["BuildingFit", "fit_building"]
 
@@ -104,13 +104,13 @@ def fit_building(
         raise FitError("expected roof points inside the outline, got none; add a cloud that covers the building")
     types = settings.fit.types
     volumes, value, scene = find_volumes(plan, outline, settings.compound, types)
-    whole, ends = Whole(scene, plan, outline), ends_of(outline, plan, scene)
-    volumes = tidy_volumes(volumes, ends, whole)
+    site, ends = Site(outline, plan, scene, {}), ends_of(outline, plan, scene)
+    known: Known = {}
+    volumes = tidy_volumes(volumes, ends, site, known)
     unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
-    roof, agreement = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, whole)
+    roof, agreement = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, site, known)
     volumes, base = roof.volumes, bool(base_shows(roof.volumes, scene))
-    sides, planes = weld(volumes, roof.sides, agreement, outline, plan, scene, base)
-    regions = regions_of(volumes, planes, sides, plan, outline, scene, base)
+    sides, planes, regions = weld(volumes, roof.sides, agreement, outline, plan, scene, base)
     parts = [
         part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)
         for k, own in places_of(regions, outline, plan)
@@ -126,16 +126,18 @@ def fit_building(
     return BuildingFit(tuple(parts), outline, value, scene.n, far)
 
 
-def tidy_volumes(volumes: np.ndarray, ends: Ends, whole: Whole) -> np.ndarray:
+def tidy_volumes(volumes: np.ndarray, ends: Ends, site: Site, known: Known) -> np.ndarray:
     """The volumes without specks and slivers, those that show in several places split, those that are one united."""
 
     def tidy(rows: np.ndarray, scene: Scene, _: list[int] | None) -> np.ndarray:
         return told_apart(without_slivers(without_specks(rows, scene), scene), scene)
 
     def unite(rows: np.ndarray, scene: Scene, own: list[int] | None) -> np.ndarray:
-        return united(rows, ends if own is None else ends_within(ends, scene), scene, own).volumes
+        if own is None:
+            return united(rows, ends, scene, known).volumes
+        return united(rows, ends_within(ends, scene), scene, {}, own).volumes
 
-    return run_in_groups(unite, run_in_groups(tidy, volumes, whole), whole)
+    return run_in_groups(unite, run_in_groups(tidy, volumes, site), site)
 
 
 def largest_polygon(outline: shapely.Geometry) -> shapely.Polygon:

@@ -13,7 +13,9 @@ import numpy as np
 
 from .agree import Agreement, agreed
 from .box import Box, box_around
+from .cants import Known
 from .finish import Planes, planes_as_found
+from .regions import Site
 from .scene import Scene
 from .sides import Side
 from .unite import Drawn, Ends, drawn, ends_within
@@ -30,11 +32,11 @@ WINDOW_POINTS = 6000  # of a group's window at most
 Pass = Callable[[np.ndarray, Scene, list[int] | None], np.ndarray]
 
 
-def run_in_groups(change: Pass, volumes: np.ndarray, whole: Whole) -> np.ndarray:
+def run_in_groups(change: Pass, volumes: np.ndarray, site: Site) -> np.ndarray:
     """Let a pass change the volumes: all at once where they are few, else group by group."""
     if len(volumes) <= MOST_AT_ONCE:
-        return change(volumes, whole.scene, None)
-    whole.set_volumes(volumes.copy())
+        return change(volumes, site.scene, None)
+    whole = Whole(site.scene, site.plan, site.outline, volumes)
     for places in [[whole.volumes[k, PLACE].tobytes() for k in group] for group in groups_of(whole)]:
         group = [k for k in map(whole.find, places) if k is not None]
         seen = look_at(whole, group) if group else None
@@ -79,16 +81,17 @@ def look_at(whole: Whole, group: Sequence[int]) -> tuple[Scene, list[int]] | Non
     return None if scene is None else (scene, [0, *whole.volumes_in(box)])
 
 
-def draw_in_groups(volumes: np.ndarray, ends: Ends, whole: Whole) -> tuple[Drawn, Agreement]:
+def draw_in_groups(volumes: np.ndarray, ends: Ends, site: Site, known: Known) -> tuple[Drawn, Agreement]:
     """The volumes with their sides and planes, and those that agree with their neighbours equal to these.
 
-    Of volumes that are not looked at all at once no common unknowns are known: their agreement has no members.
+    Planes `known` of volumes seen all at once are not fitted again. Of volumes that are not looked at
+    all at once no common unknowns are known: their agreement has no members.
     """
     if len(volumes) <= MOST_AT_ONCE:
-        roof = drawn(volumes, ends, whole.scene, {})
-        agreement = agreed(volumes, roof.sides, roof.planes, whole.scene)
+        roof = drawn(volumes, ends, site.scene, known)
+        agreement = agreed(volumes, roof.sides, roof.planes, site.scene)
         return replace(roof, planes=agreement.planes), agreement
-    whole.set_volumes(volumes.copy())
+    whole = Whole(site.scene, site.plan, site.outline, volumes)
     sides = [[Side(float(x)) for x in row[U0 : V1 + 1]] for row in volumes]
     planes = [found_planes(row, whole.scene) for row in volumes]
     for group in groups_of(whole):

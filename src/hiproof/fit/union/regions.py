@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -16,6 +17,7 @@ from .plan import Plan
 from .scene import Scene
 from .sides import Side, corners_of
 from .volumes import DIRECTION, LEVEL, OFFSET, REPLACES, U0, V1
+from .whole import PLACE
 
 THICK_M = 0.25  # a gap may be the base's where a disc of this radius fits
 SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
@@ -25,29 +27,51 @@ FAR_M = 1e4  # m beyond all of an outline
 SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
 
 
-def regions_of(
-    volumes: np.ndarray,
-    planes: list[Planes],
-    sides: list[list[Side]],
-    plan: Plan,
-    outline: shapely.Polygon,
-    scene: Scene,
-    base: bool,
-) -> list[list]:
-    """For each volume the polygons (local coordinates) of `outline` that it may roof; overlapping, as volumes do.
+class Site(NamedTuple):
+    """What volumes are cut to: an outline (local coordinates), or the part of one in a window.
 
-    What a later volume replaces is cut out. With `base`, what no other covers is the base's, and what rises through others.
+    Overlays are `known` once they were made: of a roof that changes in one place, most stay.
     """
-    quads = [None] + [quad_of(volume, own, plan, scene) for volume, own in zip(volumes[1:], sides[1:], strict=True)]
-    regions: list[list] = [polygons_of(outline) if base or len(volumes) == 1 else []]
-    for k in range(1, len(volumes)):
-        own = shapely.intersection(quads[k], outline, grid_size=GRID_M)
+
+    outline: shapely.Polygon
+    plan: Plan
+    scene: Scene
+    known: dict
+
+    def quad(self, volume: np.ndarray, sides: list[Side]) -> tuple[shapely.Polygon, shapely.Geometry]:
+        """A volume's plan, and what of it lies inside the outline."""
+        key = volume[PLACE].tobytes(), *sides
+        if key not in self.known:
+            quad = quad_of(volume, sides, self.plan, self.scene)
+            self.known[key] = quad, shapely.intersection(quad, self.outline, grid_size=GRID_M)
+        return self.known[key]
+
+    def rest(self, quads: list[shapely.Polygon]) -> list[shapely.Polygon]:
+        """What of the outline lies in no quad."""
+        key = tuple(map(id, quads))
+        if key not in self.known:
+            covered = with_area(shapely.union_all(quads, grid_size=GRID_M))
+            self.known[key] = polygons_of(shapely.difference(self.outline, covered, grid_size=GRID_M))
+        return self.known[key]
+
+
+def regions_of(
+    volumes: np.ndarray, planes: list[Planes], sides: list[list[Side]], site: Site, base: bool
+) -> list[list[shapely.Polygon]]:
+    """For each volume the polygons (local coordinates) of the site's outline that it may roof.
+
+    They overlap, as volumes do. What a later volume replaces is cut out. With `base`, what no other
+    covers is the base's, and what rises through others.
+    """
+    cut = [site.quad(volume, own) for volume, own in zip(volumes[1:], sides[1:], strict=True)]
+    regions = [polygons_of(site.outline) if base or len(volumes) == 1 else []]
+    for k, (quad, own) in enumerate(cut, start=1):
         if volumes[k, REPLACES]:
-            regions = [cut_out(before, quads[k]) for before in regions]
-        elif regions[0] and not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, plan, scene):
-            regions[0] = cut_out(regions[0], quads[k])
+            regions = [cut_out(before, quad) for before in regions]
+        elif regions[0] and not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, site):
+            regions[0] = cut_out(regions[0], quad)
         regions.append(polygons_of(own))
-    return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, quads, outline, plan, scene)
+    return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, [quad for quad, _ in cut], site)
 
 
 def places_of(
@@ -96,28 +120,29 @@ def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> 
     return quad
 
 
-def rises_through(
-    base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, plan: Plan, scene: Scene
-) -> bool:
+def rises_through(base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, site: Site) -> bool:
     """Whether the level base is noticeably above the volume somewhere over its region, and no worse for the points there."""
     corners = shapely.get_coordinates(region)
-    if not len(corners) or not (heights_over(volume, planes, corners, plan, scene) < base - SHOWS_M).any():
+    if not len(corners) or not (heights_over(volume, planes, corners, site) < base - SHOWS_M).any():
         return False
-    xy, z = points_in(region, plan, scene)
-    height = heights_over(volume, planes, xy, plan, scene)
+    xy, z = points_in(region, site)
+    height = heights_over(volume, planes, xy, site)
     below = height < base
-    return bool(misfits(z[below], base, scene).sum() <= misfits(z[below], height[below], scene).sum())
+    at_base, at_volume = misfits(z[below], base, site.scene), misfits(z[below], height[below], site.scene)
+    return bool(at_base.sum() <= at_volume.sum())
 
 
-def points_in(region: shapely.Geometry, plan: Plan, scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+def points_in(region: shapely.Geometry, site: Site) -> tuple[np.ndarray, np.ndarray]:
     """The points inside a region: local x, y (n, 2) and the plan's z (n,)."""
+    _, plan, scene, _ = site
     xy = plan.frame.xy_local(np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]]))
     inside = shapely.contains_xy(region, xy[:, 0], xy[:, 1])
     return xy[inside], scene.z[: scene.n][inside]
 
 
-def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, plan: Plan, scene: Scene) -> np.ndarray:
+def heights_over(volume: np.ndarray, planes: Planes, xy: np.ndarray, site: Site) -> np.ndarray:
     """Heights (n,) of a volume, in the plan's z, at local `xy` (n, 2)."""
+    _, plan, scene, _ = site
     c, s = scene.turn[int(volume[DIRECTION])]
     uv = (xy - plan.frame.origin[:2]) @ plan.frame.rotation.T @ np.array([[c, -s], [s, c]])
     rows = planes.rows[np.isfinite(planes.rows[:, 2])]
@@ -145,21 +170,14 @@ def besides(parts: Iterable[Part], some: Iterable[Part]) -> list[Part]:
 
 
 def gaps_filled(
-    volumes: np.ndarray,
-    planes: list[Planes],
-    regions: list[list],
-    quads: list,
-    outline: shapely.Polygon,
-    plan: Plan,
-    scene: Scene,
+    volumes: np.ndarray, planes: list[Planes], regions: list[list], quads: list[shapely.Polygon], site: Site
 ) -> list[list]:
     """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
-    rest = shapely.difference(outline, with_area(shapely.union_all(quads[1:], grid_size=GRID_M)), grid_size=GRID_M)
-    for gap in polygons_of(rest):
+    for gap in site.rest(quads):
         near, k, q = shares_most(gap, [[], *regions[1:]])
-        if k > 0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], plan, scene)):
+        if k > 0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], site)):
             wider = with_area(shapely.union_all([regions[k][q], near], grid_size=GRID_M))
-            merged = polygons_of(shapely.intersection(wider, outline, grid_size=GRID_M))
+            merged = polygons_of(shapely.intersection(wider, site.outline, grid_size=GRID_M))
             if len(merged) == 1:
                 regions[k][q] = merged[0]
                 regions[0] = cut_out(regions[0], near)
@@ -186,18 +204,11 @@ def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
     return bool(shapely.covers(shapely.union_all(polygons, grid_size=GRID_M).buffer(1e-3), gap))
 
 
-def is_base(
-    gap: shapely.Polygon,
-    base: np.ndarray,
-    volume: np.ndarray,
-    planes: Planes,
-    plan: Plan,
-    scene: Scene,
-) -> bool:
+def is_base(gap: shapely.Polygon, base: np.ndarray, volume: np.ndarray, planes: Planes, site: Site) -> bool:
     """Whether a gap is wide enough to be drawn and its points lie on the base rather than on its neighbour continued."""
     if shapely.buffer(gap, -THICK_M).is_empty:
         return False
-    xy, z = points_in(gap, plan, scene)
-    continued = heights_over(volume, planes, xy, plan, scene)
-    gain = misfits(z, continued, scene).sum() - misfits(z, base[OFFSET + LEVEL], scene).sum()
-    return not len(z) or bool(gain > SHAPE_UNITS * scene.evidence)
+    xy, z = points_in(gap, site)
+    continued = misfits(z, heights_over(volume, planes, xy, site), site.scene).sum()
+    gain = continued - misfits(z, base[OFFSET + LEVEL], site.scene).sum()
+    return not len(z) or bool(gain > SHAPE_UNITS * site.scene.evidence)

@@ -15,10 +15,10 @@ from .improve import simplify
 from .large import find_in_windows
 from .objective import objective
 from .plan import Plan
+from .regions import Site
 from .run_on import run_on
 from .scene import Scene, directions_of, scene_of, seen_through
 from .trim import trim
-from .whole import Whole
 
 SEARCH_POINTS = 600  # points that structure is looked for in; all of them settle it
 # Price of structure by detail: the ends of the curve of share against parts that `benchmarks.curve` draws. Below a half every
@@ -60,8 +60,8 @@ def find_volumes(
     angles = directions_of(outline, plan)
     every = scene_of(plan, outline, angles, evidence[1], settings.tolerance_m, allowed_shapes(types))
     if outline.area > LARGE_M2 and count > SEARCH_POINTS:  # else a house's search sees every point
-        whole = Whole(every, plan, outline)
-        volumes = run_in_groups(trim_and_run_on, find_in_windows(plan, outline, every), whole)
+        site = Site(outline, plan, every, {})
+        volumes = run_in_groups(trim_and_run_on, find_in_windows(plan, outline, every), site)
         return volumes, objective(volumes, every, np.inf), every
     scene = seen_through(every, few, evidence[0])
     volumes, _ = grow(scene)

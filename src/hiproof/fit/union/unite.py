@@ -68,13 +68,13 @@ class Drawn:
     cost: float
 
 
-def united(volumes: np.ndarray, ends: Ends, scene: Scene, own: Collection[int] | None = None) -> Drawn:
+def united(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known, own: Collection[int] | None = None) -> Drawn:
     """The volumes along their sides, without those that do not pay once planes face as these do.
 
-    Only volumes of the numbers `own` are made one with others, or go; all where it is None.
+    Only volumes of the numbers `own` are made one with others, or go; all where it is None. Planes
+    that are `known` in this scene are not fitted again; those found become known.
     """
     value = objective(volumes, scene, np.inf)
-    known: Known = {}
     best = with_cut_corners(drawn(volumes, ends, scene, known), ends, scene, known)
     tried = True
     while tried:

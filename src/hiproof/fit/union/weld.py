@@ -21,7 +21,7 @@ from .drawn_plan import DrawnPlan, count_parameters, draw_plan, local_planes
 from .finish import Planes
 from .objective import costs, misfits
 from .plan import Plan
-from .regions import polygons_of, quad_of, regions_of
+from .regions import Site, polygons_of, quad_of, regions_of
 from .repairs import Repair, find_repairs
 from .scene import Scene
 from .sides import Side, corners_of
@@ -73,17 +73,30 @@ class State(NamedTuple):
 
 
 class Window(NamedTuple):
-    """A part of a roof: its `box` in local coordinates, the numbers of the volumes that reach into
-    it, the outline within it, the scene of the points in it, and those that judge (local `xy` (n,
-    2), `z` (n,)), each for `weight` points."""
+    """A part of a roof, or all of it, in a `box` of local coordinates.
+
+    It has the numbers of the volumes that reach into the box, what they are cut to (one site for
+    every part of the outline), and the points that judge: local `xy` (n, 2) and `z` (n,), each for
+    `weight` points.
+    """
 
     box: shapely.Polygon
     numbers: np.ndarray
-    outlines: list[shapely.Polygon]
+    sites: list[Site]
     scene: Scene
     xy: np.ndarray
     z: np.ndarray
     weight: float
+
+
+class Drawing(NamedTuple):
+    """What a window shows of a roof: regions and plan for each of its sites.
+
+    A plan is None where its regions make none.
+    """
+
+    regions: list[list[list[shapely.Polygon]]]
+    plans: list[DrawnPlan | None]
 
 
 def weld(
@@ -94,18 +107,19 @@ def weld(
     plan: Plan,
     scene: Scene,
     base: bool,
-) -> tuple[list[list[Side]], list[Planes]]:
-    """Return the sides and planes of all volumes with every repair that pays."""
+) -> tuple[list[list[Side]], list[Planes], list[list[shapely.Polygon]]]:
+    """Return the sides, planes and regions of all volumes with every repair that pays."""
     problem = problem_of(volumes, agreement, outline, plan, scene, base)
     state = state_before(sides, problem)
+    whole = window_of(whole_box(problem), quads_of(state, problem), problem)
+    drawing = draw(state, whole, problem)
     tried: set[tuple] = set()
     for _ in range(MOST_ROUNDS):
-        drawn = draw(state, problem)
-        better = state if drawn is None else after_a_round(state, drawn, tried, problem)
+        better, better_drawing = after_a_round(state, drawing, whole, tried, problem)
         if better is state:
             break
-        state = better
-    return state.sides, state.planes
+        state, drawing = better, better_drawing or draw(better, whole, problem)
+    return state.sides, state.planes, drawing.regions[0]
 
 
 def problem_of(
@@ -130,42 +144,59 @@ def state_before(sides: list[list[Side]], problem: Problem) -> State:
     return State(sides, list(planes), basis, cost)
 
 
-def draw(state: State, problem: Problem) -> DrawnPlan | None:
-    """The whole roof's plan; None where none comes out."""
-    volumes, outline, plan, scene, _, base, *_ = problem
-    regions = regions_of(volumes, state.planes, state.sides, plan, outline, scene, base)
-    return draw_plan(regions, volumes, state.planes, outline, plan, scene)
+def draw(state: State, window: Window, problem: Problem) -> Drawing:
+    """Draw what a window shows of a roof."""
+    volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
+    sides = [state.sides[k] for k in window.numbers]
+    regions = [regions_of(volumes, planes, sides, site, problem.base) for site in window.sites]
+    pairs = zip(regions, window.sites, strict=True)
+    plans = [draw_plan(own, volumes, planes, site.outline, problem.plan, problem.scene) for own, site in pairs]
+    return Drawing(regions, plans)
 
 
-def after_a_round(state: State, drawn: DrawnPlan, tried: set[tuple], problem: Problem) -> State:
-    """The roof with every repair that pays, of those not `tried`, one in each window."""
+def after_a_round(
+    state: State, drawing: Drawing, whole: Window, tried: set[tuple], problem: Problem
+) -> tuple[State, Drawing | None]:
+    """The roof with every repair that pays, of those not `tried`, one in each window.
+
+    Its drawing comes with it where it is known.
+    """
+    drawn = drawing.plans[0]
+    if drawn is None:
+        return state, drawing
     area = problem.outline.area
     most = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
     changed: list[shapely.Polygon] = []
-    window, quads = None, quads_of(state, problem)
+    window, price, after_drawing = whole, None, None
+    quads = quads_of(state, problem)
     for repair in find_repairs(drawn, problem.volumes, state.sides, problem.plan, problem.scene):
         if repair.key in tried or len(tried) >= most:
             continue
-        box = box_of(repair, state, problem) if area > WINDOW_M2 else whole_box(problem)
+        box = box_of(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
             continue
-        if window is None or not window.box.equals(box):
-            window = window_of(box, quads, problem)
+        if not window.box.equals(box):
+            window, price = window_of(box, quads, problem), None
         after = repaired(state, repair, window, problem)
         if after is None:
             continue
         tried.add(repair.key)
-        if pays(state, after, drawn, window, problem):
-            state = after
+        beyond = owners_beyond(drawn, window.box)
+        if price is None:
+            before = drawing if window is whole else draw(state, window, problem)
+            price = price_of(state, before, beyond, window, problem)
+        if price is None:
+            continue
+        trial = draw(after, window, problem)
+        if is_cheaper(price_of(after, trial, beyond, window, problem), price):
+            state, after_drawing = after, trial if window is whole else None
             changed.append(box)
-    return state
+    return state, after_drawing
 
 
-def pays(before: State, after: State, drawn: DrawnPlan, window: Window, problem: Problem) -> bool:
-    """Whether a window of the roof is cheaper `after`, and has fewer corners."""
-    beyond = owners_beyond(drawn, window.box)
-    was, now = (price_of(state, beyond, window, problem) for state in (before, after))
-    return was is not None and now is not None and now[0] < was[0] and now[1] < was[1]
+def is_cheaper(now: tuple[float, int] | None, was: tuple[float, int]) -> bool:
+    """Tell whether a window costs less than it did, and has fewer corners."""
+    return now is not None and now[0] < was[0] and now[1] < was[1]
 
 
 def owners_beyond(drawn: DrawnPlan, box: shapely.Polygon) -> set[tuple[int, int]]:
@@ -222,12 +253,18 @@ def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Probl
     )
     judges = inside[np.arange(count) * len(inside) // max(count, 1)]
     outline = problem.outline
-    within = polygons_of(outline if box.covers(outline) else shapely.intersection(outline, box))
+    if box.covers(outline):
+        sites = [Site(outline, problem.plan, scene, {})]
+    else:
+        within = polygons_of(shapely.intersection(outline, box))
+        sites = [Site(part, problem.plan, seen, {}) for part in within]
     weight = len(inside) / max(count, 1)
-    return Window(box, numbers, within, seen, xy[judges], scene.z[judges], weight)
+    return Window(box, numbers, sites, seen, xy[judges], scene.z[judges], weight)
 
 
-def price_of(state: State, beyond: set[tuple[int, int]], window: Window, problem: Problem) -> tuple[float, int] | None:
+def price_of(
+    state: State, drawing: Drawing, beyond: set[tuple[int, int]], window: Window, problem: Problem
+) -> tuple[float, int] | None:
     """What a window of a roof costs (points), with the parameters that show in it or `beyond`, and
     its corners.
 
@@ -235,11 +272,8 @@ def price_of(state: State, beyond: set[tuple[int, int]], window: Window, problem
     """
     plan, scene, numbers = problem.plan, problem.scene, window.numbers
     volumes, planes = problem.volumes[numbers], [state.planes[k] for k in numbers]
-    sides = [state.sides[k] for k in numbers]
     shown, corners, height = set(beyond), 0, np.full(len(window.z), -np.inf)
-    for outline in window.outlines:
-        regions = regions_of(volumes, planes, sides, plan, outline, window.scene, problem.base)
-        drawn = draw_plan(regions, volumes, planes, outline, plan, scene)
+    for regions, drawn in zip(drawing.regions, drawing.plans, strict=True):
         if drawn is None:
             return None
         corners += drawn.corners
