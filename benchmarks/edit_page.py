@@ -36,9 +36,9 @@ from hiproof.edit.edits import FILE
 from hiproof.edit.server import Server, Service
 from hiproof.evaluate.metrics import FACADE_M
 from hiproof.evaluate.run import run_record
+from hiproof.geometry.rings import GRID_M
 from hiproof.parametric.file import read_parameters
 from hiproof.read.solids import read_solids
-from hiproof.rings import GRID_M
 from hiproof.settings import Settings
 
 TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "side_hip", "asymmetric_gable", "mansard")

@@ -14,8 +14,8 @@ from pathlib import Path
 import numpy as np
 
 from hiproof.evaluate.metrics import iou, plan_outline, psd
-from hiproof.fit.alpha_shape import alpha_shape
 from hiproof.fit.single import fit_roof
+from hiproof.geometry.alpha_shape import alpha_shape
 from hiproof.model import Fit, Solid
 from hiproof.reconstruct import reconstruct
 

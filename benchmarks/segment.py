@@ -18,10 +18,10 @@ from hiproof import reconstruct
 from hiproof.errors import FitError
 from hiproof.evaluate.distance import point_surface_distances
 from hiproof.fit import fit_roof
+from hiproof.geometry.rings import ring_normal
 from hiproof.learn.data import POINTS, as_sample
 from hiproof.learn.shapes import Shape, read_shapes
 from hiproof.model import ROOF
-from hiproof.rings import ring_normal
 from hiproof.segment import combine, segment
 from hiproof.segment.inference import SHIPPED_WEIGHTS
 from hiproof.segment.scores import Scores

@@ -36,9 +36,9 @@ import shapely
 from hiproof import reconstruct
 from hiproof.compose import compose
 from hiproof.frames import LocalFrame
+from hiproof.geometry.rings import ring_normal
 from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Roof, Solid
 from hiproof.read.solids import read_solids
-from hiproof.rings import ring_normal
 from hiproof.settings import Settings
 from hiproof.simulate import SOURCES, Defects, ScanSettings, scan_solids
 from hiproof.status import Status

@@ -31,8 +31,8 @@ from scipy import ndimage
 
 from hiproof import reconstruct
 from hiproof.evaluate.distance import point_surface_distances
+from hiproof.geometry.rings import ring_normal
 from hiproof.model import ROOF, WALL, Building, Solid
-from hiproof.rings import ring_normal
 from hiproof.status import Grade
 
 from .towns import STEEPEST

@@ -11,7 +11,7 @@ import numpy as np
 import shapely
 
 from hiproof.errors import FitError, InputError
-from hiproof.fit.alpha_shape import alpha_shape
+from hiproof.geometry.alpha_shape import alpha_shape
 from hiproof.read.roofn3d import read_roofn3d
 from hiproof.simulate import NOT_ROOF, ROOF_TYPES, Defects, ScanSettings, random_building, scan
 

@@ -1,4 +1,4 @@
-"""ARCHITECTURE.md against the code: its rooms and files are those there are, and imports run as it draws them."""
+"""Compare ARCHITECTURE.md with the code: its packages exist, and imports run as it draws them."""
 
 import ast
 import re
@@ -9,113 +9,110 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-PACKAGE = ROOT / "src/hiproof"
+SOURCES = ROOT / "src/hiproof"
 PAGE = (ROOT / "ARCHITECTURE.md").read_text(encoding="utf-8")
-DOORS = {("model",)}  # its methods open rooms above it when a person calls them, as the page says
-SELF_EVIDENT = {"cli", "primitives"}  # a file a command, a file a shape
-NOT_DRAWN = {"__init__", "__main__"}  # what the package offers, and what `python -m` calls
+SELF_EVIDENT = {"cli", "primitives"}  # one file a command, one file a shape
+NOT_DRAWN = {"__init__", "__main__"}  # what hiproof exports, and what `python -m` calls
 
 
-def table():
-    """What the page's table says of each room or file at the package's top, by name."""
+def read_table():
+    """Return the page's description of each package or file, by name."""
     rows = re.findall(r"^\| ((?:`[\w./]+`\s*)+) \| (.+) \|$", PAGE, re.MULTILINE)
-    return {name.rstrip("/"): says for names, says in rows for name in re.findall(r"`([\w./]+)`", names)}
+    names = [(re.findall(r"`([\w./]+)`", cell), description) for cell, description in rows]
+    return {name.rstrip("/"): description for row, description in names for name in row}
 
 
-def drawn():
-    """The line of the drawing that each room or file stands on, the lowest 0."""
+def read_drawing():
+    """Return the names on each line of the page's drawing, the lowest line first."""
     block = re.search(r"Imports run one way.+?\n\n((?:    [\w ]+\n)+)", PAGE, re.DOTALL)
-    lines = [line.split() for line in reversed(block[1].splitlines())]
-    return {room: number for number, line in enumerate(lines) for room in line}
+    return [line.split() for line in reversed(block[1].splitlines())]
 
 
-def rooms():
-    """Rooms and files at the package's top."""
-    found = {path.name for path in PACKAGE.iterdir() if (path / "__init__.py").is_file()}
-    return found | {path.stem for path in PACKAGE.glob("*.py")} - NOT_DRAWN
+def list_packages():
+    """Return the names of packages and files at the top of hiproof."""
+    packages = {path.name for path in SOURCES.iterdir() if (path / "__init__.py").is_file()}
+    return packages | {path.stem for path in SOURCES.glob("*.py")} - NOT_DRAWN
 
 
-def module(file):
-    """The names that lead to a file, such as ("fit", "single"); those of a room's own file are the room's."""
-    parts = file.relative_to(PACKAGE).with_suffix("").parts
+def module_name(file):
+    """Return a file's module as a tuple, such as ("fit", "single")."""
+    parts = file.relative_to(SOURCES).with_suffix("").parts
     return parts[:-1] if parts[-1] == "__init__" else parts
 
 
-MODULES = {module(file): file for file in sorted(PACKAGE.rglob("*.py"))}
+MODULES = {module_name(file): file for file in sorted(SOURCES.rglob("*.py"))}
 
 
 @cache
-def statements(name):
-    """(import statement, whether at the top of the file) of all in the module `name`, inside functions too."""
-    tree = ast.parse(MODULES[name].read_text(encoding="utf-8"))
-    at_top = {id(node) for node in tree.body}
-    return [(node, id(node) in at_top) for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+def import_statements(module):
+    """Return all import statements of a module, those inside functions too."""
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    return [node for node in ast.walk(tree) if isinstance(node, ast.Import | ast.ImportFrom)]
 
 
 @cache
-def imports(name):
-    """(module of the package, whether at the top of the file) of all that the module `name` imports of it."""
-    folder = MODULES[name].parent.relative_to(PACKAGE).parts
+def imported_modules(module):
+    """Return the modules of hiproof that a module imports, inside functions too."""
+    folder = MODULES[module].parent.relative_to(SOURCES).parts
     found = set()
-    for node, at_top in statements(name):
+    for node in import_statements(module):
         if isinstance(node, ast.ImportFrom) and node.level:
-            base = (*folder[: len(folder) - node.level + 1], *(node.module.split(".") if node.module else ()))
+            names = node.module.split(".") if node.module else []
+            base = (*folder[: len(folder) - node.level + 1], *names)
             for imported in node.names:
-                target = (*base, imported.name) if (*base, imported.name) in MODULES else base
-                found.add((target, at_top))
-    return found - {(name, True), (name, False)}
+                submodule = (*base, imported.name)
+                found.add(submodule if submodule in MODULES else base)
+    return found - {module}
 
 
-def foreign(name):
-    """Packages beside hiproof that the module `name` imports."""
-    nodes = [node for node, _ in statements(name)]
+def other_packages(module):
+    """Return the packages other than hiproof that a module imports."""
+    nodes = import_statements(module)
     names = [node.module for node in nodes if isinstance(node, ast.ImportFrom) and not node.level]
     names += [alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names]
     return {name.split(".")[0] for name in names}
 
 
-def test_the_table_tells_of_every_room_and_file_and_of_no_other():
-    assert {name.removesuffix(".py") for name in table()} == rooms()
-    assert [name for name in table() if not (PACKAGE / name).exists()] == []
+def test_the_table_describes_every_package_and_file():
+    assert {name.removesuffix(".py") for name in read_table()} == list_packages()
+    assert [name for name in read_table() if not (SOURCES / name).exists()] == []
 
 
-def test_the_drawing_has_every_room_once():
-    block = re.search(r"Imports run one way.+?\n\n((?:    [\w ]+\n)+)", PAGE, re.DOTALL)[1].split()
-    assert sorted(block) == sorted(rooms())
+def test_the_drawing_shows_every_package_once():
+    assert sorted(name for line in read_drawing() for name in line) == sorted(list_packages())
 
 
-@pytest.mark.parametrize("room", sorted(rooms()))
-def test_a_room_imports_only_from_below(room):
-    """As drawn, inside functions too."""
-    line = drawn()
+@pytest.mark.parametrize("package", sorted(list_packages()))
+def test_a_package_imports_only_from_lines_below(package):
+    level = {name: number for number, line in enumerate(read_drawing()) for name in line}
     wrong = {
-        f"{'.'.join(name)} imports {'.'.join(target)}"
-        for name in MODULES
-        if name[:1] == (room,)
-        for target, at_top in imports(name)
-        if target and target[0] != room and line[target[0]] >= line[room] and (at_top or name not in DOORS)
+        f"{'.'.join(module)} imports {'.'.join(target)}"
+        for module in MODULES
+        if module[:1] == (package,)
+        for target in imported_modules(module)
+        if target and target[0] != package and level[target[0]] >= level[package]
     }
     assert wrong == set()
 
 
-def test_no_file_imports_itself_by_way_of_others():
-    graph = {
-        name: {target for target, at_top in imports(name) if at_top or name not in DOORS} for name in MODULES if name
-    }
+def test_no_imports_run_in_a_circle():
+    graph = {module: imported_modules(module) - {()} for module in MODULES if module}
     assert len(list(TopologicalSorter(graph).static_order())) >= len(graph)
 
 
-@pytest.mark.parametrize("package", re.findall(r"the only package that imports (\w+)", PAGE))
-def test_only_one_room_imports(package):
-    (room,) = (name for name, says in table().items() if f"the only package that imports {package}" in says)
-    assert {name[0] for name in MODULES if package in foreign(name)} == {room}
+@pytest.mark.parametrize("library", re.findall(r"the only package that imports (\w+)", PAGE))
+def test_one_package_alone_imports(library):
+    phrase = f"the only package that imports {library}"
+    (package,) = (name for name, description in read_table().items() if phrase in description)
+    assert {module[0] for module in MODULES if library in other_packages(module)} == {package}
 
 
-@pytest.mark.parametrize("room", sorted(name for name in rooms() - SELF_EVIDENT if (PACKAGE / name).is_dir()))
-def test_a_room_tells_its_files(room):
-    """In the text at its door, and so do rooms within it."""
-    for door in (PACKAGE / room).rglob("__init__.py"):
-        told = ast.get_docstring(ast.parse(door.read_text(encoding="utf-8"))) or ""
-        files = {path.stem for path in door.parent.glob("*.py") if not path.stem.startswith("__")}
-        files |= {path.parent.name for path in door.parent.glob("*/__init__.py")}
-        assert [name for name in sorted(files) if not re.search(rf"\b{name}\b", told)] == []
+@pytest.mark.parametrize(
+    "package", sorted(name for name in list_packages() - SELF_EVIDENT if (SOURCES / name).is_dir())
+)
+def test_the_docstring_of_a_package_lists_its_files(package):
+    for init in (SOURCES / package).rglob("__init__.py"):
+        text = ast.get_docstring(ast.parse(init.read_text(encoding="utf-8"))) or ""
+        files = {path.stem for path in init.parent.glob("*.py") if not path.stem.startswith("__")}
+        files |= {path.parent.name for path in init.parent.glob("*/__init__.py")}
+        assert [name for name in sorted(files) if not re.search(rf"\b{name}\b", text)] == []

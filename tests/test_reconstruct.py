@@ -7,7 +7,7 @@ import shapely.affinity
 
 import hiproof
 from hiproof import Grade, NoModelError, Status
-from hiproof.compose import check_solid, volume
+from hiproof.compose import check_solid
 from hiproof.settings import Settings
 from hiproof.stages import candidates
 from tiny_town import gable
@@ -41,7 +41,7 @@ def test_a_gable_becomes_a_valid_gable():
     assert building.status is Status.MODELLED
     assert building.type == "gable"
     assert check_solid(building.solid) == ()
-    assert volume(building.solid) == pytest.approx(12 * 8 * (5 + 1.5 + 1.0), rel=0.01)
+    assert building.solid.volume == pytest.approx(12 * 8 * (5 + 1.5 + 1.0), rel=0.01)
     assert building.z_ground == pytest.approx(-1.0)
     assert building.ground_source == "a slope"
     (line,) = building.terrain_intersection

@@ -8,10 +8,12 @@ Most names below are imported when first used, so that `import hiproof` stays fa
 since a module of the same name would otherwise take its place.
 """
 
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
 from . import early  # first, so that Ctrl-C while the rest is imported ends the command quietly  # noqa: F401
+from .model.building import METHODS
 from .reconstruct import reconstruct
 
 __version__ = "0.1.0"
@@ -66,6 +68,13 @@ _HOME = {
     "Terrain": "read.terrain",
 }
 
+_METHODS = {
+    "with_part": "parametric.edit",
+    "without_part": "parametric.edit",
+    "refit": "parametric.refit",
+    "html_of": "draw.html",
+}
+
 __all__ = ["__version__", "reconstruct", *sorted(_HOME)]
 
 
@@ -76,6 +85,18 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f".{_HOME[name]}", __name__), name)
     globals()[name] = value
     return value
+
+
+def _import_when_called(module: str, name: str) -> Callable[..., Any]:
+    """Return a function that imports `name` from `module` when it is first called."""
+
+    def call(*args: Any, **kwargs: Any) -> Any:
+        return getattr(import_module(f".{module}", __name__), name)(*args, **kwargs)
+
+    return call
+
+
+METHODS.update({name: _import_when_called(module, name) for name, module in _METHODS.items()})
 
 
 def __dir__() -> list[str]:

@@ -13,10 +13,10 @@ import shapely
 
 from .errors import CompositionError, FitError, InputError
 from .frames import LocalFrame
+from .geometry.rings import enclosed
 from .log import counted
 from .model import ROOF, Building, Fit, Footprint, Model, Part, Piece, Roof, Solid, as_xyz
 from .read.plausible import is_plausible
-from .rings import enclosed
 from .settings import Settings
 from .status import Doubt, Status
 

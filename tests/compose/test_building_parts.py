@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.compose import check_solid, compose, volume
+from hiproof.compose import check_solid, compose
 from hiproof.compose.blocks import block, blocks
 from hiproof.compose.building_parts import LEAST_PART_M2, building_parts, whole_of
 from hiproof.frames import LocalFrame
@@ -55,11 +55,11 @@ def test_parts_are_valid_do_not_overlap_and_make_up_the_whole(kind, seed):
         )  # walls are upright: no overlap in plan, none in space (601)
     if parts:
         # walls of the whole run straight past corners within half a millimetre of their line
-        assert sum(volume(part.solid) for part in parts) == pytest.approx(volume(solid), rel=1e-4)
+        assert sum(part.solid.volume for part in parts) == pytest.approx(solid.volume, rel=1e-4)
         faces = [face for part in parts for face in part.solid.of_kind(ROOF)]
         assert len(faces) == len(solid.of_kind(ROOF))
         whole = whole_of(together([part.solid for part in parts]))
-        assert check_solid(whole) == () and volume(whole) == pytest.approx(volume(solid), rel=1e-4)
+        assert check_solid(whole) == () and whole.volume == pytest.approx(solid.volume, rel=1e-4)
 
 
 def test_roofs_that_meet_at_a_wall_are_parts_and_those_that_share_an_edge_are_one():
@@ -74,7 +74,7 @@ def test_a_tower_out_of_a_roof_is_a_part_and_the_rest_goes_around_it():
     parts = building_parts(compose(roof(level(0, 0, 12, 10, 5.0), level(4, 3, 8, 7, 9.0)), 0.0))
     around, tower = parts
     assert len(around.outline.interiors) == 1 and len(around.solid.of_kind(GROUND)[0].rings) == 2
-    assert tower.outline.equals(shapely.box(4, 3, 8, 7)) and volume(tower.solid) == pytest.approx(16 * 9.0)
+    assert tower.outline.equals(shapely.box(4, 3, 8, 7)) and tower.solid.volume == pytest.approx(16 * 9.0)
 
 
 def test_what_is_smaller_than_a_part_stays_with_its_neighbour():
@@ -99,11 +99,11 @@ def test_blocks_are_valid_and_as_large_as_their_outlines_and_heights(kind, seed)
     outlines, heights = [part.outline for part in parts], [4.0 + 0.5 * k for k in range(len(parts))]
     for outline, height in zip(outlines, heights, strict=True):
         assert check_solid(block(outline, 0.0, height)) == ()
-        assert volume(block(outline, 0.0, height)) == pytest.approx(outline.area * height)
+        assert block(outline, 0.0, height).volume == pytest.approx(outline.area * height)
     if len(parts) > 1:
         stepped = blocks(outlines, heights, 0.0)
         expected = sum(outline.area * height for outline, height in zip(outlines, heights, strict=True))
-        assert check_solid(stepped) == () and volume(stepped) == pytest.approx(expected, rel=1e-3)
+        assert check_solid(stepped) == () and stepped.volume == pytest.approx(expected, rel=1e-3)
 
 
 def test_blocks_that_do_not_touch_are_no_solid():

@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 import roof_zoo
-from hiproof.compose import check_solid, compose, terrain_intersection, volume
+from hiproof.compose import check_solid, compose, terrain_intersection
 from hiproof.model import Part, Piece, Roof, Solid
 from hiproof.settings import Settings
 from roof_zoo import KINDS, generated, moved
@@ -120,7 +120,7 @@ def test_volume_is_the_integral_over_the_roof(composed, kind):
             polygon = plan_polygon(solid, face)
             middle = np.array([polygon.centroid.x, polygon.centroid.y, 1.0])
             total += polygon.area * (middle @ plane_of(solid, face) - z_ground)
-        assert volume(solid) == pytest.approx(total, rel=1e-4, abs=1e-3)
+        assert solid.volume == pytest.approx(total, rel=1e-4, abs=1e-3)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -129,7 +129,7 @@ def test_answer_moves_with_the_roof(composed, kind):
         roof, solid = composed[kind, seed]
         other = compose(moved(roof, 33.3, np.array([12.3456, -7.8912])), Z_GROUND, EXACT)
         extent = solid.vertices[:, 2].max() - solid.vertices[:, 2].min()
-        assert volume(other) == pytest.approx(volume(solid), abs=2e-3 * roof.outline.length * extent)
+        assert other.volume == pytest.approx(solid.volume, abs=2e-3 * roof.outline.length * extent)
 
 
 def test_a_part_under_the_others_changes_nothing(composed):
@@ -137,7 +137,7 @@ def test_a_part_under_the_others_changes_nothing(composed):
         roof, solid = composed[kind, 1]
         low = Part("flat", (Piece(shapely.box(-9, -9, 9, 9), np.array([[0.0, 0.0, -50.0]])),))
         other = compose(Roof((*roof.parts, low), roof.outline, roof.frame), Z_GROUND, EXACT)
-        assert volume(other) == pytest.approx(volume(solid), rel=1e-4)
+        assert other.volume == pytest.approx(solid.volume, rel=1e-4)
         assert len(other.of_kind("RoofSurface")) == len(solid.of_kind("RoofSurface"))
 
 
@@ -145,7 +145,7 @@ def test_order_of_the_parts_does_not_matter(composed):
     for kind in ("partition", "cross_gables", "towers"):
         roof, solid = composed[kind, 2]
         other = compose(Roof(roof.parts[::-1], roof.outline, roof.frame), Z_GROUND, EXACT)
-        assert volume(other) == pytest.approx(volume(solid), rel=1e-4)
+        assert other.volume == pytest.approx(solid.volume, rel=1e-4)
 
 
 def test_same_roof_same_bytes():
@@ -205,7 +205,7 @@ def test_levels_meeting_crosswise_are_set_back():
     pieces = [Piece(box, np.array([[0.0, 0.0, z]])) for box, z in zip(boxes, (9, 5, 5, 8), strict=True)]
     solid = compose(roof_zoo.roof(pieces, shapely.box(0, 0, 8, 8)), 0.0)
     assert check_solid(solid) == ()
-    assert volume(solid) == pytest.approx(16 * (9 + 5 + 5 + 8), abs=0.01)
+    assert solid.volume == pytest.approx(16 * (9 + 5 + 5 + 8), abs=0.01)
 
 
 def test_hole_that_touches_the_outer_ring_is_cut_loose():
@@ -213,7 +213,7 @@ def test_hole_that_touches_the_outer_ring_is_cut_loose():
     assert outline.is_valid
     _, solid = roof_zoo.flat_block(outline, 4.0, 0.0)
     assert check_solid(solid) == ()
-    assert volume(solid) == pytest.approx(4 * outline.area, abs=0.01)
+    assert solid.volume == pytest.approx(4 * outline.area, abs=0.01)
 
 
 def test_ground_gives_way_to_a_roof_below_it():

@@ -7,9 +7,9 @@ import pytest
 import shapely
 
 from hiproof.errors import FitError
-from hiproof.fit.alpha_shape import alpha_shape
 from hiproof.fit.paper import BETA, PaperFit, fit_paper, outline_misfit, plane_distances
 from hiproof.frames import LocalFrame
+from hiproof.geometry.alpha_shape import alpha_shape
 from hiproof.primitives import CATALOGUE
 from hiproof.simulate import random_building, uniform_points
 

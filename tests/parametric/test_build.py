@@ -14,7 +14,7 @@ import hiproof
 from hiproof.city.overrides import override_records
 from hiproof.cli import main
 from hiproof.cli.app import app
-from hiproof.compose import check_solid, volume
+from hiproof.compose import check_solid
 from hiproof.errors import CompositionError, HiproofError, InputError
 from hiproof.evaluate.run import evaluate_run
 from hiproof.parametric.file import opened_parameters
@@ -104,7 +104,7 @@ def test_a_saw_tooth_by_hand_has_all_its_teeth():
         solid = hiproof.build(house(type="shed", parameters=parameters, **part)).solid
         assert len(solid.of_kind("RoofSurface")) == 4
         assert np.ptp(solid.vertices[:, 2]) == pytest.approx(6.0)
-        assert volume(solid) == pytest.approx(96 * 5.5, rel=1e-3)
+        assert solid.volume == pytest.approx(96 * 5.5, rel=1e-3)
 
 
 def test_numbers_are_what_they_say():

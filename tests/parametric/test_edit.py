@@ -61,7 +61,7 @@ def test_a_ridge_comes_to_its_height(gable, kind):
 def test_a_flat_roof_becomes_a_gable_and_its_volume_grows(gable):
     flat = gable.with_part(0, type="flat", ridge_height=7.0)
     ridged = flat.with_part(0, type="gable", ridge_height=10.0)
-    volumes = [hiproof.compose.volume(b.solid) for b in (flat, ridged)]
+    volumes = [b.solid.volume for b in (flat, ridged)]
     assert volumes == pytest.approx([96 * 5.0, 96 * 6.5], rel=1e-6)
 
 

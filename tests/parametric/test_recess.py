@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from hiproof.compose import check_solid, volume
+from hiproof.compose import check_solid
 from hiproof.errors import InputError
 from hiproof.parametric.building import build
 from hiproof.parametric.recess import placed, with_recess
@@ -45,18 +45,18 @@ def test_where_a_recess_goes_the_roof_comes_back(house, sunk, change):
     there = sunk.with_part(1, **change)
     back = there.with_part(1, position=position, rotation=0.0, width=SIDE_M, length=SIDE_M)
     assert not check_solid(there.solid)
-    assert volume(back.solid) == pytest.approx(volume(sunk.solid), abs=0.01)
+    assert back.solid.volume == pytest.approx(sunk.solid.volume, abs=0.01)
     direct = rebuilt(house, with_recess(building_record(house)["parts"], house.roof, 0)).with_part(1, **change)
-    assert volume(there.solid) == pytest.approx(volume(direct.solid), abs=0.01)
+    assert there.solid.volume == pytest.approx(direct.solid.volume, abs=0.01)
 
 
 def test_a_recess_of_the_same_area_takes_the_same_volume_anywhere_on_a_level_roof(house):
     flat = house.with_part(0, type="flat")
     sunk = rebuilt(flat, with_recess(building_record(flat)["parts"], flat.roof, 0))
-    taken = volume(flat.solid) - volume(sunk.solid)
+    taken = flat.solid.volume - sunk.solid.volume
     moved = sunk.with_part(1, position=[2.5, -1.5, float(sunk.parts[1].translation[2])])
     assert taken == pytest.approx(SIDE_M**2 * DEPTH_M, abs=0.01)
-    assert volume(flat.solid) - volume(moved.solid) == pytest.approx(taken, abs=0.01)
+    assert flat.solid.volume - moved.solid.volume == pytest.approx(taken, abs=0.01)
 
 
 def test_a_part_that_leaves_nothing_out_stays_as_it_is(house):

@@ -7,7 +7,7 @@ import typer
 from glb_files import accessor_values, parse_glb
 from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
-from hiproof.rings import ring_normal
+from hiproof.geometry.rings import ring_normal
 from hiproof.write.colours import linear_rgb, type_colour
 from hiproof.write.gltf import write_models as write_glb
 from hiproof.write.obj import write_models as write_obj

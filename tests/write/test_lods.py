@@ -12,13 +12,13 @@ import shapely
 from lxml import etree
 
 from handmade import RD_ORIGIN, gable_house, modelled, unmodelled
-from hiproof.compose import check_solid, compose, volume
+from hiproof.compose import check_solid, compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
+from hiproof.geometry.rings import ring_normal
 from hiproof.model import GROUND, ROOF, Building, Model, Part, Piece, Quality, Roof
 from hiproof.parametric.run import build_file
 from hiproof.read.solids import read_solids
-from hiproof.rings import ring_normal
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.view.loading import database_rows
@@ -102,10 +102,10 @@ def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):
     kinds = [geometry["semantics"]["surfaces"][0]["type"] for geometry in city_object["geometry"][:2]]
     assert kinds == ["GroundSurface", "RoofSurface"]
     block, steps, roof = (solid for _, solid in read_solids(tmp_path / "a.city.jsonl"))
-    assert volume(block) == pytest.approx(80 * figures.h_70p, rel=1e-4)
+    assert block.volume == pytest.approx(80 * figures.h_70p, rel=1e-4)
     gable_70p = 6.0 - 2.0 * 0.3  # of a gable's heights over the plan, which are spread evenly from eave to ridge
-    assert volume(steps) == pytest.approx(48 * gable_70p + 32 * 3.0, rel=1e-3)
-    assert volume(roof) == pytest.approx(48 * 5.0 + 32 * 3.0, rel=1e-4)
+    assert steps.volume == pytest.approx(48 * gable_70p + 32 * 3.0, rel=1e-3)
+    assert roof.volume == pytest.approx(48 * 5.0 + 32 * 3.0, rel=1e-4)
 
 
 def test_citygml_has_each_level_in_its_property(tmp_path):
@@ -157,9 +157,7 @@ def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, wr
     objects(tmp_path, [building, modelled(gable_house(), "house")], write)
     model, house = read_models(tmp_path / "a.city.jsonl")
     assert (model.id, house.id) == ("terrace", "house")
-    assert check_solid(model.solid, 0.01) == () and volume(model.solid) == pytest.approx(
-        volume(building.solid), rel=1e-4
-    )
+    assert check_solid(model.solid, 0.01) == () and model.solid.volume == pytest.approx(building.solid.volume, rel=1e-4)
     for face in model.solid.of_kind(ROOF):
         x, y, z = ring_normal(model.solid.vertices[list(face.rings[0])])
         assert model.part_types[face.part] == ("gable" if np.hypot(x, y) > 0.1 * z else "flat")

@@ -7,7 +7,7 @@ import pytest
 from lxml import etree
 
 from hiproof import read_parameters
-from hiproof.compose import check_solid, compose, volume
+from hiproof.compose import check_solid, compose
 from hiproof.evaluate.models import read_models
 from hiproof.model import Building, Model, Quality, Solid
 from hiproof.primitives import CATALOGUE
@@ -44,7 +44,7 @@ def test_solids_read_back_are_valid_and_the_same(run):
         local = Solid(model.solid.vertices - building.roof.frame.origin, model.solid.faces)
         assert check_solid(local) == ()
         assert [face.kind for face in model.solid.faces] == [face.kind for face in building.solid.faces]
-        assert volume(local) == pytest.approx(model.attributes["rf_volume_lod22"], rel=1e-3, abs=0.01)
+        assert local.volume == pytest.approx(model.attributes["rf_volume_lod22"], rel=1e-3, abs=0.01)
 
 
 def test_figures_agree_with_the_roof(run):

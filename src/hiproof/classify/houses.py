@@ -17,7 +17,7 @@ import shapely
 
 from ..compiled import compiled
 from ..fit.direction import quarter_gap, support_of
-from ..rings import GRID_M, with_area
+from ..geometry.rings import GRID_M, with_area
 from .surfaces import Surfaces, surfaces_of
 
 REACH_M, REACH_SPACINGS = 1.25, 2.2  # length of a bond, at most

@@ -3,7 +3,7 @@
 settle            the roof made of exactly the numbers that are written of it
 simpler           parts given up one by one, where a roof cannot become a valid solid
 readable          whether a file of parameters can hold a roof
-solid             `compose`: the steps below, one after the other; volume, terrain intersection
+solid             `compose`: the steps below, one after the other; terrain intersection
 cells             outline, pieces and the lines where the active plane changes as one plan of cells
 arrangement       the planar arrangement under them, on an integer grid
 joined            sets that are joined, for it and for the check
@@ -20,6 +20,6 @@ building_parts    a solid cut where its roofs meet, for formats that know buildi
 
 from .check import Finding, check_solid
 from .simpler import compose_simpler
-from .solid import compose, terrain_intersection, volume
+from .solid import compose, terrain_intersection
 
-__all__ = ["Finding", "check_solid", "compose", "compose_simpler", "terrain_intersection", "volume"]
+__all__ = ["Finding", "check_solid", "compose", "compose_simpler", "terrain_intersection"]

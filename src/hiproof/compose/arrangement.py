@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from ..parity import flips
+from ..geometry.point_in_polygon import flips
 from .joined import join, root_of
 
 GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is written

@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
+from ..geometry.area_vectors import dot
 
 # val3dity's limit of 20 degrees, and half of it, below which no pair needs to be compared
 FLAT_COSINE, SURELY_FLAT_COSINE = np.cos(np.deg2rad(20.0)), np.cos(np.deg2rad(10.0))
@@ -38,12 +39,6 @@ def bent_faces(
     triangles, owner = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons), return_index=True)
     places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
     return faces[are_bent(places, owner, corners, flat, start, normals[faces])]
-
-
-@compiled
-def dot(a, b):
-    """The inner product of two vectors (3,); `@` would bring BLAS along for it."""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @compiled

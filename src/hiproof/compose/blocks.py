@@ -17,9 +17,9 @@ from .solid import compose
 def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
     """The prism over `outline` (m, any frame) between two heights; its walls are the outline's edges.
 
-    >>> from hiproof.compose import check_solid, volume
+    >>> from hiproof.compose import check_solid
     >>> yard = shapely.box(0, 0, 10, 10).difference(shapely.box(3, 3, 7, 7))
-    >>> check_solid(block(yard, 0.0, 5.0)), volume(block(yard, 0.0, 5.0))
+    >>> check_solid(block(yard, 0.0, 5.0)), block(yard, 0.0, 5.0).volume
     ((), 420.0)
     """
     outline = shapely.geometry.polygon.orient(outline)

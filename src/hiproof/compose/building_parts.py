@@ -55,10 +55,10 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
 
     >>> from hiproof.frames import LocalFrame
     >>> from hiproof.model import Part, Piece, Roof
-    >>> from hiproof.compose import compose, volume
+    >>> from hiproof.compose import compose
     >>> low, high = (Piece(shapely.box(x, 0, x + 5, 4), np.array([[0.0, 0.0, z]])) for x, z in ((0, 3.0), (5, 6.0)))
     >>> roof = Roof((Part("flat", (low,)), Part("flat", (high,))), shapely.box(0, 0, 10, 4), LocalFrame(np.zeros(3)))
-    >>> [(part.members, volume(part.solid)) for part in building_parts(compose(roof, 0.0))]
+    >>> [(part.members, part.solid.volume) for part in building_parts(compose(roof, 0.0))]
     [((0,), 60.0), ((1,), 120.0)]
     """
     place_of = places_of(solid)

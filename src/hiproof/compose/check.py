@@ -50,15 +50,6 @@ def finding(code: int, face: int = -1, other: int = -1) -> Finding:
     return Finding(code, face, f"{code}: {subject}{f' (face {other})' if other >= 0 else ''}")
 
 
-def flattened(solid: Solid) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Vertex indices of all rings one after the other, the start of each ring, and of each face among the rings."""
-    rings = [ring for face in solid.faces for ring in face.rings]
-    index = np.array([vertex for ring in rings for vertex in ring], np.int64)
-    ring_start = np.cumsum([0, *map(len, rings)], dtype=np.int64)
-    face_start = np.cumsum([0, *(len(face.rings) for face in solid.faces)], dtype=np.int64)
-    return index, ring_start, face_start
-
-
 def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]:
     """Everything wrong with the shell of `solid`, nothing if it is valid.
 
@@ -75,7 +66,7 @@ def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]
     301
     """
     vertices = np.ascontiguousarray(solid.vertices, float).reshape(-1, 3)
-    index, ring_start, face_start = flattened(solid)
+    index, ring_start, face_start = solid.flattened()
     if len(index) == 0:
         return (finding(301),)
     if not (np.abs(vertices) <= FARTHEST_M).all() or index.min() < 0 or index.max() >= len(vertices):

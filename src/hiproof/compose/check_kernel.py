@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from ..compiled import compiled
-from ..parity import flips
-from .bends import SURELY_FLAT_COSINE, dot
+from ..geometry.area_vectors import dot, enclosed_volume, newell
+from ..geometry.point_in_polygon import flips
+from .bends import SURELY_FLAT_COSINE
 from .joined import join, root_of
 
 SAME_POINT_M = 1e-3  # m; val3dity's snap tolerance
@@ -39,20 +40,6 @@ def weld(vertices, tolerance):
     for v in range(len(same)):
         same[v] = root_of(same, v)
     return same
-
-
-@compiled
-def newell(vertices, index, low, high):
-    """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the normal."""
-    total = np.zeros(3)
-    origin = vertices[index[low]]
-    for k in range(low, high):
-        p = vertices[index[k]] - origin
-        q = vertices[index[k + 1 if k + 1 < high else low]] - origin
-        total[0] += p[1] * q[2] - p[2] * q[1]
-        total[1] += p[2] * q[0] - p[0] * q[2]
-        total[2] += p[0] * q[1] - p[1] * q[0]
-    return 0.5 * total
 
 
 @compiled
@@ -595,16 +582,6 @@ def apart(low, high, low2, high2, slack):
         if low2[axis] > high[axis] + slack or low[axis] > high2[axis] + slack:
             return True
     return False
-
-
-@compiled
-def enclosed_volume(vertices, index, ring_start, face_start):
-    total = 0.0
-    for f in range(len(face_start) - 1):
-        anchor = vertices[index[ring_start[face_start[f]]]]
-        for r in range(face_start[f], face_start[f + 1]):
-            total += dot(anchor, newell(vertices, index, ring_start[r], ring_start[r + 1]))
-    return total / 3.0
 
 
 @compiled

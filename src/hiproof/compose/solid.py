@@ -1,4 +1,4 @@
-"""A fitted roof becomes a closed solid: `compose`, the flat block it falls back to, volume, the line on the terrain."""
+"""A fitted roof becomes a closed solid: `compose`, the line on the terrain."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from ..errors import CompositionError
 from ..model import Roof, Solid
 from ..settings import ComposeSettings, Settings
 from .cells import PlanProblem, arrange, plan_problem
-from .check import Finding, check_solid, flattened
-from .check_kernel import enclosed_volume
+from .check import Finding, check_solid
 from .shell import Saddle, raise_shell
 
 # factor on the snap distance, whether straight walls become one and whether flat corners are turned in, tried in turn
@@ -51,7 +50,7 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     >>> house = shapely.box(0, 0, 10, 8)
     >>> gable = Piece(house, np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]]))
     >>> solid = compose(Roof((Part("gable", (gable,)),), house, LocalFrame(np.zeros(3))), 0.0)
-    >>> [len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface")], volume(solid)
+    >>> [len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface")], solid.volume
     ([2, 4, 1], 480.0)
     """
     options = (settings or Settings()).compose
@@ -108,11 +107,6 @@ def compose_at(
         except Saddle as saddle:
             problem = replace(problem, patches=[*problem.patches, saddle.patch])
     raise CompositionError("expected at most forty corners where roof levels meet crosswise, got more")
-
-
-def volume(solid: Solid) -> float:
-    """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
-    return round(enclosed_volume(solid.vertices - solid.vertices.mean(axis=0), *flattened(solid)), 9)
 
 
 def terrain_intersection(

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ..compose import volume
 from ..errors import HiproofError
 from ..model import Building
 from ..parametric.change import rise_of, with_sizes
@@ -60,7 +59,7 @@ def figures_of(building: Building) -> dict[str, float | None]:
     quality = dataclasses.asdict(building.quality)
     return {
         **{name: number(quality[name], 4) for name in FIGURES},
-        "volume_m3": number(volume(building.solid), 1),
+        "volume_m3": number(building.solid.volume, 1),
         "ridge_height": number(building.solid.vertices[:, 2].max(), 3),
         "z_ground": number(building.z_ground, 3),
     }

@@ -13,8 +13,8 @@ import numpy as np
 
 from ..compiled import compiled
 from ..errors import InputError
+from ..geometry.point_in_polygon import flips
 from ..model import as_xyz
-from ..parity import flips
 
 Ring = np.ndarray
 """(m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer first, holes after."""

@@ -12,8 +12,8 @@ import math
 import numpy as np
 import shapely
 
-from ..fit.union.shown import highest_of
 from ..model import Roof
+from ..model.heights import highest_of
 from .metrics import NEAR_M, Inner, well_inside
 
 CELL_POINTS = 8.0

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ..geometry.rings import GRID_M
 from ..model import ROOF, Fit, Quality, Solid
 from ..read.cell_kernel import cell_keys
 from ..read.thin import cell_range, occupied_cells
-from ..rings import GRID_M
 from .distance import point_surface_distances, surface_and_vertical_distances
 
 NEAR_M = 0.2
@@ -168,7 +168,7 @@ def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
 def observed_outline(points: np.ndarray) -> shapely.Polygon | None:
     """The alpha shape of points in plan, None where they have none."""
     from ..errors import FitError
-    from ..fit.alpha_shape import alpha_shape
+    from ..geometry.alpha_shape import alpha_shape
 
     try:
         return alpha_shape(points[:, :2])

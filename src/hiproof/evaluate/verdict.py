@@ -20,9 +20,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..fit.union.shown import highest_of
 from ..log import counted
 from ..model import WALL, Model
+from ..model.heights import highest_of
 from ..status import Doubt, Grade
 from .distance import point_surface_distances
 from .layers import unseen_share

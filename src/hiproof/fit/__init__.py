@@ -7,7 +7,6 @@ walls          which points lie on walls
 tables         the catalogue as arrays
 kernel         the likelihood with gradient and Hessian, minimised; compiled
 paper          the objective of the paper, as published
-alpha_shape    the outline that goes with it
 union          `fit_building`: a roof as a union of few volumes
 outline        the outline of a building that comes without one
 align          how far a footprint lies beside its roof

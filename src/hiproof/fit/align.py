@@ -18,7 +18,7 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
-from ..rings import counterclockwise
+from ..geometry.rings import counterclockwise
 from .outline.cost import cost_at_depth
 from .outline.lines import lines_through
 from .outline.settle import side_offsets, span_of

@@ -17,11 +17,11 @@ import shapely
 
 from ..errors import FitError
 from ..frames import LocalFrame
+from ..geometry.alpha_shape import SPACINGS, alpha_shape, default_radius
 from ..model import Fit
 from ..primitives import Primitive, get
 from ..primitives.contract import placed
 from ..settings import Settings
-from .alpha_shape import SPACINGS, alpha_shape, default_radius
 
 BETA = 0.1  # weight of the outline in the objective, the paper's own
 ALPHA_SPACINGS = 4.0

@@ -13,10 +13,10 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..geometry.rings import enclosed
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.family import Member, member_of
 from ..primitives.parameters import SIDED
-from ..rings import enclosed
 from .record import measure, place
 
 PLAN = ("width", "length")

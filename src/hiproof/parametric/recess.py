@@ -12,8 +12,8 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..geometry.rings import enclosed, with_area
 from ..model import Roof
-from ..rings import enclosed, with_area
 from .arrange import BLOCK_HEIGHT_M, BLOCK_M, GRID_M, corners_of, rings_of
 from .change import with_sizes
 from .record import list_at, number, numbers_by_name, place, polygon

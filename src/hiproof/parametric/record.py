@@ -13,11 +13,11 @@ from ..compose.readable import refuse_many, refuse_wrong_parts
 from ..compose.settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, settled, settled_outline, settled_sigma
 from ..errors import InputError
 from ..frames import LocalFrame
+from ..geometry.rings import enclosed
 from ..model import Building, Part, Quality, Roof
 from ..primitives.catalogue import CATALOGUE
 from ..primitives.parameters import refuse_no_shape
 from ..read.damage import excerpt
-from ..rings import enclosed
 from ..status import Grade, Status
 from ..write.attribute_list import PARAMETERS, PART
 

@@ -15,10 +15,10 @@ from pyproj import CRS
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
+from ..geometry.rings import clockwise
 from ..log import counted
 from ..masking import remember
 from ..model import Footprint
-from ..rings import clockwise
 from ..settings import Settings
 from .attribute_columns import as_declared, where_known
 from .crs import described, names_heights_alone, names_place, parse_crs, same_horizontal, units_of, way_between

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import shapely
 
-from ..rings import enclosed
+from ..geometry.rings import enclosed
 from .plausible import is_plausible
 
 SLIVER_SHARE = 0.01  # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection

@@ -10,8 +10,8 @@ import numpy as np
 import shapely
 
 from ..errors import InputError
+from ..geometry.rings import ring_normal
 from ..model import ROOF, Piece, Solid
-from ..rings import ring_normal
 from .relief import Plane, Relief
 from .roofs import SimBuilding, random_parameters, turned
 from .shapes import NOT_ROOF, ROOF_TYPES, box, label_of, make_part

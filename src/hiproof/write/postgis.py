@@ -21,9 +21,9 @@ import numpy as np
 
 from ..errors import InputError, OutputError
 from ..frames import METRES, Units
+from ..geometry.rings import ring_normal
 from ..model import ROOF, Solid
 from ..read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
-from ..rings import ring_normal
 from .attribute_list import PARTS_LAYER
 from .roof_figures import FLAT_SLOPE_DEG
 from .triangles import faces_triangles

@@ -76,8 +76,6 @@ def roof_figures(solid: Solid) -> RoofFigures:
     >>> figures.volume_m3, figures.h_70p, figures.roofer_type
     (60.0, 3.0, 'horizontal')
     """
-    from ..compose import volume  # compiled: a process that only joins files does without
-
     if not solid.of_kind(ROOF):
         raise ValueError("its solid has no RoofSurface")
     fan, face_of = face_fans(solid)
@@ -99,7 +97,7 @@ def roof_figures(solid: Solid) -> RoofFigures:
         h_ridge=ridge_height(edges) + float(origin[2]),
         h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),  # it is rounded, and no eave leaves the roof
         h_base=base_height(solid),
-        volume_m3=volume(solid),
+        volume_m3=solid.volume,
         plan_area_m2=float(plan.sum()),
         roof_area_m2=float(size.sum()),
         slope_deg=float(slope[largest]),

@@ -12,7 +12,6 @@ from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
 from .building_attributes import shape_attributes
 from .roof_figures import RoofFigures, roof_figures
-from .shown import shown_areas
 from .table_rows import part_values
 from .values import metres, plain
 
@@ -98,7 +97,7 @@ def part_shapes(
     building: Building, cut: tuple[BuildingPart, ...], asked: set[str], prefix: str
 ) -> tuple[PartShape, ...]:
     """The building parts with what their roof parts are."""
-    primitives = [part_values(building, number, shown) for number, shown in enumerate(shown_areas(building))]
+    primitives = [part_values(building, number, shown) for number, shown in enumerate(building.shown_areas())]
     return tuple(
         part_shape(part, [primitives[member] for member in part.members if member < len(primitives)], asked, prefix)
         for part in cut

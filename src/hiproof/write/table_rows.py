@@ -16,7 +16,6 @@ from ..model import ROOF, Building, Face, Part
 from ..primitives.cants import CANTED, MEASURES, cants_named
 from .attribute_list import SHAPE
 from .roof_figures import RoofFigures
-from .shown import shown_areas
 from .values import metres, plain_text, rounded
 
 TEXT = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
@@ -75,7 +74,7 @@ def known_outline(building: Building) -> shapely.Geometry | None:
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
     """A row a part: where it shows, its type, every parameter that it has and its standard deviation."""
     rows = []
-    for number, shown in enumerate(shown_areas(building)):
+    for number, shown in enumerate(building.shown_areas()):
         values = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
         rows.append((wkb_of(shown, units), values))
     return tuple(rows)

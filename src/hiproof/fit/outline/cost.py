@@ -21,7 +21,7 @@ from collections import namedtuple
 import numpy as np
 
 from ...compiled import compiled
-from ...parity import flips
+from ...geometry.point_in_polygon import flips
 from .lines import SAME_RAD, area_of, find_corners, quarter_gap
 from .soft import SURE_BLURS, share_inside
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ..alpha_shape import SPACINGS, alpha_shape, default_radius
+from ...geometry.alpha_shape import SPACINGS, alpha_shape, default_radius
 from ..walls import on_walls
 from .lines import BACK, SHARPEST, find_corners, lines_through
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
-from ...rings import counterclockwise
+from ...geometry.rings import counterclockwise
 from .add import UNEXPLAINED
 from .objective import base_shows, misfits
 from .plan import Plan

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...geometry.rings import counterclockwise
 from ...primitives.cants import MOST_CANTS
-from ...rings import counterclockwise
 from .finish import (
     FLATTEST,
     Planes,

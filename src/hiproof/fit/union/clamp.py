@@ -7,8 +7,8 @@ import dataclasses
 import numpy as np
 import shapely
 
+from ...geometry.rings import GRID_M, with_area
 from ...model import Part, Piece
-from ...rings import GRID_M, with_area
 from .regions import polygons_of
 
 CLAMP_M = 0.4  # m beyond the lowest and highest point: ridges are often not hit, eaves not seen

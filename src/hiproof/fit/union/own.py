@@ -11,11 +11,11 @@ import numpy as np
 import shapely
 
 from ...errors import FitError
+from ...geometry.rings import GRID_M
 from ...model import Part, Piece
 from ...primitives.catalogue import CATALOGUE
 from ...primitives.contract import Primitive
 from ...primitives.family import COMPONENTS
-from ...rings import GRID_M
 from ...settings import Settings
 from .regions import area_of, besides, polygons_of
 

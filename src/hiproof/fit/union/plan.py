@@ -11,7 +11,8 @@ import shapely
 
 from ...compiled import compiled
 from ...frames import PlanFrame
-from ...parity import flips
+from ...geometry.point_in_polygon import flips
+from ...geometry.rings import ring_edges
 from ..direction import main_direction
 from ..walls import on_walls
 from .planes import Cloud, Ghosts, Grid
@@ -56,15 +57,6 @@ def signed_depth(x, y, starts, ends):
             t = min(max(((x[i] - x0) * dx + (y[i] - y0) * dy) / square, 0.0), 1.0)
             nearest[i] = min(nearest[i], (x0 + t * dx - x[i]) ** 2 + (y0 + t * dy - y[i]) ** 2)
     return np.where(inside, np.sqrt(nearest), -np.sqrt(nearest))
-
-
-def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
-    """Starts and ends (m, 2) of all edges of the outline, holes included."""
-    if not outline.interiors:
-        ring = shapely.get_coordinates(outline)
-        return ring[:-1], ring[1:]
-    rings = [shapely.get_coordinates(ring) for ring in (outline.exterior, *outline.interiors)]
-    return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
 
 
 def grid_lines(low: float, high: float, vertices: np.ndarray, cell: float, most_cells: int = MAX_CELLS) -> np.ndarray:

@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...geometry.rings import GRID_M, with_area
 from ...model import Part
-from ...rings import GRID_M, with_area
 from .apart import IN_LINE_M
 from .finish import Planes
 from .objective import misfits

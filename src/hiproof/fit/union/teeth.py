@@ -14,10 +14,10 @@ from itertools import pairwise
 import numpy as np
 import shapely
 
+from ...geometry.rings import GRID_M, with_area
 from ...model import Part, Piece
 from ...primitives import get
 from ...primitives.shed import TEETH
-from ...rings import GRID_M, with_area
 from .regions import area_of, besides, polygons_of
 from .shown import with_slivers
 

@@ -11,8 +11,9 @@ from itertools import accumulate, chain
 import numpy as np
 import shapely
 
-from ..model import ROOF, Building, Face, Model, Part, Roof
-from ..rings import enclosed, with_area
+from ..geometry.rings import enclosed, with_area
+from .roof import Part, Roof
+from .solid import ROOF, Face, Solid
 
 SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
 GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
@@ -20,35 +21,24 @@ AREA_DIGITS = 4  # of areas in square metres, as the tables of parts round them
 LEAST_M2 = 0.05  # of what one part has of a common surface; less is a sliver between outlines that miss one another
 
 
-def shown_areas(building: Building) -> list[shapely.Geometry]:
-    """Where each part shows, in world coordinates; empty where others hide all of it, none for a building without a model.
-
-    >>> from hiproof import build
-    >>> ring = [[0, 0], [10, 0], [10, 6], [0, 6]]
-    >>> flat = {"type": "flat", "parameters": {"width": 6, "length": 10}, "position": [5, 3, 4]}
-    >>> hut = {"type": "flat", "parameters": {"width": 4, "length": 4}, "position": [9, 3, 6]}
-    >>> record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": [flat, hut]}
-    >>> [area.area for area in shown_areas(build(record))]
-    [48.0, 12.0]
-    """
-    if building.built is None:
-        return []
-    united = [with_area(shapely.union_all(areas, grid_size=GRID_M)) for areas in shown_pieces(building.built)]
-    return shapely.transform(np.array(united, object), building.roof.frame.to_world).tolist()
+def shown_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
+    """Where each part shows, in world coordinates; empty where others hide all of it."""
+    united = [with_area(shapely.union_all(areas, grid_size=GRID_M)) for areas in shown_pieces(roof, solid)]
+    return shapely.transform(np.array(united, object), roof.frame.to_world).tolist()
 
 
-def shown_m2(model: Model) -> tuple[float, ...]:
+def shown_m2(roof: Roof, solid: Solid) -> tuple[float, ...]:
     """Plan area that each part shows, rounded, so that parts which show the same are equal."""
-    return tuple(round(float(shapely.area(pieces).sum()), AREA_DIGITS) for pieces in shown_pieces(model))
+    return tuple(round(float(shapely.area(pieces).sum()), AREA_DIGITS) for pieces in shown_pieces(roof, solid))
 
 
-def shown_pieces(model: Model) -> list[list[shapely.Geometry]]:
+def shown_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
     """Where each part shows, in the roof's local frame, as pieces that share no area."""
-    roof, solid = model.roof, model.solid.moved(-model.roof.frame.origin)
+    local = solid.moved(-roof.frame.origin)
     shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
-    faces = solid.of_kind(ROOF)
-    for face, others in zip(faces, parts_in_plane(faces, solid.vertices, planes_of(roof)), strict=True):
-        left = solid.plan_of(face)
+    faces = local.of_kind(ROOF)
+    for face, others in zip(faces, parts_in_plane(faces, local.vertices, planes_of(roof)), strict=True):
+        left = local.plan_of(face)
         for other in others:
             left, others_own = shared_out(left, drawn(roof.parts[face.part]), drawn(roof.parts[other]))
             shown[other].append(others_own)

@@ -40,6 +40,15 @@ def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
     return shapely.get_coordinates(ring)[:: 1 if shapely.is_ccw(ring) else -1]
 
 
+def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
+    """Starts and ends (m, 2) of all edges of the outline, holes included."""
+    if not outline.interiors:
+        ring = shapely.get_coordinates(outline)
+        return ring[:-1], ring[1:]
+    rings = [shapely.get_coordinates(ring) for ring in (outline.exterior, *outline.interiors)]
+    return np.concatenate([r[:-1] for r in rings]), np.concatenate([r[1:] for r in rings])
+
+
 def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
     """What of a geometry has an area: areas that only touch have lines and points in common, with which nothing more can be intersected.
 

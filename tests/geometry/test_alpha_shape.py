@@ -5,7 +5,7 @@ import pytest
 import shapely
 
 from hiproof.errors import FitError
-from hiproof.fit.alpha_shape import alpha_shape
+from hiproof.geometry.alpha_shape import alpha_shape
 
 
 def slow_alpha_area(xy, radius):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 import shapely
 
-from hiproof.parity import flips
-from hiproof.rings import ring_normal, ring_normals
+from hiproof.geometry.point_in_polygon import flips
+from hiproof.geometry.rings import ring_normal, ring_normals
 
 
 @pytest.mark.parametrize("seed", range(20))

@@ -14,11 +14,11 @@ from hiproof.compose import compose
 from hiproof.evaluate.models import read_models
 from hiproof.frames import LocalFrame
 from hiproof.model import Building, Model, Part, Piece, Roof
+from hiproof.model.shown import shared_out
 from hiproof.status import Status
 from hiproof.write import write_all
 from hiproof.write.osm_tags import osm_tags
 from hiproof.write.roof_figures import roof_figures
-from hiproof.write.shown import shared_out, shown_areas
 from hiproof.write.table_rows import table_rows
 from roof_zoo import FRAME, KINDS, generated
 
@@ -39,7 +39,7 @@ def flat(z, *box):
 @pytest.mark.parametrize("kind", KINDS)
 def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
     building = composed(generated(kind, seed))
-    areas = shown_areas(building)
+    areas = building.shown_areas()
     assert len(areas) == len(building.parts)
     assert shapely.is_valid(areas).all()
     together = shapely.union_all(areas)
@@ -53,7 +53,7 @@ def test_parts_share_no_area_and_are_the_outline_together(kind, seed):
 def test_where_a_part_shows_none_is_higher(kind, seed):
     building = composed(generated(kind, seed))
     roof, rng = building.roof, np.random.default_rng(seed)
-    for part, area in zip(roof.parts, shown_areas(building), strict=True):
+    for part, area in zip(roof.parts, building.shown_areas(), strict=True):
         inner = shapely.buffer(shapely.transform(area, roof.frame.to_local), -2 * SNAPPED_M)
         if inner.is_empty:
             continue
@@ -67,7 +67,7 @@ def test_parts_in_one_plane_share_a_surface_by_their_outlines():
     roof = Roof((flat(3.0, 0, 0, 6, 5), flat(3.0, 6, 0, 10, 5), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
     building = composed(roof)
     assert len(building.solid.of_kind("RoofSurface")) == 1
-    assert [area.area for area in shown_areas(building)] == pytest.approx([30.0, 20.0, 0.0])
+    assert [area.area for area in building.shown_areas()] == pytest.approx([30.0, 20.0, 0.0])
 
 
 def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
@@ -131,7 +131,7 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
     boxes = [shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4) for box in (first, second)]
     parts = tuple(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)) for box in boxes)
     building = composed(Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME))
-    areas = shown_areas(building)
+    areas = building.shown_areas()
     assert shapely.is_valid(areas).all() and {area.geom_type for area in areas} == {"Polygon"}
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0], abs=0.1)
 
@@ -139,14 +139,14 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
 def test_a_part_drawn_with_a_spike_of_no_width_shares_its_surface_all_the_same():
     spiked = shapely.Polygon([(0, 0), (6, 0), (6, 3), (9, 3), (6, 3), (6, 5), (0, 5)])
     parts = (Part("flat", (Piece(spiked, np.array([[0.0, 0.0, 3.0]])),)), flat(3.0, 6, 0, 10, 5))
-    areas = shown_areas(composed(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)))
+    areas = composed(Roof(parts, shapely.box(0, 0, 10, 5), FRAME)).shown_areas()
     assert [area.area for area in areas] == pytest.approx([30.0, 20.0])
 
 
 def test_a_part_around_a_yard_has_a_hole():
-    (area,) = shown_areas(modelled(courtyard(), kinds=("flat",)))
+    (area,) = modelled(courtyard(), kinds=("flat",)).shown_areas()
     assert area.area == pytest.approx(84.0) and len(area.interiors) == 1
 
 
 def test_a_building_without_a_model_shows_nothing():
-    assert shown_areas(unmodelled()) == []
+    assert unmodelled().shown_areas() == []

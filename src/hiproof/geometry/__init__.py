@@ -1,0 +1,7 @@
+"""Geometry that several packages use. It imports no values of hiproof.
+
+rings               polygons repaired and oriented, edges and area vectors of rings
+point_in_polygon    whether a point lies in rings, compiled
+alpha_shape         the outline of a set of points
+area_vectors        area vectors and enclosed volumes, compiled
+"""

@@ -1,0 +1,42 @@
+"""Area vectors of rings in space, and the volume that they enclose. Compiled.
+
+Faces are flattened: ring r has vertices `index[ring_start[r]:ring_start[r + 1]]`, face f the rings
+`face_start[f]:face_start[f + 1]`, the outer one first.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..compiled import compiled
+
+
+@compiled
+def dot(a, b):
+    """The inner product of two vectors (3,); `@` would bring BLAS along for it."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@compiled
+def newell(vertices, index, low, high):
+    """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the normal."""
+    total = np.zeros(3)
+    origin = vertices[index[low]]
+    for k in range(low, high):
+        p = vertices[index[k]] - origin
+        q = vertices[index[k + 1 if k + 1 < high else low]] - origin
+        total[0] += p[1] * q[2] - p[2] * q[1]
+        total[1] += p[2] * q[0] - p[0] * q[2]
+        total[2] += p[0] * q[1] - p[1] * q[0]
+    return 0.5 * total
+
+
+@compiled
+def enclosed_volume(vertices, index, ring_start, face_start):
+    """Volume of a shell by the divergence theorem; positive when its faces point outwards."""
+    total = 0.0
+    for f in range(len(face_start) - 1):
+        anchor = vertices[index[ring_start[face_start[f]]]]
+        for r in range(face_start[f], face_start[f + 1]):
+            total += dot(anchor, newell(vertices, index, ring_start[r], ring_start[r + 1]))
+    return total / 3.0

@@ -1,0 +1,34 @@
+"""The frozen values handed from stage to stage. Arrays are float64; plan geometry is shapely; frames are in the names.
+
+inputs      point clouds and footprints
+roof        pieces, parts, roofs: a roof is a max of mins of planes
+solid       faces, solids
+fit         one primitive fitted to points
+building    models and buildings
+shown       where each part of a roof shows from above
+heights     heights of roofs at many points, compiled
+"""
+
+from .building import Building, Model, Quality
+from .fit import Fit
+from .inputs import Footprint, PointCloud, as_xyz
+from .roof import Part, Piece, Roof
+from .solid import GROUND, ROOF, WALL, Face, Solid
+
+__all__ = [
+    "GROUND",
+    "ROOF",
+    "WALL",
+    "Building",
+    "Face",
+    "Fit",
+    "Footprint",
+    "Model",
+    "Part",
+    "Piece",
+    "PointCloud",
+    "Quality",
+    "Roof",
+    "Solid",
+    "as_xyz",
+]

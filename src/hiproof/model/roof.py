@@ -1,0 +1,79 @@
+"""A roof is a max of mins of planes. Over the plan,
+
+z(x, y) = max over pieces whose outline holds (x, y)  of  min over that piece's planes of  a x + b y + c
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import shapely
+
+from ..frames import LocalFrame
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Where `outline` covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the outline's frame."""
+
+    outline: shapely.Polygon
+    planes: np.ndarray
+
+    def height_at(self, xy: np.ndarray) -> np.ndarray:
+        """Height (n,) of the lower envelope at `xy` (n, 2), the outline not asked."""
+        return (np.asarray(xy, float) @ self.planes[:, :2].T + self.planes[:, 2]).min(axis=1)
+
+    def moved(self, shift: np.ndarray) -> Piece:
+        """The piece moved by `shift` (3,): its outline, and its planes with it."""
+        planes = self.planes.copy()
+        planes[:, 2] += shift[2] - planes[:, :2] @ shift[:2]
+        return Piece(shapely.transform(self.outline, lambda xy: xy + shift[:2]), planes)
+
+
+@dataclass(frozen=True)
+class Part:
+    """One primitive of a roof: its type (a name of the catalogue, or "free"), parameters and the pieces it covers.
+
+    `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L (3,) in the roof's
+    local frame, `sigma` the standard deviation by parameter name. A saw-tooth has a piece a tooth; all others have one.
+    """
+
+    type: str
+    pieces: tuple[Piece, ...]
+    parameters: dict[str, float] = field(default_factory=dict)
+    kappa: float = 0.0
+    translation: np.ndarray = field(default_factory=lambda: np.zeros(3))
+    sigma: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def area(self) -> float:
+        return float(sum(piece.outline.area for piece in self.pieces))
+
+    def height_at(self, xy_local: np.ndarray) -> np.ndarray:
+        """Height (n,) at `xy_local` (n, 2) in the roof's frame; minus infinity beside the part, for roofs are the max of these."""
+        z = np.full(len(xy_local), -np.inf)
+        for piece in self.pieces:
+            inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
+            if inside.any():
+                z[inside] = np.maximum(z[inside], piece.height_at(xy_local[inside]))
+        return z
+
+
+@dataclass(frozen=True)
+class Roof:
+    """All parts of one building's roof in the local `frame`, over the plan `outline` (may have holes)."""
+
+    parts: tuple[Part, ...]
+    outline: shapely.Polygon
+    frame: LocalFrame
+
+    @property
+    def pieces(self) -> tuple[Piece, ...]:
+        return tuple(piece for part in self.parts for piece in part.pieces)
+
+    def height_at(self, xy_local: np.ndarray) -> np.ndarray:
+        """Roof height (n,) at `xy_local` (n, 2) in the local frame; NaN where no piece covers."""
+        xy_local = np.asarray(xy_local, float)
+        z = np.max([part.height_at(xy_local) for part in self.parts], axis=0)
+        return np.where(np.isfinite(z), z, np.nan)

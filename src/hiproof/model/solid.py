@@ -1,0 +1,60 @@
+"""A closed shell of planar faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import shapely
+
+ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
+
+
+@dataclass(frozen=True)
+class Face:
+    """A planar polygon of a solid: `rings` of vertex indices (outer ring first, counter-clockwise seen from outside).
+
+    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part of a RoofSurface, else -1.
+    """
+
+    rings: tuple[tuple[int, ...], ...]
+    kind: str
+    part: int = -1
+
+
+@dataclass(frozen=True)
+class Solid:
+    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented outwards.
+
+    `defects` are (ISO 19107 code, face) of a shell read from a file that its vertices cannot show, such as an open ring.
+    """
+
+    vertices: np.ndarray
+    faces: tuple[Face, ...]
+    defects: tuple[tuple[int, int], ...] = ()
+
+    def moved(self, shift: np.ndarray) -> Solid:
+        return Solid(self.vertices + shift, self.faces, self.defects)
+
+    @property
+    def volume(self) -> float:
+        """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
+        from ..geometry.area_vectors import enclosed_volume  # compiled: who needs no volume does without
+
+        return round(enclosed_volume(self.vertices - self.vertices.mean(axis=0), *self.flattened()), 9)
+
+    def flattened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Vertex indices of all rings one after the other, the start of each ring, and of each face among the rings."""
+        rings = [ring for face in self.faces for ring in face.rings]
+        index = np.array([vertex for ring in rings for vertex in ring], np.int64)
+        ring_start = np.cumsum([0, *map(len, rings)], dtype=np.int64)
+        face_start = np.cumsum([0, *(len(face.rings) for face in self.faces)], dtype=np.int64)
+        return index, ring_start, face_start
+
+    def of_kind(self, kind: str) -> tuple[Face, ...]:
+        return tuple(face for face in self.faces if face.kind == kind)
+
+    def plan_of(self, face: Face) -> shapely.Polygon:
+        """A face of the solid in plan, its holes left out."""
+        outer, *holes = (self.vertices[list(ring), :2] for ring in face.rings)
+        return shapely.Polygon(outer, holes)
