@@ -18,11 +18,11 @@ import numpy as np
 import shapely
 
 from ..compiled import compiled
-from ..geometry.rings import counterclockwise
+from ..geometry.rings import counterclockwise, ring_edges
 from .outline.cost import cost_at_depth
 from .outline.lines import lines_through
 from .outline.settle import side_offsets, span_of
-from .union.plan import ring_edges, signed_depth
+from .union.plan import signed_depth
 
 FARTHEST_M = 3.0  # a footprint is moved at most
 AROUND_M = 4.0  # of points that are asked for around it
