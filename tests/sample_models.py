@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from hiproof.model import GROUND, ROOF, WALL, Face, Solid
-from hiproof.write.viewed import ViewedModel
+from hiproof.write.meshes.viewed import ViewedModel
 
 ORIGIN = np.array([85000.0, 446000.0, 0.0])
 

@@ -13,7 +13,9 @@ from hiproof.classify import buildings, split
 from hiproof.cli.app import app
 from hiproof.model import Footprint
 from hiproof.status import Status
-from hiproof.write import citygml, cityjson, parameters, run_files
+from hiproof.write import parameters, run_files
+from hiproof.write.citygml import version2
+from hiproof.write.cityjson import features
 from run_records import by_id
 from tiny_town import make_town, write_cloud, write_town
 
@@ -37,7 +39,7 @@ STAGES = (
 WRITERS = (
     (run_files, "measured"),
     (run_files, "building_attributes"),
-    *((module, "fragment") for module in (parameters, cityjson, citygml)),
+    *((module, "fragment") for module in (parameters, features, version2)),
 )
 
 

@@ -12,7 +12,7 @@ from hiproof import formats
 from hiproof.formats import FORMATS, Format, asked_files, asked_fragments, asked_tile_files, module_of
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import files_text
-from hiproof.write.citygml3 import write_citygml3
+from hiproof.write.citygml.version3 import write_citygml3
 from hiproof.write.fragments import Fragment
 from hiproof.write.head import FileHead
 from hiproof.write.run_files import fragments, join_fragments, write_all

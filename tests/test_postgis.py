@@ -19,8 +19,8 @@ from hiproof.parametric.run import build_file
 from hiproof.read.footprints import footprint_crs, read_footprints
 from hiproof.view.loading import load_postgis
 from hiproof.write import write_all, write_attributes, write_cityjson, write_parameters
-from hiproof.write.postgis import lie_of
 from hiproof.write.roof_figures import roof_figures
+from hiproof.write.tables.postgis import lie_of
 from postgis_server import running, why_not
 from sample_models import write_sample_run
 

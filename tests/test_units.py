@@ -32,7 +32,7 @@ from hiproof.read.pointcloud import read_header
 from hiproof.read.solids import read_solids
 from hiproof.settings import Settings
 from hiproof.view.loading import database_rows
-from hiproof.write.postgis import roof_rows
+from hiproof.write.tables.postgis import roof_rows
 from read.test_lax import write_lax
 from read.test_pointcloud import write_copc
 from tiny_town import ORIGIN, make_town, write_cloud, write_footprints

@@ -8,7 +8,7 @@ here. The module of a file that a run writes has
 
 and that of one that `hiproof convert` makes of finished models has
 
-    write_models(path, buildings, crs)      write.viewed.ViewedModel; returns how many it wrote
+    write_models(path, buildings, crs)      write.meshes.viewed.ViewedModel; returns how many it wrote
 
 Modules are imported when a file of theirs is asked for.
 """
@@ -62,24 +62,24 @@ FORMATS = {
     "gml": Format(
         file="buildings.gml",
         what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection curves, roofType",
-        module="citygml",
-        fragment="citygml",
+        module="citygml.version2",
+        fragment="citygml.version2",
         asked=citygml2,
         tile_ending=".gml",
     ),
     "gml3": Format(
         file="buildings.citygml3.gml",
         what="CityGML 3.0 with the same content (`--citygml 3.0` or `both`)",
-        module="citygml3",
-        fragment="citygml3",
+        module="citygml.version3",
+        fragment="citygml.version3",
         asked=citygml3,
         tile_ending=".citygml3.gml",
     ),
     "cityjson": Format(
         file="buildings.city.jsonl",
         what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG use (`rf_...`)",
-        module="cityjson",
-        fragment="cityjson",
+        module="cityjson.features",
+        fragment="cityjson.features",
         tile_ending=".city.jsonl",
     ),
     "parameters": Format(
@@ -91,35 +91,35 @@ FORMATS = {
     "gpkg": Format(
         file="buildings.gpkg",
         what="outlines, parts and roof surfaces as tables, for QGIS",
-        module="attributes",
-        fragment="attributes",
+        module="tables.geopackage",
+        fragment="tables.geopackage",
     ),
     "parquet": Format(
         file="buildings.parquet",
         what="the outlines as GeoParquet (`--parquet`)",
-        module="geoparquet",
-        fragment="attributes",
+        module="tables.geoparquet",
+        fragment="tables.geopackage",
         asked=parquet,
     ),
     "parquet_parts": Format(
         file="parts.parquet",
         what="the parts as GeoParquet (`--parquet`)",
-        module="geoparquet",
-        fragment="attributes",
+        module="tables.geoparquet",
+        fragment="tables.geopackage",
         asked=parquet,
         given={"layer": "parts"},
     ),
     "parquet_surfaces": Format(
         file="roof_surfaces.parquet",
         what="the roof surfaces as GeoParquet (`--parquet`)",
-        module="geoparquet",
-        fragment="attributes",
+        module="tables.geoparquet",
+        fragment="tables.geopackage",
         asked=parquet,
         given={"layer": "roof_surfaces"},
     ),
-    "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="gltf"),
-    "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="obj"),
-    "3dtiles": Format(file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="tiles"),
+    "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="meshes.gltf"),
+    "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="meshes.obj"),
+    "3dtiles": Format(file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="meshes.tiles"),
 }
 OF_MODELS = {name: format for name, format in FORMATS.items() if not format.fragment}
 """What `hiproof convert` makes of the models of a run."""

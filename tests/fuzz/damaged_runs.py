@@ -36,7 +36,7 @@ from hiproof.errors import HiproofError
 from hiproof.log import LOGGER
 from hiproof.parametric.run import build_file
 from hiproof.view.loading import load_postgis
-from hiproof.write.postgis import Row, polyhedral_wkt, roof_rows
+from hiproof.write.tables.postgis import Row, polyhedral_wkt, roof_rows
 from sample_parameters import write_parameters_of_each_kind
 
 FILES = ("buildings.city.jsonl", "parameters.jsonl", "run.json")

@@ -19,7 +19,7 @@ from hiproof.status import Status
 from hiproof.write import write_all
 from hiproof.write.osm_tags import osm_tags
 from hiproof.write.roof_figures import roof_figures
-from hiproof.write.table_rows import table_rows
+from hiproof.write.tables.rows import table_rows
 from roof_zoo import FRAME, KINDS, generated
 
 SNAPPED_M = 0.05  # composing moves edges by less than this

@@ -15,10 +15,10 @@ from hiproof.parametric.schema import schema
 from hiproof.primitives import CATALOGUE
 from hiproof.segment import combine
 from hiproof.simulate import ScanSettings, random_building, scan, training_sample
+from hiproof.write.citygml.roof_codes import roof_type_code
 from hiproof.write.colours import type_colour
 from hiproof.write.osm_tags import osm_shape
 from hiproof.write.parameters import building_record
-from hiproof.write.roof_codes import roof_type_code
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "new_primitive.py"
 NAME = "curb_lean_to"

@@ -14,7 +14,7 @@ from hiproof.city.prepare import say_if_columns_run_out
 from hiproof.errors import InputError, InputWarning
 from hiproof.model import Footprint
 from hiproof.read.footprints import read_footprints
-from hiproof.write.attributes import attributes_with_a_column
+from hiproof.write.tables.geopackage import attributes_with_a_column
 
 SQUARES = [shapely.box(500000 + 20 * i, 4649776, 500010 + 20 * i, 4649786) for i in range(4)]
 

@@ -22,8 +22,8 @@ from hiproof.errors import HiproofError, InputError, OutputError
 from hiproof.loopback import LOOPBACK, LoopbackServer
 from hiproof.view.server import Handler, page_of, server_of
 from hiproof.write import files
-from hiproof.write.tiles import write_models
-from hiproof.write.viewed import ViewedModel
+from hiproof.write.meshes.tiles import write_models
+from hiproof.write.meshes.viewed import ViewedModel
 from sample_models import ORIGIN, SOLIDS, two_parts, write_sample_run
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

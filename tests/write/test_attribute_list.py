@@ -30,7 +30,7 @@ from hiproof.write.attribute_list import (
 )
 from hiproof.write.building_attributes import building_attributes, figures_of
 from hiproof.write.parameters import FileHead, building_record, head_record
-from hiproof.write.postgis import MEASURES, SCHEMA
+from hiproof.write.tables.postgis import MEASURES, SCHEMA
 
 DOCUMENT = Path(__file__).parents[2] / "docs/attributes.md"
 KINDS = {"number": (int, float), "count": int, "text": str}

@@ -9,8 +9,8 @@ import shapely
 
 from handmade import courtyard, gable_house, modelled, unmodelled
 from hiproof.errors import InputError
-from hiproof.write.attributes import LAYERS, write_attributes
-from hiproof.write.geoparquet import GeoParquetWriter
+from hiproof.write.tables.geopackage import LAYERS, write_attributes
+from hiproof.write.tables.geoparquet import GeoParquetWriter
 
 
 def street():

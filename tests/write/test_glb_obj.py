@@ -9,10 +9,10 @@ from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError
 from hiproof.geometry.rings import ring_normal
 from hiproof.write.colours import linear_rgb, type_colour
-from hiproof.write.gltf import write_models as write_glb
-from hiproof.write.obj import write_models as write_obj
-from hiproof.write.triangles import face_triangles, faces_triangles
-from hiproof.write.viewed import ViewedModel
+from hiproof.write.meshes.gltf import write_models as write_glb
+from hiproof.write.meshes.obj import write_models as write_obj
+from hiproof.write.meshes.triangles import face_triangles, faces_triangles
+from hiproof.write.meshes.viewed import ViewedModel
 from sample_models import SOLIDS, courtyard_solid, gable_solid, two_parts, write_sample_run
 
 BUILDINGS = [ViewedModel(id, kind, solid, {"height": 3.5}, {0: kind}) for id, (kind, solid) in SOLIDS.items()]

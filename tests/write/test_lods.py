@@ -23,11 +23,11 @@ from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.view.loading import database_rows
 from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
-from hiproof.write.citygml import NAMESPACES, CityGMLWriter
-from hiproof.write.citygml3 import CityGML3Writer
-from hiproof.write.postgis import polyhedral_wkt
-from hiproof.write.roof_codes import CODE_SPACES
-from hiproof.write.styles import STYLES, TABLE
+from hiproof.write.citygml.roof_codes import CODE_SPACES
+from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter
+from hiproof.write.citygml.version3 import CityGML3Writer
+from hiproof.write.tables.postgis import polyhedral_wkt
+from hiproof.write.tables.styles import STYLES, TABLE
 
 ALL = ("0", "1.2", "1.3", "2.2")
 WHOLE = WriteSettings(lods=ALL)

@@ -15,11 +15,11 @@ from hiproof.cli.convert import convert
 from hiproof.errors import HiproofError, InputError, InputWarning
 from hiproof.read.crs import units_of
 from hiproof.write.colours import linear_rgb, type_colour
+from hiproof.write.meshes.tiles import Globe, write_models
+from hiproof.write.meshes.tiles.properties import NO_NUMBER, Found
+from hiproof.write.meshes.tiles.quadtree import quadtree
+from hiproof.write.meshes.viewed import ViewedModel
 from hiproof.write.naming import FileUnits
-from hiproof.write.tiles import Globe, write_models
-from hiproof.write.tiles.properties import NO_NUMBER, Found
-from hiproof.write.tiles.quadtree import quadtree
-from hiproof.write.viewed import ViewedModel
 from sample_models import ORIGIN, courtyard_solid, gable_solid, two_parts, write_sample_run
 
 GEOID_M = 43.2

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from lxml import etree
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
-from hiproof.write.citygml import NAMESPACES, CityGMLWriter, write_citygml
+from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter, write_citygml
 from hiproof.write.naming import gml_name
 from hiproof.write.xml_text import xml_attribute, xml_text
 

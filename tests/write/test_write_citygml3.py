@@ -8,9 +8,9 @@ from lxml import etree
 
 from handmade import box, courtyard, gable_house, modelled, unmodelled
 from hiproof.read.solids import read_solids
-from hiproof.write.citygml import NAMESPACES as OLD
-from hiproof.write.citygml import write_citygml
-from hiproof.write.citygml3 import ID, NAMESPACES, upgraded, write_citygml3
+from hiproof.write.citygml.version2 import NAMESPACES as OLD
+from hiproof.write.citygml.version2 import write_citygml
+from hiproof.write.citygml.version3 import ID, NAMESPACES, upgraded, write_citygml3
 from hiproof.write.fragments import Fragment
 
 HREF = f"{{{NAMESPACES['xlink']}}}href"

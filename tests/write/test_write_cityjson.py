@@ -10,7 +10,7 @@ import shapely
 
 from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelled
 from hiproof.model import GROUND, ROOF
-from hiproof.write.cityjson import CityJSONWriter, write_cityjson
+from hiproof.write.cityjson.features import CityJSONWriter, write_cityjson
 
 SHARED = Path(__file__).parents[3] / "shared"
 FOOTPRINT = shapely.Polygon([(85000, 446000), (85000, 446009), (85009, 446009), (85009, 446000)])

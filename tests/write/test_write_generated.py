@@ -14,7 +14,7 @@ from hiproof.primitives import CATALOGUE
 from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, random_building, random_compound
 from hiproof.status import Status
 from hiproof.write import roof_figures, write_all
-from hiproof.write.citygml import NAMESPACES
+from hiproof.write.citygml.version2 import NAMESPACES
 
 
 def generated(seed):

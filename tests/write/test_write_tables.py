@@ -13,7 +13,8 @@ from handmade import RD_ORIGIN, box, courtyard, gable_house, modelled, unmodelle
 from hiproof import read_parameters
 from hiproof.errors import InputError
 from hiproof.parametric.run import build_file
-from hiproof.write import attributes, write_attributes, write_parameters
+from hiproof.write import write_attributes, write_parameters
+from hiproof.write.tables import geopackage as attributes
 
 
 def table(tmp_path, buildings, crs="EPSG:7415"):

@@ -45,7 +45,7 @@ def refuse_missing_packages(request: Any) -> None:
 
         import_rasterio()
     if request.settings.write.parquet:
-        from ..write.geoparquet import import_pyarrow
+        from ..write.tables.geoparquet import import_pyarrow
 
         import_pyarrow()
 

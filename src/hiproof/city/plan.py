@@ -21,7 +21,7 @@ from ..read.crs import parse_crs
 from ..read.operations import Operation
 from ..settings import Settings
 from ..stages import without_needless_vertices
-from ..write.cityjson import offset_of
+from ..write.cityjson.features import offset_of
 from ..write.head import FileHead
 from ..write.naming import UniqueNames, gml_name
 from ..write.parameters import crs_text

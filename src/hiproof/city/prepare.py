@@ -15,9 +15,9 @@ from ..masking import masked
 from ..model import Footprint
 from ..read.overlap import told_box
 from ..settings import Settings
-from ..write.attributes import attributes_with_a_column
 from ..write.naming import FileUnits
 from ..write.reprojected import crs_of_files
+from ..write.tables.geopackage import attributes_with_a_column
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
 from .outlines import MOST_ROW_M

@@ -46,7 +46,7 @@ def tiles_of(folder: Path) -> Iterator[Path]:
     ends.
     """
     from ..evaluate.models import run_models
-    from ..write.tiles.tileset import TILESET
+    from ..write.meshes.tiles.tileset import TILESET
 
     if (folder / TILESET).is_file():
         yield folder

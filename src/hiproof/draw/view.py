@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry.rings import ring_normal
 from ..model import ROOF, Building, Solid
-from ..write.viewed import look_of
+from ..write.meshes.viewed import look_of
 
 TURN_DEG, TILT_DEG = -35.0, 35.0  # degrees; from the front left and above, so that two walls and the roof show
 

@@ -20,7 +20,7 @@ from ..parametric.building import build
 from ..parametric.record import list_at, number, outline_of, text_at
 from ..primitives.catalogue import CATALOGUE
 from ..read.damage import finite
-from ..write.page_mesh import packed
+from ..write.meshes.page_mesh import packed
 from ..write.parameters import building_record
 from ..write.values import plain_text
 from .actions import edited

@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import HiproofError
 from ..model import Building
 from ..parametric.change import rise_of, with_sizes
-from ..write.page_mesh import packed, solid_mesh
+from ..write.meshes.page_mesh import packed, solid_mesh
 from ..write.parameters import building_record, number
 
 MOST_POINTS = 4000  # drawn

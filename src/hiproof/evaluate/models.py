@@ -23,7 +23,7 @@ from ..read.damage import Damaged, excerpt, finite, refuse
 from ..read.plausible import is_plausible
 from ..read.shells import Surface, list_of, read_geometries, read_shell
 from ..write.attribute_list import OWN
-from ..write.triangles import faces_triangles
+from ..write.meshes.triangles import faces_triangles
 
 RUN_MODELS = FORMATS["cityjson"].file
 PART, PART_TYPE = f"{OWN}part", f"{OWN}part_type"

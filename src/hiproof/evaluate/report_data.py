@@ -10,7 +10,7 @@ import shapely
 
 from ..status import Status
 from ..write.colours import GRADE_COLOURS, UNKNOWN_COLOUR, WALL_COLOUR, type_colour
-from ..write.page_mesh import packed, solid_mesh
+from ..write.meshes.page_mesh import packed, solid_mesh
 from .evaluation import TEXTS
 from .metrics import plan_outline, psd
 from .models import BuildingModel

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..geometry.rings import ring_normal
 from ..model import GROUND, ROOF, Solid
-from ..write.viewed import look_of
+from ..write.meshes.viewed import look_of
 
 RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "#fdae61"), (0.4, "#d7191c"))
 """Colour from each distance in metres upwards, blue near and red far; the same on map, models and points."""

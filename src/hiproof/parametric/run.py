@@ -25,7 +25,7 @@ from ..model import Building
 from ..read.damage import finite
 from ..settings import Settings
 from ..status import Status
-from ..write.cityjson import offset_of
+from ..write.cityjson.features import offset_of
 from ..write.files import atomic
 from ..write.fragments import Fragment, Fragments
 from ..write.head import FileHead

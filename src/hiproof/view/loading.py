@@ -14,7 +14,7 @@ from ..read.cityjson import documents, reference_system
 from ..read.crs import units_named
 from ..read.damage import Damaged, refuse
 from ..write.attribute_list import OWN, PARTS_LAYER
-from ..write.postgis import Row, load_rows
+from ..write.tables.postgis import Row, load_rows
 
 PARTS_AT_ONCE = 5000  # rows read of the GeoPackage at once: memory stays small for any city
 MOST_SRID = 998_999  # of a reference system of PostGIS

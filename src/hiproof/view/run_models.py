@@ -17,9 +17,9 @@ from ..parametric.file import DAMAGED, opened_parameters
 from ..parametric.record import refuse_other_kinds
 from ..read.cityjson import documents, reference_system
 from ..read.damage import Damaged, refuse
+from ..write.meshes.viewed import ViewedModel, told_beside
 from ..write.parameters import crs_text
 from ..write.reprojected import crs_of_files
-from ..write.viewed import ViewedModel, told_beside
 
 TOLD = ("type", "parameters", "position", "rotation")
 

@@ -1,25 +1,39 @@
-"""Buildings out: CityGML, CityJSON, parameters and tables, each file whole or not at all.
+"""Write buildings to files, each whole or not at all.
 
-What is written: attribute_list (every attribute, once), building_attributes (those of one building), roof_figures and
-roof_levels (measured on its solid), roof_codes and osm_tags (its type in other words), shapes (blocks, parts, LoD0),
-shown (where its parts show), table_rows (its rows), values (numbers and text as every format holds them), naming (ids), reprojected (another CRS), colours.
+Formats: citygml, cityjson, tables, meshes, and parameters (the parametric models).
 
-Formats: citygml (citygml_geometry, xml_text), citygml3 (made of 2.0), cityjson (cityjson_geometry), parameters (json_text), attributes (the
-GeoPackage, with styles), geoparquet, gltf (in the container glb), obj, triangles and viewed for these, tiles, postgis, page_mesh (for pages).
+Contents that formats share:
 
-Files: writer (the life of one: opened, added to, finished), files (whole or none), head (what all of a run have in common),
-fragments (a building's texts, to be joined), run_files (all files of a run in one pass).
+attribute_list         every attribute and table, declared once
+building_attributes    the attributes of one building
+roof_figures           heights, slopes, ridge and volume of a solid
+roof_levels            heights below which a share of a roof lies, compiled
+osm_tags               a roof as OpenStreetMap tags it
+shapes                 LoD0, blocks and building parts, as far as requested
+colours                one colour a roof type
+values                 numbers and text as every format holds them
+xml_text, json_text    values in XML and in JSON
+naming                 ids, names of reference systems, units
+reprojected            coordinates in another reference system than the run's
+
+Files:
+
+writer       a file is opened, given one building after another, finished
+files        files that appear whole or not at all
+head         what all files of a run have in common
+fragments    one building's texts, kept until they are joined
+run_files    all files of a run in one pass
 """
 
-from .attributes import AttributesWriter, write_attributes
 from .building_attributes import building_attributes
-from .citygml import CityGMLWriter, write_citygml
-from .cityjson import CityJSONWriter, write_cityjson
+from .citygml.version2 import CityGMLWriter, write_citygml
+from .cityjson.features import CityJSONWriter, write_cityjson
 from .files import atomic, atomic_file
 from .fragments import Fragments, load_fragments, save_fragments
 from .parameters import FileHead, ParametersWriter, write_parameters
 from .roof_figures import RoofFigures, roof_figures
 from .run_files import fragments, join_fragments, write_all
+from .tables.geopackage import AttributesWriter, write_attributes
 from .writer import BuildingWriter
 
 __all__ = [

@@ -12,7 +12,7 @@ from ..settings import WriteSettings
 from .attribute_list import OF_PARTS, OWN, PREFIX
 from .building_attributes import shape_attributes
 from .roof_figures import RoofFigures, roof_figures
-from .table_rows import part_values
+from .tables.rows import part_values
 from .values import metres, plain
 
 if TYPE_CHECKING:

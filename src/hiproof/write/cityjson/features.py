@@ -15,19 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from ..model import Building
-from ..settings import WriteSettings
-from .building_attributes import PREFIX, building_attributes, figures_of
-from .cityjson_geometry import Vertices, building_geometry, first_corner, part_geometry
-from .files import scratch
-from .fragments import Fragment, Sheet
-from .head import FileHead
-from .json_text import dump
-from .naming import UniqueNames, reference_system
-from .roof_figures import RoofFigures
-from .shapes import PartShape
-from .values import WIDEST, metres, plain_text
-from .writer import BuildingWriter
+from ...model import Building
+from ...settings import WriteSettings
+from ..building_attributes import PREFIX, building_attributes, figures_of
+from ..files import scratch
+from ..fragments import Fragment, Sheet
+from ..head import FileHead
+from ..json_text import dump
+from ..naming import UniqueNames, reference_system
+from ..roof_figures import RoofFigures
+from ..shapes import PartShape
+from ..values import WIDEST, metres, plain_text
+from ..writer import BuildingWriter
+from .boundaries import Vertices, building_geometry, first_corner, part_geometry
 
 SCALE = 0.0001  # units of the file; tenths of a millimetre, on which solids are composed
 GRID = 1000.0  # units of the file; offsets are whole thousands, so that files of neighbouring tiles often share theirs

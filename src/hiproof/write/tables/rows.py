@@ -10,13 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import shapely
 
-from ..errors import OutputError
-from ..frames import METRES, Units
-from ..model import ROOF, Building, Face, Part
-from ..primitives.cants import CANTED, MEASURES, cants_named
-from .attribute_list import SHAPE
-from .roof_figures import RoofFigures
-from .values import metres, plain_text, rounded
+from ...errors import OutputError
+from ...frames import METRES, Units
+from ...model import ROOF, Building, Face, Part
+from ...primitives.cants import CANTED, MEASURES, cants_named
+from ..attribute_list import SHAPE
+from ..roof_figures import RoofFigures
+from ..values import metres, plain_text, rounded
 
 TEXT = json.JSONEncoder(check_circular=False)  # a row cannot hold itself
 Row = tuple[bytes | None, dict[str, Any]]  # the geometry as WKB, the values by column

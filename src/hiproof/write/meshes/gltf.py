@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..model import Face
-from .colours import linear_rgb
+from ...model import Face
+from ..colours import linear_rgb
 from .glb import GlbDocument, y_up
 from .triangles import face_normals, faces_triangles
 from .viewed import Look, ViewedModel, told_beside
@@ -24,7 +24,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 
     `crs` is kept as text beside the origin, which is in metres too, whatever the unit of the CRS. Raises OutputError when the file cannot be written.
     """
-    from .files import atomic_file
+    from ..files import atomic_file
 
     content = GlbContent()
     for model in buildings:

@@ -9,11 +9,11 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from ..frames import Units
-from ..model import GROUND, ROOF, WALL, Face, Solid
-from .roof_figures import RoofFigures
-from .values import rounded
-from .xml_text import generic_attribute
+from ...frames import Units
+from ...model import GROUND, ROOF, WALL, Face, Solid
+from ..roof_figures import RoofFigures
+from ..values import rounded
+from ..xml_text import generic_attribute
 
 ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 

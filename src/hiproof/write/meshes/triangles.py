@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import shapely
 
-from ..geometry.rings import ring_normals
-from ..model import Face
+from ...geometry.rings import ring_normals
+from ...model import Face
 
 
 def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:

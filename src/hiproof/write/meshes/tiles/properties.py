@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..attribute_list import HIPROOF, OSM, OWN, PREFIX, ROOFER
+from ...attribute_list import HIPROOF, OSM, OWN, PREFIX, ROOFER
+from ...naming import UniqueNames
 from ..glb import GlbDocument
-from ..naming import UniqueNames
 
 EXTENSION = "EXT_structural_metadata"
 CLASS = "building"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from .attribute_list import OWN
-from .colours import GRADE_COLOURS, UNKNOWN_COLOUR, type_colours
-from .xml_text import xml_attribute
+from ..attribute_list import OWN
+from ..colours import GRADE_COLOURS, UNKNOWN_COLOUR, type_colours
+from ..xml_text import xml_attribute
 
 TABLE = "layer_styles"
 LINE = "50,50,50,255"

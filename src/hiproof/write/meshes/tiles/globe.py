@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError
-from ...frames import Units
-from ...read.crs import best_of, described, horizontal_crs, parse_crs, units_of, vertical_crs
+from ....errors import InputError
+from ....frames import Units
+from ....read.crs import best_of, described, horizontal_crs, parse_crs, units_of, vertical_crs
 
 GEOGRAPHIC, GEOCENTRIC = "EPSG:4979", "EPSG:4978"
 SAME_PLACE_M = 0.005  # m that a place may move on its way to the globe and back; more is a CRS used outside its area

@@ -7,12 +7,12 @@ import json
 import os
 from typing import Any
 
-from ..extras import needed
-from ..settings import WriteSettings
-from .attributes import BUILDINGS, AttributesWriter, column_names
-from .building_attributes import PREFIX
-from .head import FileHead
-from .table_rows import Row
+from ...extras import needed
+from ...settings import WriteSettings
+from ..building_attributes import PREFIX
+from ..head import FileHead
+from .geopackage import BUILDINGS, AttributesWriter, column_names
+from .rows import Row
 
 GEOMETRY = "geometry"
 PLAN = ["Polygon", "MultiPolygon"]

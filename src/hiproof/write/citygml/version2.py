@@ -15,10 +15,19 @@ from typing import Any
 
 import numpy as np
 
-from ..model import GROUND, Building, Face, Solid
-from ..settings import WriteSettings
-from .building_attributes import OWN, PREFIX, building_attributes, figures_of
-from .citygml_geometry import (
+from ...model import GROUND, Building, Face, Solid
+from ...settings import WriteSettings
+from ..building_attributes import OWN, PREFIX, building_attributes, figures_of
+from ..fragments import Fragment, Sheet
+from ..head import FileHead
+from ..naming import UniqueNames, gml_name, srs_name
+from ..roof_figures import RoofFigures, ground_height
+from ..shapes import PartShape
+from ..values import WIDEST
+from ..writer import BuildingWriter
+from ..xml_text import attribute_set, generic_attribute, xml_attribute, xml_text
+from .roof_codes import CODE_SPACES, roof_type_code
+from .surfaces import (
     boundary_surfaces,
     lod1_solid,
     lod2_solid,
@@ -29,15 +38,6 @@ from .citygml_geometry import (
     surface_ids,
     terrain_element,
 )
-from .fragments import Fragment, Sheet
-from .head import FileHead
-from .naming import UniqueNames, gml_name, srs_name
-from .roof_codes import CODE_SPACES, roof_type_code
-from .roof_figures import RoofFigures, ground_height
-from .shapes import PartShape
-from .values import WIDEST
-from .writer import BuildingWriter
-from .xml_text import attribute_set, generic_attribute, xml_attribute, xml_text
 
 NAMESPACES = {
     "bldg": "http://www.opengis.net/citygml/building/2.0",

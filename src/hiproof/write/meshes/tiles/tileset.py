@@ -16,9 +16,9 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ... import __version__
-from ...errors import InputError, InputWarning, OutputError
-from ..files import hidden_name, output_error, scratch
+from .... import __version__
+from ....errors import InputError, InputWarning, OutputError
+from ...files import hidden_name, output_error, scratch
 from ..viewed import ViewedModel, told_beside
 from .content import tile_glb
 from .globe import Globe, east_north_up

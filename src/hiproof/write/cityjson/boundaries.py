@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import shapely
 
-from ..frames import METRES, Units
-from ..model import GROUND, ROOF, Building, Face, Solid
-from .building_attributes import OWN
-from .roof_figures import RoofFigures
-from .shapes import PartShape, Shapes
-from .values import plain, rounded
+from ...frames import METRES, Units
+from ...model import GROUND, ROOF, Building, Face, Solid
+from ..building_attributes import OWN
+from ..roof_figures import RoofFigures
+from ..shapes import PartShape, Shapes
+from ..values import plain, rounded
 
 LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import ROOF, WALL, Solid
+from ...model import ROOF, WALL, Solid
 from .triangles import faces_triangles
 
 

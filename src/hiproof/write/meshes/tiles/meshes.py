@@ -7,7 +7,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ..colours import linear_rgb
+from ...colours import linear_rgb
 from ..gltf import flat_triangles
 from ..viewed import ViewedModel
 

@@ -14,12 +14,12 @@ from typing import Any
 
 from lxml import etree
 
-from ..model import Building
-from . import citygml
-from .building_attributes import PREFIX
-from .citygml import CityGMLWriter
-from .fragments import Fragment, Sheet
-from .head import FileHead
+from ...model import Building
+from ..building_attributes import PREFIX
+from ..fragments import Fragment, Sheet
+from ..head import FileHead
+from . import version2
+from .version2 import CityGMLWriter
 
 NAMESPACES = {
     "bldg": "http://www.opengis.net/citygml/building/3.0",
@@ -29,7 +29,7 @@ NAMESPACES = {
     "gml": "http://www.opengis.net/gml/3.2",
     "xlink": "http://www.w3.org/1999/xlink",
 }
-ID, OLD_ID = f"{{{NAMESPACES['gml']}}}id", f"{{{citygml.NAMESPACES['gml']}}}id"
+ID, OLD_ID = f"{{{NAMESPACES['gml']}}}id", f"{{{version2.NAMESPACES['gml']}}}id"
 ORDER = (
     *("name", "creationDate", "genericAttribute", "boundary", "lod0MultiSurface", "lod1MultiSurface", "lod1Solid"),
     *("lod2Solid", "lod2MultiSurface", "lod1TerrainIntersectionCurve", "lod2TerrainIntersectionCurve", "height"),
@@ -72,12 +72,12 @@ def writer(path: str | os.PathLike, head: FileHead) -> CityGML3Writer:
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's part of a run's file."""
-    return upgraded(citygml.fragment(sheet))
+    return upgraded(version2.fragment(sheet))
 
 
 def upgraded(member: Fragment) -> Fragment:
     """The cityObjectMember of CityGML 2.0 as one of 3.0; the root's namespaces are taken as declared in both."""
-    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in citygml.NAMESPACES.items())
+    declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in version2.NAMESPACES.items())
     (old,) = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
     root = etree.Element("root", nsmap=NAMESPACES)
     root.append(made("core:cityObjectMember", building_of(old[0])))

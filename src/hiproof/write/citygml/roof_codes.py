@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..primitives.catalogue import CATALOGUE
+from ...primitives.catalogue import CATALOGUE
 
 CODE_SPACES = {
     "sig3d": "http://www.sig3d.org/codelists/standard/building/2.0/_AbstractBuilding_roofType.xml",

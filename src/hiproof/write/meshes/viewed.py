@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ..model import GROUND, ROOF, WALL, Face, Solid
-from .colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
+from ...model import GROUND, ROOF, WALL, Face, Solid
+from ..colours import GROUND_COLOUR, WALL_COLOUR, type_colour, type_colours
 
 
 class Look(NamedTuple):

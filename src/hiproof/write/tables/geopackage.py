@@ -16,19 +16,19 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from ..errors import OutputError
-from ..model import Building
-from ..settings import WriteSettings
-from .attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
-from .building_attributes import building_attributes, figures_of
-from .files import atomic, scratch
-from .fragments import Fragment, Sheet
-from .head import FileHead
-from .naming import plan_wkt
-from .roof_figures import RoofFigures
+from ...errors import OutputError
+from ...model import Building
+from ...settings import WriteSettings
+from ..attribute_list import HIPROOF, OSM, OWN, PARTS_LAYER, PREFIX, ROOFER, SURFACES_LAYER
+from ..building_attributes import building_attributes, figures_of
+from ..files import atomic, scratch
+from ..fragments import Fragment, Sheet
+from ..head import FileHead
+from ..naming import plan_wkt
+from ..roof_figures import RoofFigures
+from ..writer import BuildingWriter
+from .rows import Row, lines_of, table_rows
 from .styles import TABLE, style_rows
-from .table_rows import Row, lines_of, table_rows
-from .writer import BuildingWriter
 
 BUILDINGS = "buildings"
 LAYERS = {BUILDINGS: "MultiPolygon", "parts": "MultiPolygon", "roof_surfaces": "Polygon Z"}

@@ -11,8 +11,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ..model import Face, Solid
-from .colours import GROUND_COLOUR, WALL_COLOUR, srgb, type_colours
+from ...model import Face, Solid
+from ..colours import GROUND_COLOUR, WALL_COLOUR, srgb, type_colours
 from .triangles import face_triangles
 from .viewed import ViewedModel
 
@@ -22,7 +22,7 @@ def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None =
 
     Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file cannot be written.
     """
-    from .files import atomic_file
+    from ..files import atomic_file
 
     path = Path(path)
     library = path.with_suffix(".mtl")

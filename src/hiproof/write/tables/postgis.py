@@ -19,14 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, OutputError
-from ..frames import METRES, Units
-from ..geometry.rings import ring_normal
-from ..model import ROOF, Solid
-from ..read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
-from .attribute_list import PARTS_LAYER
-from .roof_figures import FLAT_SLOPE_DEG
-from .triangles import faces_triangles
+from ...errors import InputError, OutputError
+from ...frames import METRES, Units
+from ...geometry.rings import ring_normal
+from ...model import ROOF, Solid
+from ...read.database import TIMEOUT_S, import_psycopg, refuse_half_a_password
+from ..attribute_list import PARTS_LAYER
+from ..meshes.triangles import faces_triangles
+from ..roof_figures import FLAT_SLOPE_DEG
 
 BATCH = 500  # buildings sent at once
 LOCKS = 0x6869  # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the extension

@@ -1,0 +1,8 @@
+"""Tables of buildings, parts and roof surfaces.
+
+rows          the rows of one building
+geopackage    the GeoPackage
+styles        how QGIS draws its layers
+geoparquet    GeoParquet, made of the same columns
+postgis       a PostGIS database
+"""
