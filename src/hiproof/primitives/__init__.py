@@ -1,4 +1,4 @@
-"""Roof shapes: the contract (contract.py), one shape a file, and the catalogue that names them."""
+"""Roof shapes: the contract (contract.py), one shape a file, halves of others (halves.py), the catalogue."""
 
 from .catalogue import CATALOGUE, get
 from .contract import Primitive

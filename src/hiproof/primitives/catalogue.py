@@ -1,33 +1,44 @@
-"""All roof shapes by name. A new shape is one file with its `PRIMITIVE` and its name here; it inherits every test."""
+"""All roof shapes by name. A new shape is one file with its `PRIMITIVE` and its name here; every test covers it."""
 
 from ..errors import SettingsError
 from . import (
     asymmetric_gable,
     corner,
-    corner_mansard,
     flat,
     gable,
     gambrel,
     half_hip,
-    half_mansard,
+    halves,
     hip,
     mansard,
     monopitch,
     pyramid,
     shed,
-    side_half_hip,
-    side_hip,
-    side_mansard,
     truncated_gable,
 )
 from .contract import Primitive
 
-# In the order in which types are tried and told; where several have planes on the same sides, the first is the general one.
+# Types are tried and listed in this order. Of several with planes on the same sides the first is the general one.
 SHAPES = (
-    *(flat, monopitch, gable, hip, half_hip, pyramid, mansard, shed, asymmetric_gable, gambrel),
-    *(side_hip, side_half_hip, half_mansard, truncated_gable, side_mansard, corner, corner_mansard),
+    flat.PRIMITIVE,
+    monopitch.PRIMITIVE,
+    gable.PRIMITIVE,
+    hip.PRIMITIVE,
+    half_hip.PRIMITIVE,
+    pyramid.PRIMITIVE,
+    mansard.PRIMITIVE,
+    shed.PRIMITIVE,
+    asymmetric_gable.PRIMITIVE,
+    gambrel.PRIMITIVE,
+    halves.SIDE_HIP,
+    halves.SIDE_HALF_HIP,
+    halves.HALF_MANSARD,
+    truncated_gable.PRIMITIVE,
+    halves.SIDE_MANSARD,
+    corner.PRIMITIVE,
+    halves.CORNER_MANSARD,
 )
-CATALOGUE: dict[str, Primitive] = {shape.PRIMITIVE.name: shape.PRIMITIVE for shape in SHAPES}
+CATALOGUE: dict[str, Primitive] = {shape.name: shape for shape in SHAPES}
 
 
 def get(name: str) -> Primitive:

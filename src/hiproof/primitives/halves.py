@@ -1,6 +1,7 @@
-"""One half of a roof: what stands on one side of a cut through its middle, such as one of a pair of houses under one hipped roof.
+"""Halves of other roofs, such as the roof of one of two houses under one hipped roof.
 
-A plane of the whole stands in the half as it stood, seen from the half's own middle; lengths that the cut crosses are halved.
+A cut through the middle of the whole roof makes the half. Its planes keep their slopes and are given about the
+middle of the half. Lengths that the cut crosses are halved.
 """
 
 from __future__ import annotations
@@ -11,22 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from .algebra import Formula, U, V, formula
-from .contract import BACK, LEFT, Plane, Primitive, Shape, Sides
+from .algebra import Formula, U, V, formula, q0, q1, q2
+from .contract import BACK, LEFT, DerivedStart, Plane, Primitive, Shape, Sides, at_quarters
+from .half_hip import PRIMITIVE as HALF_HIP
+from .hip import PRIMITIVE as HIP
+from .mansard import PRIMITIVE as MANSARD
+from .truncated_gable import PRIMITIVE as TRUNCATED_GABLE
 
 ALONG, ACROSS = 0, 1  # the axis that the cut halves
 CROSSED = (("length", "ridge_length", "top_length"), ("width", "top_width"))
 EXTENT = (("U", U), ("V", V))
-
-
-def right_half(whole: Primitive, **own: Any) -> Primitive:
-    """The end at +u of the roof `whole`, with what is its `own`: name, codes, starts, colour."""
-    return half_of(whole, ALONG, **own)
-
-
-def front_half(whole: Primitive, **own: Any) -> Primitive:
-    """The side at -v of the roof `whole`, with what is its `own`: name, codes, starts, colour."""
-    return half_of(whole, ACROSS, **own)
 
 
 def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
@@ -91,3 +86,48 @@ def cut(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
     moved = vertices.copy()
     moved[:, axis] = sign * np.maximum(sign * vertices[:, axis], 0.0) - sign * 0.5 * extent
     return moved
+
+
+SIDE_HIP = half_of(  # a gable of which one end slopes too
+    HIP,
+    ALONG,
+    name="side_hip",
+    osm_shape="side_hipped",
+    colour="#4fa3c7",
+    starts=(*at_quarters("gable", (q0, q1, 1.0), (0, 2)), *at_quarters("hip", (q0, q1, q2), (0, 2))),
+)
+SIDE_HALF_HIP = half_of(  # a gable of which a small hip cuts one end
+    HALF_HIP,
+    ALONG,
+    name="side_half_hip",
+    osm_shape="side_half-hipped",
+    colour="#8fd6ee",
+    starts=at_quarters("gable", (q0, q1, 1.0, 0.5), (0, 2)),
+)
+HALF_MANSARD = half_of(  # one slope up to a level top
+    TRUNCATED_GABLE,
+    ACROSS,
+    name="half_mansard",
+    osm_shape="saltbox",
+    colour="#6fbf8f",
+    starts=(DerivedStart("monopitch", (q0 + 0.2 * q1 * V, q1, 0.6)), *at_quarters("flat", (q0, 1.0, 0.15))),
+)
+SIDE_MANSARD = half_of(  # three slopes up to a level top that reaches to the fourth side
+    MANSARD,
+    ALONG,
+    name="side_mansard",
+    osm_shape="mansard",
+    colour="#35a866",
+    starts=(
+        *at_quarters("gable", (q0 - 0.4 * q1 * V, q1, 1.0, 0.6), (0, 2)),
+        *at_quarters("flat", (q0, 1.0, 1.0, 0.25)),
+    ),
+)
+CORNER_MANSARD = half_of(  # two adjacent slopes up to a level top that reaches to the other two sides
+    SIDE_MANSARD,
+    ACROSS,
+    name="corner_mansard",
+    osm_shape="mansard",
+    colour="#1e7a46",
+    starts=(DerivedStart("corner", (q0 + q1 * V, q1, q2, 0.5)), *at_quarters("flat", (q0, 1.0, 1.0, 0.15))),
+)
