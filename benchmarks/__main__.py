@@ -1,4 +1,6 @@
-"""Run every benchmark one after the other: `python -m benchmarks [--quick]`; --quick goes to those that know it."""
+"""Run every benchmark one after the other: `python -m benchmarks [--quick]`; --quick goes to those
+that know it.
+"""
 
 import subprocess
 import sys

@@ -2,9 +2,10 @@
 
 usage: python -m benchmarks.align [--each 14] [--density 5] [--first-seed 0]
 
-Simulated houses of five kinds (outlines.py) are scanned without defects of the scene, walls included; their true outline is put
-0.5, 1 and 2 m off in a direction drawn by chance. Printed by distance: the share whose shift is found within 0.1 m, its 95th
-percentile, the share that a run would move, and for no distance at all the share that would be moved wrongly.
+Simulated houses of five kinds (outlines.py) are scanned without defects of the scene, walls
+included; their true outline is put 0.5, 1 and 2 m off in a direction drawn by chance. Printed by
+distance: the share whose shift is found within 0.1 m, its 95th percentile, the share that a run
+would move, and for no distance at all the share that would be moved wrongly.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ WITHIN_M = 0.1
 
 
 def outcomes(density: float, seeds: range) -> dict[float, list[tuple[float, bool]]]:
-    """By distance (m): how far the shift found is from the true one (m), and whether it is clear enough to move the footprint."""
+    """By distance (m): how far the shift found is from the true one (m), and whether it is clear
+    enough to move the footprint.
+    """
     found: dict[float, list[tuple[float, bool]]] = {distance: [] for distance in DISTANCES_M}
     for kind in KINDS:
         for seed in seeds:
@@ -47,7 +50,8 @@ def main() -> None:
     for distance, rows in outcomes(a.density, range(a.first_seed, a.first_seed + a.each)).items():
         error, moved = np.array(rows).T
         print(
-            f"{a.density:g}/m2, {distance:g} m off: {len(rows)} houses, {np.mean(error < WITHIN_M):.1%} within {WITHIN_M:g} m, "
+            f"{a.density:g}/m2, {distance:g} m off: {len(rows)} houses, "
+            f"{np.mean(error < WITHIN_M):.1%} within {WITHIN_M:g} m, "
             f"95th percentile {np.quantile(error, 0.95):.3f} m, {np.mean(moved):.1%} moved"
         )
 

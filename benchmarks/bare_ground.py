@@ -1,14 +1,16 @@
-"""Is bare ground inside footprints found, and are footprints without a building, and are sound buildings left alone?
+"""Is bare ground inside footprints found, and are footprints without a building, and are sound
+buildings left alone?
 
 usage: python -m benchmarks.bare_ground [--parity even|odd] [--count 200] [--densities 2 5 15]
 
-Houses are scanned by simulation over sloping ground. Those with a yard of 10 to 60 m2 that is no hole in the footprint (in
-the middle, at a side, at a corner where a wing was pulled down) should have it cut out; sound ones of many kinds should not:
-glass roofs, passages, canopies, trees, dormers, lost points, footprints half a metre off, low sheds. Footprints over bare
-ground with rubble, bushes and trees should be found to have no building; houses, sheds and carports from 2 m on, green
-roofs, houses on slopes, and decks of garages below ground should not (the last are level with the ground, and are). Each kind
-is printed by density, with the classes of real clouds (3 % of them wrong) and without classes. Constants are chosen on even
-seeds and reported on odd ones.
+Houses are scanned by simulation over sloping ground. Those with a yard of 10 to 60 m2 that is no
+hole in the footprint (in the middle, at a side, at a corner where a wing was pulled down) should
+have it cut out; sound ones of many kinds should not: glass roofs, passages, canopies, trees,
+dormers, lost points, footprints half a metre off, low sheds. Footprints over bare ground with
+rubble, bushes and trees should be found to have no building; houses, sheds and carports from 2 m
+on, green roofs, houses on slopes, and decks of garages below ground should not (the last are level
+with the ground, and are). Each kind is printed by density, with the classes of real clouds (3 % of
+them wrong) and without classes. Constants are chosen on even seeds and reported on odd ones.
 """
 
 from __future__ import annotations
@@ -28,7 +30,15 @@ from hiproof.read.thin import thin_to_grid
 from hiproof.settings import Settings
 from hiproof.simulate.relief import Plane
 from hiproof.simulate.scanner import Scan, ScanSettings, scan_scene
-from hiproof.simulate.scene import SOURCE_GROUND, SOURCE_ROOF, SOURCE_TREE, SOURCE_WALL, Body, Defects, scene_of
+from hiproof.simulate.scene import (
+    SOURCE_GROUND,
+    SOURCE_ROOF,
+    SOURCE_TREE,
+    SOURCE_WALL,
+    Body,
+    Defects,
+    scene_of,
+)
 from hiproof.simulate.shapes import box
 
 AROUND_M = 9.0  # of ground that is scanned around a footprint
@@ -37,7 +47,10 @@ WRONG_CLASS = 0.03  # share of roof and ground points that have another class
 
 @dataclass
 class Site:
-    """A footprint, what stands on it and around it; `true` is the part of the footprint that is built on."""
+    """A footprint, what stands on it and around it;
+
+    `true` is the part of the footprint that is built on.
+    """
 
     footprint: shapely.Polygon
     true: shapely.Geometry
@@ -48,7 +61,9 @@ class Site:
     defects: Defects = field(default_factory=Defects.none)
 
 
-def rectangle_body(rect: tuple[float, float, float, float], eave: float, rise: float, ground: Plane) -> Body:
+def rectangle_body(
+    rect: tuple[float, float, float, float], eave: float, rise: float, ground: Plane
+) -> Body:
     """A house of that plan (xmin, ymin, xmax, ymax): flat, or a gable along its longer side."""
     x0, y0, x1, y1 = rect
     centre, size = np.array([(x0 + x1) / 2, (y0 + y1) / 2]), (x1 - x0, y1 - y0)
@@ -61,7 +76,9 @@ def random_slope(rng: np.random.Generator, steepest: float = 0.06) -> Plane:
     return Plane(*rng.uniform(-steepest, steepest, 2))
 
 
-def house(rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0)) -> tuple[np.ndarray, float, float]:
+def house(
+    rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0)
+) -> tuple[np.ndarray, float, float]:
     """Size (2,), eave and rise of a house."""
     size = np.array([rng.uniform(10.0, 20.0), rng.uniform(9.0, 16.0)])
     return size, rng.uniform(*eave), rng.choice([0.0, rng.uniform(1.0, 3.5)])
@@ -71,14 +88,22 @@ def with_yard(rng: np.random.Generator, place: str) -> Site:
     """A house around a yard of 10 to 60 m2: `place` is court, side or corner."""
     size, eave, rise = house(rng, (2.8, 7.0))
     area, ratio = rng.uniform(10.0, 60.0), rng.uniform(0.6, 1.7)
-    yard = np.minimum([math.sqrt(area * ratio), math.sqrt(area / ratio)], size - (4.5 if place == "court" else 3.0))
+    yard = np.minimum(
+        [math.sqrt(area * ratio), math.sqrt(area / ratio)],
+        size - (4.5 if place == "court" else 3.0),
+    )
     inner = rng.uniform(2.0, np.maximum(size - yard - 2.0, 2.0))
     low = inner * {"court": (1.0, 1.0), "side": (1.0, 0.0), "corner": (0.0, 0.0)}[place]
     (a, b), (c, d), (w, h) = low, low + yard, size
     blocks = [(0, d, w, h), (0, 0, a, d), (c, 0, w, d), (a, 0, c, b)]
     ground = random_slope(rng)
     bodies = [
-        rectangle_body(r, eave + rng.uniform(-0.5, 0.5), rise if min(r[2] - r[0], r[3] - r[1]) > 4 else 0.0, ground)
+        rectangle_body(
+            r,
+            eave + rng.uniform(-0.5, 0.5),
+            rise if min(r[2] - r[0], r[3] - r[1]) > 4 else 0.0,
+            ground,
+        )
         for r in blocks
         if r[2] - r[0] > 0.05 and r[3] - r[1] > 0.05
     ]
@@ -86,14 +111,27 @@ def with_yard(rng: np.random.Generator, place: str) -> Site:
     return Site(footprint, footprint - shapely.box(a, b, c, d), bodies, slope=ground)
 
 
-def plain(rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0), steep: float = 0.06, **more) -> Site:
+def plain(
+    rng: np.random.Generator, eave: tuple[float, float] = (2.8, 9.0), steep: float = 0.06, **more
+) -> Site:
     size, eave_m, rise = house(rng, eave)
     footprint, ground = shapely.box(0, 0, *size), random_slope(rng, steep)
-    return Site(footprint, footprint, [rectangle_body((0, 0, *size), eave_m, rise, ground)], slope=ground, **more)
+    return Site(
+        footprint,
+        footprint,
+        [rectangle_body((0, 0, *size), eave_m, rise, ground)],
+        slope=ground,
+        **more,
+    )
 
 
 def lost_points(rng: np.random.Generator) -> Site:
-    return plain(rng, defects=Defects(0, 0, 0, 0, 0, missing_strip=0.7, partial=0.7, swath_edge=0.3, outliers=0.01))
+    return plain(
+        rng,
+        defects=Defects(
+            0, 0, 0, 0, 0, missing_strip=0.7, partial=0.7, swath_edge=0.3, outliers=0.01
+        ),
+    )
 
 
 def dormers(rng: np.random.Generator) -> Site:
@@ -108,13 +146,17 @@ def dormers(rng: np.random.Generator) -> Site:
 
 
 def sunk(site: Site, area: shapely.Geometry, share: float) -> Site:
-    """The site where of the roof points over `area` a `share` goes through it and meets the ground."""
+    """The site where of the roof points over `area` a `share` goes through it and meets the
+    ground.
+    """
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         inside = shapely.intersects_xy(area, *scan.points[:, :2].T) & (scan.source == SOURCE_ROOF)
         through = inside & (rng.random(len(scan)) < share)
         points, source = scan.points.copy(), scan.source.copy()
-        points[through, 2] = site.slope.height_at(points[through, :2]) + rng.normal(0, 0.03, through.sum())
+        points[through, 2] = site.slope.height_at(points[through, :2]) + rng.normal(
+            0, 0.03, through.sum()
+        )
         source[through] = SOURCE_GROUND
         return Scan(points, scan.label, source)
 
@@ -123,7 +165,9 @@ def sunk(site: Site, area: shapely.Geometry, share: float) -> Site:
 
 
 def glass(rng: np.random.Generator) -> Site:
-    """A glass roof over a court: most of the light goes through, and frames and some panes return."""
+    """A glass roof over a court: most of the light goes through, and frames and some panes
+    return.
+    """
     site = plain(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     size = rng.uniform(3.0, 7.0, 2)
@@ -132,19 +176,27 @@ def glass(rng: np.random.Generator) -> Site:
 
 
 def passage(rng: np.random.Generator) -> Site:
-    """A way through a house, whose ground is seen from aslant for some metres at either end, under the roof."""
+    """A way through a house, whose ground is seen from aslant for some metres at either end, under
+    the roof.
+    """
     site = plain(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     at, width, deep = rng.uniform(x0 + 2, x1 - 5), rng.uniform(2.5, 4.0), rng.uniform(1.0, 2.5)
-    ends = shapely.union(shapely.box(at, y0, at + width, y0 + deep), shapely.box(at, y1 - deep, at + width, y1))
+    ends = shapely.union(
+        shapely.box(at, y0, at + width, y0 + deep), shapely.box(at, y1 - deep, at + width, y1)
+    )
     return with_ground_under(site, ends, rng.uniform(0.3, 0.8))
 
 
 def canopy(rng: np.random.Generator) -> Site:
-    """A roof that reaches over a yard without walls: ground is seen below it along the open side."""
+    """A roof that reaches over a yard without walls: ground is seen below it along the open
+    side.
+    """
     site = plain(rng, (2.3, 4.0))
     x0, y0, x1, _ = site.footprint.bounds
-    return with_ground_under(site, shapely.box(x0, y0, x1, y0 + rng.uniform(1.0, 3.0)), rng.uniform(0.2, 0.7))
+    return with_ground_under(
+        site, shapely.box(x0, y0, x1, y0 + rng.uniform(1.0, 3.0)), rng.uniform(0.2, 0.7)
+    )
 
 
 def with_ground_under(site: Site, area: shapely.Geometry, share: float) -> Site:
@@ -156,24 +208,34 @@ def with_ground_under(site: Site, area: shapely.Geometry, share: float) -> Site:
         xy = seen.points[:, :2] + rng.normal(0, 0.3, (len(seen), 2))
         points = np.column_stack([xy, site.slope.height_at(xy) + rng.normal(0, 0.03, len(xy))])
         source = np.concatenate([scan.source, np.full(len(seen), SOURCE_GROUND, np.int8)])
-        return Scan(np.concatenate([scan.points, points]), np.concatenate([scan.label, seen.label]), source)
+        return Scan(
+            np.concatenate([scan.points, points]), np.concatenate([scan.label, seen.label]), source
+        )
 
     site.change = change
     return site
 
 
-def crowns_around(rng: np.random.Generator, footprint: shapely.Polygon, count: int, inside: bool) -> np.ndarray:
+def crowns_around(
+    rng: np.random.Generator, footprint: shapely.Polygon, count: int, inside: bool
+) -> np.ndarray:
     x0, y0, x1, y1 = footprint.bounds
     rows = []
     for _ in range(count):
-        at = rng.uniform((x0, y0), (x1, y1)) if inside else rng.choice([(x0, y0), (x1, y1), (x0, y1), (x1, y0)])
+        at = (
+            rng.uniform((x0, y0), (x1, y1))
+            if inside
+            else rng.choice([(x0, y0), (x1, y1), (x0, y1), (x1, y0)])
+        )
         radius, half = rng.uniform(1.0, 3.5), rng.uniform(1.0, 4.0)
         rows.append((*(at + rng.normal(0, 1, 2)), rng.uniform(0.5, 4.0) + half, radius, half))
     return np.array(rows).reshape(-1, 5)
 
 
 def under_trees(rng: np.random.Generator) -> Site:
-    """A house whose footprint is too large by up to 1.2 m at a side, with trees over its corners."""
+    """A house whose footprint is too large by up to 1.2 m at a side, with trees over its
+    corners.
+    """
     site = plain(rng)
     x0, y0, x1, y1 = site.footprint.bounds
     wide = shapely.box(x0, y0, x1 + rng.uniform(0.3, 1.2), y1)
@@ -189,7 +251,9 @@ def beside(rng: np.random.Generator) -> Site:
 
 
 def gone(rng: np.random.Generator, steep: float = 0.06) -> Site:
-    """Ground where a house stood, with heaps and bushes on up to half of it, and up to two trees."""
+    """Ground where a house stood, with heaps and bushes on up to half of it, and up to two
+    trees.
+    """
     site = plain(rng, steep=steep)
     x0, y0, x1, y1 = site.footprint.bounds
     bodies = []
@@ -216,14 +280,20 @@ def green(rng: np.random.Generator) -> Site:
 
     def change(rng: np.random.Generator, scan: Scan) -> Scan:
         roof = scan.source == SOURCE_ROOF
-        return Scan(scan.points + np.outer(roof * rng.exponential(0.15, len(scan)), (0, 0, 1)), scan.label, scan.source)
+        return Scan(
+            scan.points + np.outer(roof * rng.exponential(0.15, len(scan)), (0, 0, 1)),
+            scan.label,
+            scan.source,
+        )
 
     site.change = change
     return site
 
 
 def dug_in(rng: np.random.Generator) -> Site:
-    """A house on a slope of up to 35 %, its eaves level: uphill they are 2 m lower above the ground."""
+    """A house on a slope of up to 35 %, its eaves level: uphill they are 2 m lower above the
+    ground.
+    """
     return plain(rng, (3.5, 6.0), 0.35)
 
 
@@ -240,20 +310,43 @@ def block(rng: np.random.Generator) -> Site:
         random_slope(rng),
         rng.uniform(4.0, 9.0),
     )
-    rows = [(0, 0, w, deep), (0, h - deep, w, h), (0, deep, deep, h - deep), (w - deep, deep, w, h - deep)]
+    rows = [
+        (0, 0, w, deep),
+        (0, h - deep, w, h),
+        (0, deep, deep, h - deep),
+        (w - deep, deep, w, h - deep),
+    ]
     footprint = shapely.box(0, 0, w, h)
     bodies = [rectangle_body(one, eave, rng.choice([0.0, 2.0]), ground) for one in rows]
-    return Site(footprint, footprint - shapely.box(deep, deep, w - deep, h - deep), bodies, slope=ground)
+    return Site(
+        footprint, footprint - shapely.box(deep, deep, w - deep, h - deep), bodies, slope=ground
+    )
 
 
-YARDS = {f"yard: {place}": (lambda rng, p=place: with_yard(rng, p)) for place in ("court", "side", "corner")}
+YARDS = {
+    f"yard: {place}": (lambda rng, p=place: with_yard(rng, p))
+    for place in ("court", "side", "corner")
+}
 YARDS["yard of a block"] = block
 SOUND = {
-    "plain": plain, "lost points": lost_points, "dormers": dormers, "glass roof": glass, "passage": passage,
-    "canopy": canopy, "under trees": under_trees, "footprint beside": beside, "green roof": green, "slope": dug_in,
-    "shed 1.8-2.5 m": lambda rng: small(rng, (1.8, 2.5)), "carport": lambda rng: small(rng, (2.0, 2.5), 0.5),
-}  # fmt: skip
-GONE = {"gone": gone, "gone, slope to 25 %": lambda rng: gone(rng, 0.25), "garage deck": garage_deck}
+    "plain": plain,
+    "lost points": lost_points,
+    "dormers": dormers,
+    "glass roof": glass,
+    "passage": passage,
+    "canopy": canopy,
+    "under trees": under_trees,
+    "footprint beside": beside,
+    "green roof": green,
+    "slope": dug_in,
+    "shed 1.8-2.5 m": lambda rng: small(rng, (1.8, 2.5)),
+    "carport": lambda rng: small(rng, (2.0, 2.5), 0.5),
+}
+GONE = {
+    "gone": gone,
+    "gone, slope to 25 %": lambda rng: gone(rng, 0.25),
+    "garage deck": garage_deck,
+}
 
 
 def scanned(site: Site, density: float, rng: np.random.Generator) -> Scan:
@@ -266,7 +359,9 @@ def scanned(site: Site, density: float, rng: np.random.Generator) -> Scan:
 def with_classes(site: Site, scan: Scan, rng: np.random.Generator) -> fit_site.Site:
     """As of a cloud whose roofs, ground and trees have classes, few of them wrong."""
     right = rng.random(len(scan)) >= WRONG_CLASS
-    roof, ground = (scan.points[(scan.source == source) & right] for source in (SOURCE_ROOF, SOURCE_GROUND))
+    roof, ground = (
+        scan.points[(scan.source == source) & right] for source in (SOURCE_ROOF, SOURCE_GROUND)
+    )
     leaves = np.unique(np.floor(scan.points[scan.source == SOURCE_TREE, :2]), axis=0)
     ground = thin_to_grid(ground, 1.0)
     bare = ~(np.floor(ground[:, None, :2]) == leaves[None]).all(axis=2).any(axis=1)
@@ -311,7 +406,9 @@ WAYS = {"with classes": with_classes, "without classes": without_classes, "one c
 
 
 def row(make: Callable, key: int, density: float, seeds: range) -> str:
-    """Of a kind of site by each way: share without a building, share with bare ground cut, error of the area left."""
+    """Of a kind of site by each way: share without a building, share with bare ground cut, error of
+    the area left.
+    """
     found: dict[str, list] = {way: [] for way in WAYS}
     for seed in seeds:
         rng = np.random.default_rng([seed, key, round(10 * density)])
@@ -320,7 +417,11 @@ def row(make: Callable, key: int, density: float, seeds: range) -> str:
         for way, look in WAYS.items():
             seen = look(site, scan, rng)
             is_cut = not seen.is_empty and seen.outline.area < 0.999 * site.footprint.area
-            off = 0.0 if seen.is_empty or site.true.is_empty else abs(seen.outline.area / site.true.area - 1)
+            off = (
+                0.0
+                if seen.is_empty or site.true.is_empty
+                else abs(seen.outline.area / site.true.area - 1)
+            )
             found[way].append((seen.is_empty or seen.remark == "no points", is_cut, off))
     text = []
     for rows in found.values():
@@ -338,7 +439,10 @@ def main() -> None:
     parser.add_argument("--kinds", default="", help="only kinds whose name holds this")
     a = parser.parse_args()
     seeds = range(int(a.parity == "odd"), 2 * a.count, 2)
-    print("% without a building, % with bare ground cut, error of the area left (median, 90th percentile, %)")
+    print(
+        "% without a building, % with bare ground cut, error of the area left (median, 90th "
+        "percentile, %)"
+    )
     print(f"{'kind':20s}  density | {' | '.join(f'{way:21s}' for way in WAYS)}")
     for key, (name, make) in enumerate((YARDS | SOUND | GONE).items()):
         for density in a.densities if a.kinds in name else ():

@@ -62,7 +62,9 @@ from .towns import TOWNS, read_town
 SHARES = (1.0, 0.5, 0.25, 0.125)  # Shares of the points of real clouds.
 TOWN_DENSITIES = (2.0, 8.0)  # points/m2
 MOST_TOLD = 5  # Tracebacks and other findings printed a run.
-OTHER_TOWNS = {name: SHARED / f"data/towns/{name}.city.json" for name in ("vienna", "rotterdam", "delft_5907")}
+OTHER_TOWNS = {
+    name: SHARED / f"data/towns/{name}.city.json" for name in ("vienna", "rotterdam", "delft_5907")
+}
 
 
 @dataclass
@@ -82,7 +84,11 @@ class Findings:
         return not any(self.counts[kind] for kind in MUST_BE_NONE)
 
 
-INTERNAL, INVALID, INVALID_WRITTEN = "internal error", "invalid solid", "invalid solid in a written file"
+INTERNAL, INVALID, INVALID_WRITTEN = (
+    "internal error",
+    "invalid solid",
+    "invalid solid in a written file",
+)
 NOT_ALIKE, ENDED = "not rebuilt alike", "run that ended"
 CHECKED = "solids in files"
 MUST_BE_NONE = (INTERNAL, INVALID, INVALID_WRITTEN, NOT_ALIKE, ENDED)
@@ -190,7 +196,9 @@ def judge_scene(task: tuple[int, int, Path]) -> Findings:
     try:
         found = judge_run(f"seed {seed}", write_scene(seed, count, folder))
         if (folder / "run" / "failures").exists():  # `hiproof repro` runs them again
-            shutil.copytree(folder / "run" / "failures", work / "failures" / f"seed-{seed}", dirs_exist_ok=True)
+            shutil.copytree(
+                folder / "run" / "failures", work / "failures" / f"seed-{seed}", dirs_exist_ok=True
+            )
         return found
     finally:
         shutil.rmtree(folder, ignore_errors=True)
@@ -203,7 +211,9 @@ def judge_real(task: tuple[str, Callable[[], Request]]) -> Findings:
 
 
 def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield runs over every cloud of the data folder, by name; their thinned files are made when called."""
+    """Yield runs over every cloud of the data folder, by name; their thinned files are made when
+    called.
+    """
     french = Settings.from_dict({"read": {"building_classes": [6, 67]}})
     unnamed = Settings.from_dict({"read": {"crs": "EPSG:5490"}})
     sets = (
@@ -219,12 +229,21 @@ def list_real_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], R
             for outlines in dict.fromkeys([footprints and str(data / footprints), None]):
                 told = "with" if outlines else "without"
                 name = f"{folder}, {share:g} of the points, {told} footprints"
-                yield name, partial(thinned_request, data / folder, share, outlines, settings, work / folder)
+                yield (
+                    name,
+                    partial(
+                        thinned_request, data / folder, share, outlines, settings, work / folder
+                    ),
+                )
 
 
-def thinned_request(folder: Path, share: float, footprints: str | None, settings: Settings, work: Path) -> Request:
+def thinned_request(
+    folder: Path, share: float, footprints: str | None, settings: Settings, work: Path
+) -> Request:
     """The run over a share of the points of all files in `folder`."""
-    clouds = [str(thin_file(path, share, work / "thinned")) for path in sorted(folder.glob("*.laz"))]
+    clouds = [
+        str(thin_file(path, share, work / "thinned")) for path in sorted(folder.glob("*.laz"))
+    ]
     out = work / f"{share:g}-{'with' if footprints else 'without'}-footprints"
     return Request(tuple(clouds), out, footprints, settings=settings, restart=True)
 
@@ -242,7 +261,9 @@ def thin_file(path: Path, share: float, folder: Path) -> Path:
 
 
 def list_roof_runs(data: Path, work: Path) -> Iterator[tuple[str, Callable[[], Request]]]:
-    """Yield runs over real roofs without ground and over scanned towns, by name; made when called."""
+    """Yield runs over real roofs without ground and over scanned towns, by name; made when
+    called.
+    """
     if (data / "roofn3d").exists() or (data / "hand_drawn").exists():
         yield "real roofs", partial(roofs_request, data, work / "real-roofs")
     for town, path in (TOWNS | OTHER_TOWNS).items():
@@ -280,7 +301,11 @@ def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
     columns = int(np.ceil(np.sqrt(len(clouds))))
     moved = []
     for number, cloud in enumerate(clouds):
-        place = np.array([*np.multiply(divmod(number, columns), extent), 0.0]) + [100000.0, 450000.0, 10.0]
+        place = np.array([*np.multiply(divmod(number, columns), extent), 0.0]) + [
+            100000.0,
+            450000.0,
+            10.0,
+        ]
         moved.append(cloud - [*cloud[:, :2].min(axis=0), cloud[:, 2].min()] + place)
     points = np.concatenate(moved)
     write_cloud(folder / "cloud.laz", points, np.full(len(points), 6, np.uint8))
@@ -288,11 +313,15 @@ def lay_out(clouds: list[np.ndarray], folder: Path) -> Request:
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--count", type=int, default=20000)
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--processes", type=int, default=1)
-    parser.add_argument("--only", nargs="*", choices=("simulated", "real", "roofs"), help="[default: all]")
+    parser.add_argument(
+        "--only", nargs="*", choices=("simulated", "real", "roofs"), help="[default: all]"
+    )
     parser.add_argument("--work", type=Path)
     parser.add_argument("--data", type=Path, default=SHARED / "data")
     asked = parser.parse_args()
@@ -308,7 +337,11 @@ def main() -> int:
         if "real" in wanted:
             report("real clouds", pool.map(judge_real, list_real_runs(asked.data, work)), total)
         if "roofs" in wanted:
-            report("real roofs and towns", pool.map(judge_real, list_roof_runs(asked.data, work)), total)
+            report(
+                "real roofs and towns",
+                pool.map(judge_real, list_roof_runs(asked.data, work)),
+                total,
+            )
     print_counts("all", total)
     return 0 if total.is_clean else 1
 
@@ -331,7 +364,9 @@ def print_counts(name: str, found: Findings) -> None:
         print(f"  {kind:32} {found.counts[kind]}")
     others = {k: n for k, n in found.counts.items() if k in {s.code for s in Status}}
     print(
-        "  statuses: " + ", ".join(f"{n} {k}" for k, n in sorted(others.items(), key=lambda pair: -pair[1])), flush=True
+        "  statuses: "
+        + ", ".join(f"{n} {k}" for k, n in sorted(others.items(), key=lambda pair: -pair[1])),
+        flush=True,
     )
 
 

@@ -39,7 +39,8 @@ CRS = "EPSG:7415"
 CLASS_OF_SOURCE = {"roof": 6, "wall": 6, "ground": 2, "tree": 5, "clutter": 6}
 UNCLASSIFIED = 1
 DENSITIES = (0.5, 30.0)  # points/m2
-SHARE_OF_BLOCKS, SHARE_OF_COMPOUNDS = 0.06, 0.5  # Shares of the buildings; the others have one roof shape.
+# Shares of the buildings; the others have one roof shape.
+SHARE_OF_BLOCKS, SHARE_OF_COMPOUNDS = 0.06, 0.5
 
 
 @dataclass(frozen=True)
@@ -67,7 +68,11 @@ def draw_settings(rng: np.random.Generator) -> SceneSettings:
     """Draw the settings of a scene."""
     changes: dict[str, dict[str, Any]] = {}
     if rng.random() < 0.1:
-        changes["write"] = {"lods": ["0", "1.2", "1.3", "2.2"], "parts_as": "buildingparts", "citygml": "both"}
+        changes["write"] = {
+            "lods": ["0", "1.2", "1.3", "2.2"],
+            "parts_as": "buildingparts",
+            "citygml": "both",
+        }
     if rng.random() < 0.2:
         changes["compound"] = {"detail": str(rng.choice(("fine", "main")))}
     if rng.random() < 0.1:
@@ -88,7 +93,11 @@ def write_scene(seed: int, count: int, folder: Path) -> Request:
     folder.mkdir(parents=True, exist_ok=True)
     cloud, footprints = folder / "cloud.laz", folder / "footprints.gpkg"
     sources = np.concatenate([building.source for building in buildings])
-    write_cloud(cloud, np.concatenate([b.points for b in buildings]), classify(sources, settings.has_classes))
+    write_cloud(
+        cloud,
+        np.concatenate([b.points for b in buildings]),
+        classify(sources, settings.has_classes),
+    )
     if settings.has_footprints:
         write_footprints(footprints, buildings)
     return Request(
@@ -104,10 +113,16 @@ def place_building(seed: int, number: int, settings: SceneSettings) -> Placed:
     """Draw, scan and damage building `number` of the scene `seed`, whatever its `count`."""
     rng = np.random.default_rng([seed, number])
     row, column = divmod(number - 1, math.isqrt(BUILDINGS_A_SCENE))
-    place = ORIGIN + [column * SPACING_M + rng.uniform(0, 5), row * SPACING_M + rng.uniform(0, 5), rng.uniform(0, 9)]
+    place = ORIGIN + [
+        column * SPACING_M + rng.uniform(0, 5),
+        row * SPACING_M + rng.uniform(0, 5),
+        rng.uniform(0, 9),
+    ]
     building = draw_building(rng, place)
     defects = Defects() if rng.random() < 0.7 else Defects.none()
-    cloud = scan(building, rng, ScanSettings(density=settings.density, defects=defects, margin_m=4.0))
+    cloud = scan(
+        building, rng, ScanSettings(density=settings.density, defects=defects, margin_m=4.0)
+    )
     keep = damage_points(rng, cloud.points, building.footprint, settings.damage)
     footprint = damage_footprint(rng, building.footprint, settings.damage)
     return Placed(f"b{number:03d}", cloud.points[keep], cloud.source[keep], footprint)
@@ -138,11 +153,15 @@ def draw_city_block(rng: np.random.Generator, place: np.ndarray) -> SimBuilding:
             parts.append(make_part(part.type, part.parameters, kappa + turn, translation))
     block = assemble(tuple(parts), "block", place)
     outline = max(shapely.get_parts(block.outline), key=lambda polygon: polygon.area)
-    kept = tuple(part for part in parts if shapely.intersects(part.pieces[0].outline.buffer(-0.5), outline))
+    kept = tuple(
+        part for part in parts if shapely.intersects(part.pieces[0].outline.buffer(-0.5), outline)
+    )
     return block if len(kept) == len(parts) else assemble(kept, "block", place)
 
 
-def damage_points(rng: np.random.Generator, points: np.ndarray, outline: shapely.Geometry, damage: float) -> np.ndarray:
+def damage_points(
+    rng: np.random.Generator, points: np.ndarray, outline: shapely.Geometry, damage: float
+) -> np.ndarray:
     """Choose the indices of points that remain after holes, thinning and repetition."""
     keep = np.arange(len(points))
     for _ in range(int(rng.binomial(3, damage))):
@@ -157,19 +176,27 @@ def damage_points(rng: np.random.Generator, points: np.ndarray, outline: shapely
     return keep
 
 
-def damage_footprint(rng: np.random.Generator, outline: shapely.Polygon, damage: float) -> shapely.Geometry:
+def damage_footprint(
+    rng: np.random.Generator, outline: shapely.Polygon, damage: float
+) -> shapely.Geometry:
     """Jitter, shift, cut, perforate, densify or offset an outline."""
     if rng.random() < damage:
         corners = shapely.get_coordinates(shapely.get_exterior_ring(outline))[:-1]
-        outline = shapely.make_valid(shapely.Polygon(corners + rng.normal(0.0, rng.uniform(0.02, 0.6), corners.shape)))
+        outline = shapely.make_valid(
+            shapely.Polygon(corners + rng.normal(0.0, rng.uniform(0.02, 0.6), corners.shape))
+        )
     if rng.random() < 0.5 * damage:
         shift = rng.normal(0.0, 1.2, 2)
         outline = shapely.transform(outline, lambda xy: xy + shift)
     x, y = rng.uniform(*np.reshape(outline.bounds, (2, 2)))
     if rng.random() < damage:
-        outline = shapely.difference(outline, shapely.box(x, y, x + rng.uniform(1, 20), y + rng.uniform(1, 20)))
+        outline = shapely.difference(
+            outline, shapely.box(x, y, x + rng.uniform(1, 20), y + rng.uniform(1, 20))
+        )
     if rng.random() < 0.5 * damage:
-        outline = shapely.difference(outline, shapely.Point(x, y).buffer(rng.uniform(0.2, 3.0), quad_segs=3))
+        outline = shapely.difference(
+            outline, shapely.Point(x, y).buffer(rng.uniform(0.2, 3.0), quad_segs=3)
+        )
     if rng.random() < 0.3 * damage:
         outline = shapely.segmentize(outline, rng.uniform(0.1, 1.0))
     if rng.random() < 0.3 * damage:

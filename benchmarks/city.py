@@ -1,12 +1,15 @@
-"""A simulated city through the whole program: speed, workers, size, memory, kills, damaged input; prints one table.
+"""A simulated city through the whole program: speed, workers, size, memory, kills, damaged input;
+prints one table.
 
-usage: python -m benchmarks.city [--work FOLDER] [--buildings 300] [--large N] [--kills N] [--kill-buildings 40]
+usage: python -m benchmarks.city [--work FOLDER] [--buildings 300] [--large N] [--kills N]
+[--kill-buildings 40]
                                  [--large-flat N] [--delft ../shared/data/delft]
 
-Cities are made once in the folder and used again. Rates are buildings a CPU second of one core, everything from reading to
-the written files included, in a process that has run once before (imports and compiled code loaded); wall times stand
-beside them, and tell little on a machine that has other work. `--large` adds the run whose cost a building is compared
-with the small one's, `--kills` random kill -9 of the main process and its workers.
+Cities are made once in the folder and used again. Rates are buildings a CPU second of one core,
+everything from reading to the written files included, in a process that has run once before
+(imports and compiled code loaded); wall times stand beside them, and tell little on a machine that
+has other work. `--large` adds the run whose cost a building is compared with the small one's,
+`--kills` random kill -9 of the main process and its workers.
 """
 
 from __future__ import annotations
@@ -39,13 +42,17 @@ from hiproof.simulate import demo_files
 from hiproof.simulate.city import City, write_city
 
 DEFAULTS = Settings()
-FLAT = Settings.from_dict({"fit": {"parts": "one", "types": ["flat"]}, "segment": {"enabled": False}})
+FLAT = Settings.from_dict(
+    {"fit": {"parts": "one", "types": ["flat"]}, "segment": {"enabled": False}}
+)
 RECORDS = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl")
 
 
 @dataclass(frozen=True)
 class Cost:
-    """One run: CPU seconds of the main process and of its workers, wall seconds, peak memory of any process in MB."""
+    """One run: CPU seconds of the main process and of its workers, wall seconds, peak memory of any
+    process in MB.
+    """
 
     buildings: int
     main_s: float
@@ -59,8 +66,10 @@ class Cost:
 
     def line(self) -> str:
         return (
-            f"{self.buildings / self.cpu_s:.1f} buildings/CPU s, {1000 * self.cpu_s / self.buildings:.1f} ms a building "
-            f"(main {self.main_s:.1f} s, workers {self.workers_s:.1f} s, wall {self.wall_s:.1f} s, {self.peak_mb:.0f} MB)"
+            f"{self.buildings / self.cpu_s:.1f} buildings/CPU s, "
+            f"{1000 * self.cpu_s / self.buildings:.1f} ms a building "
+            f"(main {self.main_s:.1f} s, workers {self.workers_s:.1f} s, wall {self.wall_s:.1f} s, "
+            f"{self.peak_mb:.0f} MB)"
         )
 
 
@@ -70,12 +79,19 @@ def city_files(work: Path, buildings: int) -> tuple[list[str], str]:
     if not (folder / "complete").exists():
         shutil.rmtree(folder, ignore_errors=True)
         for tile in write_city(folder, City(buildings)):
-            print(f"  simulated {tile.tile}: {tile.buildings} buildings, {tile.points} points", flush=True)
+            print(
+                f"  simulated {tile.tile}: {tile.buildings} buildings, {tile.points} points",
+                flush=True,
+            )
         (folder / "complete").touch()
-    return sorted(str(path) for path in (folder / "tiles").glob("*.laz")), str(folder / "footprints.gpkg")
+    return sorted(str(path) for path in (folder / "tiles").glob("*.laz")), str(
+        folder / "footprints.gpkg"
+    )
 
 
-def measured(clouds: list[str], footprints: str, out: Path, jobs: int = 1, settings: Settings = DEFAULTS) -> Cost:
+def measured(
+    clouds: list[str], footprints: str, out: Path, jobs: int = 1, settings: Settings = DEFAULTS
+) -> Cost:
     """Cost of a run in a fresh process that has done the demo's neighbourhood before."""
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         return pool.submit(warm_run, clouds, footprints, out, jobs, settings).result()
@@ -84,11 +100,23 @@ def measured(clouds: list[str], footprints: str, out: Path, jobs: int = 1, setti
 def warm_run(clouds: list[str], footprints: str, out: Path, jobs: int, settings: Settings) -> Cost:
     demo = demo_files()
     warm_up = out.with_name("warm-up")
-    reconstruct_area(Request((str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True))
+    reconstruct_area(
+        Request(
+            (str(demo["cloud"]),), warm_up, str(demo["footprints"]), settings=settings, restart=True
+        )
+    )
     before, started = used(), time.perf_counter()
-    summary = reconstruct_area(Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True))
+    summary = reconstruct_area(
+        Request(tuple(clouds), out, footprints, settings=settings, processes=jobs, restart=True)
+    )
     wall, after = time.perf_counter() - started, used()
-    peak = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)) / 1024
+    peak = (
+        max(
+            resource.getrusage(who).ru_maxrss
+            for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
+        )
+        / 1024
+    )
     return Cost(summary.buildings, after[0] - before[0], after[1] - before[1], wall, peak)
 
 
@@ -103,19 +131,37 @@ def outcomes(out: Path, asked: int) -> str:
     rows = read_parameters(out / "parameters.jsonl")
     solids = [solid for _, solid in read_solids(out / "buildings.city.jsonl")]
     valid = sum(not check_solid(solid, planarity_m=0.01) for solid in solids)
-    statuses = ", ".join(f"{sum(r['status'] == s for r in rows)} {s}" for s in sorted({r["status"] for r in rows}))
+    statuses = ", ".join(
+        f"{sum(r['status'] == s for r in rows)} {s}" for s in sorted({r["status"] for r in rows})
+    )
     return f"{valid} of {len(solids)} solids valid; {asked - len(rows)} without outcome; {statuses}"
 
 
-def killed_run(clouds: list[str], footprints: str, out: Path, whole: Path, kills: int, seed: int = 1) -> str:
-    """Runs with two workers, killed at random moments and started again until they end; each is compared with `whole`."""
+def killed_run(
+    clouds: list[str], footprints: str, out: Path, whole: Path, kills: int, seed: int = 1
+) -> str:
+    """Runs with two workers, killed at random moments and started again until they end; each is
+    compared with `whole`.
+    """
     draw, done, of_main, runs, different = random.Random(seed), 0, 0, 0, 0
-    command = [sys.executable, "-m", "hiproof", "reconstruct", *clouds, "--footprints", footprints, "--out", str(out)]
+    command = [
+        sys.executable,
+        "-m",
+        "hiproof",
+        "reconstruct",
+        *clouds,
+        "--footprints",
+        footprints,
+        "--out",
+        str(out),
+    ]
     while done < kills:
         shutil.rmtree(out, ignore_errors=True)
         ended = False
         while not ended:
-            main = subprocess.Popen([*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+            main = subprocess.Popen(
+                [*command, "--jobs", "2"], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+            )
             while done < kills and main.poll() is None:
                 time.sleep(draw.uniform(0.3, 5.0))
                 victim = draw.choice([main.pid, *children(main.pid)])
@@ -124,21 +170,30 @@ def killed_run(clouds: list[str], footprints: str, out: Path, whole: Path, kills
                     done, of_main = done + 1, of_main + (victim == main.pid)
             ended = main.wait() >= 0
         runs += 1
-        different += any((out / name).read_bytes() != (whole / name).read_bytes() for name in RECORDS)
-    return f"{done} kills ({of_main} of the main process) over {runs} runs, all gone on to the end; {different} differ in a byte"
+        different += any(
+            (out / name).read_bytes() != (whole / name).read_bytes() for name in RECORDS
+        )
+    return (
+        f"{done} kills ({of_main} of the main process) over {runs} runs, all gone on to the end; "
+        f"{different} differ in a byte"
+    )
 
 
 def children(pid: int) -> list[int]:
     """Processes started by `pid` that run Python code of ours, from the process table."""
     try:
         text = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="utf-8")
-        return [int(c) for c in text.split() if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()]
+        return [
+            int(c) for c in text.split() if b"spawn_main" in Path(f"/proc/{c}/cmdline").read_bytes()
+        ]
     except OSError:
         return []
 
 
 def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> str:
-    """One tile cut off, 1 % of the polygons self-crossing, 1 % more away from all points; the rest is compared."""
+    """One tile cut off, 1 % of the polygons self-crossing, 1 % more away from all points; the rest
+    is compared.
+    """
     folder, out = work / "damaged", work / "out-damaged"
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
@@ -150,7 +205,10 @@ def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> 
     asked = read_footprints(footprints)
     broken = set(range(0, len(asked), 100))
     shapes = [crossed(f.polygon) if i in broken else f.polygon for i, f in enumerate(asked)]
-    empty = [shapely.box(xmax + 1e4 + 20 * i, ymax, xmax + 1e4 + 20 * i + 10, ymax + 10) for i in range(len(broken))]
+    empty = [
+        shapely.box(xmax + 1e4 + 20 * i, ymax, xmax + 1e4 + 20 * i + 10, ymax + 10)
+        for i in range(len(broken))
+    ]
     ids = [f.id for f in asked] + [f"empty-{i}" for i in range(len(empty))]
     layer = folder / "footprints.gpkg"
     meta = pyogrio.read_info(footprints)
@@ -160,12 +218,16 @@ def damaged_run(clouds: list[str], footprints: str, work: Path, whole: Path) -> 
     )  # fmt: skip
     summary = reconstruct_area(Request((*clouds[:-1], str(cut)), out, str(layer), restart=True))
     rows, before = ({r["id"]: r for r in read_rows(folder)} for folder in (out, whole))
-    unharmed = [f.id for i, f in enumerate(asked) if i not in broken and not lost.intersects(f.polygon)]
+    unharmed = [
+        f.id for i, f in enumerate(asked) if i not in broken and not lost.intersects(f.polygon)
+    ]
     different = sum(rows.get(id) != before[id] for id in unharmed)
     named = [Path(name).name for name, _ in summary.broken_inputs]
     return (
-        f"exit code {summary.exit_code}, named {named}; {len(unharmed)} buildings away from the damage, {different} of them "
-        f"changed; {len(empty)} planted without points, {summary.by_status.get('no_points', 0)} found (with those of the lost tile)"
+        f"exit code {summary.exit_code}, named {named}; {len(unharmed)} buildings away from the "
+        f"damage, {different} of them "
+        f"changed; {len(empty)} planted without points, {summary.by_status.get('no_points', 0)} "
+        "found (with those of the lost tile)"
     )
 
 
@@ -186,10 +248,14 @@ def show(name: str, text: str) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--work", type=Path, default=Path("/tmp/hiproof-city"), help="folder for cities and results")
+    parser.add_argument(
+        "--work", type=Path, default=Path("/tmp/hiproof-city"), help="folder for cities and results"
+    )
     parser.add_argument("--buildings", type=int, default=300)
     parser.add_argument("--large", type=int, default=0, help="buildings of the large city, 0: none")
-    parser.add_argument("--large-flat", type=int, default=0, help="buildings of a city run without fitting, 0: none")
+    parser.add_argument(
+        "--large-flat", type=int, default=0, help="buildings of a city run without fitting, 0: none"
+    )
     parser.add_argument("--kills", type=int, default=0, help="how many random kills")
     parser.add_argument("--kill-buildings", type=int, default=40)
     parser.add_argument("--delft", type=Path, default=Path("../shared/data/delft"))
@@ -208,14 +274,22 @@ def main() -> None:
     show("outcomes", outcomes(out, len(read_footprints(footprints))))
     two = measured(clouds, footprints, args.work / "out-two", jobs=2)
     show("the same, two workers", two.line())
-    same = all((out / name).read_bytes() == (args.work / "out-two" / name).read_bytes() for name in RECORDS)
+    same = all(
+        (out / name).read_bytes() == (args.work / "out-two" / name).read_bytes() for name in RECORDS
+    )
     bound = one.cpu_s / (two.main_s + two.workers_s / 2)
-    show("two workers against one", f"wall {one.wall_s / two.wall_s:.2f}, by CPU time {bound:.2f}; same bytes: {same}")
+    show(
+        "two workers against one",
+        f"wall {one.wall_s / two.wall_s:.2f}, by CPU time {bound:.2f}; same bytes: {same}",
+    )
     show("damaged input", damaged_run(clouds, footprints, args.work, out))
     if args.large:
         large = measured(*city_files(args.work, args.large), args.work / "out-large")
         ratio = large.cpu_s / large.buildings / (one.cpu_s / one.buildings)
-        show(f"{args.large} buildings", f"{large.line()}; cost a building against {args.buildings}: {ratio:.2f}")
+        show(
+            f"{args.large} buildings",
+            f"{large.line()}; cost a building against {args.buildings}: {ratio:.2f}",
+        )
     for buildings in filter(None, (args.buildings, args.large_flat)):
         flat = measured(*city_files(args.work, buildings), args.work / "out-flat", settings=FLAT)
         show(f"{buildings} buildings, all but fitting and recognising", flat.line())

@@ -1,13 +1,16 @@
-"""Clouds without classes: ground and buildings found by shape, against the files' own classes; models of such a cloud.
+"""Clouds without classes: ground and buildings found by shape, against the files' own classes;
+models of such a cloud.
 
-usage: python -m benchmarks.classes [--set delft amsterdam_west ctview stbarth] [--pictures FOLDER] [--quick]
+usage: python -m benchmarks.classes [--set delft amsterdam_west ctview stbarth] [--pictures FOLDER]
+[--quick]
 
-For each set (each of its files that lies alone is taken alone, Delft's two together): precision, recall and F1 by points of
-what is found to be buildings against class 6, and the mean absolute difference in height, over the metre cells that hold
-building points, between the ground found and that of the points of class 2. Delft is told in two halves: thresholds were
-chosen on the western one. Then, unless --quick, Delft and Amsterdam West with footprints and all classes made 1 are reconstructed by
-the command line's default options, from all points, a quarter and an eighth, and measured by roof_residuals.py. `--pictures` draws hits,
-misses and false alarms.
+For each set (each of its files that lies alone is taken alone, Delft's two together): precision,
+recall and F1 by points of what is found to be buildings against class 6, and the mean absolute
+difference in height, over the metre cells that hold building points, between the ground found and
+that of the points of class 2. Delft is told in two halves: thresholds were chosen on the western
+one. Then, unless --quick, Delft and Amsterdam West with footprints and all classes made 1 are
+reconstructed by the command line's default options, from all points, a quarter and an eighth, and
+measured by roof_residuals.py. `--pictures` draws hits, misses and false alarms.
 """
 
 from __future__ import annotations
@@ -35,7 +38,10 @@ SETS = ("delft", "amsterdam_west", "ctview", "stbarth")
 APART = ("amsterdam_west",)
 HALVES_X = 84930.0  # of Delft: thresholds were chosen west of it
 NOISE = 7
-WITH_FOOTPRINTS, SHARES = {"delft": "footprints.gpkg", "amsterdam_west": "footprints_bag.gpkg"}, (1.0, 0.25, 0.125)
+WITH_FOOTPRINTS, SHARES = (
+    {"delft": "footprints.gpkg", "amsterdam_west": "footprints_bag.gpkg"},
+    (1.0, 0.25, 0.125),
+)
 
 
 def clouds_of(name: str) -> list[PointCloud]:
@@ -46,24 +52,35 @@ def clouds_of(name: str) -> list[PointCloud]:
 
 
 def chosen(cloud: PointCloud, keep: np.ndarray) -> PointCloud:
-    return PointCloud(cloud.xyz[keep], cloud.classification[keep], cloud.crs, cloud.sources, cloud.units)
+    return PointCloud(
+        cloud.xyz[keep], cloud.classification[keep], cloud.crs, cloud.sources, cloud.units
+    )
 
 
 def agreement(found: np.ndarray, truth: np.ndarray) -> str:
     """Precision, recall and F1 of points (n,) `found` against the `truth`."""
     hits = (found & truth).sum()
     precision, recall = hits / max(found.sum(), 1), hits / max(truth.sum(), 1)
-    return f"F1 {2 * hits / (found.sum() + truth.sum()):.4f} precision {precision:.4f} recall {recall:.4f}"
+    return (
+        f"F1 {2 * hits / (found.sum() + truth.sum()):.4f} precision {precision:.4f} recall "
+        f"{recall:.4f}"
+    )
 
 
 def ground_differences(cloud: PointCloud) -> np.ndarray:
-    """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold points of class 6."""
+    """Height differences (k,) of the ground found to that of class 2, at the metre cells that hold
+    points of class 6.
+    """
     cells, is_ground = SquareCells(cloud.xyz, 1.0), cloud.classification == GROUND
     count = cells.count(is_ground)
-    total = np.bincount(cells.index[is_ground], cloud.xyz[is_ground, 2], count.size).reshape(count.shape)
+    total = np.bincount(cells.index[is_ground], cloud.xyz[is_ground, 2], count.size).reshape(
+        count.shape
+    )
     mean = np.where(count > 0, total / np.maximum(count, 1), np.nan)
     true = GroundGrid(np.array(cells.first, float), filled(mean), 1.0)
-    under = np.argwhere(cells.count(cloud.classification == BUILDING) > 0) + np.array(cells.first) + 0.5
+    under = (
+        np.argwhere(cells.count(cloud.classification == BUILDING) > 0) + np.array(cells.first) + 0.5
+    )
     return ground_grid(cloud.xyz).height_at(under) - true.height_at(under)
 
 
@@ -74,14 +91,17 @@ def report(name: str, pictures: Path | None) -> None:
     truth = [cloud.classification == BUILDING for cloud in clouds]
     ground = np.concatenate([ground_differences(cloud) for cloud in clouds])
     print(
-        f"{name}: {agreement(np.concatenate(found), np.concatenate(truth))}; {seconds:.1f} s of {sum(map(len, clouds)):,} points"
+        f"{name}: {agreement(np.concatenate(found), np.concatenate(truth))}; {seconds:.1f} s of "
+        f"{sum(map(len, clouds)):,} points"
     )
     if name == "delft":
         west = clouds[0].xyz[:, 0] < HALVES_X
         for half, here in (("west (chosen on)", west), ("east", ~west)):
             print(f"  {half}: {agreement(found[0][here], truth[0][here])}")
     print(
-        f"  terrain under buildings: mean |dz| {np.abs(ground).mean():.3f} m, mean {ground.mean():+.3f} m", flush=True
+        f"  terrain under buildings: mean |dz| {np.abs(ground).mean():.3f} m, mean "
+        f"{ground.mean():+.3f} m",
+        flush=True,
     )
     for number, (cloud, guess, true) in enumerate(zip(clouds, found, truth, strict=True)):
         if pictures:
@@ -89,14 +109,20 @@ def report(name: str, pictures: Path | None) -> None:
 
 
 def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) -> None:
-    """Half-metre cells: grey by height, green where found and true agree, red false alarms, blue misses."""
+    """Half-metre cells: grey by height, green where found and true agree, red false alarms, blue
+    misses.
+    """
     from matplotlib import image
 
     cells = SquareCells(cloud.xyz, 0.5)
-    height = cells.highest(cloud.xyz[:, 2] - ground_grid(cloud.xyz).height_at(cloud.xyz), np.ones(len(cloud), bool))
+    height = cells.highest(
+        cloud.xyz[:, 2] - ground_grid(cloud.xyz).height_at(cloud.xyz), np.ones(len(cloud), bool)
+    )
     shade = 0.25 + 0.5 * np.clip(np.nan_to_num(height, neginf=0.0) / 12, 0, 1)
     picture = np.repeat(shade[..., None], 3, axis=2)
-    both, only, missed = (cells.count(which) for which in (found & truth, found & ~truth, truth & ~found))
+    both, only, missed = (
+        cells.count(which) for which in (found & truth, found & ~truth, truth & ~found)
+    )
     picture[both > 0] *= (0.7, 1.1, 0.7)
     picture[only > both] = (1.0, 0.2, 0.2)
     picture[(missed > both) & (missed > only)] = (0.2, 0.4, 1.0)
@@ -105,15 +131,22 @@ def draw(path: Path, cloud: PointCloud, found: np.ndarray, truth: np.ndarray) ->
 
 
 def models_without_classes(name: str, share: float) -> str:
-    """A town reconstructed from footprints and a `share` of its points, of class 1 alone, by default options."""
+    """A town reconstructed from footprints and a `share` of its points, of class 1 alone, by
+    default options.
+    """
     data = SHARED / "data" / name
     with tempfile.TemporaryDirectory() as folder, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         clouds = [unclassified(file, Path(folder), share) for file in sorted(data.glob("*.laz"))]
         footprints, out = data / WITH_FOOTPRINTS[name], Path(folder) / "out"
         summary = reconstruct_area(Request(tuple(map(str, clouds)), out, str(footprints)))
-        figures = tool("roof_residuals").measure(out / "buildings.city.jsonl", footprints, sorted(data.glob("*.laz")))
-    return f"{name}, {share:g} of the points, classes all 1, footprints: share {figures['share_within_20cm']:.4f}; {summary.by_status}"
+        figures = tool("roof_residuals").measure(
+            out / "buildings.city.jsonl", footprints, sorted(data.glob("*.laz"))
+        )
+    return (
+        f"{name}, {share:g} of the points, classes all 1, footprints: share "
+        f"{figures['share_within_20cm']:.4f}; {summary.by_status}"
+    )
 
 
 def unclassified(file: Path, folder: Path, share: float) -> Path:

@@ -1,7 +1,9 @@
-"""Time of composing and checking one building: `python -m benchmarks.compose_speed` (after one warm-up, process time).
+"""Time of composing and checking one building: `python -m benchmarks.compose_speed` (after one
+warm-up, process time).
 
-Prints, for each kind of generated roof and for a typical compound building (five pieces over a footprint of twelve
-vertices), the median and the largest time of `compose` (its check included) and of `check_solid` alone.
+Prints, for each kind of generated roof and for a typical compound building (five pieces over a
+footprint of twelve vertices), the median and the largest time of `compose` (its check included) and
+of `check_solid` alone.
 """
 
 from __future__ import annotations
@@ -40,13 +42,17 @@ def main() -> None:
     compose(compound(0), 0.0)
     cases = {kind: [generated(kind, seed) for seed in range(ROOFS_A_KIND)] for kind in KINDS}
     cases["compound, 5 pieces"] = [compound(seed) for seed in range(ROOFS_A_KIND)]
-    print(f"{'kind':20} {'faces':>6} {'compose ms, median':>19} {'largest':>8} {'check ms, median':>17}")
+    print(
+        f"{'kind':20} {'faces':>6} {'compose ms, median':>19} {'largest':>8} "
+        f"{'check ms, median':>17}"
+    )
     for kind, roofs in cases.items():
         composed = [timed(lambda made: compose(made, 0.0), made) for made in roofs]
         checked = [timed(check_solid, solid)[0] for _, solid in composed]
         times, faces = [ms for ms, _ in composed], [len(solid.faces) for _, solid in composed]
         print(
-            f"{kind:20} {np.median(faces):6.0f} {np.median(times):19.2f} {max(times):8.2f} {np.median(checked):17.3f}"
+            f"{kind:20} {np.median(faces):6.0f} {np.median(times):19.2f} {max(times):8.2f} "
+            f"{np.median(checked):17.3f}"
         )
 
 

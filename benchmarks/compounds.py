@@ -1,15 +1,21 @@
-"""Compound roofs with known truth: volumes and types found, the surface's error, and honest standard deviations.
+"""Compound roofs with known truth: volumes and types found, the surface's error, and honest
+standard deviations.
 
-usage: python -m benchmarks.compounds [--each 20] [--densities 2 5 10] [--kinds L T ...] [--first-seed 0]
+usage: python -m benchmarks.compounds [--each 20] [--densities 2 5 10] [--kinds L T ...]
+[--first-seed 0]
 
-Simulated buildings (simulate/compounds.py) are scanned without defects of the scene, fitted under their footprint and
-compared with the truth on a 0.2 m raster:
+Simulated buildings (simulate/compounds.py) are scanned without defects of the scene, fitted under
+their footprint and compared with the truth on a 0.2 m raster:
 
-    volumes   share of buildings with the true number of parts, where houses of a row that nothing tells apart may be one
-    types     share with that number, each true part found (matching.py says how) and called by its type
-    RMSE      over the whole roof in m: the median, and the share of buildings under 0.1 m; then the same without the
+    volumes   share of buildings with the true number of parts, where houses of a row that nothing
+              tells apart may be one
+    types     share with that number, each true part found (matching.py says how) and called by its
+              type
+    RMSE      over the whole roof in m: the median, and the share of buildings under 0.1 m; then the
+              same without the
               cells within 0.5 m of a step of the true roof
-    sigmas    root mean square of error over standard deviation, by parameter, over the parts found with their type; in
+    sigmas    root mean square of error over standard deviation, by parameter, over the parts found
+              with their type; in
               brackets the same from the median, which a few blunders do not move
 """
 
@@ -37,7 +43,9 @@ MEDIAN_OF_ABSOLUTE_NORMAL = 0.6745
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one compound: RMSE in m, numbers of parts, and errors over sigma by parameter."""
+    """What became of one compound: RMSE in m, numbers of parts, and errors over sigma by
+    parameter.
+    """
 
     rmse: float
     rmse_away_from_steps: float
@@ -48,7 +56,9 @@ class Outcome:
 
 
 def errors(truth: Roof, fit: BuildingFit) -> tuple[float, float]:
-    """RMSE (m) over the roof's raster, and over it without the surroundings of the true roof's steps."""
+    """RMSE (m) over the roof's raster, and over it without the surroundings of the true roof's
+    steps.
+    """
     x0, y0, x1, y1 = truth.outline.bounds
     x, y = np.meshgrid(np.arange(x0, x1, RASTER_M), np.arange(y0, y1, RASTER_M), indexing="ij")
     xy, shape = np.column_stack([x.ravel(), y.ravel()]), x.shape
@@ -74,7 +84,9 @@ def drawn(kind: str, density: float, seed: int) -> tuple[SimBuilding, np.ndarray
 
 
 def compared(truth: Roof, parts: tuple[Part, ...]) -> tuple[int, bool, list[tuple[str, float]]]:
-    """The true number of parts, whether `parts` are as many, each found with its type, and their errors in sigmas."""
+    """The true number of parts, whether `parts` are as many, each found with its type, and their
+    errors in sigmas.
+    """
     as_built = len(parts) == len(truth.parts)
     true_parts = list(truth.parts) if as_built else told_apart(truth.parts)
     right, ratios = len(parts) == len(true_parts), []
@@ -112,14 +124,20 @@ def sigma_report(found: Iterable[Outcome]) -> str:
     columns = []
     for name, values in sorted(ratios.items()):
         robust = np.median(np.abs(values)) / MEDIAN_OF_ABSOLUTE_NORMAL
-        columns.append(f"{name} {np.sqrt(np.mean(np.square(values))):.2f} ({robust:.2f}; {len(values)})")
-    return "errors over sigma, RMS (robust; count): " + (", ".join(columns) or "no part has standard deviations")
+        columns.append(
+            f"{name} {np.sqrt(np.mean(np.square(values))):.2f} ({robust:.2f}; {len(values)})"
+        )
+    return "errors over sigma, RMS (robust; count): " + (
+        ", ".join(columns) or "no part has standard deviations"
+    )
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=int, default=20, help="buildings a kind and density")
-    parser.add_argument("--densities", type=float, nargs="+", default=[2.0, 5.0, 10.0], help="points a square metre")
+    parser.add_argument(
+        "--densities", type=float, nargs="+", default=[2.0, 5.0, 10.0], help="points a square metre"
+    )
     parser.add_argument("--kinds", nargs="+", choices=COMPOUND_KINDS, default=COMPOUND_KINDS)
     parser.add_argument("--first-seed", type=int, default=0)
     arguments = parser.parse_args()

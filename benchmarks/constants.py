@@ -1,10 +1,12 @@
 """What a named number does: Delft's even footprints with half of it, with it, and with twice of it.
 
-usage: python -m benchmarks.constants hiproof.fit.union.grow.MOST_REGROWN [--shares 1 0.25] [--factors 0.5 1 2]
+usage: python -m benchmarks.constants hiproof.fit.union.grow.MOST_REGROWN [--shares 1 0.25]
+[--factors 0.5 1 2]
 
-The package is copied, the number changed in the copy's text, and `benchmarks.delft --parity even` run on that copy: so numbers that are
-compiled into functions count like all others. What was compiled from the changed file is compiled again, minutes for a
-number of the search. Each row is one of `benchmarks.delft`; a number that changes no row does nothing on Delft.
+The package is copied, the number changed in the copy's text, and `benchmarks.delft --parity even`
+run on that copy: so numbers that are compiled into functions count like all others. What was
+compiled from the changed file is compiled again, minutes for a number of the search. Each row is
+one of `benchmarks.delft`; a number that changes no row does nothing on Delft.
 """
 
 from __future__ import annotations
@@ -32,10 +34,15 @@ def value_of(text: str, name: str) -> ast.Constant:
             both = isinstance(target, ast.Tuple) and isinstance(value, ast.Tuple)
             names, values = (target.elts, value.elts) if both else ([target], [value])
             for one, number in zip(names, values, strict=True):
-                if isinstance(one, ast.Name) and one.id == name and isinstance(number, ast.Constant):
+                if (
+                    isinstance(one, ast.Name)
+                    and one.id == name
+                    and isinstance(number, ast.Constant)
+                ):
                     return number
     sys.exit(
-        f"expected a number that a module names by itself, such as TILE_M = 250.0, got {name}; the page of constants lists them"
+        f"expected a number that a module names by itself, such as TILE_M = 250.0, got {name}; the "
+        "page of constants lists them"
     )
 
 
@@ -46,24 +53,44 @@ def changed(text: str, name: str, factor: float) -> str:
     'A, MOST = 1.5, 4  # of all\\n'
     """
     number = value_of(text, name)
-    new = type(number.value)(round(number.value * factor) if isinstance(number.value, int) else number.value * factor)
+    new = type(number.value)(
+        round(number.value * factor) if isinstance(number.value, int) else number.value * factor
+    )
     lines = text.splitlines(keepends=True)
     line = lines[number.lineno - 1].encode()  # columns are counted in bytes
-    lines[number.lineno - 1] = (line[: number.col_offset] + repr(new).encode() + line[number.end_col_offset :]).decode()
+    lines[number.lineno - 1] = (
+        line[: number.col_offset] + repr(new).encode() + line[number.end_col_offset :]
+    ).decode()
     return "".join(lines)
 
 
 def rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
-    """What `benchmarks.delft` says of a copy of the package in which the number is `factor` times as large."""
+    """What `benchmarks.delft` says of a copy of the package in which the number is `factor` times
+    as large.
+    """
     with tempfile.TemporaryDirectory() as folder:
         copy = Path(folder) / "hiproof"
-        shutil.copytree(PACKAGE, copy)  # what is compiled goes along, and is used where it still holds
+        # what is compiled goes along, and is used where it still holds
+        shutil.copytree(PACKAGE, copy)
         file = copy / module
         file.write_text(changed(file.read_text(encoding="utf-8"), name, factor), encoding="utf-8")
-        command = [sys.executable, "-m", "benchmarks.delft", "--parity", PARITY, "--shares", *shares]
+        command = [
+            sys.executable,
+            "-m",
+            "benchmarks.delft",
+            "--parity",
+            PARITY,
+            "--shares",
+            *shares,
+        ]
         path = os.pathsep.join([folder, *filter(None, [os.environ.get("PYTHONPATH")])])
         done = subprocess.run(
-            command, cwd=ROOT, env={**os.environ, "PYTHONPATH": path}, capture_output=True, text=True, check=False
+            command,
+            cwd=ROOT,
+            env={**os.environ, "PYTHONPATH": path},
+            capture_output=True,
+            text=True,
+            check=False,
         )
         return done.stdout or done.stderr
 
@@ -71,7 +98,9 @@ def rows(module: Path, name: str, factor: float, shares: list[str]) -> str:
 def tell() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("name", help="module and name, such as hiproof.fit.union.grow.MOST_REGROWN")
-    parser.add_argument("--shares", nargs="+", default=["1", "0.25"], help="of the points, as in benchmarks.delft")
+    parser.add_argument(
+        "--shares", nargs="+", default=["1", "0.25"], help="of the points, as in benchmarks.delft"
+    )
     parser.add_argument("--factors", nargs="+", type=float, default=[0.5, 1.0, 2.0])
     arguments = parser.parse_args()
     place, _, name = arguments.name.removeprefix("hiproof.").rpartition(".")
@@ -79,11 +108,15 @@ def tell() -> None:
     module = module if (PACKAGE / module).is_file() else module.with_suffix("") / "__init__.py"
     if not (PACKAGE / module).is_file():
         sys.exit(
-            f"expected a module of hiproof and a name in it, got {arguments.name}; the page of constants lists them"
+            f"expected a module of hiproof and a name in it, got {arguments.name}; the page of "
+            "constants lists them"
         )
     value = value_of((PACKAGE / module).read_text(encoding="utf-8"), name).value
     for factor in arguments.factors:
-        print(f"{name} = {value!r} times {factor:g}:\n{rows(module, name, factor, arguments.shares)}", flush=True)
+        print(
+            f"{name} = {value!r} times {factor:g}:\n{rows(module, name, factor, arguments.shares)}",
+            flush=True,
+        )
 
 
 if __name__ == "__main__":

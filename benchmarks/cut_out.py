@@ -1,11 +1,14 @@
-"""Are roofs that were cut out of a cloud told from scenes with their ground, where no class says so?
+"""Are roofs that were cut out of a cloud told from scenes with their ground, where no class says
+so?
 
 usage: python -m benchmarks.cut_out [--every K]
 
-Buildings of three towns scanned by simulation at 2, 5 and 19 points/m2, as `benchmarks.towns` does: their points with walls, their
-roofs alone, and with 3 m of ground around them. Then the points of Delft's footprints of 25 m2 or more, all of them and a tenth:
-inside, half a metre around, and in boxes 3 m and 8 m around, in which rows of houses are cut off. Printed is how many of each are
-taken for roofs cut out: all but those with 3 m of ground or more should be. `--every` takes each k-th building.
+Buildings of three towns scanned by simulation at 2, 5 and 19 points/m2, as `benchmarks.towns` does:
+their points with walls, their roofs alone, and with 3 m of ground around them. Then the points of
+Delft's footprints of 25 m2 or more, all of them and a tenth: inside, half a metre around, and in
+boxes 3 m and 8 m around, in which rows of houses are cut off. Printed is how many of each are taken
+for roofs cut out: all but those with 3 m of ground or more should be. `--every` takes each k-th
+building.
 """
 
 from __future__ import annotations
@@ -49,7 +52,11 @@ def cut_clouds(building: TrueBuilding, density: float) -> dict[str, np.ndarray]:
 
 def told(clouds: list[np.ndarray]) -> str:
     """How many of the clouds that may be one building are taken for roofs cut out."""
-    found = [is_cut_out(xyz) is not False for xyz in clouds if len(xyz) >= LEAST_POINTS and is_single(xyz[:, :2])]
+    found = [
+        is_cut_out(xyz) is not False
+        for xyz in clouds
+        if len(xyz) >= LEAST_POINTS and is_single(xyz[:, :2])
+    ]
     return f"{sum(found)} of {len(found)}"
 
 
@@ -68,13 +75,20 @@ def main() -> None:
             )
     folder = SHARED / "data/delft"
     xyz = read_points(*sorted(map(str, folder.glob("*.laz")))).xyz
-    footprints = [f.polygon for f in read_footprints(str(folder / "footprints.gpkg")) if f.polygon.area >= LEAST_M2]
+    footprints = [
+        f.polygon
+        for f in read_footprints(str(folder / "footprints.gpkg"))
+        if f.polygon.area >= LEAST_M2
+    ]
     for kept in 1.0, 0.1:
         some = xyz[np.random.default_rng(0).random(len(xyz)) < kept]
         grid = PointGrid(some)
         for kind, around in AROUND.items():
             areas = [around(footprint) for footprint in footprints[::every]]
-            print(f"delft, {kept:g} of the points, {kind}: {told([some[grid.inside(area)] for area in areas])}")
+            print(
+                f"delft, {kept:g} of the points, {kind}: "
+                f"{told([some[grid.inside(area)] for area in areas])}"
+            )
 
 
 if __name__ == "__main__":

@@ -1,17 +1,20 @@
-"""Compound roofs on a real town: solids for every footprint at four densities, measured against all points.
+"""Compound roofs on a real town: solids for every footprint at four densities, measured against all
+points.
 
-usage: python -m benchmarks.delft [--set delft|amsterdam_west|two_epochs] [--shares 1 0.5 0.25 0.125] [--parity even|odd]
+usage: python -m benchmarks.delft [--set delft|amsterdam_west|two_epochs] [--shares 1 0.5 0.25
+0.125] [--parity even|odd]
            [--data DIR] [--tools ../shared/tools]
 
-Fits and composes every footprint of the folder from its `*.laz` (class 6), thinned as `thin_cloud.py` does, writes the
-solids as CityJSONSeq and lets `roof_residuals.py` measure them on the full cloud. `--parity` takes the footprints whose id
-is an even or an odd number: constants are chosen on the even ones of Delft and reported on the odd. Amsterdam West is for
-reporting only.
+Fits and composes every footprint of the folder from its `*.laz` (class 6), thinned as
+`thin_cloud.py` does, writes the solids as CityJSONSeq and lets `roof_residuals.py` measure them on
+the full cloud. `--parity` takes the footprints whose id is an even or an odd number: constants are
+chosen on the even ones of Delft and reported on the odd. Amsterdam West is for reporting only.
 
-Prints one row a density: the measured figures, faces in the mean, parts in the mean, the share of the roof area in plan
-whose part has a type other than "free", milliseconds a building on one core for fitting and for composing, how far
-roofs leave the range of their points, how many solids the check refused, and how many parts are narrower than 1 m (of these,
-how many stand 2 m or more above all they touch); below it the area by type.
+Prints one row a density: the measured figures, faces in the mean, parts in the mean, the share of
+the roof area in plan whose part has a type other than "free", milliseconds a building on one core
+for fitting and for composing, how far roofs leave the range of their points, how many solids the
+check refused, and how many parts are narrower than 1 m (of these, how many stand 2 m or more above
+all they touch); below it the area by type.
 """
 
 from __future__ import annotations
@@ -57,8 +60,12 @@ def thinned(paths: list[Path], share: float) -> np.ndarray:
     return np.concatenate(kept)
 
 
-def model(points: np.ndarray, footprint: Footprint, settings: Settings) -> tuple[Building | None, dict[str, float]]:
-    """One building and its figures: seconds of fitting and composing, faces, metres beyond its points."""
+def model(
+    points: np.ndarray, footprint: Footprint, settings: Settings
+) -> tuple[Building | None, dict[str, float]]:
+    """One building and its figures: seconds of fitting and composing, faces, metres beyond its
+    points.
+    """
     frame = LocalFrame.around(points)
     local, outline = frame.to_local(points), shapely.transform(footprint.polygon, frame.to_local)
     started = time.process_time()
@@ -70,14 +77,23 @@ def model(points: np.ndarray, footprint: Footprint, settings: Settings) -> tuple
         solid = compose(roof, float(local[:, 2].min()) - WALL_M, settings)
     except HiproofError as error:
         print(f"{footprint.id}: {error}")
-        return None, figures | {"compose": time.process_time() - done, "faces": 0, "beyond": 0.0, "bad": 1.0}
+        return None, figures | {
+            "compose": time.process_time() - done,
+            "faces": 0,
+            "beyond": 0.0,
+            "bad": 1.0,
+        }
     figures["compose"] = time.process_time() - done
-    top = np.unique(np.concatenate([np.concatenate(face.rings) for face in solid.of_kind(ROOF)]).astype(int))
+    top = np.unique(
+        np.concatenate([np.concatenate(face.rings) for face in solid.of_kind(ROOF)]).astype(int)
+    )
     z = solid.vertices[top, 2]
     figures["faces"] = len(solid.of_kind(ROOF))
     figures["beyond"] = max(z.max() - local[:, 2].max(), local[:, 2].min() - z.min())
     figures["bad"] = float(len(check_solid(solid)) > 0)
-    return Building(footprint.id, Status.MODELLED, built=Model(roof, solid.moved(frame.origin))), figures
+    return Building(
+        footprint.id, Status.MODELLED, built=Model(roof, solid.moved(frame.origin))
+    ), figures
 
 
 def asked_footprints(path: Path, parity: str | None) -> list[Footprint]:
@@ -90,33 +106,47 @@ def asked_footprints(path: Path, parity: str | None) -> list[Footprint]:
 
 @dataclass(frozen=True)
 class Asked:
-    """The `footprints` of a set, the files of its cloud, and the points (n, 3) of those footprints that have any."""
+    """The `footprints` of a set, the files of its cloud, and the points (n, 3) of those footprints
+    that have any.
+    """
 
     footprints: list[Footprint]
     clouds: list[Path]
     own_points: list[tuple[np.ndarray, Footprint]]
 
 
-def asked_of(name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None) -> Asked:
+def asked_of(
+    name: str, share: float = 1.0, parity: str | None = None, data: Path | None = None
+) -> Asked:
     """The set `name`, its cloud thinned to `share`; `data` is its folder where that is another."""
     data = data or SHARED / "data" / name
     footprints = asked_footprints(data / (SETS | EPOCHS)[name], parity)
     clouds = sorted((data / EPOCH if name in EPOCHS else data).glob("*.laz"))
     cloud = thinned(clouds, share)
     indices = points_of_footprints(cloud, footprints)
-    return Asked(footprints, clouds, [(cloud[i], f) for i, f in zip(indices, footprints, strict=True) if len(i)])
+    return Asked(
+        footprints,
+        clouds,
+        [(cloud[i], f) for i, f in zip(indices, footprints, strict=True) if len(i)],
+    )
 
 
 def models_of(asked: Asked, settings: Settings) -> tuple[list[Building], dict[str, np.ndarray]]:
-    """All buildings that could be composed, and the figures of `model` for every building asked for."""
+    """All buildings that could be composed, and the figures of `model` for every building asked
+    for.
+    """
     model(*asked.own_points[0], settings)  # compiles or loads what is compiled
     outcomes = [model(points, footprint, settings) for points, footprint in asked.own_points]
-    columns = {name: np.array([figures[name] for _, figures in outcomes]) for name in outcomes[0][1]}
+    columns = {
+        name: np.array([figures[name] for _, figures in outcomes]) for name in outcomes[0][1]
+    }
     return [building for building, _ in outcomes if building is not None], columns
 
 
 def measure(buildings: list[Building], asked: Asked, tools: Path = SHARED / "tools") -> dict:
-    """What roof_residuals.py says of the written models within the footprints, on all points of the cloud."""
+    """What roof_residuals.py says of the written models within the footprints, on all points of the
+    cloud.
+    """
     with tempfile.TemporaryDirectory() as folder:
         models, footprints = Path(folder) / "models.city.jsonl", Path(folder) / "asked.gpkg"
         write_cityjson(models, buildings)
@@ -131,13 +161,19 @@ def row(share: float, asked: Asked, tools: Path, settings: Settings) -> str:
     narrow, standing = np.sum([count_narrow_parts(building.roof) for building in buildings], axis=0)
     both, areas = 1e3 * (columns["fit"] + columns["compose"]), area_by_type(buildings)
     return (
-        f"{share:<6g} {len(asked.footprints)} footprints  share {figures['share_within_20cm']:.4f}  modelled {figures['modelled']}"
-        f"  faces median {figures['median_roof_faces']:.0f} ({np.median(columns['faces']):.0f}) mean {columns['faces'].mean():.2f}"
-        f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named {named_share(buildings):.3f}"
-        f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(both):.1f} mean {both.mean():.1f} max {both.max():.0f}"
-        f" (fit {1e3 * np.median(columns['fit']):.1f})  beyond {columns['beyond'].max():.2f}  bad {columns['bad'].sum():.0f}"
+        f"{share:<6g} {len(asked.footprints)} footprints  share {figures['share_within_20cm']:.4f} "
+        f" modelled {figures['modelled']}"
+        f"  faces median {figures['median_roof_faces']:.0f} ({np.median(columns['faces']):.0f}) "
+        f"mean {columns['faces'].mean():.2f}"
+        f"  parts {columns['parts'].mean():.2f} ({columns['parts'].sum()})  named "
+        f"{named_share(buildings):.3f}"
+        f"  rmse {figures['median_rmse_m']:.3f}  ms median {np.median(both):.1f} mean "
+        f"{both.mean():.1f} max {both.max():.0f}"
+        f" (fit {1e3 * np.median(columns['fit']):.1f})  beyond {columns['beyond'].max():.2f}  bad "
+        f"{columns['bad'].sum():.0f}"
         f"  narrow {narrow} (standing {standing})"
-        f"\n       " + ", ".join(f"{name} {area / areas.total():.1%}" for name, area in areas.items())
+        f"\n       "
+        + ", ".join(f"{name} {area / areas.total():.1%}" for name, area in areas.items())
     )
 
 
@@ -147,7 +183,9 @@ def main() -> None:
     parser.add_argument("--data", type=Path, help="folder of the set's files")
     parser.add_argument("--tools", type=Path, default=SHARED / "tools")
     parser.add_argument("--shares", type=float, nargs="+", default=[1.0, 0.5, 0.25, 0.125])
-    parser.add_argument("--parity", choices=("even", "odd"), help="footprints whose id is such a number")
+    parser.add_argument(
+        "--parity", choices=("even", "odd"), help="footprints whose id is such a number"
+    )
     arguments = parser.parse_args()
     for share in arguments.shares:
         asked = asked_of(arguments.set, share, arguments.parity, arguments.data)

@@ -1,11 +1,13 @@
-"""Is it said where points lie on two surfaces, or on a part of a building alone, and of sound buildings not?
+"""Is it said where points lie on two surfaces, or on a part of a building alone, and of sound
+buildings not?
 
 usage: python -m benchmarks.doubts [--parity even|odd] [--share 1] [--density 5]
 
-Delft's footprints of that parity, from a `--share` of their points, and the true roofs of three towns, scanned by simulation, are
-modelled as they are, then with half their points put 0.25, 0.4 and 1 m higher, and without what lies in the eastern half of the
-outline. Printed for each: how many of the buildings of 30 points or more a sentence tells of two surfaces, of a part without
-points, and how far apart the surfaces are said to be in the median.
+Delft's footprints of that parity, from a `--share` of their points, and the true roofs of three
+towns, scanned by simulation, are modelled as they are, then with half their points put 0.25, 0.4
+and 1 m higher, and without what lies in the eastern half of the outline. Printed for each: how many
+of the buildings of 30 points or more a sentence tells of two surfaces, of a part without points,
+and how far apart the surfaces are said to be in the median.
 """
 
 from __future__ import annotations
@@ -25,7 +27,8 @@ from hiproof.settings import Settings
 from .delft import asked_of
 from .towns import TOWNS, read_town
 
-SETTINGS = Settings.from_dict({"reconstruct": {"align": "off"}})  # no footprint is off, and half a roof moves none
+# no footprint is off, and half a roof moves none
+SETTINGS = Settings.from_dict({"reconstruct": {"align": "off"}})
 EACH = {"denhaag": 12}  # of that town's 1,990 buildings one in so many
 
 Case = tuple[str, np.ndarray, shapely.Polygon]
@@ -77,15 +80,22 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--parity", choices=("even", "odd"), default="odd")
     parser.add_argument("--share", type=float, default=1.0, help="of Delft's points")
-    parser.add_argument("--density", type=float, default=5.0, help="points a square metre in the towns")
+    parser.add_argument(
+        "--density", type=float, default=5.0, help="points a square metre in the towns"
+    )
     a = parser.parse_args()
-    delft = [(f.id, points, f.polygon) for points, f in asked_of("delft", a.share, a.parity).own_points]
+    delft = [
+        (f.id, points, f.polygon) for points, f in asked_of("delft", a.share, a.parity).own_points
+    ]
     towns = [
         (building.id, building.scanned(a.density), building.footprint)
         for name, path in TOWNS.items()
         for building in read_town(path)[:: EACH.get(name, 1)]
     ]
-    for name, cases in ((f"Delft {a.parity}, {a.share:g} of the points", delft), (f"towns, {a.density:g}/m2", towns)):
+    for name, cases in (
+        (f"Delft {a.parity}, {a.share:g} of the points", delft),
+        (f"towns, {a.density:g}/m2", towns),
+    ):
         for words, change in CHANGES.items():
             print(f"{name}, {words}: {told(cases, change)}", flush=True)
 

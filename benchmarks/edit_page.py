@@ -1,13 +1,16 @@
-"""The page of `hiproof edit` on Delft: how long an edit takes, and the most doubtful buildings mended through what the page asks.
+"""The page of `hiproof edit` on Delft: how long an edit takes, and the most doubtful buildings
+mended through what the page asks.
 
 usage: python -m benchmarks.edit_page RUN [--buildings 60] [--mend 12] [--rounds 3] [--browser]
 
-RUN is the folder of a finished run whose clouds are still there; edits.jsonl in it is replaced. Prints the median and the 95th percentile
-of an edit (a ridge raised, measured) and of a refit, from the request's bytes to the answer's, and with --browser from the
-key to the model shown in Chromium (needs playwright). Then each of the most doubtful buildings is mended by a script
-that does what a person does, without eyes: other types, cuts, parts left out, edges dragged, dormers and blocks drawn around points
-that crowd above the roof and recesses around those below, each refitted; the first that raises the share of points
-within 0.2 m by a hundredth is kept, else the best, round by round. What comes of it is accepted, and the run done again with it.
+RUN is the folder of a finished run whose clouds are still there; edits.jsonl in it is replaced.
+Prints the median and the 95th percentile of an edit (a ridge raised, measured) and of a refit, from
+the request's bytes to the answer's, and with --browser from the key to the model shown in Chromium
+(needs playwright). Then each of the most doubtful buildings is mended by a script that does what a
+person does, without eyes: other types, cuts, parts left out, edges dragged, dormers and blocks
+drawn around points that crowd above the roof and recesses around those below, each refitted; the
+first that raises the share of points within 0.2 m by a hundredth is kept, else the best, round by
+round. What comes of it is accepted, and the run done again with it.
 """
 
 from __future__ import annotations
@@ -66,7 +69,9 @@ class Window:
         self.service.port = 8000
         self.headers = {"Host": "127.0.0.1:8000", "Content-Type": "application/json"}
 
-    def ask(self, method: str, name: str, body: dict[str, Any] | None = None) -> tuple[int, dict[str, Any]]:
+    def ask(
+        self, method: str, name: str, body: dict[str, Any] | None = None
+    ) -> tuple[int, dict[str, Any]]:
         text = b"" if body is None else json.dumps(body).encode()
         answer = self.service.answer(method, f"/{self.service.token}/{name}", self.headers, text)
         return answer.code, json.loads(answer.body)
@@ -95,8 +100,10 @@ def times(window: Window, ids: list[str]) -> None:
             cpu[name].append(1e3 * (time.process_time() - used))
     for name, taken in wall.items():
         print(
-            f"{name}: median {statistics.median(taken):.0f} ms, 95 % {np.percentile(taken, 95):.0f} ms over {len(taken)} buildings "
-            f"(CPU {statistics.median(cpu[name]):.0f} and {np.percentile(cpu[name], 95):.0f} ms; load {os.getloadavg()[0]:.0f})",
+            f"{name}: median {statistics.median(taken):.0f} ms, 95 % "
+            f"{np.percentile(taken, 95):.0f} ms over {len(taken)} buildings "
+            f"(CPU {statistics.median(cpu[name]):.0f} and {np.percentile(cpu[name], 95):.0f} ms; "
+            f"load {os.getloadavg()[0]:.0f})",
             flush=True,
         )
 
@@ -105,7 +112,12 @@ def in_browser(window: Window, ids: list[str]) -> None:
     """Milliseconds from the key r to the model shown, in Chromium."""
     from playwright.sync_api import sync_playwright
 
-    flags = ["--no-sandbox", "--disable-quic", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+    flags = [
+        "--no-sandbox",
+        "--disable-quic",
+        "--disable-background-networking",
+        "--enable-unsafe-swiftshader",
+    ]
     taken = []
     with Server(window.service) as server, sync_playwright() as driver:
         threading.Thread(target=server.serve_forever, daemon=True).start()
@@ -123,7 +135,8 @@ def in_browser(window: Window, ids: list[str]) -> None:
         server.shutdown()
     window.service.port = 8000
     print(
-        f"refit in the page: median {statistics.median(taken):.0f} ms, 95 % {np.percentile(taken, 95):.0f} ms, {len(taken)} buildings"
+        f"refit in the page: median {statistics.median(taken):.0f} ms, 95 % "
+        f"{np.percentile(taken, 95):.0f} ms, {len(taken)} buildings"
     )
 
 
@@ -134,7 +147,9 @@ def tries(model: dict[str, Any]) -> Iterator[dict[str, Any]]:
         kinds = [kind for kind in TYPES if kind != model["parts"][part]["type"]]
         yield from ({"action": "change", "part": part, "change": {"type": kind}} for kind in kinds)
         for side in ("length", "width"):
-            yield from ({"action": "split", "part": part, "side": side, "share": share} for share in SHARES)
+            yield from (
+                {"action": "split", "part": part, "side": side, "share": share} for share in SHARES
+            )
         if len(areas) > 1:
             yield {"action": "remove", "part": part}
             yield from drags(model, part)
@@ -148,7 +163,11 @@ def drags(model: dict[str, Any], part: int) -> Iterator[dict[str, Any]]:
         for sign in (-1.0, 1.0):
             for drag in (d for d in DRAGS_M if h[side] + d > LEAST_M):
                 x, y = (np.array(h["place"]) + 0.5 * sign * drag * axis).tolist()
-                yield {"action": "change", "part": part, "change": {side: h[side] + drag, "position": [x, y, z]}}
+                yield {
+                    "action": "change",
+                    "part": part,
+                    "change": {side: h[side] + drag, "position": [x, y, z]},
+                }
 
 
 def tried(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -161,13 +180,19 @@ def tried(window: Window, id: str, model: dict[str, Any]) -> Iterator[dict[str, 
 
 
 def refitted(window: Window, id: str, model: dict[str, Any] | None) -> Iterator[dict[str, Any]]:
-    """The model with its heights fitted to the points, itself where they cannot be; nothing of none."""
+    """The model with its heights fitted to the points, itself where they cannot be; nothing of
+    none.
+    """
     if model is not None:
         yield window.change(id, model["parts"], action="refit") or model
 
 
-def crowds(window: Window, id: str, model: dict[str, Any], heights: tuple[float, float]) -> list[np.ndarray]:
-    """The largest crowds of points (n, 3) whose heights over the roof lie within two: what a person sees stand out of it."""
+def crowds(
+    window: Window, id: str, model: dict[str, Any], heights: tuple[float, float]
+) -> list[np.ndarray]:
+    """The largest crowds of points (n, 3) whose heights over the roof lie within two: what a person
+    sees stand out of it.
+    """
     cloud = window.ask("GET", f"points?id={id}")[1]
     places = np.frombuffer(base64.b64decode(cloud["places"]), "<f4").reshape(-1, 3).astype(float)
     gaps = np.frombuffer(base64.b64decode(model["gaps"]), "<f4")
@@ -189,7 +214,9 @@ def crowds(window: Window, id: str, model: dict[str, Any], heights: tuple[float,
 def drawn_around(
     window: Window, id: str, model: dict[str, Any], crowd: np.ndarray, action: str
 ) -> Iterator[dict[str, Any]]:
-    """The models with a dormer, a block or a recess drawn around a crowd, refitted, its edges dragged while that helps."""
+    """The models with a dormer, a block or a recess drawn around a crowd, refitted, its edges
+    dragged while that helps.
+    """
     middle = crowd.mean(axis=0)
     for part in owners_of(model, middle)[:PARTS]:
         made = window.change(id, model["parts"], action=action, part=part, place=middle.tolist())
@@ -229,7 +256,9 @@ def owners_of(model: dict[str, Any], place: np.ndarray) -> list[int]:
     return [
         index
         for index, h in enumerate(model["handles"])
-        if h and np.hypot(h["place"][0] - place[0], h["place"][1] - place[1]) < 0.5 * max(h["width"], h["length"])
+        if h
+        and np.hypot(h["place"][0] - place[0], h["place"][1] - place[1])
+        < 0.5 * max(h["width"], h["length"])
     ]
 
 
@@ -260,7 +289,9 @@ def mended(window: Window, id: str, rounds: int) -> tuple[float, float, int, int
         best = better
     note = f"share {share_of(first):.3f} to {share_of(best):.3f}"
     code, answer = window.ask(
-        "POST", "accept", {"id": id, "parts": best["parts"], "version": start["version"], "note": note}
+        "POST",
+        "accept",
+        {"id": id, "parts": best["parts"], "version": start["version"], "note": note},
     )
     assert code == 200, answer
     return share_of(first), share_of(best), len(start["parts"]), len(best["parts"])
@@ -283,7 +314,9 @@ def run_again(folder: Path) -> None:
 
 def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
     """The most doubtful buildings, mended one after the other; then the run done again."""
-    ids = [row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None][:count]
+    ids = [
+        row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
+    ][:count]
     before = {row["id"]: row for row in read_parameters(folder / "parameters.jsonl")}
     for id in ids:
         start = time.perf_counter()
@@ -298,7 +331,8 @@ def mend(window: Window, folder: Path, count: int, rounds: int) -> None:
     others = [id for id in before if id not in ids]
     same = sum(after[id] == before[id] for id in others)
     print(
-        f"after the next run: share up of {up} of {len(ids)}, {valid} valid, {same} of {len(others)} others unchanged"
+        f"after the next run: share up of {up} of {len(ids)}, {valid} valid, {same} of "
+        f"{len(others)} others unchanged"
     )
 
 
@@ -307,7 +341,9 @@ def share_in(record: dict[str, Any]) -> float:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("run", type=Path)
     parser.add_argument("--buildings", type=int, default=60)
     parser.add_argument("--mend", type=int, default=12)
@@ -316,7 +352,9 @@ def main() -> None:
     asked = parser.parse_args()
     (asked.run / FILE).unlink(missing_ok=True)
     window = Window(asked.run)
-    rows = [row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None]
+    rows = [
+        row["id"] for row in window.ask("GET", "buildings")[1]["rows"] if row["share"] is not None
+    ]
     ids = rows[:: max(1, len(rows) // asked.buildings)][: asked.buildings]
     times(window, ids)
     if asked.browser:

@@ -1,5 +1,5 @@
-"""Random edits of generated buildings, by their parameters and by what the page's buttons do: each becomes a valid solid or one
-sentence. And: how long an edit takes.
+"""Random edits of generated buildings, by their parameters and by what the page's buttons do: each
+becomes a valid solid or one sentence. And: how long an edit takes.
 
 python -m benchmarks edits [EDITS] [BUILDINGS]
 """
@@ -46,7 +46,11 @@ def random_press(rng: np.random.Generator, building: Building) -> dict[str, Any]
     x0, y0, x1, y1 = building.roof.outline.bounds
     place = [rng.uniform(x0 - 1.0, x1 + 1.0), rng.uniform(y0 - 1.0, y1 + 1.0), 0.0]
     asked: list[dict[str, Any]] = [
-        {"action": "split", "side": str(rng.choice(["length", "width"])), "share": rng.uniform(-0.1, 1.1)},
+        {
+            "action": "split",
+            "side": str(rng.choice(["length", "width"])),
+            "share": rng.uniform(-0.1, 1.1),
+        },
         {"action": "merge", "other": other},
         {"action": "dormer", "place": place if rng.random() < 0.9 else None},
         {"action": "recess", "place": place if rng.random() < 0.9 else None},
@@ -58,13 +62,20 @@ def one_edit(rng: np.random.Generator, house: Building) -> tuple[str, Callable[[
     """A random edit's kind, and what does it."""
     if rng.random() < PRESSED:
         asked = random_press(rng, house)
-        return asked["action"], lambda: edited(building_record(house), asked, np.zeros((0, 3)), Settings(), False)
+        return asked["action"], lambda: edited(
+            building_record(house), asked, np.zeros((0, 3)), Settings(), False
+        )
     kind, index, change = random_edit(rng, house)
-    return kind, lambda: house.without_part(index) if kind == "remove" else house.with_part(index, **change)
+    return (
+        kind,
+        lambda: house.without_part(index) if kind == "remove" else house.with_part(index, **change),
+    )
 
 
 def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, Counter]:
-    """Each building is edited again and again, an edit standing on those before it that made a building."""
+    """Each building is edited again and again, an edit standing on those before it that made a
+    building.
+    """
     rng, houses = np.random.default_rng(seed), generated(buildings)
     outcomes = {kind: Counter() for kind in (*KINDS, *PRESSES)}
     sentences: Counter = Counter()
@@ -86,7 +97,9 @@ def main(edits: int = 10_000, buildings: int = 500, seed: int = 0) -> dict[str, 
         seconds.append(time.perf_counter() - start)
     for kind, counts in outcomes.items():
         print(f"{kind}: " + ", ".join(f"{number} {what}" for what, number in counts.most_common()))
-    print(f"{edits} edits of {buildings} buildings, {1e3 * np.median(seconds):.1f} ms in the median")
+    print(
+        f"{edits} edits of {buildings} buildings, {1e3 * np.median(seconds):.1f} ms in the median"
+    )
     for sentence, number in sentences.most_common(8):
         print(f"  {number} {sentence} ...")
     return outcomes

@@ -1,4 +1,5 @@
-"""CPU time of fitting one roof, all types tried, after warm-up, and the ratio to the paper's objective on the same roofs.
+"""CPU time of fitting one roof, all types tried, after warm-up, and the ratio to the paper's
+objective on the same roofs.
 
 python -m benchmarks.fit_speed [--quick]
 """
@@ -24,20 +25,38 @@ POINTS = 310
 
 def main() -> None:
     """Print the median and mean CPU milliseconds a roof for both objectives, and their ratio."""
-    parser = argparse.ArgumentParser(description="CPU time of fit_roof on simulated roofs of about 300 points")
-    parser.add_argument("--quick", action="store_true", help="one repetition, the paper's objective on two roofs")
+    parser = argparse.ArgumentParser(
+        description="CPU time of fit_roof on simulated roofs of about 300 points"
+    )
+    parser.add_argument(
+        "--quick", action="store_true", help="one repetition, the paper's objective on two roofs"
+    )
     quick = parser.parse_args().quick
     rng = np.random.default_rng(22)
-    clouds = [scan(random_roof(name, rng), DENSITY, rng, outlier_share=0.03) for name in CATALOGUE for _ in range(2)]
+    clouds = [
+        scan(random_roof(name, rng), DENSITY, rng, outlier_share=0.03)
+        for name in CATALOGUE
+        for _ in range(2)
+    ]
     clouds = [rng.permutation(cloud)[:POINTS] for cloud in clouds]
     fit_roof(clouds[0])
     repetitions = 1 if quick else 7
-    ours = np.median([[cpu_ms(cloud, "likelihood") for cloud in clouds] for _ in range(repetitions)], axis=0)
-    print(f"likelihood: median {np.median(ours):.2f}, mean {ours.mean():.2f} ms a roof of {POINTS} points, all types")
+    ours = np.median(
+        [[cpu_ms(cloud, "likelihood") for cloud in clouds] for _ in range(repetitions)], axis=0
+    )
+    print(
+        f"likelihood: median {np.median(ours):.2f}, mean {ours.mean():.2f} ms a roof of {POINTS} "
+        "points, all types"
+    )
     asked = slice(0, len(clouds), 10 if quick else 4)
-    fit_roof(clouds[0], settings=Settings.from_dict({"fit": {"types": ["flat"], "objective": "paper"}}))
+    fit_roof(
+        clouds[0], settings=Settings.from_dict({"fit": {"types": ["flat"], "objective": "paper"}})
+    )
     papers = np.array([cpu_ms(cloud, "paper") for cloud in clouds[asked]])
-    print(f"paper:      median {np.median(papers):.0f}, mean {papers.mean():.0f} ms on {len(papers)} of these roofs")
+    print(
+        f"paper:      median {np.median(papers):.0f}, mean {papers.mean():.0f} ms on {len(papers)} "
+        "of these roofs"
+    )
     print(f"ratio of the means on the same roofs: {papers.mean() / ours[asked].mean():.0f}")
 
 

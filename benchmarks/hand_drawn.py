@@ -3,10 +3,10 @@
 usage: python -m benchmarks.hand_drawn [--mode points|footprints|both] [--parity even|odd]
            [--worst N]
 
-Reconstructs the 23 clouds of ../shared/data/hand_drawn from points only and under the outline of the
-drawn roof, and compares them by the rule of ../shared/tools/hand_drawn.py: an edge is right within a
-tenth of the cloud's radius. `--parity` takes the roofs with an even or an odd number: choose by the
-even ones, report the odd ones.
+Reconstructs the 23 clouds of ../shared/data/hand_drawn from points only and under the outline of
+the drawn roof, and compares them by the rule of ../shared/tools/hand_drawn.py: an edge is right
+within a tenth of the cloud's radius. `--parity` takes the roofs with an even or an odd number:
+choose by the even ones, report the odd ones.
 """
 
 from __future__ import annotations
@@ -28,7 +28,9 @@ MODES = {"points": "points only", "footprints": "with footprints"}
 SHORT_M = 1.0
 
 
-def scores_of(judge: ModuleType, with_footprint: bool, parity: str | None) -> tuple[list[Score], list[int]]:
+def scores_of(
+    judge: ModuleType, with_footprint: bool, parity: str | None
+) -> tuple[list[Score], list[int]]:
     """Return the score of every roof, and the numbers of short edges and of right ones among them.
 
     `parity` takes roofs with an even or an odd number. A short edge has less than a metre.
@@ -50,9 +52,15 @@ def scores_of(judge: ModuleType, with_footprint: bool, parity: str | None) -> tu
 
 
 def compared(
-    judge: ModuleType, building: Building, points: np.ndarray, true_corners: np.ndarray, true_edges: np.ndarray
+    judge: ModuleType,
+    building: Building,
+    points: np.ndarray,
+    true_corners: np.ndarray,
+    true_edges: np.ndarray,
 ) -> tuple[WireframeCounts, tuple[int, int]]:
-    """Return a building's counts against the drawn roof, and the numbers of short edges and right ones."""
+    """Return a building's counts against the drawn roof, and the numbers of short edges and right
+    ones.
+    """
     corners, edges = judge.model_wireframe(building)
     near = judge.judge.NEAR * np.linalg.norm(points - points.mean(axis=0), axis=1).max()
     right, right_corners, found = judge.matched(corners, edges, true_corners, true_edges, near)
@@ -66,7 +74,9 @@ def compared(
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--mode", choices=(*MODES, "both"), default="both")
-    parser.add_argument("--parity", choices=("even", "odd"), help="take the roofs with such a number")
+    parser.add_argument(
+        "--parity", choices=("even", "odd"), help="take the roofs with such a number"
+    )
     parser.add_argument("--worst", type=int, default=0, help="name the roofs with the worst edges")
     arguments = parser.parse_args()
     judge = tool("hand_drawn")

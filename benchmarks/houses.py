@@ -1,12 +1,16 @@
-"""Houses that touch, told apart without footprints: how many of the walls between them are found, and how many that are none.
+"""Houses that touch, told apart without footprints: how many of the walls between them are found,
+and how many that are none.
 
-usage: python -m benchmarks.houses [--each 20] [--density 5] [--first-seed 0] [--real delft amsterdam_west stbarth]
+usage: python -m benchmarks.houses [--each 20] [--density 5] [--first-seed 0] [--real delft
+amsterdam_west stbarth]
 
-Simulated rows (simulate/compounds.py) are scanned without defects of the scene, walls included. A wall between two houses shows
-where the roofs on either side differ by a quarter of a metre or more over most of it; it is found where most points within
-two metres of it lie in an area of their own side's. Of houses of one family (plain, L, T, U, cross, hips, dormers, extensions) it is
-printed how many were cut. Of real sets: of pairs of footprints of 30 m2 or more that share two metres of border, how many were
-told apart, and how many footprints were cut, a tenth of their points or more lying apart from the rest.
+Simulated rows (simulate/compounds.py) are scanned without defects of the scene, walls included. A
+wall between two houses shows where the roofs on either side differ by a quarter of a metre or more
+over most of it; it is found where most points within two metres of it lie in an area of their own
+side's. Of houses of one family (plain, L, T, U, cross, hips, dormers, extensions) it is printed how
+many were cut. Of real sets: of pairs of footprints of 30 m2 or more that share two metres of
+border, how many were told apart, and how many footprints were cut, a tenth of their points or more
+lying apart from the rest.
 """
 
 from __future__ import annotations
@@ -21,7 +25,14 @@ from hiproof import read_points
 from hiproof.classify.houses import told_apart
 from hiproof.classify.split import split_buildings
 from hiproof.read import read_footprints
-from hiproof.simulate import Defects, ScanSettings, SimBuilding, random_building, random_compound, scan
+from hiproof.simulate import (
+    Defects,
+    ScanSettings,
+    SimBuilding,
+    random_building,
+    random_compound,
+    scan,
+)
 
 from .delft import SETS
 from .judging import SHARED
@@ -48,18 +59,26 @@ def shows(one: shapely.Polygon, other: shapely.Polygon, row: SimBuilding) -> boo
     """Whether the roofs of neighbours in a `row` differ along most of the wall between them."""
     parts = [next(p for p in row.roof.parts if p.pieces[0].outline.equals(o)) for o in (one, other)]
     wall = shapely.intersection(shapely.buffer(one, 0.01), shapely.buffer(other, 0.01))
-    xy = shapely.get_coordinates(shapely.line_interpolate_point(wall.exterior, np.linspace(0, 1, 60), normalized=True))
-    return bool(np.median(np.abs(np.subtract(*(part.pieces[0].height_at(xy) for part in parts)))) > SHOWS_M)
+    xy = shapely.get_coordinates(
+        shapely.line_interpolate_point(wall.exterior, np.linspace(0, 1, 60), normalized=True)
+    )
+    return bool(
+        np.median(np.abs(np.subtract(*(part.pieces[0].height_at(xy) for part in parts)))) > SHOWS_M
+    )
 
 
-def is_apart(one: shapely.Polygon, other: shapely.Polygon, areas: list[shapely.Geometry], points: np.ndarray) -> bool:
+def is_apart(
+    one: shapely.Polygon, other: shapely.Polygon, areas: list[shapely.Geometry], points: np.ndarray
+) -> bool:
     """Whether most points beside the border of two outlines lie in areas of their own side."""
     border = shapely.intersection(shapely.buffer(one, 0.3), shapely.buffer(other, 0.3))
     xy = points[shapely.dwithin(border, shapely.points(points[:, :2]), NEAR_M), :2]
     sides = [xy[shapely.contains_xy(outline, *xy.T)] for outline in (one, other)]
     if not all(map(len, sides)):
         return False
-    shares = np.array([[shapely.intersects_xy(area, *side.T).mean() for area in areas] for side in sides])
+    shares = np.array(
+        [[shapely.intersects_xy(area, *side.T).mean() for area in areas] for side in sides]
+    )
     best = shares.argmax(axis=1)
     return bool(best[0] != best[1] and shares.max(axis=1).min() > APART)
 
@@ -83,8 +102,12 @@ def report_simulated(density: float, seeds: range) -> None:
     cut = {}
     for kind in FAMILIES:
         rngs = [np.random.default_rng([seed, 1001]) for seed in seeds]
-        houses = [random_building(rng) if kind == "plain" else random_compound(rng, kind) for rng in rngs]
-        cut[kind] = sum(len(areas_of(scanned(h, rng, density))) > 1 for h, rng in zip(houses, rngs, strict=True))
+        houses = [
+            random_building(rng) if kind == "plain" else random_compound(rng, kind) for rng in rngs
+        ]
+        cut[kind] = sum(
+            len(areas_of(scanned(h, rng, density))) > 1 for h, rng in zip(houses, rngs, strict=True)
+        )
     of = len(seeds) * len(FAMILIES)
     print(f"{density:g}/m2 single houses cut: {sum(cut.values())} of {of}  {cut}", flush=True)
 
@@ -92,7 +115,9 @@ def report_simulated(density: float, seeds: range) -> None:
 def report_real(name: str) -> None:
     folder = SHARED / "data" / name
     files = sorted(folder.glob("*.laz"))
-    clouds = [read_points(file) for file in files] if name == "amsterdam_west" else [read_points(*files)]
+    clouds = (
+        [read_points(file) for file in files] if name == "amsterdam_west" else [read_points(*files)]
+    )
     found = []
     for cloud in clouds:
         found += [(b.area, cloud.xyz[b.index]) for b in split_buildings(cloud)]
@@ -100,10 +125,13 @@ def report_real(name: str) -> None:
     if name not in SETS:
         return
     areas, points = [area for area, _ in found], np.concatenate([xyz for _, xyz in found])
-    outlines = [f.polygon for f in read_footprints(folder / SETS[name]) if f.polygon.area >= LEAST_M2]
+    outlines = [
+        f.polygon for f in read_footprints(folder / SETS[name]) if f.polygon.area >= LEAST_M2
+    ]
     inside = [points[shapely.contains_xy(o, *points[:, :2].T), :2] for o in outlines]
     outlines, inside = zip(
-        *[(o, xy) for o, xy in zip(outlines, inside, strict=True) if len(xy) > 2 * o.area], strict=True
+        *[(o, xy) for o, xy in zip(outlines, inside, strict=True) if len(xy) > 2 * o.area],
+        strict=True,
     )
     cut = sum(max(shapely.intersects_xy(a, *xy.T).mean() for a in areas) < 1 - CUT for xy in inside)
     pairs = [
@@ -114,7 +142,8 @@ def report_real(name: str) -> None:
     ]
     apart = sum(is_apart(one, other, areas, points) for one, other in pairs)
     print(
-        f"  {apart} of {len(pairs)} pairs of touching footprints told apart; {cut} of {len(outlines)} footprints cut",
+        f"  {apart} of {len(pairs)} pairs of touching footprints told apart; {cut} of "
+        f"{len(outlines)} footprints cut",
         flush=True,
     )
 

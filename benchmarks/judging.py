@@ -1,4 +1,6 @@
-"""What several benchmarks share: one door to the fit of a building, the judges in ../shared/tools, figures of parts."""
+"""What several benchmarks share: one door to the fit of a building, the judges in ../shared/tools,
+figures of parts.
+"""
 
 from __future__ import annotations
 
@@ -19,10 +21,13 @@ from hiproof.settings import Settings
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared"
 RASTER_M = 0.2
-NARROW_M, STANDING_M = 1.0, 2.0  # m: nobody draws a part that is narrower; a step by which one stands out
+# m: nobody draws a part that is narrower; a step by which one stands out
+NARROW_M, STANDING_M = 1.0, 2.0
 
 
-def fitted(points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None) -> BuildingFit:
+def fitted(
+    points_local: np.ndarray, outline: shapely.Polygon | None, settings: Settings | None = None
+) -> BuildingFit:
     """The roof of one building: the only place where benchmarks name the search they measure."""
     return fit_building(points_local, outline, settings or Settings())
 
@@ -38,7 +43,9 @@ def tool(name: str, tools: Path = SHARED / "tools") -> ModuleType:
 
 
 def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
-    """Plan points (n, 2) inside `outline` on a square grid; one point within it where the grid has none."""
+    """Plan points (n, 2) inside `outline` on a square grid; one point within it where the grid has
+    none.
+    """
     x0, y0, x1, y1 = outline.bounds
     axes = (np.arange(low + 0.5 * step_m, high, step_m) for low, high in ((x0, x1), (y0, y1)))
     xy = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -47,14 +54,17 @@ def raster(outline: shapely.Polygon, step_m: float = RASTER_M) -> np.ndarray:
 
 
 def visible_areas(roof: Roof) -> np.ndarray:
-    """Plan area (m2) where each part is the highest: what is hidden under another does not count."""
+    """Plan area (m2) where each part is the highest: what is hidden under another does not
+    count.
+    """
     xy = raster(roof.outline)
     top = np.argmax([part.height_at(xy) for part in roof.parts], axis=0)
     return roof.outline.area * np.bincount(top, minlength=len(roof.parts)) / len(top)
 
 
 def count_narrow_parts(roof: Roof) -> tuple[int, int]:
-    """Count the parts narrower than NARROW_M, and those of them that stand STANDING_M or more above all they touch.
+    """Count the parts narrower than NARROW_M, and those of them that stand STANDING_M or more above
+    all they touch.
 
     A part's width is that of the smallest rectangle around its outlines within the roof's.
     """
@@ -64,13 +74,22 @@ def count_narrow_parts(roof: Roof) -> tuple[int, int]:
     beside = cKDTree(xy)
     narrow = standing = 0
     for number, part in enumerate(roof.parts):
-        outline = shapely.union_all([piece.outline for piece in part.pieces]).intersection(roof.outline)
-        sides = np.hypot(*np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(outline)), axis=0).T)
+        outline = shapely.union_all([piece.outline for piece in part.pieces]).intersection(
+            roof.outline
+        )
+        sides = np.hypot(
+            *np.diff(shapely.get_coordinates(shapely.minimum_rotated_rectangle(outline)), axis=0).T
+        )
         if len(sides) < 4 or sides.min() >= NARROW_M:
             continue
         narrow += 1
         own = np.flatnonzero(top == number)
-        around = {i for near in beside.query_ball_point(xy[own], 2.1 * RASTER_M) for i in near if top[i] != number}
+        around = {
+            i
+            for near in beside.query_ball_point(xy[own], 2.1 * RASTER_M)
+            for i in near
+            if top[i] != number
+        }
         standing += bool(around) and z[own].min() > z[list(around)].max() + STANDING_M
     return narrow, standing
 

@@ -1,7 +1,9 @@
-"""Which fitted part stands for which true one, whether its type is right, and how large its errors are in sigmas.
+"""Which fitted part stands for which true one, whether its type is right, and how large its errors
+are in sigmas.
 
-Parts are compared by what shows of them: the part on top at points of the plan, in the truth and in the fit. A true part
-is found where a fitted one, each of them taken once, has at least half of the points that either of the two has.
+Parts are compared by what shows of them: the part on top at points of the plan, in the truth and in
+the fit. A true part is found where a fitted one, each of them taken once, has at least half of the
+points that either of the two has.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ ALONG = ("length", "ridge_length", "t_x", "t_y")
 
 
 def told_apart(parts: Sequence[Part]) -> list[Part]:
-    """`parts` where neighbours that nothing tells apart, such as a row's houses under one ridge, are one.
+    """`parts` where neighbours that nothing tells apart, such as a row's houses under one ridge,
+    are one.
 
     A united part keeps the parameters its members share; its place along the row is NaN.
     """
@@ -37,25 +40,37 @@ def told_apart(parts: Sequence[Part]) -> list[Part]:
 
 def one_of(a: Part, b: Part) -> Part | None:
     """Two parts of the same planes side by side as one; None where they differ or lie otherwise."""
-    if a.type != b.type or len(a.pieces) > 1 or a.pieces[0].planes.shape != b.pieces[0].planes.shape:
+    if (
+        a.type != b.type
+        or len(a.pieces) > 1
+        or a.pieces[0].planes.shape != b.pieces[0].planes.shape
+    ):
         return None
     outline = a.pieces[0].outline.union(b.pieces[0].outline.buffer(SAME, join_style="mitre"))
     rectangle = outline.minimum_rotated_rectangle
-    if rectangle.area - a.area - b.area > 1e-3 or not np.allclose(a.pieces[0].planes, b.pieces[0].planes, atol=SAME):
+    if rectangle.area - a.area - b.area > 1e-3 or not np.allclose(
+        a.pieces[0].planes, b.pieces[0].planes, atol=SAME
+    ):
         return None
     sides = np.hypot(*np.diff(shapely.get_coordinates(rectangle)[:3], axis=0).T)
     shared = {
-        name: value for name, value in a.parameters.items() if abs(value - b.parameters.get(name, math.inf)) < SAME
+        name: value
+        for name, value in a.parameters.items()
+        if abs(value - b.parameters.get(name, math.inf)) < SAME
     }
     for side in ("length", "width"):
         if side in shared and np.abs(sides - shared[side]).min() > 1e-3:
             del shared[side]
     place = np.array([np.nan, np.nan, a.translation[2]])
-    return dataclasses.replace(a, pieces=(Piece(rectangle, a.pieces[0].planes),), parameters=shared, translation=place)
+    return dataclasses.replace(
+        a, pieces=(Piece(rectangle, a.pieces[0].planes),), parameters=shared, translation=place
+    )
 
 
 def matched(truth: Sequence[Part], fit: Sequence[Part], xy: np.ndarray) -> list[int]:
-    """For each true part the index of the fitted one that stands for it at plan points (n, 2), -1 where none does."""
+    """For each true part the index of the fitted one that stands for it at plan points (n, 2), -1
+    where none does.
+    """
     tops = [np.argmax([part.height_at(xy) for part in parts], axis=0) for parts in (truth, fit)]
     common = np.zeros((len(truth), len(fit)))
     np.add.at(common, tuple(tops), 1.0)
@@ -83,20 +98,37 @@ def hidden_end(part: Part, others: Sequence[Part]) -> bool:
 
 
 def right_types(part: Part, hidden: bool) -> set[str]:
-    """The types a true part may be called by: of a hidden end nothing can be known, and an asymmetric gable of equal
-    slopes is a gable whose eaves differ."""
-    types = {part.type} | ({ONE_END_LESS[part.type]} if hidden and part.type in ONE_END_LESS else set())
+    """The types a true part may be called by: of a hidden end nothing can be known, and an
+    asymmetric gable of equal slopes is a gable whose eaves differ.
+    """
+    types = {part.type} | (
+        {ONE_END_LESS[part.type]} if hidden and part.type in ONE_END_LESS else set()
+    )
     slopes = np.hypot(*part.pieces[0].planes[:, :2].T)
-    return types | ({"gable"} if part.type == "asymmetric_gable" and np.ptp(slopes) < 0.01 else set())
+    return types | (
+        {"gable"} if part.type == "asymmetric_gable" and np.ptp(slopes) < 0.01 else set()
+    )
 
 
 def errors_in_sigmas(truth: Part, fit: Part, hidden: bool) -> dict[str, float]:
-    """Error over standard deviation of every parameter that both parts of one type have; none where they are turned
-    against each other, none along a part whose end is hidden, none of what the footprint gives (a sigma of 0)."""
+    """Error over standard deviation of every parameter that both parts of one type have; none where
+    they are turned against each other, none along a part whose end is hidden, none of what the
+    footprint gives (a sigma of 0).
+    """
     turn = math.remainder(fit.kappa - truth.kappa, math.pi)
     if fit.type != truth.type or abs(turn) > 0.3:
         return {}
-    gaps = {name: fit.parameters[name] - truth.parameters[name] for name in truth.parameters if name in fit.parameters}
-    gaps |= dict(zip(("t_x", "t_y", "t_z"), fit.translation - truth.translation, strict=True)) | {"kappa": turn}
-    ratios = {name: gap / fit.sigma[name] for name, gap in gaps.items() if fit.sigma.get(name, 0.0) > 0}
-    return {n: float(r) for n, r in ratios.items() if math.isfinite(r) and not (hidden and n in ALONG)}
+    gaps = {
+        name: fit.parameters[name] - truth.parameters[name]
+        for name in truth.parameters
+        if name in fit.parameters
+    }
+    gaps |= dict(zip(("t_x", "t_y", "t_z"), fit.translation - truth.translation, strict=True)) | {
+        "kappa": turn
+    }
+    ratios = {
+        name: gap / fit.sigma[name] for name, gap in gaps.items() if fit.sigma.get(name, 0.0) > 0
+    }
+    return {
+        n: float(r) for n, r in ratios.items() if math.isfinite(r) and not (hidden and n in ALONG)
+    }

@@ -1,11 +1,14 @@
-"""Are roofs called what they are? The demo's 26 buildings and 12 labelled real roofs through `reconstruct`.
+"""Are roofs called what they are?
+
+The demo's 26 buildings and 12 labelled real roofs through `reconstruct`.
 
 usage: python -m benchmarks.named_roofs [--data ../shared/data/roofn3d/labelled]
 
-The demo's buildings are reconstructed under their footprints: `main` counts those whose largest part has the true type,
-`all` those with the true number of parts, each found with its type (matching.py says how). The labelled roofs come
-without footprints and are right where the largest part has the label, an asymmetric gable counting as a gable; how many
-parts they have is printed beside. Every building that is not right is named.
+The demo's buildings are reconstructed under their footprints: `main` counts those whose largest
+part has the true type, `all` those with the true number of parts, each found with its type
+(matching.py says how). The labelled roofs come without footprints and are right where the largest
+part has the label, an asymmetric gable counting as a gable; how many parts they have is printed
+beside. Every building that is not right is named.
 """
 
 from __future__ import annotations
@@ -30,12 +33,17 @@ BUILDING_CLASS = 6
 
 
 def demo() -> list[tuple[SimBuilding, np.ndarray, Footprint]]:
-    """True building, points (n, 3) and footprint of each of the demo's buildings, in world metres."""
+    """True building, points (n, 3) and footprint of each of the demo's buildings, in world
+    metres.
+    """
     files = demo_files()
     cloud = read_points(files["cloud"])
     points = cloud.xyz[cloud.classification == BUILDING_CLASS]
     footprints = list(read_footprints(files["footprints"]))
-    truth = {record["id"]: building_of(record) for record in json.loads(files["truth"].read_text())["buildings"]}
+    truth = {
+        record["id"]: building_of(record)
+        for record in json.loads(files["truth"].read_text())["buildings"]
+    }
     own = points_of_footprints(points, footprints)
     return [(truth[f.id], points[index], f) for index, f in zip(own, footprints, strict=True)]
 
@@ -45,7 +53,9 @@ def parts_in(roof: Roof, origin: np.ndarray) -> tuple[Part, ...]:
     shift = roof.frame.origin - origin
     return tuple(
         dataclasses.replace(
-            part, translation=part.translation + shift, pieces=tuple(piece.moved(shift) for piece in part.pieces)
+            part,
+            translation=part.translation + shift,
+            pieces=tuple(piece.moved(shift) for piece in part.pieces),
         )
         for part in roof.parts
     )
@@ -69,7 +79,10 @@ def demo_report() -> str:
         model = reconstruct(points, footprint)
         right.append(judged(truth, model))
         if not all(right[-1]):
-            lines.append(f"  {footprint.id} ({truth.kind}): {named(truth.roof.parts)} taken for {named(model.parts)}")
+            lines.append(
+                f"  {footprint.id} ({truth.kind}): {named(truth.roof.parts)} taken for "
+                f"{named(model.parts)}"
+            )
     main, every = np.sum(right, axis=0)
     return "\n".join([f"demo: main type {main}, all parts {every} of {len(right)}", *lines])
 
@@ -84,7 +97,12 @@ def labelled_report(folder: Path) -> str:
         parts.append(len(model.parts))
         if name != path.parent.name:
             lines.append(f"  {path.parent.name} {path.stem} taken for {named(model.parts)}")
-    return "\n".join([f"labelled roofs: {right} of {len(files)} right, {np.mean(parts):.2f} parts a roof", *lines])
+    return "\n".join(
+        [
+            f"labelled roofs: {right} of {len(files)} right, {np.mean(parts):.2f} parts a roof",
+            *lines,
+        ]
+    )
 
 
 def main() -> None:

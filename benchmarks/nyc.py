@@ -1,8 +1,10 @@
-"""392 real New York roofs, fitted on all points and judged on those of the roof: one primitive each, or as compounds.
+"""392 real New York roofs, fitted on all points and judged on those of the roof: one primitive
+each, or as compounds.
 
-python -m benchmarks.nyc [--compounds] [--quick] [--data FILE]: point-surface distance (PSD, to the bounded roof surfaces)
-of the points with face > 0, beside the IoU of the plan with the points' alpha shape, since a larger outline games the PSD.
-`--compounds` reconstructs each roof without a footprint, of as many parts as the evidence pays for.
+python -m benchmarks.nyc [--compounds] [--quick] [--data FILE]: point-surface distance (PSD, to the
+bounded roof surfaces) of the points with face > 0, beside the IoU of the plan with the points'
+alpha shape, since a larger outline games the PSD. `--compounds` reconstructs each roof without a
+footprint, of as many parts as the evidence pays for.
 """
 
 from __future__ import annotations
@@ -32,8 +34,12 @@ def fitted(points: np.ndarray, compounds: bool) -> tuple[Fit | Solid, str, int]:
 
 
 def main() -> None:
-    """Print the mean, median and tail of the PSD over roofs, the types chosen, and the worst ten."""
-    parser = argparse.ArgumentParser(description="PSD of one primitive a roof on real New York roofs")
+    """Print the mean, median and tail of the PSD over roofs, the types chosen, and the
+    worst ten.
+    """
+    parser = argparse.ArgumentParser(
+        description="PSD of one primitive a roof on real New York roofs"
+    )
     parser.add_argument("--quick", action="store_true", help="every eighth roof")
     parser.add_argument("--compounds", action="store_true", help="several parts a roof")
     parser.add_argument("--data", type=Path, default=DATA, help="nyc_roofs.npz")
@@ -50,8 +56,15 @@ def main() -> None:
         distance[k] = psd(fit, judged).mean()
         overlap[k] = iou(plan_outline(fit), alpha_shape(judged[:, :2]))
         types[type] += 1
-    print(f"PSD over {len(chosen)} roofs: mean {distance.mean():.4f}, median {np.median(distance):.4f}, ", end="")
-    print(f"90th percentile {np.percentile(distance, 90):.4f} m; {100 * np.mean(distance > 0.3):.1f} % above 0.3 m")
+    print(
+        f"PSD over {len(chosen)} roofs: mean {distance.mean():.4f}, median "
+        f"{np.median(distance):.4f}, ",
+        end="",
+    )
+    print(
+        f"90th percentile {np.percentile(distance, 90):.4f} m; {100 * np.mean(distance > 0.3):.1f} "
+        "% above 0.3 m"
+    )
     print(f"IoU with the alpha shape: mean {overlap.mean():.3f}, median {np.median(overlap):.3f}")
     print(f"parts a roof: {parts.mean():.2f}")
     print("types: " + ", ".join(f"{name} {count}" for name, count in types.most_common()))

@@ -1,13 +1,17 @@
-"""Outlines of buildings without footprints: how much of the true plan they cover, and whether the corners are as many.
+"""Outlines of buildings without footprints: how much of the true plan they cover, and whether the
+corners are as many.
 
-usage: python -m benchmarks.outlines [--each 20] [--densities 2 5 10] [--first-seed 0] [--real delft amsterdam_west]
+usage: python -m benchmarks.outlines [--each 20] [--densities 2 5 10] [--first-seed 0] [--real delft
+amsterdam_west]
 
-Simulated plain houses and L, T, U and cross-shaped ones (simulate/compounds.py) are scanned without defects of the scene, walls
-included; printed are the mean intersection over union of outline and truth and the share with the true number of corners.
-Of real sets the cloud of class 6 is split into buildings (classify/split.py); their outlines are compared with the unions of footprints
-that touch, or that one building found reaches into, of those that hold points: per union the outlines of all buildings whose points
-mostly lie in it, together. Both are cut off at the box of the file's points: what a footprint says of ground that was not scanned is
-not asked. Beside it stands what the points' own cells of half a metre have, for points lie where there is no footprint too.
+Simulated plain houses and L, T, U and cross-shaped ones (simulate/compounds.py) are scanned without
+defects of the scene, walls included; printed are the mean intersection over union of outline and
+truth and the share with the true number of corners. Of real sets the cloud of class 6 is split into
+buildings (classify/split.py); their outlines are compared with the unions of footprints that touch,
+or that one building found reaches into, of those that hold points: per union the outlines of all
+buildings whose points mostly lie in it, together. Both are cut off at the box of the file's points:
+what a footprint says of ground that was not scanned is not asked. Beside it stands what the points'
+own cells of half a metre have, for points lie where there is no footprint too.
 """
 
 from __future__ import annotations
@@ -40,11 +44,15 @@ APART = ("amsterdam_west",)  # sets whose files lie apart
 
 
 def simulated(kind: str, density: float, seed: int) -> tuple[np.ndarray, shapely.Polygon]:
-    """Points (n, 3) of a house without the ground's, and its true outline, in its frame; always the same for a seed."""
+    """Points (n, 3) of a house without the ground's, and its true outline, in its frame; always the
+    same for a seed.
+    """
     rng = np.random.default_rng([seed, KINDS.index(kind)])
     house = random_building(rng) if kind == "plain" else random_compound(rng, kind)
     cloud = scan(house, rng, ScanSettings(density=density, defects=Defects.none()))
-    return house.roof.frame.to_local(cloud.points[cloud.source != 2]), shapely.Polygon(house.outline.exterior)
+    return house.roof.frame.to_local(cloud.points[cloud.source != 2]), shapely.Polygon(
+        house.outline.exterior
+    )
 
 
 def corner_count(outline: shapely.Polygon) -> int:
@@ -83,30 +91,41 @@ def report_real(name: str) -> None:
     footprints = [f.polygon for f in read_footprints(folder / SETS[name])]
     files = sorted(folder.glob("*.laz"))
     overlaps = [
-        row for part in ([[f] for f in files] if name in APART else [files]) for row in overlaps_of(part, footprints)
+        row
+        for part in ([[f] for f in files] if name in APART else [files])
+        for row in overlaps_of(part, footprints)
     ]
     overlap, of_cells, area, outside = np.array(overlaps).T
     print(
-        f"{name}: {len(overlaps)} unions of footprints  IoU mean {overlap.mean():.4f}  median {np.median(overlap):.4f}"
-        f"  by area {np.average(overlap, weights=area):.4f} (cells {np.average(of_cells, weights=area):.4f})"
+        f"{name}: {len(overlaps)} unions of footprints  IoU mean {overlap.mean():.4f}  median "
+        f"{np.median(overlap):.4f}"
+        f"  by area {np.average(overlap, weights=area):.4f} (cells "
+        f"{np.average(of_cells, weights=area):.4f})"
         f"  points outside {np.average(outside, weights=area):.1%}",
         flush=True,
     )
 
 
-def overlaps_of(files: list[Path], footprints: list[shapely.Polygon]) -> list[tuple[float, float, float, float]]:
-    """IoU of the outlines and of the points' cells, area (m2) and share of the points outside of each union of `footprints` that
-    the files' points cover."""
+def overlaps_of(
+    files: list[Path], footprints: list[shapely.Polygon]
+) -> list[tuple[float, float, float, float]]:
+    """IoU of the outlines and of the points' cells, area (m2) and share of the points outside of
+    each union of `footprints` that the files' points cover.
+    """
     cloud = read_points(*files)
     box = shapely.box(*cloud.xyz[:, :2].min(axis=0), *cloud.xyz[:, :2].max(axis=0))
     joined = shapely.union_all([polygon.buffer(TOUCH_M) for polygon in footprints]).buffer(-TOUCH_M)
     found = split_buildings(cloud)
-    outlines = np.array([shapely.intersection(outlined(cloud.xyz[building.index]), box) for building in found])
+    outlines = np.array(
+        [shapely.intersection(outlined(cloud.xyz[building.index]), box) for building in found]
+    )
     cells = np.array([cell_area(cloud.xyz[building.index, :2], CELL_M) for building in found])
     touching = shapely.get_parts(shapely.intersection(joined, box))
     shapely.prepare(touching)
     points = [shapely.points(cloud.xyz[building.index, :2]) for building in found]
-    inside = np.array([[int(shapely.contains(union, own).sum()) for own in points] for union in touching])
+    inside = np.array(
+        [[int(shapely.contains(union, own).sum()) for own in points] for union in touching]
+    )
     count, overlaps = np.array([len(own) for own in points]), []
     _, label = connected_components(
         csr_array((inside > REACHES_IN * count).astype(int) @ (inside > REACHES_IN * count).T)
@@ -123,7 +142,9 @@ def overlaps_of(files: list[Path], footprints: list[shapely.Polygon]) -> list[tu
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--each", type=int, default=20, help="houses a kind and density")
-    parser.add_argument("--densities", type=float, nargs="*", default=[2.0, 5.0, 10.0], help="points a square metre")
+    parser.add_argument(
+        "--densities", type=float, nargs="*", default=[2.0, 5.0, 10.0], help="points a square metre"
+    )
     parser.add_argument("--first-seed", type=int, default=0)
     parser.add_argument("--real", nargs="*", choices=list(SETS), default=list(SETS))
     a = parser.parse_args()

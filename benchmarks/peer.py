@@ -1,11 +1,13 @@
-"""What Delft costs a whole process, in seconds and in decodings of its two LAZ files, beside what roofer needs.
+"""What Delft costs a whole process, in seconds and in decodings of its two LAZ files, beside what
+roofer needs.
 
     python -m benchmarks.peer [--runs 3] [--data ../shared/data/delft]
 
-Seconds do not travel between machines; decoding the same files (laspy, lazrs), measured between the runs, does. Each line is
-the median of fresh processes, everything from reading to the written files included, compiled before; "steady" is the second
-run in one process. Roofer's figures are not measured here: version 1.1 on the same files, its whole process, against the same
-decoding on the machine where both were measured.
+Seconds do not travel between machines; decoding the same files (laspy, lazrs), measured between the
+runs, does. Each line is the median of fresh processes, everything from reading to the written files
+included, compiled before; "steady" is the second run in one process. Roofer's figures are not
+measured here: version 1.1 on the same files, its whole process, against the same decoding on the
+machine where both were measured.
 """
 
 from __future__ import annotations
@@ -24,8 +26,10 @@ ROOFER = {"cpu_s": 3.4, "peak_mb": 92.0, "decode_s": 0.30}
 USED = """
 import json, resource, time
 def used():
-    own, ended = resource.getrusage(resource.RUSAGE_SELF), resource.getrusage(resource.RUSAGE_CHILDREN)
-    return [own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime, time.perf_counter(), own.ru_maxrss / 1024]
+    own = resource.getrusage(resource.RUSAGE_SELF)
+    ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+    cpu = own.ru_utime + own.ru_stime + ended.ru_utime + ended.ru_stime
+    return [cpu, time.perf_counter(), own.ru_maxrss / 1024]
 def tell(before):
     cpu, wall, peak = used()
     print(json.dumps([cpu - before[0], wall - before[1], peak]))
@@ -56,9 +60,16 @@ STEADY = WHOLE + "start = used(); run(); tell(start)"
 
 def measured(script: str, inputs: tuple[list[str], str, str]) -> list[float]:
     """CPU seconds, wall seconds and peak memory (MB) that a fresh process tells of itself."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT / "src"),
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+    }
     command = [sys.executable, "-W", "ignore", "-c", USED + script, json.dumps(inputs)]
-    said = subprocess.run(command, check=True, env=environment, capture_output=True, text=True).stdout
+    said = subprocess.run(
+        command, check=True, env=environment, capture_output=True, text=True
+    ).stdout
     return json.loads(said.splitlines()[-1])
 
 
@@ -69,7 +80,9 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data" / "delft")
     args = parser.parse_args()
     if not args.data.is_dir():
-        raise SystemExit(f"expected Delft's files in {args.data}, got no such folder; name it with --data")
+        raise SystemExit(
+            f"expected Delft's files in {args.data}, got no such folder; name it with --data"
+        )
     clouds = sorted(map(str, args.data.glob("*.laz")))
     with tempfile.TemporaryDirectory() as out:
         inputs = (clouds, str(args.data / "footprints.gpkg"), out)
@@ -80,14 +93,23 @@ def main() -> None:
         ]
     decode = statistics.median(run[0][0] for run in runs)
     print(f"decoding the LAZ files: {decode:.2f} s CPU, the unit\n")
-    print("| Delft | CPU, decodings | CPU, s | wall, s | peak memory, MB |\n| --- | --- | --- | --- | --- |")
-    for place, name in ((1, "whole process, compiled before"), (2, "steady: the second run in a process")):
+    print(
+        "| Delft | CPU, decodings | CPU, s | wall, s | peak memory, MB |\n| --- | --- | --- | --- "
+        "| --- |"
+    )
+    for place, name in (
+        (1, "whole process, compiled before"),
+        (2, "steady: the second run in a process"),
+    ):
         cpu = statistics.median(run[place][0] for run in runs)
         units = statistics.median(run[place][0] / run[0][0] for run in runs)
         wall, peak = (statistics.median(run[place][k] for run in runs) for k in (1, 2))
         print(f"| {name} | {units:.1f} | {cpu:.2f} | {wall:.2f} | {peak:.0f} |")
     there = ROOFER["cpu_s"] / ROOFER["decode_s"]
-    print(f"| roofer 1.1, measured elsewhere | {there:.1f} | {ROOFER['cpu_s']:.2f} there | | {ROOFER['peak_mb']:.0f} |")
+    print(
+        f"| roofer 1.1, measured elsewhere | {there:.1f} | {ROOFER['cpu_s']:.2f} there | | "
+        f"{ROOFER['peak_mb']:.0f} |"
+    )
 
 
 if __name__ == "__main__":

@@ -1,4 +1,5 @@
-"""The parameters are the model: runs built again from their own parameters, and a city done again with overrides.
+"""The parameters are the model: runs built again from their own parameters, and a city done again
+with overrides.
 
 usage: python -m benchmarks.rebuild [--work FOLDER] [--buildings 1000] [--flat] [--lines 1000000]
                                     [--data ../shared/data] [--only NAME ...]
@@ -36,13 +37,20 @@ from .city import city_files
 
 FILES = ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
 OVERRIDES = 50
-FLAT = Settings.from_dict({"fit": {"types": ["flat"], "parts": "one"}, "segment": {"enabled": False}})
+FLAT = Settings.from_dict(
+    {"fit": {"types": ["flat"], "parts": "one"}, "segment": {"enabled": False}}
+)
 
 
-def requests(work: Path, data: Path, buildings: int, settings: Settings) -> Iterator[tuple[str, Callable[[], Request]]]:
+def requests(
+    work: Path, data: Path, buildings: int, settings: Settings
+) -> Iterator[tuple[str, Callable[[], Request]]]:
     """Yield what is run, by name, its input made when called; real data only where they are."""
     demo = {name: str(path) for name, path in demo_files().items()}
-    yield "demo", lambda: Request((demo["cloud"],), work / "demo", demo["footprints"], demo["terrain"])
+    yield (
+        "demo",
+        lambda: Request((demo["cloud"],), work / "demo", demo["footprints"], demo["terrain"]),
+    )
     yield from list_real_runs(data, work)
     yield from list_roof_runs(data, work)
 
@@ -58,7 +66,9 @@ def rebuilt(name: str, request: Request) -> str:
     reconstruct_area(request)
     again = request.out.with_name(f"{request.out.name}-again")
     built = build_file(request.out / "parameters.jsonl", again)
-    other = [file for file in FILES if (again / file).read_bytes() != (request.out / file).read_bytes()]
+    other = [
+        file for file in FILES if (again / file).read_bytes() != (request.out / file).read_bytes()
+    ]
     refused = len(find_refused(again / "parameters.jsonl"))
     told = f"DIFFERENT: {', '.join(other)}" if other else "byte-identical"
     return f"{name}: {built.buildings} buildings, {refused} refused, {told}"
@@ -87,7 +97,8 @@ def overridden(request: Request, work: Path) -> str:
     same = sum(after[id] == before[id] for id in before if id not in chosen)
     obeyed = sum("overridden: block_height" in after[id]["detail"] for id in chosen)
     return (
-        f"{len(chosen)} overrides: {len(solved)} buildings solved in a run of {seconds:.1f} s ({cpu:.1f} s of CPU), {obeyed} obeyed, "
+        f"{len(chosen)} overrides: {len(solved)} buildings solved in a run of {seconds:.1f} s "
+        f"({cpu:.1f} s of CPU), {obeyed} obeyed, "
         f"{same} of {len(before) - len(chosen)} others unchanged"
     )
 
@@ -96,22 +107,31 @@ def many_lines(work: Path, lines: int) -> str:
     """A file of as many overrides, read and checked."""
     path = work / "many.jsonl"
     with path.open("w") as file:
-        file.writelines(f'{{"id": "building-{k}", "ridge_height": {8.0 + k % 7}}}\n' for k in range(lines))
+        file.writelines(
+            f'{{"id": "building-{k}", "ridge_height": {8.0 + k % 7}}}\n' for k in range(lines)
+        )
     start, cpu = time.perf_counter(), time.process_time()
     found = sum(1 for _ in read_overrides(str(path)))
     took, cpu = time.perf_counter() - start, time.process_time() - cpu
-    return f"{found} lines of overrides, {path.stat().st_size / 1e6:.0f} MB: read in {took:.1f} s ({cpu:.1f} s of CPU)"
+    return (
+        f"{found} lines of overrides, {path.stat().st_size / 1e6:.0f} MB: read in {took:.1f} s "
+        f"({cpu:.1f} s of CPU)"
+    )
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("--work", type=Path)
     parser.add_argument("--buildings", type=int, default=1000)
     parser.add_argument("--flat", action="store_true", help="flat blocks alone in the city")
     parser.add_argument("--lines", type=int, default=1_000_000)
     parser.add_argument("--data", type=Path, default=Path("../shared/data"))
     parser.add_argument(
-        "--only", nargs="*", help="beginnings of names, such as demo, delft, city, lines [default: all]"
+        "--only",
+        nargs="*",
+        help="beginnings of names, such as demo, delft, city, lines [default: all]",
     )
     asked = parser.parse_args()
     work = asked.work or Path(tempfile.mkdtemp(prefix="hiproof-rebuild-"))
@@ -123,7 +143,11 @@ def main() -> None:
             request = make()
             start, cpu = time.perf_counter(), time.process_time()
             told = rebuilt(name, request)
-            print(f"{told} ({time.perf_counter() - start:.0f} s, {time.process_time() - cpu:.0f} s of CPU)", flush=True)
+            print(
+                f"{told} ({time.perf_counter() - start:.0f} s, {time.process_time() - cpu:.0f} s "
+                "of CPU)",
+                flush=True,
+            )
             if name.startswith("city"):
                 print(overridden(request, work), flush=True)
     if "lines".startswith(wanted):

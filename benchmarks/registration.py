@@ -1,14 +1,17 @@
 """Real footprints put beside their roofs: is the shift found, and do those that lie right stay?
 
-usage: python -m benchmarks.registration [--sets delft amsterdam_west two_epochs] [--parity even|odd]
+usage: python -m benchmarks.registration [--sets delft amsterdam_west two_epochs] [--parity
+even|odd]
 
-The footprints of each set are shifted by vectors of 0.3 to 3 m in directions drawn by chance. "all" shifts all of them and
-estimates their common shift, as a run does before there are work tiles. "row" shifts one row of touching footprints, "one"
-a single house: those that stand alone, and those within a row, which a run must leave where they are. "each" is how houses
-were moved before rows were: every house of a shifted data set by itself.
+The footprints of each set are shifted by vectors of 0.3 to 3 m in directions drawn by chance. "all"
+shifts all of them and estimates their common shift, as a run does before there are work tiles.
+"row" shifts one row of touching footprints, "one" a single house: those that stand alone, and those
+within a row, which a run must leave where they are. "each" is how houses were moved before rows
+were: every house of a shifted data set by itself.
 
-Printed by distance: how many are found within 0.15 m of the known vector (moved, and to the right place), and how many
-are moved to a place more than 0.3 m beside it. At distance 0 every move is wrong. `--parity` takes every second row.
+Printed by distance: how many are found within 0.15 m of the known vector (moved, and to the right
+place), and how many are moved to a place more than 0.3 m beside it. At distance 0 every move is
+wrong. `--parity` takes every second row.
 """
 
 from __future__ import annotations
@@ -71,7 +74,9 @@ def found_shift(row: Polygons, grid: PointGrid, points: np.ndarray) -> np.ndarra
     return shift.xy if shift.is_clear else np.zeros(2)
 
 
-def trials_of(kind: str, polygons: Polygons, distance: float, parity: str | None) -> Iterator[Trial]:
+def trials_of(
+    kind: str, polygons: Polygons, distance: float, parity: str | None
+) -> Iterator[Trial]:
     """Rows as a run sees them, and the vector that the one asked of was shifted by."""
     outlines = Outlines(polygons)
     rows = [numbers.tolist() for numbers in outlines.members]
@@ -121,7 +126,10 @@ def main() -> None:
             for distance in DISTANCES_M:
                 trials = list(trials_of(kind, polygons, distance, arguments.parity))
                 if trials:
-                    outcomes = [(found_shift(row, grid, points) if row else np.zeros(2), off) for row, off in trials]
+                    outcomes = [
+                        (found_shift(row, grid, points) if row else np.zeros(2), off)
+                        for row, off in trials
+                    ]
                     print(row_line(kind, outcomes, distance), flush=True)
 
 

@@ -1,4 +1,6 @@
-"""Random roofs and their points for the benchmarks: uniform in plan, with the noise of the paper's simulation."""
+"""Random roofs and their points for the benchmarks: uniform in plan, with the noise of the paper's
+simulation.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ DENSITY = 4.72  # points a square metre, the paper's
 
 @dataclass(frozen=True)
 class TrueRoof:
-    """A roof whose parameters are known: `theta_p` by name, turned by `kappa`, at `translation` T_L (3,)."""
+    """A roof whose parameters are known: `theta_p` by name, turned by `kappa`, at `translation` T_L
+    (3,).
+    """
 
     primitive: Primitive
     theta_p: dict[str, float]
@@ -29,28 +33,38 @@ class TrueRoof:
 
 
 def random_roof(name: str, rng: np.random.Generator) -> TrueRoof:
-    """An ordinary house of type `name`: 6 to 12 m wide, up to 2.2 times as long, slopes of 20 to 50 degrees."""
+    """An ordinary house of type `name`: 6 to 12 m wide, up to 2.2 times as long, slopes of 20 to 50
+    degrees.
+    """
     width = rng.uniform(6, 12)
     length = width * (rng.uniform(1.05, 1.3) if name == "pyramid" else rng.uniform(1.3, 2.2))
     height = width / 2 * rng.uniform(0.36, 1.2)
-    theta_p = CATALOGUE[name].typical(width, length, height) | shape_of(name, width, length, height, rng)
+    theta_p = CATALOGUE[name].typical(width, length, height) | shape_of(
+        name, width, length, height, rng
+    )
     kappa, translation = rng.uniform(-np.pi / 2, np.pi / 2), np.array([*rng.uniform(-1, 1, 2), 6.0])
     return TrueRoof(CATALOGUE[name].variant(theta_p), theta_p, kappa, translation)
 
 
-def shape_of(name: str, width: float, length: float, height: float, rng: np.random.Generator) -> dict[str, float]:
+def shape_of(
+    name: str, width: float, length: float, height: float, rng: np.random.Generator
+) -> dict[str, float]:
     """The lengths that make a type what it is, drawn where they can be seen."""
     ends = 1 if name.startswith(("side", "corner")) else 2  # sloping ends, and sides
     sides = 1 if name in ("half_mansard", "corner", "corner_mansard") else 2
     if name in ("hip", "side_hip"):
         return {"ridge_length": length - ends * width / 2 * rng.uniform(0.6, 1.0)}
     if name in ("half_hip", "side_half_hip"):
-        share = rng.uniform(0.3, 0.6) if ends == 2 else rng.uniform(0.45, 0.7)  # so that one end is seen as well
+        # so that one end is seen as well
+        share = rng.uniform(0.3, 0.6) if ends == 2 else rng.uniform(0.45, 0.7)
         ridge = length - ends * share * width / 2 * rng.uniform(0.6, 1.0)
         return {"hip_height": share * height, "ridge_length": ridge}
     if "top_width" in CATALOGUE[name].parameters:
         run = width * rng.uniform(0.15, 0.3)
-        lengths = {"top_width": width - sides * run, "top_length": length - ends * run * rng.uniform(0.8, 1.2)}
+        lengths = {
+            "top_width": width - sides * run,
+            "top_length": length - ends * run * rng.uniform(0.8, 1.2),
+        }
         lengths["height"] = run * rng.uniform(0.7, 2.0)
         return {own: lengths[own] for own in lengths if own in CATALOGUE[name].parameters}
     if name == "corner":
@@ -59,7 +73,10 @@ def shape_of(name: str, width: float, length: float, height: float, rng: np.rand
     if name == "asymmetric_gable":
         return asymmetry(width, height, rng)
     if name == "gambrel":
-        return {"break_width": width * rng.uniform(0.5, 0.7), "break_height": height * rng.uniform(0.62, 0.75)}
+        return {
+            "break_width": width * rng.uniform(0.5, 0.7),
+            "break_height": height * rng.uniform(0.62, 0.75),
+        }
     if name == "monopitch":
         return {"height": height * rng.uniform(0.5, 1.0)}
     if name == "shed":
@@ -69,7 +86,9 @@ def shape_of(name: str, width: float, length: float, height: float, rng: np.rand
 
 
 def asymmetry(width: float, height: float, rng: np.random.Generator) -> dict[str, float]:
-    """A ridge off the middle and a step between the eaves with which one slope is at least a seventh steeper."""
+    """A ridge off the middle and a step between the eaves with which one slope is at least a
+    seventh steeper.
+    """
     while True:
         offset, step = width * rng.uniform(0.08, 0.25), height * rng.uniform(0.1, 0.5)
         steeper = (height - step) / (width / 2 - offset) / (height / (width / 2 + offset))
@@ -91,7 +110,9 @@ def scan(
     outlier_share: float = 0.0,
     noise_rmse_m: float = NOISE_RMSE_M,
 ) -> np.ndarray:
-    """Points (n, 3): `density` a square metre, uniform over the plan; outliers uniform in a box around the roof."""
+    """Points (n, 3): `density` a square metre, uniform over the plan; outliers uniform in a box
+    around the roof.
+    """
     theta = roof.theta
     half = np.array([theta[HALF_LENGTH], theta[HALF_WIDTH]])
     count = max(4, round(density * 4 * half.prod()))
@@ -107,6 +128,8 @@ def scan(
 
 
 def paper_noise(count: int, rng: np.random.Generator) -> np.ndarray:
-    """Errors in RMSE as the paper draws them: 90 % within 1, 9 % between 1 and 2, 1 % between 2 and 3, either sign."""
+    """Errors in RMSE as the paper draws them: 90 % within 1, 9 % between 1 and 2, 1 % between 2 and
+    3, either sign.
+    """
     band = rng.choice(3, count, p=[0.9, 0.09, 0.01])
     return (band + rng.random(count)) * rng.choice([-1.0, 1.0], count)

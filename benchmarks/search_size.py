@@ -20,7 +20,8 @@ PACKAGE = Path(hiproof.__file__).parent
 def count_constants(text: str) -> int:
     """Count the numbers in assignments at the top of a module's text.
 
-    >>> count_constants("NEAR_M, TURNS = 0.2, (1, -2)\\nNAMES = ('a',)\\ndef f(x=3):\\n    y = 4\\n")
+    >>> text = "NEAR_M, TURNS = 0.2, (1, -2)\\nNAMES = ('a',)\\ndef f(x=3):\\n    y = 4\\n"
+    >>> count_constants(text)
     3
     """
     statements = [s for s in ast.parse(text).body if isinstance(s, ast.Assign | ast.AnnAssign)]

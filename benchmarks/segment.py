@@ -1,7 +1,9 @@
-"""The network, the fit and both together, on simulated, scanned and real roofs. python -m benchmarks.segment [--quick]
+"""The network, the fit and both together, on simulated, scanned and real roofs. python -m
+benchmarks.segment [--quick]
 
-Writes `benchmarks/segment.md` and the confusion matrices in `benchmarks/figures/`. `--calibrate` prints instead how the
-exponents of `hiproof.segment.combine` change the accuracy. Real data are read from ../shared/data where they exist.
+Writes `benchmarks/segment.md` and the confusion matrices in `benchmarks/figures/`. `--calibrate`
+prints instead how the exponents of `hiproof.segment.combine` change the accuracy. Real data are
+read from ../shared/data where they exist.
 """
 
 from __future__ import annotations
@@ -47,7 +49,9 @@ class Tally:
     def add(self, truth: str, **answers: str | None) -> None:
         self.truth.append(TYPES.index(truth))
         for method, answer in answers.items():
-            self.told.setdefault(method, []).append(TYPES.index(answer) if answer in TYPES else len(TYPES))
+            self.told.setdefault(method, []).append(
+                TYPES.index(answer) if answer in TYPES else len(TYPES)
+            )
 
     def scores(self, method: str) -> Scores:
         return Scores.of(np.array(self.truth), np.array(self.told[method]), (*TYPES, "none"))
@@ -55,7 +59,10 @@ class Tally:
 
 @dataclass(frozen=True)
 class Opinion:
-    """What network and fit say of one building; `bics` are of the fit to the points the network calls roof."""
+    """What network and fit say of one building;
+
+    `bics` are of the fit to the points the network calls roof.
+    """
 
     network: dict[str, float]
     bics: dict[str, float]
@@ -72,7 +79,9 @@ class Opinion:
 
 
 def opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
-    """Network alone, fit alone on all points, and the evidence of the fit to the network's roof points."""
+    """Network alone, fit alone on all points, and the evidence of the fit to the network's roof
+    points.
+    """
     found = segment(points, Settings().replace({"fit": {"types": types}}))
     alone, informed = fitted(points, types), fitted(points, types, found.weights)
     bics, used = (informed.bics, informed.points_used) if informed else ({}, 0)
@@ -81,13 +90,17 @@ def opinion(points: np.ndarray, types: tuple[str, ...] = TYPES) -> Opinion:
 
 def fitted(points: np.ndarray, types: tuple[str, ...], weights: np.ndarray | None = None):
     try:
-        return fit_roof(points, settings=Settings.from_dict({"fit": {"types": types}}), weights=weights)
+        return fit_roof(
+            points, settings=Settings.from_dict({"fit": {"types": types}}), weights=weights
+        )
     except FitError:
         return None
 
 
 def three_types(count: int) -> tuple[str, Scores, Scores]:
-    """The paper's configuration: pyramid, gable, hip on simulated clouds with all defects, with labels of every point."""
+    """The paper's configuration: pyramid, gable, hip on simulated clouds with all defects, with
+    labels of every point.
+    """
     true_points, told_points, tally = [], [], Tally()
     allowed = Settings().replace({"fit": {"types": THREE}})
     for index in range(count):
@@ -98,7 +111,9 @@ def three_types(count: int) -> tuple[str, Scores, Scores]:
         told = np.array([THREE.index(name) if name in THREE else 0 for name in TYPES])
         told_points.append(np.where(found.is_roof, told[found.labels], len(THREE)))
     types = tally.scores("network")
-    of_points = Scores.of(np.concatenate(true_points), np.concatenate(told_points), (*THREE, "not_roof"))
+    of_points = Scores.of(
+        np.concatenate(true_points), np.concatenate(told_points), (*THREE, "not_roof")
+    )
     text = table(
         ("measure", "reached", "to reach"),
         [
@@ -111,7 +126,9 @@ def three_types(count: int) -> tuple[str, Scores, Scores]:
     return text, types, of_points
 
 
-def all_types(count: int, densities: tuple[float, ...] = (2.0, 5.0, 10.0)) -> tuple[str, dict[float, Tally]]:
+def all_types(
+    count: int, densities: tuple[float, ...] = (2.0, 5.0, 10.0)
+) -> tuple[str, dict[float, Tally]]:
     """Network, fit and combination on all types with all defects, `count` buildings a density."""
     rows, tallies = [], {}
     for density in densities:
@@ -120,16 +137,23 @@ def all_types(count: int, densities: tuple[float, ...] = (2.0, 5.0, 10.0)) -> tu
             said = opinion(points)
             tally.add(truth, network=said.network_alone, fit=said.fit_alone, combined=said.combined)
         tallies[density] = tally
-        figures = [percent(tally.scores(method).balanced_accuracy) for method in ("network", "fit", "combined")]
+        figures = [
+            percent(tally.scores(method).balanced_accuracy)
+            for method in ("network", "fit", "combined")
+        ]
         rows.append((f"{density:g}", *figures))
     return table(("points/m2", "network alone", "fit alone", "combined"), rows), tallies
 
 
-def simulated(count: int, density: float, seed: int = TEST_SEED) -> Iterator[tuple[str, np.ndarray]]:
+def simulated(
+    count: int, density: float, seed: int = TEST_SEED
+) -> Iterator[tuple[str, np.ndarray]]:
     """(type, points) of `count` buildings at one density, all of the scanner's defects in them."""
     for index in range(count):
         rng = np.random.default_rng([seed, int(10 * density), index])
-        points, _, type = training_sample(rng, TYPES, n_points=(30, 3000), density=(density, density))
+        points, _, type = training_sample(
+            rng, TYPES, n_points=(30, 3000), density=(density, density)
+        )
         yield TYPES[type], points
 
 
@@ -138,7 +162,9 @@ DIRECTIONS = {"flat": 0, "monopitch": 1, "gable": 2, "hip": 4, "pyramid": 4}
 
 
 def the_hague(scans: int) -> tuple[str, Tally] | None:
-    """Held-out shapes of The Hague at 5 points/m2, `scans` scans a type; all of them, and those true to their code."""
+    """Held-out shapes of The Hague at 5 points/m2, `scans` scans a type; all of them, and those
+    true to their code.
+    """
     path = DATA / "denhaag" / "DenHaag_01.city.json"
     if not path.exists():
         return None
@@ -153,24 +179,39 @@ def the_hague(scans: int) -> tuple[str, Tally] | None:
             if len(cloud) < POINTS[0] // 2:
                 continue
             said = opinion(as_sample(cloud, TYPES, TYPES.index(type), rng).xyz)
-            answers = {"network": said.network_alone, "fit": said.fit_alone, "combined": said.combined}
+            answers = {
+                "network": said.network_alone,
+                "fit": said.fit_alone,
+                "combined": said.combined,
+            }
             answers = {method: SAME_CODE.get(answer, answer) for method, answer in answers.items()}
             answers["perfect judge of shapes"] = type if is_true_to_code(shape) else None
             everything.add(type, **answers)
             if is_true_to_code(shape):
                 true_to_code.add(type, **answers)
     rows = [
-        (method, *(percent(tally.scores(method).balanced_accuracy) for tally in (everything, true_to_code)))
+        (
+            method,
+            *(
+                percent(tally.scores(method).balanced_accuracy)
+                for tally in (everything, true_to_code)
+            ),
+        )
         for method in everything.told
     ]
     kept = np.mean([is_true_to_code(shape) for shape in shapes])
-    header = ("method", "balanced accuracy (combined: 93 to reach)", f"on the {percent(kept)} % true to their code")
+    header = (
+        "method",
+        "balanced accuracy (combined: 93 to reach)",
+        f"on the {percent(kept)} % true to their code",
+    )
     return table(header, rows), everything
 
 
 def is_true_to_code(shape: Shape) -> bool:
-    """Whether the solid's roof slopes in as many directions as its roofType says: some "monopitch" are level, some
-    "hipped" have a flat top, some pyramids are halved by a wall."""
+    """Whether the solid's roof slopes in as many directions as its roofType says: some "monopitch"
+    are level, some "hipped" have a flat top, some pyramids are halved by a wall.
+    """
     areas, normals = [], []
     for face in shape.solid.of_kind(ROOF):
         ring = shape.solid.vertices[list(face.rings[0])]
@@ -198,11 +239,15 @@ def labelled_roofs() -> str | None:
         answers = (said.network_alone, said.fit_alone, said.combined)
         right += [SAME_CODE.get(answer, answer) == truth for answer in answers]
         rows.append((f"{truth}/{path.stem}", *answers))
-    return table(("roof", "network alone", "fit alone", "combined"), [*rows, ("right", *map(str, right))])
+    return table(
+        ("roof", "network alone", "fit alone", "combined"), [*rows, ("right", *map(str, right))]
+    )
 
 
 def new_york() -> str | None:
-    """392 real roofs through the whole pipeline with and without the network: distance of their roof points."""
+    """392 real roofs through the whole pipeline with and without the network: distance of their
+    roof points.
+    """
     path = DATA / "roofn3d" / "nyc_roofs.npz"
     if not path.exists():
         return None
@@ -212,15 +257,28 @@ def new_york() -> str | None:
     rows = []
     for parts in ("one", "compound"):
         for enabled in (False, True):
-            settings = Settings().replace({"fit": {"parts": parts}, "segment": {"enabled": enabled}})
-            distances = [roof_distance(cloud, face > 0, settings) for cloud, face in zip(clouds, faces, strict=True)]
+            settings = Settings().replace(
+                {"fit": {"parts": parts}, "segment": {"enabled": enabled}}
+            )
+            distances = [
+                roof_distance(cloud, face > 0, settings)
+                for cloud, face in zip(clouds, faces, strict=True)
+            ]
             figures = (np.mean(distances), np.median(distances), np.percentile(distances, 90))
-            rows.append((parts, "with" if enabled else "without", *(f"{figure:.4f} m" for figure in figures)))
+            rows.append(
+                (
+                    parts,
+                    "with" if enabled else "without",
+                    *(f"{figure:.4f} m" for figure in figures),
+                )
+            )
     return table(("parts", "network", "mean", "median", "90th percentile"), rows)
 
 
 def roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) -> float:
-    """Mean distance of a roof's points to the nearest roof surface of its reconstruction, NaN counted as 1 m."""
+    """Mean distance of a roof's points to the nearest roof surface of its reconstruction, NaN
+    counted as 1 m.
+    """
     solid = reconstruct(cloud, settings=settings).solid
     if solid is None:
         return 1.0
@@ -229,24 +287,34 @@ def roof_distance(cloud: np.ndarray, is_roof: np.ndarray, settings: Settings) ->
 
 
 def speed() -> str:
-    """Time of recognising on one core, types alone as a compound fit needs them and with the points' labels, and the
-    size of the weights."""
+    """Time of recognising on one core, types alone as a compound fit needs them and with the
+    points' labels, and the size of the weights.
+    """
     rows = []
     for count in (300, 700, 1500):
-        points = training_sample(np.random.default_rng(0), n_points=(count, count), density=(5.0, 5.0))[0]
+        points = training_sample(
+            np.random.default_rng(0), n_points=(count, count), density=(5.0, 5.0)
+        )[0]
         types, labels = (
-            1000 * processor_time(road, points) for road in (segment, lambda points: segment(points).labels)
+            1000 * processor_time(road, points)
+            for road in (segment, lambda points: segment(points).labels)
         )
         rows.append((f"types, {count} points, one core", f"{types:.1f} ms", ""))
         rows.append(
-            (f"types and labels, {count} points, one core", f"{labels:.1f} ms", "10 ms" if count == 300 else "")
+            (
+                f"types and labels, {count} points, one core",
+                f"{labels:.1f} ms",
+                "10 ms" if count == 300 else "",
+            )
         )
     megabytes = SHIPPED_WEIGHTS.stat().st_size / 1e6
     rows.append(("shipped weights", f"{megabytes:.2f} MB", "8 MB"))
     return table(("measure", "reached", "to reach"), rows)
 
 
-def processor_time(road: Callable[[np.ndarray], object], points: np.ndarray, repeats: int = 100) -> float:
+def processor_time(
+    road: Callable[[np.ndarray], object], points: np.ndarray, repeats: int = 100
+) -> float:
     """Median seconds of processor time of one call, after a first one."""
     times = []
     for _ in range(repeats + 1):
@@ -257,9 +325,13 @@ def processor_time(road: Callable[[np.ndarray], object], points: np.ndarray, rep
 
 
 def calibrate(count: int) -> None:
-    """Print the balanced accuracy of the combination over exponents of the evidence, on buildings of another seed."""
+    """Print the balanced accuracy of the combination over exponents of the evidence, on buildings
+    of another seed.
+    """
     for density in (1.0, 2.0, 5.0, 10.0):
-        said = [(truth, opinion(points)) for truth, points in simulated(count, density, TEST_SEED + 1)]
+        said = [
+            (truth, opinion(points)) for truth, points in simulated(count, density, TEST_SEED + 1)
+        ]
         truth = np.array([TYPES.index(name) for name, _ in said])
         line = []
         for exponent in (0.0, 0.01, 0.02, 0.05, 0.1, 0.2, 1.0):
@@ -271,7 +343,9 @@ def calibrate(count: int) -> None:
 
 def table(header: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
     """A Markdown table."""
-    lines = ["| " + " | ".join(map(str, row)) + " |" for row in (header, ["---"] * len(header), *rows)]
+    lines = [
+        "| " + " | ".join(map(str, row)) + " |" for row in (header, ["---"] * len(header), *rows)
+    ]
     return "\n".join(lines)
 
 
@@ -295,7 +369,13 @@ def picture(scores: Scores, title: str, name: str) -> None:
     for (row, column), share in np.ndenumerate(shares):
         if counts[row, column]:
             axes.text(
-                column, row, f"{share:.1f}", ha="center", va="center", color="w" if share > 50 else "k", fontsize=8
+                column,
+                row,
+                f"{share:.1f}",
+                ha="center",
+                va="center",
+                color="w" if share > 50 else "k",
+                fontsize=8,
             )
     axes.set_xticks(range(len(names)), names, rotation=50, ha="right")
     axes.set_yticks(range(len(names)), names)
@@ -308,7 +388,9 @@ def main() -> None:
     """Run everything and write the report; parts without data are left out."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--quick", action="store_true", help="a tenth of the buildings")
-    parser.add_argument("--calibrate", action="store_true", help="print accuracies over the exponents and stop")
+    parser.add_argument(
+        "--calibrate", action="store_true", help="print accuracies over the exponents and stop"
+    )
     arguments = parser.parse_args()
     scale = 10 if arguments.quick else 1
     if arguments.calibrate:
@@ -324,16 +406,32 @@ def main() -> None:
     parts += ["## Three types, simulated with all defects, network alone", text, recalls(types)]
     text, tallies = all_types(600 // scale)
     for method in ("network", "fit", "combined"):
-        picture(tallies[5.0].scores(method), f"all types, 5 points/m2: {method}", f"segment_all_types_{method}")
-    parts += ["## All types, simulated with all defects: balanced accuracy (combined, 96 to reach at 5)", text]
+        picture(
+            tallies[5.0].scores(method),
+            f"all types, 5 points/m2: {method}",
+            f"segment_all_types_{method}",
+        )
+    parts += [
+        "## All types, simulated with all defects: balanced accuracy (combined, 96 to reach at 5)",
+        text,
+    ]
     parts += [recalls(tallies[5.0].scores("combined"))]
     found = the_hague(150 // scale)
     if found:
-        picture(found[1].scores("combined"), "The Hague, 5 points/m2: combined", "segment_the_hague")
-        parts += ["## The Hague's held-out shapes, 5 points/m2", found[0], recalls(found[1].scores("combined"))]
+        picture(
+            found[1].scores("combined"), "The Hague, 5 points/m2: combined", "segment_the_hague"
+        )
+        parts += [
+            "## The Hague's held-out shapes, 5 points/m2",
+            found[0],
+            recalls(found[1].scores("combined")),
+        ]
     for title, text in (
         ("Twelve labelled real roofs (an asymmetric gable counts as gable)", labelled_roofs()),
-        ("392 New York roofs through the pipeline: distance of roof points", None if arguments.quick else new_york()),
+        (
+            "392 New York roofs through the pipeline: distance of roof points",
+            None if arguments.quick else new_york(),
+        ),
         ("Speed and size", speed()),
     ):
         parts += [f"## {title}", text] if text else []
@@ -345,7 +443,11 @@ def main() -> None:
 
 def recalls(scores: Scores) -> str:
     """Recall of every type that occurs, as one sentence."""
-    return "Recall: " + ", ".join(f"{name} {percent(recall)}" for name, recall in scores.recalls.items()) + "."
+    return (
+        "Recall: "
+        + ", ".join(f"{name} {percent(recall)}" for name, recall in scores.recalls.items())
+        + "."
+    )
 
 
 if __name__ == "__main__":

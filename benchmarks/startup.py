@@ -1,10 +1,11 @@
-"""What a user waits for: `import hiproof`, `hiproof --help`, a town of one building and a whole Delft run in a fresh process,
-compiled before.
+"""What a user waits for: `import hiproof`, `hiproof --help`, a town of one building and a whole
+Delft run in a fresh process, compiled before.
 
     python -m benchmarks.startup [--quick]
 
-Each line is the median of several fresh processes: CPU and wall time, and the ratio of the wall time to starting Python with NumPy in
-between. The Delft run needs `../shared/data/delft` and is left out where that is missing.
+Each line is the median of several fresh processes: CPU and wall time, and the ratio of the wall
+time to starting Python with NumPy in between. The Delft run needs `../shared/data/delft` and is
+left out where that is missing.
 """
 
 from __future__ import annotations
@@ -28,10 +29,18 @@ REFERENCE = ["-c", "import numpy"]
 
 def cost(arguments: list[str]) -> tuple[float, float]:
     """CPU and wall seconds of a process and of those that it starts."""
-    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src"), "OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
-    environment.pop("PYTHONDONTWRITEBYTECODE", None)  # a user's Python compiles its modules once, not in every process
+    environment = {
+        **os.environ,
+        "PYTHONPATH": str(ROOT / "src"),
+        "OPENBLAS_NUM_THREADS": "1",
+        "OMP_NUM_THREADS": "1",
+    }
+    # a user's Python compiles its modules once, not in every process
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     start, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
-    subprocess.run([sys.executable, *arguments], check=True, env=environment, stdout=subprocess.DEVNULL)
+    subprocess.run(
+        [sys.executable, *arguments], check=True, env=environment, stdout=subprocess.DEVNULL
+    )
     used = resource.getrusage(resource.RUSAGE_CHILDREN)
     cpu = used.ru_utime + used.ru_stime - before.ru_utime - before.ru_stime
     return cpu, time.perf_counter() - start
@@ -43,7 +52,10 @@ def compare(name: str, arguments: list[str], runs: int) -> None:
     pairs = [(cost(arguments), cost(REFERENCE)) for _ in range(runs)]
     cpu, wall = (statistics.median(mine[k] for mine, _ in pairs) for k in (0, 1))
     ratio = statistics.median(mine[1] / reference[1] for mine, reference in pairs)
-    print(f"{name:42s} CPU {cpu:6.2f} s, wall {wall:6.2f} s   {ratio:6.1f} times starting Python with NumPy")
+    print(
+        f"{name:42s} CPU {cpu:6.2f} s, wall {wall:6.2f} s   {ratio:6.1f} times starting Python "
+        "with NumPy"
+    )
 
 
 def main() -> None:
@@ -54,7 +66,11 @@ def main() -> None:
     compare("hiproof --help", ["-m", "hiproof", "--help"], runs)
     with tempfile.TemporaryDirectory() as work:
         list(write_city(Path(work), City(1)))
-        files = [*map(str, Path(work).glob("tiles/*.laz")), "--footprints", f"{work}/footprints.gpkg"]
+        files = [
+            *map(str, Path(work).glob("tiles/*.laz")),
+            "--footprints",
+            f"{work}/footprints.gpkg",
+        ]
         run = ["-m", "hiproof", "reconstruct", *files, "--out", f"{work}/models", "--restart"]
         compare("a town of one building", run, runs)
     if not DELFT.is_dir():
@@ -62,7 +78,15 @@ def main() -> None:
         return
     clouds = [str(path) for path in sorted(DELFT.glob("*.laz"))]
     with tempfile.TemporaryDirectory() as out:
-        run = ["-m", "hiproof", "reconstruct", *clouds, "--footprints", str(DELFT / "footprints.gpkg"), "--restart"]
+        run = [
+            "-m",
+            "hiproof",
+            "reconstruct",
+            *clouds,
+            "--footprints",
+            str(DELFT / "footprints.gpkg"),
+            "--restart",
+        ]
         for name, options in (
             ("", []),
             (", no network", ["--no-network"]),

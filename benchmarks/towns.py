@@ -1,20 +1,24 @@
-"""Is the roof drawn as a person would? Real towns' LoD2 solids, scanned by simulation, modelled again and compared.
+"""Is the roof drawn as a person would?
+
+Real towns' LoD2 solids, scanned by simulation, modelled again and compared.
 
 usage: python -m benchmarks.towns [--town essen nrw_5657 denhaag vienna rotterdam delft_5907]
            [--density 5] [--without-footprints] [--every K] [--parity even|odd] [--most N]
            [--worst N] [--save DIR] [--composed-truth]
 
-A building is the solids of one CityJSON building (its parts with it) whose grounds touch; those of 30 m2 or more are
-scanned one by one (generator seeded by the id, no gaps in the cloud) and reconstructed under their true ground outline,
-or without it. `wireframe.py` compares corners, edges and faces of the written models with the true ones. `--every` takes
-each k-th building, `--parity` those at even or odd places, `--most` draws so many by chance, always the same ones.
-`--composed-truth` judges the true roof faces themselves, composed as one shell a building: towns draw the parts of a building
-one by one, and where their steps cross a single shell has other edges, so that this is about the best there is.
-Every figure comes for all buildings and by footprint area, pooled and as the mean over buildings (see
-`wireframes.py`). Without `--town` the first three towns are taken: all buildings of Vienna are dear. Vienna's are
-perimeter blocks, Rotterdam's rows with surfaces that are not closed, Delft's machine-made with many short edges.
-`--save` keeps for each town what a run would leave and `truth.city.json`, to be drawn by docs/draw_roofs.py.
-Milliseconds are the CPU time of `reconstruct`, recognition and quality included.
+A building is the solids of one CityJSON building (its parts with it) whose grounds touch; those of
+30 m2 or more are scanned one by one (generator seeded by the id, no gaps in the cloud) and
+reconstructed under their true ground outline, or without it. `wireframe.py` compares corners, edges
+and faces of the written models with the true ones. `--every` takes each k-th building, `--parity`
+those at even or odd places, `--most` draws so many by chance, always the same ones.
+`--composed-truth` judges the true roof faces themselves, composed as one shell a building: towns
+draw the parts of a building one by one, and where their steps cross a single shell has other edges,
+so that this is about the best there is. Every figure comes for all buildings and by footprint area,
+pooled and as the mean over buildings (see `wireframes.py`). Without `--town` the first three towns
+are taken: all buildings of Vienna are dear. Vienna's are perimeter blocks, Rotterdam's rows with
+surfaces that are not closed, Delft's machine-made with many short edges. `--save` keeps for each
+town what a run would leave and `truth.city.json`, to be drawn by docs/draw_roofs.py. Milliseconds
+are the CPU time of `reconstruct`, recognition and quality included.
 """
 
 from __future__ import annotations
@@ -63,7 +67,9 @@ TOUCH_M = 0.01
 
 @dataclass(frozen=True)
 class TrueBuilding:
-    """Solids that touch each other, by the ids of their city objects, and the union of their grounds (world)."""
+    """Solids that touch each other, by the ids of their city objects, and the union of their
+    grounds (world).
+    """
 
     id: str
     solids: dict[str, Solid]
@@ -72,12 +78,16 @@ class TrueBuilding:
     def scanned(self, density: float) -> np.ndarray:
         """Points (n, 3) of the building by itself, ground left out, always the same for one id."""
         rng = np.random.default_rng(zlib.crc32(self.id.encode()))
-        cloud = scan_solids(list(self.solids.values()), rng, ScanSettings(density=density, defects=Defects.none()))
+        cloud = scan_solids(
+            list(self.solids.values()), rng, ScanSettings(density=density, defects=Defects.none())
+        )
         return cloud.points[cloud.source != SOURCES.index("ground")]
 
 
 def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding]:
-    """The buildings of a CityJSON file with a ground of `smallest_m2` or more, in the order of their ids."""
+    """The buildings of a CityJSON file with a ground of `smallest_m2` or more, in the order of
+    their ids.
+    """
     objects = json.loads(path.read_text(encoding="utf-8"))["CityObjects"]
     solids = defaultdict(dict)
     for name, solid in read_solids(path):
@@ -89,13 +99,19 @@ def read_town(path: Path, smallest_m2: float = SMALLEST_M2) -> list[TrueBuilding
 def touching(id: str, solids: dict[str, Solid]) -> list[TrueBuilding]:
     """The solids of one building as one or, where their grounds lie apart, as several."""
     grounds = {name: ground_of(solid) for name, solid in solids.items()}
-    joined = shapely.union_all([ground.buffer(TOUCH_M, join_style="mitre") for ground in grounds.values()])
+    joined = shapely.union_all(
+        [ground.buffer(TOUCH_M, join_style="mitre") for ground in grounds.values()]
+    )
     outlines = shapely.get_parts(joined.buffer(-TOUCH_M, join_style="mitre"))
     outlines = sorted((o for o in outlines if o.area > 0), key=lambda outline: -outline.area)
     found = []
     for k, outline in enumerate(outlines):
-        own = {name: solids[name] for name, ground in grounds.items() if nearest(ground, outlines) == k}
-        found.append(TrueBuilding(id if k == 0 else f"{id}~{k + 1}", own, outline.simplify(TOUCH_M)))
+        own = {
+            name: solids[name] for name, ground in grounds.items() if nearest(ground, outlines) == k
+        }
+        found.append(
+            TrueBuilding(id if k == 0 else f"{id}~{k + 1}", own, outline.simplify(TOUCH_M))
+        )
     return found
 
 
@@ -105,34 +121,54 @@ def nearest(ground: shapely.Geometry, outlines: list[shapely.Polygon]) -> int:
 
 
 def ground_of(solid: Solid) -> shapely.Geometry:
-    rings = [[solid.vertices[list(ring), :2] for ring in face.rings] for face in solid.of_kind(GROUND)]
-    return shapely.union_all([shapely.make_valid(shapely.Polygon(outer, holes)) for outer, *holes in rings])
+    rings = [
+        [solid.vertices[list(ring), :2] for ring in face.rings] for face in solid.of_kind(GROUND)
+    ]
+    return shapely.union_all(
+        [shapely.make_valid(shapely.Polygon(outer, holes)) for outer, *holes in rings]
+    )
 
 
-def chosen(buildings: list, every: int = 1, parity: str | None = None, most: int | None = None) -> list:
-    """Every k-th of `buildings`, those at even or odd places, at most so many drawn by a fixed chance; in order."""
+def chosen(
+    buildings: list, every: int = 1, parity: str | None = None, most: int | None = None
+) -> list:
+    """Every k-th of `buildings`, those at even or odd places, at most so many drawn by a fixed
+    chance; in order.
+    """
     buildings = buildings[::every]
     buildings = buildings if parity is None else buildings[("even", "odd").index(parity) :: 2]
     if most is None or most >= len(buildings):
         return buildings
-    return [buildings[k] for k in sorted(np.random.default_rng(0).choice(len(buildings), most, replace=False))]
+    return [
+        buildings[k]
+        for k in sorted(np.random.default_rng(0).choice(len(buildings), most, replace=False))
+    ]
 
 
 def write_truth(path: Path, source: Path, buildings: list[TrueBuilding]) -> None:
-    """The city objects of `buildings` out of the CityJSON file `source`, those with several as parts of one object."""
+    """The city objects of `buildings` out of the CityJSON file `source`, those with several as
+    parts of one object.
+    """
     city = json.loads(source.read_text(encoding="utf-8"))
     objects, city["CityObjects"] = city["CityObjects"], {}
     for building in buildings:
         if list(building.solids) != [building.id]:
-            city["CityObjects"][building.id] = {"type": "Building", "children": list(building.solids)}
+            city["CityObjects"][building.id] = {
+                "type": "Building",
+                "children": list(building.solids),
+            }
         for name in building.solids:
-            parents = {} if name == building.id else {"type": "BuildingPart", "parents": [building.id]}
+            parents = (
+                {} if name == building.id else {"type": "BuildingPart", "parents": [building.id]}
+            )
             city["CityObjects"][name] = objects[name] | parents
     path.write_text(json.dumps(city), encoding="utf-8")
 
 
 def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) -> None:
-    """Models and points of a town as `hiproof reconstruct` leaves them, for `hiproof report` and docs/draw_roofs.py."""
+    """Models and points of a town as `hiproof reconstruct` leaves them, for `hiproof report` and
+    docs/draw_roofs.py.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_all(folder, models)
     cloud = folder / "points.xyz"
@@ -140,11 +176,20 @@ def write_run(folder: Path, models: list[Building], points: list[np.ndarray]) ->
     (folder / "run.json").write_text(json.dumps({"inputs": {"clouds": [str(cloud)]}}))
 
 
-def modelled(building: TrueBuilding, points: np.ndarray, with_footprint: bool) -> tuple[Building, float]:
-    """One building reconstructed from its scan, and the seconds it took; a bug costs one building, and is shown."""
+def modelled(
+    building: TrueBuilding, points: np.ndarray, with_footprint: bool
+) -> tuple[Building, float]:
+    """One building reconstructed from its scan, and the seconds it took; a bug costs one building,
+    and is shown.
+    """
     started = time.process_time()
     try:
-        model = reconstruct(points, building.footprint if with_footprint else None, settings=Settings(), id=building.id)
+        model = reconstruct(
+            points,
+            building.footprint if with_footprint else None,
+            settings=Settings(),
+            id=building.id,
+        )
     except Exception:
         print(f"{building.id} failed: {traceback.format_exc()}")
         model = Building(building.id, Status.INTERNAL_ERROR)
@@ -164,12 +209,17 @@ def times_told(seconds: list[float]) -> str:
     """How long the buildings took, in words."""
     ms = 1e3 * np.array(seconds)
     mean, most = ms.mean(), ms.max()
-    return f"{np.median(ms):.1f} ms a building in the median, {mean:.1f} in the mean, {most:.0f} at most"
+    return (
+        f"{np.median(ms):.1f} ms a building in the median, {mean:.1f} in the mean, {most:.0f} at "
+        "most"
+    )
 
 
 def composed(building: TrueBuilding) -> Building:
     """The true roof faces themselves as one shell: what a perfect reconstruction would score."""
-    frame = LocalFrame(np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0))
+    frame = LocalFrame(
+        np.append(np.round(shapely.get_coordinates(building.footprint.centroid)[0]), 0.0)
+    )
     solids = [solid.moved(-frame.origin) for solid in building.solids.values()]
     parts = tuple(Part("free", (piece,)) for solid in solids for piece in roof_pieces(solid))
     roof = Roof(parts, shapely.transform(building.footprint, frame.to_local), frame)
@@ -193,7 +243,11 @@ def roof_pieces(solid: Solid) -> Iterator[Piece]:
 
 
 def judged(
-    town: str, buildings: list[TrueBuilding], models: list[Building], seconds: list[float], folder: Path
+    town: str,
+    buildings: list[TrueBuilding],
+    models: list[Building],
+    seconds: list[float],
+    folder: Path,
 ) -> list[Score]:
     """The score of each model of `buildings` in `folder`, where the truth is written too."""
     truth = folder / "truth.city.json"
@@ -231,13 +285,25 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--town", nargs="+", choices=list(TOWNS), default=USUAL)
     parser.add_argument("--density", type=float, default=5.0, help="points a square metre")
-    parser.add_argument("--without-footprints", action="store_true", help="estimate outlines from the points")
+    parser.add_argument(
+        "--without-footprints", action="store_true", help="estimate outlines from the points"
+    )
     parser.add_argument("--every", type=int, default=1, help="take each k-th building")
-    parser.add_argument("--parity", choices=("even", "odd"), help="take those at even or odd places")
-    parser.add_argument("--most", type=int, help="at most so many buildings a town, drawn by chance")
-    parser.add_argument("--worst", type=int, default=0, help="name the buildings with the worst edges")
-    parser.add_argument("--save", type=Path, help="keep a run and the truth of each town in this folder")
-    parser.add_argument("--composed-truth", action="store_true", help="judge the true roofs as one shell a building")
+    parser.add_argument(
+        "--parity", choices=("even", "odd"), help="take those at even or odd places"
+    )
+    parser.add_argument(
+        "--most", type=int, help="at most so many buildings a town, drawn by chance"
+    )
+    parser.add_argument(
+        "--worst", type=int, default=0, help="name the buildings with the worst edges"
+    )
+    parser.add_argument(
+        "--save", type=Path, help="keep a run and the truth of each town in this folder"
+    )
+    parser.add_argument(
+        "--composed-truth", action="store_true", help="judge the true roofs as one shell a building"
+    )
     a = parser.parse_args()
     for town in a.town:
         buildings = chosen(read_town(TOWNS[town]), a.every, a.parity, a.most)

@@ -1,8 +1,10 @@
-"""Roof type by evidence alone, all types simulated alike often with 5 % outliers. python -m benchmarks.types [--quick] [--seed 21]
+"""Roof type by evidence alone, all types simulated alike often with 5 % outliers. python -m
+benchmarks.types [--quick] [--seed 21]
 
-Half of the gables have their ridge off the middle. The draws (roofs.py) keep types apart that are one surface at a bound: an
-asymmetric gable has one slope at least a seventh steeper, a half-hip ends of 0.3 to 0.6 of the rise and a one-ended one of 0.45
-to 0.7, a level top at least 0.4 of the width, a gambrel's break is seen.
+Half of the gables have their ridge off the middle. The draws (roofs.py) keep types apart that are
+one surface at a bound: an asymmetric gable has one slope at least a seventh steeper, a half-hip
+ends of 0.3 to 0.6 of the rise and a one-ended one of 0.45 to 0.7, a level top at least 0.4 of the
+width, a gambrel's break is seen.
 """
 
 from __future__ import annotations
@@ -30,7 +32,10 @@ def main() -> None:
     for density in DENSITIES:
         taken = Counter(types_of(density, 10 if given.quick else 100, given.seed))
         right = sum(count for (truth, found), count in taken.items() if truth == found)
-        print(f"{density:4.0f} points/m2: {100 * right / taken.total():.1f} % of {taken.total()}", flush=True)
+        print(
+            f"{density:4.0f} points/m2: {100 * right / taken.total():.1f} % of {taken.total()}",
+            flush=True,
+        )
         for (truth, found), count in taken.most_common():
             if truth != found:
                 print(f"       {truth} taken for {found}: {count}")

@@ -48,7 +48,9 @@ Polygons = list[list[np.ndarray]]
 
 @dataclass(frozen=True)
 class Outcome:
-    """A case and its model's verdict, with the truth: RMSE of the surface (m) and number of wrong levels."""
+    """A case and its model's verdict, with the truth: RMSE of the surface (m) and number of wrong
+    levels.
+    """
 
     case: Case
     grade: Grade | None
@@ -63,7 +65,12 @@ class Outcome:
 
 def polygons_of(solids: Iterable[Solid], kinds: tuple[str, ...]) -> Polygons:
     """Faces of `kinds` as lists of rings (m, 3)."""
-    return [[solid.vertices[list(r)] for r in f.rings] for solid in solids for f in solid.faces if f.kind in kinds]
+    return [
+        [solid.vertices[list(r)] for r in f.rings]
+        for solid in solids
+        for f in solid.faces
+        if f.kind in kinds
+    ]
 
 
 def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
@@ -72,7 +79,9 @@ def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
 
 
 def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
-    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none; upright ones do not count."""
+    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none; upright ones do
+    not count.
+    """
     z = np.full(len(xy), -np.inf)
     for rings in polygons:
         normal, centre = ring_normal(rings[0]), rings[0].mean(axis=0)
@@ -87,23 +96,36 @@ def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 
 
 def compared(case: Case, building: Building) -> tuple[float, int]:
-    """RMSE (m) between the true surface and the model's, and the number of levels that are missing or invented."""
+    """RMSE (m) between the true surface and the model's, and the number of levels that are missing
+    or invented.
+    """
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
     area = shapely.transform(case.truth_area, lambda xy: xy - origin[:2])
     everywhere = shapely.union_all([area, *map(plan_of, polygons_of(model, (ROOF,)))])
     step = max(RASTER_M, float(np.sqrt(everywhere.area / MOST_PLACES)))
     west, south, east, north = everywhere.bounds
-    x, y = np.meshgrid(np.arange(west + step / 2, east, step), np.arange(south + step / 2, north, step), indexing="ij")
+    x, y = np.meshgrid(
+        np.arange(west + step / 2, east, step),
+        np.arange(south + step / 2, north, step),
+        indexing="ij",
+    )
     xy = np.column_stack([x.ravel(), y.ravel()])
-    z_true, z_model = heights(polygons_of(true, (ROOF,)), xy), heights(polygons_of(model, (ROOF,)), xy)
+    z_true, z_model = (
+        heights(polygons_of(true, (ROOF,)), xy),
+        heights(polygons_of(model, (ROOF,)), xy),
+    )
     z_true[~shapely.contains_xy(area, xy[:, 0], xy[:, 1])] = np.nan
     gaps = [
-        point_surface_distances(np.column_stack([xy, z])[np.isfinite(z)], polygons_of(other, (ROOF, WALL)))
+        point_surface_distances(
+            np.column_stack([xy, z])[np.isfinite(z)], polygons_of(other, (ROOF, WALL))
+        )
         for z, other in ((z_true, model), (z_model, true))
     ]
     is_off = (np.isfinite(z_true) != np.isfinite(z_model)) | (np.abs(z_true - z_model) >= LEVEL_M)
-    wrong = patches(is_off.reshape(x.shape), step, max(LEVEL_M2, LEVEL_SHARE * case.truth_area.area))
+    wrong = patches(
+        is_off.reshape(x.shape), step, max(LEVEL_M2, LEVEL_SHARE * case.truth_area.area)
+    )
     return float(np.sqrt(np.mean(np.concatenate(gaps) ** 2))), wrong
 
 
@@ -126,7 +148,9 @@ def outcomes(
                 for case in cases(source, most, density, with_footprints, parity):
                     building = reconstruct(case.points, case.footprint, id=case.id)
                     if building.built is not None:
-                        yield Outcome(case, building.grade, building.detail, *compared(case, building))
+                        yield Outcome(
+                            case, building.grade, building.detail, *compared(case, building)
+                        )
 
 
 def line(name: str, found: list[Outcome]) -> str:
@@ -137,44 +161,79 @@ def line(name: str, found: list[Outcome]) -> str:
         called = [outcome for outcome in found if outcome.grade is grade]
         right = f"{np.mean([outcome.is_sound for outcome in called]):6.3f}" if called else "     -"
         cells.append(f"{len(called) / len(found):6.3f} {right}")
-    kept = f"{np.mean([outcome.grade is Grade.GOOD for outcome in sound]):6.3f}" if sound else "     -"
+    kept = (
+        f"{np.mean([outcome.grade is Grade.GOOD for outcome in sound]):6.3f}" if sound else "     -"
+    )
     return " | ".join([*cells, kept])
 
 
 def table(found: list[Outcome]) -> str:
     """Rows for all outcomes, and by density, area, source and defect."""
     groups: dict[str, Callable[[Outcome], bool]] = {"all": lambda outcome: True}
-    groups |= {f"{d:g} points/m2": lambda o, d=d: o.case.density == d for d in sorted({o.case.density for o in found})}
+    groups |= {
+        f"{d:g} points/m2": lambda o, d=d: o.case.density == d
+        for d in sorted({o.case.density for o in found})
+    }
     for low, high in pairwise(AREAS_M2):
-        groups[f"{low:g} to {high:g} m2"] = lambda o, low=low, high=high: low <= o.case.area_m2 < high
-    groups |= {s: lambda o, s=s: o.case.source == s for s in dict.fromkeys(o.case.source for o in found)}
-    groups |= {f"defect: {d}": lambda o, d=d: o.case.defect == d for d in dict.fromkeys(o.case.defect for o in found)}
-    head = f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
+        groups[f"{low:g} to {high:g} m2"] = lambda o, low=low, high=high: (
+            low <= o.case.area_m2 < high
+        )
+    groups |= {
+        s: lambda o, s=s: o.case.source == s for s in dict.fromkeys(o.case.source for o in found)
+    }
+    groups |= {
+        f"defect: {d}": lambda o, d=d: o.case.defect == d
+        for d in dict.fromkeys(o.case.defect for o in found)
+    }
+    head = (
+        f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
+    )
     rows = ((name, [o for o in found if belongs(o)]) for name, belongs in groups.items())
     return "\n".join([head, *(line(name, own) for name, own in rows if own)])
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--sources", nargs="+", default=["compounds", *sources()], choices=["compounds", *sources()])
+    parser.add_argument(
+        "--sources", nargs="+", default=["compounds", *sources()], choices=["compounds", *sources()]
+    )
     parser.add_argument("--most", type=int, default=40, help="buildings of each source")
     parser.add_argument(
-        "--densities", type=float, nargs="+", default=[1.0, 2.0, 5.0, 15.0], help="points a square metre"
+        "--densities",
+        type=float,
+        nargs="+",
+        default=[1.0, 2.0, 5.0, 15.0],
+        help="points a square metre",
     )
     parser.add_argument("--parity", choices=("even", "odd"), default="odd")
-    parser.add_argument("--with-footprints", action="store_true", help="cases with footprints alone")
-    parser.add_argument("--without-footprints", action="store_true", help="cases without footprints alone")
-    parser.add_argument("--wrong", type=int, default=0, help="name so many cases called good that are not sound")
+    parser.add_argument(
+        "--with-footprints", action="store_true", help="cases with footprints alone"
+    )
+    parser.add_argument(
+        "--without-footprints", action="store_true", help="cases without footprints alone"
+    )
+    parser.add_argument(
+        "--wrong", type=int, default=0, help="name so many cases called good that are not sound"
+    )
     a = parser.parse_args()
-    footprints = (True,) if a.with_footprints else (False,) if a.without_footprints else (True, False)
+    footprints = (
+        (True,) if a.with_footprints else (False,) if a.without_footprints else (True, False)
+    )
     found = list(outcomes(a.sources, a.most, a.densities, footprints, a.parity))
     for with_footprints in footprints:
-        own = [outcome for outcome in found if (outcome.case.footprint is not None) == with_footprints]
-        print(f"{a.parity} buildings, with{'' if with_footprints else 'out'} footprints\n{table(own)}\n", flush=True)
+        own = [
+            outcome for outcome in found if (outcome.case.footprint is not None) == with_footprints
+        ]
+        print(
+            f"{a.parity} buildings, with{'' if with_footprints else 'out'} "
+            f"footprints\n{table(own)}\n",
+            flush=True,
+        )
     wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
     for o in wrong[: a.wrong]:
         known = "with" if o.case.footprint is not None else "without"
-        print(f"{o.case.source} {o.case.id} {o.case.density:g}/m2 {known} footprint, {o.case.defect}: RMSE {o.rmse:.2f} m,"
+        print(f"{o.case.source} {o.case.id} {o.case.density:g}/m2 {known} footprint, "
+              f"{o.case.defect}: RMSE {o.rmse:.2f} m,"
               f" wrong levels {o.wrong_levels}")  # fmt: skip
 
 

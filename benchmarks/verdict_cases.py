@@ -1,4 +1,5 @@
-"""Roofs whose truth is known, scanned by simulation, with what goes wrong with clouds and footprints.
+"""Roofs whose truth is known, scanned by simulation, with what goes wrong with clouds and
+footprints.
 
 A case is a simulated compound or a building of a real town, its points at one density, and the
 footprint given, None for a run without footprints. A quarter of the cases is faultless, a quarter
@@ -18,7 +19,14 @@ import shapely
 
 from hiproof.compose import compose
 from hiproof.model import Solid
-from hiproof.simulate import COMPOUND_KINDS, SOURCES, ScanSettings, random_compound, scan, scan_solids
+from hiproof.simulate import (
+    COMPOUND_KINDS,
+    SOURCES,
+    ScanSettings,
+    random_compound,
+    scan,
+    scan_solids,
+)
 from hiproof.simulate.scene import Defects
 
 from .towns import TOWNS, TrueBuilding, read_town
@@ -31,7 +39,9 @@ CLUTTERED = replace(SCANNER, chimney=0.5, antenna=0.2, tree=0.3)
 
 @dataclass(frozen=True)
 class Case:
-    """A building to model: `solids` are its truth, within `truth_area` where the footprint asks for a part of it alone."""
+    """A building to model: `solids` are its truth, within `truth_area` where the footprint asks for
+    a part of it alone.
+    """
 
     source: str
     id: str
@@ -49,7 +59,10 @@ class Case:
 
 @dataclass(frozen=True)
 class Scene:
-    """Points (n, 3) and the footprint of a building, as a defect changes them; `asked` is the true area asked for."""
+    """Points (n, 3) and the footprint of a building, as a defect changes them;
+
+    `asked` is the true area asked for.
+    """
 
     points: np.ndarray
     footprint: shapely.Polygon
@@ -91,9 +104,15 @@ def facade_points(scene: Scene, rng: np.random.Generator, count: int) -> np.ndar
     weight = np.maximum(outwards @ seen_from, 0.0)
     side = rng.choice(len(edges), count, p=weight / weight.sum())
     xy = corners[side] + rng.random((count, 1)) * edges[side]
-    xy -= outwards[side] / np.hypot(*outwards[side].T)[:, None] * np.abs(rng.normal(0.0, 0.06, (count, 1)))
+    xy -= (
+        outwards[side]
+        / np.hypot(*outwards[side].T)[:, None]
+        * np.abs(rng.normal(0.0, 0.06, (count, 1)))
+    )
     top = np.quantile(scene.points[:, 2], 0.1)
-    return np.column_stack([xy, rng.uniform(scene.z_ground + 0.5, max(top, scene.z_ground + 1.0), count)])
+    return np.column_stack(
+        [xy, rng.uniform(scene.z_ground + 0.5, max(top, scene.z_ground + 1.0), count)]
+    )
 
 
 def with_facades(scene: Scene, rng: np.random.Generator) -> Scene:
@@ -117,12 +136,16 @@ def too_wide(scene: Scene, rng: np.random.Generator) -> Scene:
     """A footprint that takes in a yard beside its building."""
     west, south, east, north = scene.footprint.bounds
     shift = direction(rng) * rng.uniform(0.1, 0.5) * np.array([east - west, north - south])
-    wider = shapely.union_all([scene.footprint, shapely.transform(scene.footprint, lambda xy: xy + shift)])
+    wider = shapely.union_all(
+        [scene.footprint, shapely.transform(scene.footprint, lambda xy: xy + shift)]
+    )
     return replace(scene, footprint=max(shapely.get_parts(wider), key=shapely.area))
 
 
 def part_alone(scene: Scene, rng: np.random.Generator) -> Scene:
-    """A footprint of one half of the building, as cadastres cut them; the other half is not asked for."""
+    """A footprint of one half of the building, as cadastres cut them; the other half is not asked
+    for.
+    """
     west, south, east, north = scene.footprint.bounds
     middle = rng.uniform(0.3, 0.7) * (east - west) + west
     half = shapely.intersection(scene.footprint, shapely.box(west, south, middle, north))
@@ -144,7 +167,11 @@ OF_POINTS: dict[str, Defect] = {
     "walls alone": walls_alone,
     "noise": noisy,
 }
-OF_FOOTPRINTS: dict[str, Defect] = {"shifted": shifted, "too wide": too_wide, "part alone": part_alone}
+OF_FOOTPRINTS: dict[str, Defect] = {
+    "shifted": shifted,
+    "too wide": too_wide,
+    "part alone": part_alone,
+}
 DEFECTS = OF_POINTS | OF_FOOTPRINTS
 SOUND = ("none", "scanner")
 
@@ -154,7 +181,9 @@ def seeded(*words: object) -> np.random.Generator:
     return np.random.default_rng(zlib.crc32(" ".join(map(str, words)).encode()))
 
 
-def compound(seed: int) -> tuple[TrueBuilding, Callable[[np.random.Generator, ScanSettings], np.ndarray]]:
+def compound(
+    seed: int,
+) -> tuple[TrueBuilding, Callable[[np.random.Generator, ScanSettings], np.ndarray]]:
     """A simulated compound as a true building, and what scans it."""
     rng = np.random.default_rng([seed, 7])
     building = random_compound(rng, COMPOUND_KINDS[seed // 2 % len(COMPOUND_KINDS)])
@@ -179,7 +208,9 @@ def of_town(building: TrueBuilding) -> Callable[[np.random.Generator, ScanSettin
 
 
 def buildings(source: str, most: int) -> Iterator[tuple[int, TrueBuilding, Callable]]:
-    """Number, truth and scanner of at most so many buildings of a source, evenly chosen, as many even as odd ones."""
+    """Number, truth and scanner of at most so many buildings of a source, evenly chosen, as many
+    even as odd ones.
+    """
     if source == "compounds":
         yield from ((seed, *compound(seed)) for seed in range(most))
         return
@@ -190,15 +221,23 @@ def buildings(source: str, most: int) -> Iterator[tuple[int, TrueBuilding, Calla
 
 
 def where_seen(scene: Scene, density: float) -> shapely.Geometry:
-    """The true area as far as it has points: half a distance between points around them, gaps between them closed."""
+    """The true area as far as it has points: half a distance between points around them, gaps
+    between them closed.
+    """
     apart, points = density**-0.5, scene.points[:: max(1, len(scene.points) // MOST_SEEN)]
     apart = max(apart, (scene.asked.area / max(len(points), 1)) ** 0.5)
-    seen = shapely.multipoints(points[:, :2]).buffer(1.5 * apart, quad_segs=3).buffer(-apart, quad_segs=3)
+    seen = (
+        shapely.multipoints(points[:, :2])
+        .buffer(1.5 * apart, quad_segs=3)
+        .buffer(-apart, quad_segs=3)
+    )
     found = shapely.intersection(scene.asked, seen)
     return scene.asked if found.is_empty else found
 
 
-def cases(source: str, most: int, density: float, with_footprints: bool, parity: str) -> Iterator[Case]:
+def cases(
+    source: str, most: int, density: float, with_footprints: bool, parity: str
+) -> Iterator[Case]:
     """The cases of even or odd buildings of a source at one density.
 
     Of four buildings one has no defect, one those of the scanner, two have others.
@@ -210,7 +249,9 @@ def cases(source: str, most: int, density: float, with_footprints: bool, parity:
         rng = seeded(building.id, density, with_footprints)
         kind = number // 2 % 4
         defect = SOUND[kind] if kind < 2 else others[int(rng.integers(len(others)))]
-        own = Defects.none() if defect == "none" else CLUTTERED if source == "compounds" else SCANNER
+        own = (
+            Defects.none() if defect == "none" else CLUTTERED if source == "compounds" else SCANNER
+        )
         points = scanned(rng, ScanSettings(density=density, defects=own))
         z_ground = min(float(solid.vertices[:, 2].min()) for solid in building.solids.values())
         scene = Scene(points, building.footprint, building.footprint, z_ground)

@@ -1,12 +1,14 @@
-"""Roofs of clouds that come without footprints: how near their points they lie, of how many parts and which types.
+"""Roofs of clouds that come without footprints: how near their points they lie, of how many parts
+and which types.
 
 usage: python -m benchmarks.without_footprints [--set stbarth ctview delft] [--each]
 
-The cloud of a set (class 6 of all its files) is split into buildings, each is reconstructed from its points alone. Printed: mean
-over buildings of the share of points within 0.2 m (all points of the building, those beside the roof counted as misses),
-median distance of points to the roof, parts and roof faces in the mean, the share of the area in plan that has a type
-other than "free", the area by type, milliseconds of `reconstruct`, seconds of splitting the cloud (CPU). `--each` adds a line a building, the
-largest first.
+The cloud of a set (class 6 of all its files) is split into buildings, each is reconstructed from
+its points alone. Printed: mean over buildings of the share of points within 0.2 m (all points of
+the building, those beside the roof counted as misses), median distance of points to the roof, parts
+and roof faces in the mean, the share of the area in plan that has a type other than "free", the
+area by type, milliseconds of `reconstruct`, seconds of splitting the cloud (CPU). `--each` adds a
+line a building, the largest first.
 """
 
 from __future__ import annotations
@@ -27,21 +29,30 @@ SETS = ("stbarth", "ctview")
 
 
 def models_of(name: str) -> tuple[list[tuple[Building, float]], float]:
-    """Every building found in the set's cloud, reconstructed, and the seconds it took; the seconds in which they were found."""
+    """Every building found in the set's cloud, reconstructed, and the seconds it took; the seconds
+    in which they were found.
+    """
     cloud = read_points(*sorted((SHARED / "data" / name).glob("*.laz")))
     outcomes, started = [], time.process_time()
     buildings = split_buildings(cloud)
     splitting = time.process_time() - started
     for found in buildings:
         started = time.process_time()
-        outcomes.append((reconstruct(cloud.xyz[found.index], id=found.id), time.process_time() - started))
+        outcomes.append(
+            (reconstruct(cloud.xyz[found.index], id=found.id), time.process_time() - started)
+        )
     return outcomes, splitting
 
 
 def row(building: Building) -> str:
-    types = ", ".join(f"{count} {name}" for name, count in Counter(p.type for p in building.parts).most_common())
+    types = ", ".join(
+        f"{count} {name}" for name, count in Counter(p.type for p in building.parts).most_common()
+    )
     quality = building.quality
-    return f"  {building.id}: share {quality.share_within_20cm:.3f} of {quality.points} points; {types}"
+    return (
+        f"  {building.id}: share {quality.share_within_20cm:.3f} of {quality.points} points; "
+        f"{types}"
+    )
 
 
 def report(name: str, outcomes: list[tuple[Building, float]], splitting: float) -> str:
@@ -51,9 +62,11 @@ def report(name: str, outcomes: list[tuple[Building, float]], splitting: float) 
         f"{name}: {len(buildings)} of {len(outcomes)} buildings modelled"
         f"  share {np.nanmean([b.quality.share_within_20cm for b in buildings]):.4f}"
         f"  distance median {np.median([b.quality.psd_mean for b in buildings]):.3f} m"
-        f"  parts {np.mean([len(b.parts) for b in buildings]):.2f} ({sum(len(b.parts) for b in buildings)})"
+        f"  parts {np.mean([len(b.parts) for b in buildings]):.2f} "
+        f"({sum(len(b.parts) for b in buildings)})"
         f"  faces {np.mean([len(b.solid.of_kind(ROOF)) for b in buildings]):.2f}"
-        f"  named {named_share(buildings):.3f}  ms median {np.median(ms):.1f} mean {ms.mean():.1f} max {ms.max():.0f}, splitting {splitting:.1f} s\n"
+        f"  named {named_share(buildings):.3f}  ms median {np.median(ms):.1f} mean {ms.mean():.1f} "
+        f"max {ms.max():.0f}, splitting {splitting:.1f} s\n"
         "  " + ", ".join(f"{type} {area / areas.total():.1%}" for type, area in areas.items())
     )
 
@@ -67,7 +80,9 @@ def main() -> None:
         outcomes, splitting = models_of(name)
         print(report(name, outcomes, splitting), flush=True)
         if arguments.each:
-            largest_first = sorted((b for b, _ in outcomes), key=lambda building: -building.quality.points)
+            largest_first = sorted(
+                (b for b, _ in outcomes), key=lambda building: -building.quality.points
+            )
             print("\n".join(row(building) for building in largest_first))
 
 

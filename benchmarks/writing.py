@@ -2,9 +2,9 @@
 
     python -m benchmarks.writing [COUNT]
 
-Generated roofs of every type, composed once, are written COUNT times over (default 2000) to a temporary folder. Prints CPU
-milliseconds a building (median of five runs) for each writer, given the solid's figures, and the process's peak memory
-after COUNT / 10 and after COUNT buildings.
+Generated roofs of every type, composed once, are written COUNT times over (default 2000) to a
+temporary folder. Prints CPU milliseconds a building (median of five runs) for each writer, given
+the solid's figures, and the process's peak memory after COUNT / 10 and after COUNT buildings.
 """
 
 import resource
@@ -22,7 +22,14 @@ from hiproof.compose import compose
 from hiproof.model import Building, Model, Quality
 from hiproof.simulate import ROOF_TYPES, random_building
 from hiproof.status import Status
-from hiproof.write import AttributesWriter, CityGMLWriter, CityJSONWriter, ParametersWriter, roof_figures, write_all
+from hiproof.write import (
+    AttributesWriter,
+    CityGMLWriter,
+    CityJSONWriter,
+    ParametersWriter,
+    roof_figures,
+    write_all,
+)
 
 WRITERS = {
     "buildings.gml": CityGMLWriter,
@@ -40,12 +47,22 @@ def generated(seed=0):
         origin = made.roof.frame.origin
         solid = compose(made.roof, 0.0).moved(origin)
         quality = Quality(300, 5.0, 0.05, 0.04, 0.06, 0.1, 0.99, 0.95, 0.02, 0.0)
-        yield Building(type, Status.MODELLED, "", Model(made.roof, solid), quality, float(origin[2]), "simulated")
+        yield Building(
+            type,
+            Status.MODELLED,
+            "",
+            Model(made.roof, solid),
+            quality,
+            float(origin[2]),
+            "simulated",
+        )
 
 
 def street(buildings, count):
     """`count` buildings with ids of their own."""
-    return (replace(building, id=f"b{n}") for n, building in enumerate(islice(cycle(buildings), count)))
+    return (
+        replace(building, id=f"b{n}") for n, building in enumerate(islice(cycle(buildings), count))
+    )
 
 
 def cpu_ms(work, count, runs=5):
@@ -79,7 +96,9 @@ def main(count):
         print(f"{'figures of the solid':22} {total:.3f} ms")
         for name, writer in WRITERS.items():
             pairs = list(zip(some, figures, strict=True))
-            spent = cpu_ms(lambda w=writer, n=name, p=pairs: write_with(w, Path(folder, n), p), len(some))
+            spent = cpu_ms(
+                lambda w=writer, n=name, p=pairs: write_with(w, Path(folder, n), p), len(some)
+            )
             total += spent if name != "buildings.gpkg" else 0.0
             print(f"{name:22} {spent:.3f} ms")
         print(f"{'without the table':22} {total:.3f} ms")

@@ -1,4 +1,5 @@
-"""Draw the picture of the page of `hiproof edit`: a building of the bundled neighbourhood, as Chromium shows it.
+"""Draw the picture of the page of `hiproof edit`: a building of the bundled neighbourhood, as
+Chromium shows it.
 
 python docs/draw_edit.py [OUT.png]
 
@@ -18,12 +19,19 @@ from hiproof.edit.desk import Desk
 from hiproof.edit.server import Server, Service
 from hiproof.simulate import demo_files
 
-FLAGS = ["--no-sandbox", "--disable-quic", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--enable-unsafe-swiftshader",
+]
 SIZE = {"width": 1360, "height": 820}
 
 
 def draw(service: Service, path: Path) -> None:
-    """A picture of the page with its building of most parts, a ridge raised by hand and refitted, types tried on."""
+    """A picture of the page with its building of most parts, a ridge raised by hand and refitted,
+    types tried on.
+    """
     with sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
         page = browser.new_page(viewport=SIZE)
@@ -43,7 +51,12 @@ def draw(service: Service, path: Path) -> None:
 def main(path: Path) -> None:
     files = demo_files()
     with tempfile.TemporaryDirectory() as folder:
-        inputs = (str(files["cloud"]),), Path(folder), str(files["footprints"]), str(files["terrain"])
+        inputs = (
+            (str(files["cloud"]),),
+            Path(folder),
+            str(files["footprints"]),
+            str(files["terrain"]),
+        )
         reconstruct_area(Request(*inputs))
         service = Service(Desk(Path(folder), "anna"))
         with Server(service) as server:

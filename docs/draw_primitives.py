@@ -30,7 +30,8 @@ HEAD = """# Roof types and their parameters
 def document() -> str:
     """docs/primitives.md."""
     sections = [
-        f"## {name}\n\n{', '.join(f'`{p}`' for p in names_of(name))}\n\n![{name}](primitives/{name}.svg)\n"
+        f"## {name}\n\n{', '.join(f'`{p}`' for p in names_of(name))}\n\n"
+        f"![{name}](primitives/{name}.svg)\n"
         for name in CATALOGUE
     ]
     return "\n".join([HEAD, *sections])

@@ -1,15 +1,19 @@
-"""Draw reconstructed roofs in plan over their points, beside a view from the south, on sheets of twelve buildings.
+"""Draw reconstructed roofs in plan over their points, beside a view from the south, on sheets of
+twelve buildings.
 
-python docs/draw_roofs.py RUN|delft|amsterdam_west|stbarth|ctview [--worst 24] [--chance 24] [--ids A B] [--seed 0]
+python docs/draw_roofs.py RUN|delft|amsterdam_west|stbarth|ctview [--worst 24] [--chance 24] [--ids
+A B] [--seed 0]
                           [--truth CITYJSON] [--colour height|residual] [--out FOLDER]
 
-RUN is the output folder of `hiproof reconstruct` whose clouds are still in their place; a name stands for a set in
-../shared/data, which is modelled first. The sheets `worst-1.png`, ... show the buildings with the smallest share of
-points within 0.2 m of the roof, `chance-1.png`, ... some drawn by chance.
+RUN is the output folder of `hiproof reconstruct` whose clouds are still in their place; a name
+stands for a set in ../shared/data, which is modelled first. The sheets `worst-1.png`, ... show the
+buildings with the smallest share of points within 0.2 m of the roof, `chance-1.png`, ... some drawn
+by chance.
 
-In plan: points by height, or by residual; those more than 0.2 m off the roof as black (above it) and grey (below) crosses. Each part's
-outline in its type's colour and its type; ridges and hips red, valleys blue, steps black, seams in one plane dotted,
-the footprint dashed, roof edges of the true models dashed green. In the view: roofs in the types' colours.
+In plan: points by height, or by residual; those more than 0.2 m off the roof as black (above it)
+and grey (below) crosses. Each part's outline in its type's colour and its type; ridges and hips
+red, valleys blue, steps black, seams in one plane dotted, the footprint dashed, roof edges of the
+true models dashed green. In the view: roofs in the types' colours.
 """
 
 from __future__ import annotations
@@ -73,7 +77,10 @@ class DrawnPart:
 
 @dataclass(frozen=True)
 class Drawn:
-    """A building to draw, all in world metres; `gap` (n,) is each point's signed height over the roof, NaN beside it."""
+    """A building to draw, all in world metres;
+
+    `gap` (n,) is each point's signed height over the roof, NaN beside it.
+    """
 
     id: str
     status: str
@@ -86,27 +93,39 @@ class Drawn:
 
     @property
     def share(self) -> float:
-        """Share of the points within 0.2 m of the roof, those with no roof over or under them counted as off."""
+        """Share of the points within 0.2 m of the roof, those with no roof over or under them
+        counted as off.
+        """
         return float(np.mean(np.abs(self.gap) < NEAR_M)) if len(self.gap) else 0.0
 
 
 def modelled(name: str, out: Path) -> Path:
-    """Folder of a run over the set `name`, made now. Raises InputError where the set is not there."""
+    """Folder of a run over the set `name`, made now.
+
+    Raises InputError where the set is not there.
+    """
     data = SETS / name
     clouds, footprints = sorted(map(str, data.glob("*.laz"))), sorted(map(str, data.glob("*.gpkg")))
     if not clouds:
-        raise InputError(f"expected a run's folder or one of {', '.join(NAMED)} under {SETS}, got {name!r}")
-    summary = reconstruct_area(Request(tuple(clouds), out / name, footprints[0] if footprints else None, restart=True))
+        raise InputError(
+            f"expected a run's folder or one of {', '.join(NAMED)} under {SETS}, got {name!r}"
+        )
+    summary = reconstruct_area(
+        Request(tuple(clouds), out / name, footprints[0] if footprints else None, restart=True)
+    )
     print(f"{name}: {summary.buildings} buildings")
     return out / name
 
 
 def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
-    """The buildings of a run that have a model and points, with the models of `truth` under the same ids."""
+    """The buildings of a run that have a model and points, with the models of `truth` under the
+    same ids.
+    """
     run = evaluate_run(folder)
     if not run.clouds:
         raise InputError(
-            f"expected the clouds of the run in {folder} where run.json says, got none; make the run again"
+            f"expected the clouds of the run in {folder} where run.json says, got none; make the "
+            "run again"
         )
     roofs = {r["id"]: building_of(r)[1] for r in read_parameters(folder / "parameters.jsonl")}
     true_solids = {model.id: model.solid for model in read_models(truth)} if truth else {}
@@ -117,18 +136,26 @@ def read_run(folder: Path, truth: Path | None = None) -> list[Drawn]:
             parts = tuple(drawn_part(part, roof.frame.origin) for part in roof.parts)
             gap = gaps(model.solid, points)
             true_solid = true_solids.get(model.id)
-            found.append(Drawn(model.id, model.status, model.solid, parts, points, footprint, gap, true_solid))
+            found.append(
+                Drawn(
+                    model.id, model.status, model.solid, parts, points, footprint, gap, true_solid
+                )
+            )
     return found
 
 
 def drawn_part(part: Part, shift: np.ndarray) -> DrawnPart:
     """A part in world coordinates, its polygons made valid."""
     pieces = (piece.moved(shift) for piece in part.pieces)
-    return DrawnPart(part.type, tuple(Piece(shapely.make_valid(piece.outline), piece.planes) for piece in pieces))
+    return DrawnPart(
+        part.type, tuple(Piece(shapely.make_valid(piece.outline), piece.planes) for piece in pieces)
+    )
 
 
 def gaps(solid: Solid, points: np.ndarray) -> np.ndarray:
-    """Height (n,) of points (n, 3) over the nearest roof face above or below them, NaN where there is none."""
+    """Height (n,) of points (n, 3) over the nearest roof face above or below them, NaN where there
+    is none.
+    """
     nearest = np.full(len(points), np.nan)
     for face in solid.of_kind(ROOF):
         a, b, c = plane_of(solid.vertices, face)
@@ -176,9 +203,15 @@ def roof_lines(solid: Solid) -> list[tuple[str, np.ndarray]]:
             middle = shapely.Point(ends[:, :2].mean(axis=0))
             lines.append(("eave" if border.distance(middle) < 0.02 else "step", ends[:, :2]))
         elif a < b:
-            along, n, m = ends[1] - ends[0], normal_of(solid.vertices, face), normal_of(solid.vertices, other)
+            along, n, m = (
+                ends[1] - ends[0],
+                normal_of(solid.vertices, face),
+                normal_of(solid.vertices, other),
+            )
             bend = np.cross(n, m) @ along / max(np.linalg.norm(along), 1e-9)
-            lines.append(("seam" if abs(bend) < 0.02 else "ridge" if bend > 0 else "valley", ends[:, :2]))
+            lines.append(
+                ("seam" if abs(bend) < 0.02 else "ridge" if bend > 0 else "valley", ends[:, :2])
+            )
     return lines
 
 
@@ -203,7 +236,10 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
     if building.footprint is not None:
         for polygon in shapely.get_parts(building.footprint):
             axes.plot(
-                *(shapely.get_coordinates(polygon.exterior) - origin).T, color="#666666", linewidth=0.8, linestyle="--"
+                *(shapely.get_coordinates(polygon.exterior) - origin).T,
+                color="#666666",
+                linewidth=0.8,
+                linestyle="--",
             )
     for face in building.truth.of_kind(ROOF) if building.truth else ():
         for ring in face.rings:
@@ -212,16 +248,24 @@ def draw_plan(axes: plt.Axes, building: Drawn, colour: str) -> None:
     for kind, ends in roof_lines(building.solid):
         axes.plot(*(ends - origin).T, **LINES[kind], solid_capstyle="round", zorder=3)
     draw_parts(axes, building, origin)
-    low, high = shapely.bounds(shapely.MultiPoint(building.solid.vertices[:, :2] - origin)).reshape(2, 2)
+    low, high = shapely.bounds(shapely.MultiPoint(building.solid.vertices[:, :2] - origin)).reshape(
+        2, 2
+    )
     draw_scale(axes, low - 0.6)
     axes.set(xlim=(low[0] - 1.0, high[0] + 1.0), ylim=(low[1] - 1.6, high[1] + 1.0), aspect="equal")
     axes.set_axis_off()
 
 
 def draw_parts(axes: plt.Axes, building: Drawn, origin: np.ndarray) -> None:
-    """Each part's outline, drawn a little inside so that common edges stay apart, and its type where it is on top."""
-    x0, y0, x1, y1 = shapely.total_bounds([p.outline for part in building.parts for p in part.pieces])
-    grid = np.stack(np.meshgrid(np.linspace(x0, x1, 60), np.linspace(y0, y1, 60)), axis=-1).reshape(-1, 2)
+    """Each part's outline, drawn a little inside so that common edges stay apart, and its type
+    where it is on top.
+    """
+    x0, y0, x1, y1 = shapely.total_bounds(
+        [p.outline for part in building.parts for p in part.pieces]
+    )
+    grid = np.stack(np.meshgrid(np.linspace(x0, x1, 60), np.linspace(y0, y1, 60)), axis=-1).reshape(
+        -1, 2
+    )
     z = np.stack([part.height_at(grid) for part in building.parts])
     top = np.where(np.isfinite(z.max(axis=0)), z.argmax(axis=0), -1)
     for k, part in enumerate(building.parts):
@@ -234,7 +278,9 @@ def draw_parts(axes: plt.Axes, building: Drawn, origin: np.ndarray) -> None:
         if len(seen) > LABELLED_CELLS:
             place = seen[np.argmin(((seen - np.median(seen, axis=0)) ** 2).sum(axis=1))] - origin
             label = part.type.replace("asymmetric_", "asym. ").replace("_", " ")
-            axes.text(*place, label, fontsize=8, ha="center", va="center", zorder=5, path_effects=HALO)
+            axes.text(
+                *place, label, fontsize=8, ha="center", va="center", zorder=5, path_effects=HALO
+            )
 
 
 def draw_scale(axes: plt.Axes, corner: np.ndarray) -> None:
@@ -244,7 +290,9 @@ def draw_scale(axes: plt.Axes, corner: np.ndarray) -> None:
 
 
 def draw_view(axes: plt.Axes, building: Drawn) -> None:
-    """The solid from the south-south-west, hidden surfaces removed, roofs in the colours of their parts' types."""
+    """The solid from the south-south-west, hidden surfaces removed, roofs in the colours of their
+    parts' types.
+    """
     solid, (right, up, back) = with_low_walls(building.solid), view_axes()
     seen = solid.vertices @ np.column_stack([right, up])
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -262,8 +310,11 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
         if normal @ back < 1e-6:
             continue
         outer, *holes = (seen[list(ring)] for ring in face.rings)
-        inside = np.flatnonzero(shapely.intersects_xy(shapely.make_valid(shapely.Polygon(outer, holes)), *pixels.T))
-        # A pixel is the line right x + up y + back t: where it meets the face's plane is how near it is.
+        inside = np.flatnonzero(
+            shapely.intersects_xy(shapely.make_valid(shapely.Polygon(outer, holes)), *pixels.T)
+        )
+        # A pixel is the line right x + up y + back t: where it meets the face's plane is how near
+        # it is.
         distance = normal @ solid.vertices[face.rings[0][0]]
         near = (distance - pixels[inside] @ (normal @ right, normal @ up)) / (normal @ back)
         nearer = near > depth[inside] + 1e-6
@@ -277,7 +328,9 @@ def draw_view(axes: plt.Axes, building: Drawn) -> None:
 def with_low_walls(solid: Solid) -> Solid:
     """The solid cut off a little below its lowest eave, so that the view shows roofs."""
     vertices = solid.vertices.copy()
-    roof = np.unique([index for face in solid.of_kind(ROOF) for ring in face.rings for index in ring])
+    roof = np.unique(
+        [index for face in solid.of_kind(ROOF) for ring in face.rings for index in ring]
+    )
     vertices[:, 2] = np.maximum(vertices[:, 2], vertices[roof, 2].min() - WALL_M)
     return Solid(vertices, solid.faces)
 
@@ -286,7 +339,11 @@ def view_axes() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Unit vectors to the right and up on the picture, and towards the eye."""
     right = np.array([math.cos(VIEW_TURN), math.sin(VIEW_TURN), 0.0])
     back = np.array(
-        [math.sin(VIEW_TURN) * math.cos(VIEW_TILT), -math.cos(VIEW_TURN) * math.cos(VIEW_TILT), math.sin(VIEW_TILT)]
+        [
+            math.sin(VIEW_TURN) * math.cos(VIEW_TILT),
+            -math.cos(VIEW_TURN) * math.cos(VIEW_TILT),
+            math.sin(VIEW_TILT),
+        ]
     )
     return right, np.cross(back, right), back
 
@@ -295,7 +352,9 @@ def colour_of(building: Drawn, face: Face, normal: np.ndarray) -> tuple[float, f
     """The colour of the type that is on top at a roof face's middle; light for walls."""
     if face.kind != ROOF:
         return (0.93, 0.91, 0.87)
-    inside = shapely.get_coordinates(outline_of(building.solid.vertices, face).representative_point())
+    inside = shapely.get_coordinates(
+        outline_of(building.solid.vertices, face).representative_point()
+    )
     top = int(np.argmax([part.height_at(inside)[0] for part in building.parts]))
     return matplotlib.colors.to_rgb(building.parts[top].colour)
 
@@ -318,7 +377,11 @@ def sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
     """One page of up to twelve buildings."""
     rows = -(-len(buildings) // COLUMNS)
     figure, axes = plt.subplots(
-        rows, 2 * COLUMNS, figsize=(7.0 * COLUMNS, 4.6 * rows), squeeze=False, width_ratios=[1.6, 1.0] * COLUMNS
+        rows,
+        2 * COLUMNS,
+        figsize=(7.0 * COLUMNS, 4.6 * rows),
+        squeeze=False,
+        width_ratios=[1.6, 1.0] * COLUMNS,
     )
     for pair in axes.reshape(-1, 2)[len(buildings) :]:
         pair[0].set_axis_off(), pair[1].set_axis_off()
@@ -328,7 +391,9 @@ def sheet(path: Path, buildings: list[Drawn], colour: str) -> None:
         faces = len(building.solid.of_kind(ROOF))
         status = "" if building.status == "modelled" else f", {building.status}"
         plan.set_title(
-            f"{building.id[-18:]}: {building.share:.3f} within 0.2 m, {len(building.points)} points", fontsize=9
+            f"{building.id[-18:]}: {building.share:.3f} within 0.2 m, {len(building.points)} "
+            "points",
+            fontsize=9,
         )
         view.set_title(f"{len(building.parts)} parts, {faces} faces{status}", fontsize=9)
     figure.subplots_adjust(0.01, 0.01, 0.99, 0.97, wspace=0.04, hspace=0.12)
@@ -345,26 +410,43 @@ def sheets(out: Path, name: str, buildings: list[Drawn], colour: str) -> None:
 
 def main(words: list[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("run", help=f"output folder of `hiproof reconstruct`, or {', '.join(NAMED)}")
-    parser.add_argument("--worst", type=int, default=COLUMNS * ROWS, help="buildings with the smallest share")
-    parser.add_argument("--chance", type=int, default=COLUMNS * ROWS, help="buildings drawn by chance")
-    parser.add_argument("--ids", nargs="+", default=[], help="these buildings, by id or the end of it")
+    parser.add_argument(
+        "run", help=f"output folder of `hiproof reconstruct`, or {', '.join(NAMED)}"
+    )
+    parser.add_argument(
+        "--worst", type=int, default=COLUMNS * ROWS, help="buildings with the smallest share"
+    )
+    parser.add_argument(
+        "--chance", type=int, default=COLUMNS * ROWS, help="buildings drawn by chance"
+    )
+    parser.add_argument(
+        "--ids", nargs="+", default=[], help="these buildings, by id or the end of it"
+    )
     parser.add_argument("--truth", type=Path, help="CityJSON with true models under the same ids")
     parser.add_argument("--seed", type=int, default=0, help="of the draw by chance")
     parser.add_argument(
-        "--colour", choices=("height", "residual"), default="height", help="what points are coloured by"
+        "--colour",
+        choices=("height", "residual"),
+        default="height",
+        help="what points are coloured by",
     )
     parser.add_argument("--out", type=Path, default=Path("roofs"), help="folder of the sheets")
     a = parser.parse_args(words)
     a.out.mkdir(parents=True, exist_ok=True)
     try:
-        buildings = read_run(Path(a.run) if Path(a.run).is_dir() else modelled(a.run, a.out), a.truth)
+        buildings = read_run(
+            Path(a.run) if Path(a.run).is_dir() else modelled(a.run, a.out), a.truth
+        )
     except HiproofError as error:
         sys.exit(str(error))
     drawn = np.random.default_rng(a.seed).permutation(len(buildings))[: a.chance]
-    sheets(a.out, "worst", sorted(buildings, key=lambda building: building.share)[: a.worst], a.colour)
+    sheets(
+        a.out, "worst", sorted(buildings, key=lambda building: building.share)[: a.worst], a.colour
+    )
     sheets(a.out, "chance", [buildings[k] for k in drawn], a.colour)
-    sheets(a.out, "asked", [b for b in buildings if any(b.id.endswith(id) for id in a.ids)], a.colour)
+    sheets(
+        a.out, "asked", [b for b in buildings if any(b.id.endswith(id) for id in a.ids)], a.colour
+    )
 
 
 if __name__ == "__main__":

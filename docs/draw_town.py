@@ -30,7 +30,8 @@ ROOF_COLOUR, WALL_COLOUR, GROUND_COLOUR = "#b3563f", "#e8e2d6", "#a9a08c"
 LIGHT = np.array([-0.5, -0.4, 0.77])  # towards the sun
 COLOURS = 48  # in the file's palette
 MARGIN_M = 6.0  # of points drawn around the buildings
-SHOWN = (0.22, 0.95, 0.22, 0.86)  # of the town's width and height in the picture, from the lower left
+# of the town's width and height in the picture, from the lower left
+SHOWN = (0.22, 0.95, 0.22, 0.86)
 
 
 def project(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -76,14 +77,18 @@ def draw_models(axes, models: Path, origin: np.ndarray) -> None:
     order = np.argsort(nearness)
     faces = [polygons[k] for k in order]
     shades = [colours[k] for k in order]
-    axes.add_collection(PolyCollection(faces, facecolors=shades, edgecolors="#5a5348", linewidths=0.2))
+    axes.add_collection(
+        PolyCollection(faces, facecolors=shades, edgecolors="#5a5348", linewidths=0.2)
+    )
 
 
 def draw(run: Path, path: Path) -> None:
     clouds = [read_points(file) for file in sorted(DELFT.glob("*.laz"))]
     xyz = np.concatenate([cloud.xyz for cloud in clouds])
     classes = np.concatenate([cloud.classification for cloud in clouds])
-    corners = np.concatenate([model.solid.vertices for model in read_models(run / "buildings.city.jsonl")])
+    corners = np.concatenate(
+        [model.solid.vertices for model in read_models(run / "buildings.city.jsonl")]
+    )
     low, high = corners.min(axis=0) - MARGIN_M, corners.max(axis=0) + MARGIN_M
     shown = ((xyz[:, :2] >= low[:2]) & (xyz[:, :2] <= high[:2])).all(axis=1)
     shown &= np.isin(classes, (1, 2, 6)) & (xyz[:, 2] < high[2])

@@ -1,4 +1,6 @@
-"""Pages of the site that are made of the code: every command with its options, every setting, every number with its reason."""
+"""Pages of the site that are made of the code: every command with its options, every setting, every
+number with its reason.
+"""
 
 from __future__ import annotations
 
@@ -51,12 +53,22 @@ def command_text(name: str, command: Any) -> str:
 
 
 def settings_text() -> str:
-    """Every setting by section: its default, unit, bounds or choices, meaning, and option where it has one."""
-    text = "# Settings\n\nAs `hiproof settings` prints them, for `--config` or a `hiproof.toml` beside the data.\n"
+    """Every setting by section: its default, unit, bounds or choices, meaning, and option where it
+    has one.
+    """
+    text = (
+        "# Settings\n\n"
+        "As `hiproof settings` prints them, for `--config` or a `hiproof.toml` beside the data.\n"
+    )
     for section in dataclasses.fields(Settings):
         values = getattr(Settings(), section.name)
-        text += f"\n## {section.name}\n\n{(values.__doc__ or '').partition('] ')[2].capitalize()}\n\n"
-        text += "| setting | default | unit | values | meaning | option |\n| --- | --- | --- | --- | --- | --- |\n"
+        text += (
+            f"\n## {section.name}\n\n{(values.__doc__ or '').partition('] ')[2].capitalize()}\n\n"
+        )
+        text += (
+            "| setting | default | unit | values | meaning | option |\n| --- | --- | --- | --- | "
+            "--- | --- |\n"
+        )
         text += "".join(map(setting_row, dataclasses.fields(values)))
     return text
 
@@ -66,11 +78,16 @@ def setting_row(field: dataclasses.Field) -> str:
     bounds = f"{told['low']} to {told['high']}" if told["low"] is not None else ""
     values = ", ".join(f"`{choice}`" for choice in told["choices"]) or bounds
     option = f"`{told['option']}`" if told["option"] else ""
-    return f"| `{field.name}` | `{toml_value(field.default)}` | {told['unit']} | {values} | {cell(told['help'])} | {option} |\n"
+    return (
+        f"| `{field.name}` | `{toml_value(field.default)}` | {told['unit']} | {values} | "
+        f"{cell(told['help'])} | {option} |\n"
+    )
 
 
 class Constant(NamedTuple):
-    """A line that names numbers: of which file of the package, its `names`, the `value` as it is written, and why it is so."""
+    """A line that names numbers: of which file of the package, its `names`, the `value` as it is
+    written, and why it is so.
+    """
 
     file: str
     names: tuple[str, ...]
@@ -94,9 +111,16 @@ def constants_of(file: Path) -> Iterator[Constant]:
     text = file.read_text(encoding="utf-8")
     statements = ast.parse(text).body
     numbers = [s for s in statements if names_of(s) and is_number(s.value)]  # type: ignore[attr-defined]
-    last = max((s.end_lineno or 0 for s in numbers), default=0)  # finding comments in all of a file takes long
-    tokens = takewhile(lambda token: token.start[0] <= last, tokenize.generate_tokens(io.StringIO(text).readline))
-    said = {token.start[0]: token.string.lstrip("# ") for token in tokens if token.type == tokenize.COMMENT}
+    # finding comments in all of a file takes long
+    last = max((s.end_lineno or 0 for s in numbers), default=0)
+    tokens = takewhile(
+        lambda token: token.start[0] <= last, tokenize.generate_tokens(io.StringIO(text).readline)
+    )
+    said = {
+        token.start[0]: token.string.lstrip("# ")
+        for token in tokens
+        if token.type == tokenize.COMMENT
+    }
     lines = text.splitlines()
     whole = {line for line in said if lines[line - 1].startswith("#")}
     for statement, after in zip_longest(statements, statements[1:]):
@@ -106,8 +130,16 @@ def constants_of(file: Path) -> Iterator[Constant]:
         while first in whole:
             above.insert(0, said[first])
             first -= 1
-        behind = [said[line] for line in range(statement.lineno, (statement.end_lineno or 0) + 1) if line in said]
-        below = [after.value.value] if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) else []
+        behind = [
+            said[line]
+            for line in range(statement.lineno, (statement.end_lineno or 0) + 1)
+            if line in said
+        ]
+        below = (
+            [after.value.value]
+            if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
+            else []
+        )
         place = file.relative_to(PACKAGE).as_posix()
         why = " ".join(map(str, [*above, *behind, *below]))
         yield Constant(place, names_of(statement), ast.unparse(statement.value), why)
@@ -123,7 +155,9 @@ def names_of(statement: ast.stmt) -> tuple[str, ...]:
 
 
 def is_number(value: ast.expr | None) -> bool:
-    """Whether an expression is a number, several of them, or made of nothing else by functions and operators."""
+    """Whether an expression is a number, several of them, or made of nothing else by functions and
+    operators.
+    """
     if isinstance(value, ast.Constant):
         return isinstance(value.value, (int, float)) and not isinstance(value.value, bool)
     if isinstance(value, ast.Tuple):
@@ -138,13 +172,17 @@ def is_number(value: ast.expr | None) -> bool:
 def constants_text() -> str:
     """A table a room: every named number, its value, its file, and what it does or why it is so."""
     text = (
-        "# Constants\n\nEvery number that has a name in the code, with its unit and its reason. What a user may want to change is a "
-        "[setting](settings.md) instead. `python -m benchmarks.constants NAME` tells what half and double of one do to Delft.\n"
+        "# Constants\n\nEvery number that has a name in the code, with its unit and its reason. "
+        "What a user may want to change is a "
+        "[setting](settings.md) instead. `python -m benchmarks.constants NAME` tells what half and "
+        "double of one do to Delft.\n"
     )
     for room, own in groupby(constants(), lambda constant: constant.room):
-        text += f"\n## {room}\n\n| names | value | file | unit, what it does, why |\n| --- | --- | --- | --- |\n"
+        text += f"\n## {room}\n\n"
+        text += "| names | value | file | unit, what it does, why |\n| --- | --- | --- | --- |\n"
         text += "".join(
-            f"| {', '.join(f'`{name}`' for name in c.names)} | `{cell(c.value)}` | {c.file} | {cell(c.why)} |\n"
+            f"| {', '.join(f'`{name}`' for name in c.names)} | `{cell(c.value)}` | {c.file} | "
+            f"{cell(c.why)} |\n"
             for c in own
         )
     return text

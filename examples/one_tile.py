@@ -1,4 +1,6 @@
-"""One tile: the bundled neighbourhood through the same road as `hiproof reconstruct`, then a look at the worst building."""
+"""One tile: the bundled neighbourhood through the same road as `hiproof reconstruct`, then a look
+at the worst building.
+"""
 
 import sys
 from pathlib import Path
@@ -14,5 +16,9 @@ print(f"{summary.buildings} buildings: {summary.by_status}, roof types {summary.
 
 buildings = read_parameters(out / "parameters.jsonl")
 shares = {b["id"]: b["residuals"]["share_within_20cm"] for b in buildings}
-worst = min((id for id in shares if shares[id] is not None), key=shares.get)  # null: too few points to tell
-print(f"worst: {worst}, {100 * shares[worst]:.0f} % of its points inside the outline within 0.2 m of the roof")
+# null: too few points to tell
+worst = min((id for id in shares if shares[id] is not None), key=shares.get)
+print(
+    f"worst: {worst}, {100 * shares[worst]:.0f} % of its points inside the outline within 0.2 m of "
+    "the roof"
+)

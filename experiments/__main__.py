@@ -1,4 +1,6 @@
-"""`python -m experiments NAME [--quick] [--data ...] [--out DIR]`; several names, or `all`, run one after the other."""
+"""`python -m experiments NAME [--quick] [--data ...] [--out DIR]`; several names, or `all`, run one
+after the other.
+"""
 
 from __future__ import annotations
 
@@ -15,25 +17,42 @@ NAMES = ("table1", "table2", "fig6", "table3", "fig7", "fig8", "robust")
 
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m experiments", description=__doc__)
-    parser.add_argument("names", nargs="+", choices=(*NAMES, "all"), metavar="NAME", help=f"{', '.join(NAMES)} or all")
+    parser.add_argument(
+        "names",
+        nargs="+",
+        choices=(*NAMES, "all"),
+        metavar="NAME",
+        help=f"{', '.join(NAMES)} or all",
+    )
     parser.add_argument("--quick", action="store_true", help="a few roofs only")
-    parser.add_argument("--data", type=Path, help="folder with roofn3d/nyc_roofs.npz, or a RoofN3D csv file")
-    parser.add_argument("--out", type=Path, default=Path("out/experiments"), help="folder for the files")
+    parser.add_argument(
+        "--data", type=Path, help="folder with roofn3d/nyc_roofs.npz, or a RoofN3D csv file"
+    )
+    parser.add_argument(
+        "--out", type=Path, default=Path("out/experiments"), help="folder for the files"
+    )
     parser.add_argument("--seed", type=int, default=2020)
     parser.add_argument("--jobs", type=int, default=os.cpu_count() or 1, help="processes")
     parser.add_argument(
-        "--paper-share", type=float, default=1.0, help="share of the fits made with the paper's objective"
+        "--paper-share",
+        type=float,
+        default=1.0,
+        help="share of the fits made with the paper's objective",
     )
     given = parser.parse_args(arguments)
-    options = Options(given.quick, given.data, given.seed, 1 if given.quick else given.jobs, given.paper_share)
-    # One thread a process: the work is shared out by processes, and small matrices only lose by more threads. NumPy reads
-    # this when it is first imported, with the experiment.
+    options = Options(
+        given.quick, given.data, given.seed, 1 if given.quick else given.jobs, given.paper_share
+    )
+    # One thread a process: the work is shared out by processes, and small matrices only lose by
+    # more threads. NumPy reads this when it is first imported, with the experiment.
     for variable in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
         os.environ.setdefault(variable, "1")
     for name in NAMES if "all" in given.names else given.names:
         start = time.perf_counter()
         result = importlib.import_module(f"experiments.{name}").run(options)
-        print(write_result(name, result, given.out, options, time.perf_counter() - start).read_text())
+        print(
+            write_result(name, result, given.out, options, time.perf_counter() - start).read_text()
+        )
 
 
 if __name__ == "__main__":

@@ -26,13 +26,21 @@ def colour_of(name: str, index: int) -> str:
     return COLOURS.get(name, MORE_COLOURS[index % len(MORE_COLOURS)])
 
 
-def grouped_bars(groups: Sequence[str], series: dict[str, Sequence[float]], label: str, log: bool = False):
+def grouped_bars(
+    groups: Sequence[str], series: dict[str, Sequence[float]], label: str, log: bool = False
+):
     """A bar a series within each group; NaN and None leave a gap."""
     figure, (axis,) = new_figure(width=max(5.0, 0.9 * len(groups)))
     width = 0.8 / len(series)
     for i, (name, values) in enumerate(series.items()):
         heights = np.array([np.nan if value is None else value for value in values], float)
-        axis.bar(np.arange(len(groups)) + (i + 0.5) * width - 0.4, heights, width, label=name, color=colour_of(name, i))
+        axis.bar(
+            np.arange(len(groups)) + (i + 0.5) * width - 0.4,
+            heights,
+            width,
+            label=name,
+            color=colour_of(name, i),
+        )
     axis.set_xticks(np.arange(len(groups)), groups, rotation=30, ha="right")
     axis.set_ylabel(label)
     if log:
@@ -41,7 +49,11 @@ def grouped_bars(groups: Sequence[str], series: dict[str, Sequence[float]], labe
     return figure
 
 
-def curves(panels: dict[str, tuple[Sequence[float], dict[str, Sequence[float]]]], label: str, log: bool = False):
+def curves(
+    panels: dict[str, tuple[Sequence[float], dict[str, Sequence[float]]]],
+    label: str,
+    log: bool = False,
+):
     """A panel a name: x values and a line a series."""
     columns = min(3, len(panels))
     figure, axes = new_figure(columns, -(-len(panels) // columns), 4.2, 3.2)
@@ -51,7 +63,9 @@ def curves(panels: dict[str, tuple[Sequence[float], dict[str, Sequence[float]]]]
         for i, (name, values) in enumerate(series.items()):
             y = np.array([np.nan if value is None else value for value in values], float)
             axis.plot(range(len(x)), y, "o-", label=name, color=colour_of(name, i))
-        axis.set_xticks(range(len(x)), [f"{value:g}" if isinstance(value, float) else str(value) for value in x])
+        axis.set_xticks(
+            range(len(x)), [f"{value:g}" if isinstance(value, float) else str(value) for value in x]
+        )
         axis.set_title(title, fontsize=10)
         axis.set_ylabel(label)
         if log:
@@ -70,7 +84,13 @@ def distributions(values: dict[str, np.ndarray], label: str, top: float):
         colour = colour_of(name, i)
         shares = np.full(len(numbers), 1 / max(len(numbers), 1))
         left.hist(
-            np.clip(numbers, 0, top), bins, weights=shares, histtype="step", color=colour, label=name, linewidth=1.6
+            np.clip(numbers, 0, top),
+            bins,
+            weights=shares,
+            histtype="step",
+            color=colour,
+            label=name,
+            linewidth=1.6,
         )
         right.plot(np.sort(numbers), np.linspace(0, 1, len(numbers)), color=colour, label=name)
     right.set_xlim(0, top)

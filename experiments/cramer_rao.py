@@ -1,22 +1,24 @@
 """How exactly a roof's parameters can be known at best from points of a given density and noise.
 
-Heights. Given its place (x, y), a point's height is z = f(x, y; theta) + e with e of variance sigma^2. For normal errors
-the Fisher information about theta is the sum over the points of the outer product of the gradient g of f, divided by
-sigma^2; over a uniform density rho it is the integral
+Heights. Given its place (x, y), a point's height is z = f(x, y; theta) + e with e of variance
+sigma^2. For normal errors the Fisher information about theta is the sum over the points of the
+outer product of the gradient g of f, divided by sigma^2; over a uniform density rho it is the
+integral
 
     I_z = rho / sigma^2  *  integral over the outline of g g^T dA,
 
 and no unbiased estimator has a covariance below its inverse (Cramer 1946, Rao 1945).
 
-Sides. The places themselves tell where the outline ends. Their density jumps there, so no Fisher information exists: the
-distance from an edge of length L to the point next to it is exponential with rate rho L, and the best equivariant
-estimator of the edge's position has the variance 1 / (rho L)^2, falling with the square of the density. We add
+Sides. The places themselves tell where the outline ends. Their density jumps there, so no Fisher
+information exists: the distance from an edge of length L to the point next to it is exponential
+with rate rho L, and the best equivariant estimator of the edge's position has the variance 1 / (rho
+L)^2, falling with the square of the density. We add
 
     I_xy = sum over the four edges of  (rho L)^2  grad(edge position) grad(edge position)^T
 
-as if it were information (the *sampling limit*). It governs width, length and the place along the ridge; heights, slopes
-and the place across the ridge come from I_z. What edges say of the rotation, and what the steps of a saw-tooth say of its
-place, is of higher order and left out.
+as if it were information (the *sampling limit*). It governs width, length and the place along the
+ridge; heights, slopes and the place across the ridge come from I_z. What edges say of the rotation,
+and what the steps of a saw-tooth say of its place, is of higher order and left out.
 """
 
 from __future__ import annotations
@@ -33,14 +35,19 @@ STEP = 1e-6
 THETA_NAMES = ("x", "y", "kappa", "half_width", "half_length", "q0", "q1", "q2", "q3")
 
 
-def best_covariance(primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float) -> np.ndarray:
-    """Covariance (k, k) of the used entries of theta (metres, radians, slopes) that no estimator can go below.
+def best_covariance(
+    primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
+) -> np.ndarray:
+    """Covariance (k, k) of the used entries of theta (metres, radians, slopes) that no estimator
+    can go below.
 
-    `density` in points/m2, `sigma_m` the standard deviation of the height errors. What neither heights nor edges tell
-    (the rotation of a level roof) has an infinite variance.
+    `density` in points/m2, `sigma_m` the standard deviation of the height errors. What neither
+    heights nor edges tell (the rotation of a level roof) has an infinite variance.
     """
     theta = np.asarray(theta, float)
-    information = height_information(primitive, theta, density, sigma_m) + edge_information(primitive, theta, density)
+    information = height_information(primitive, theta, density, sigma_m) + edge_information(
+        primitive, theta, density
+    )
     known = np.diag(information) > 1e-9
     covariance = np.full_like(information, 0.0)
     covariance[np.ix_(known, known)] = np.linalg.inv(information[np.ix_(known, known)])
@@ -48,7 +55,9 @@ def best_covariance(primitive: Primitive, theta: np.ndarray, density: float, sig
     return covariance
 
 
-def height_information(primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float) -> np.ndarray:
+def height_information(
+    primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
+) -> np.ndarray:
     """I_z (k, k), the integral taken as a midpoint sum over the plan rectangle."""
     half_width, half_length = theta[HALF_WIDTH], theta[HALF_LENGTH]
     middle = (np.arange(GRID) + 0.5) / GRID * 2 - 1
@@ -75,7 +84,10 @@ def edge_information(primitive: Primitive, theta: np.ndarray, density: float) ->
     """I_xy (k, k): each edge's position is the centre's, plus or minus a half extent."""
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     information = np.zeros((primitive.theta_size,) * 2)
-    for half, other, direction in ((HALF_LENGTH, HALF_WIDTH, (c, s)), (HALF_WIDTH, HALF_LENGTH, (-s, c))):
+    for half, other, direction in (
+        (HALF_LENGTH, HALF_WIDTH, (c, s)),
+        (HALF_WIDTH, HALF_LENGTH, (-s, c)),
+    ):
         rate = density * 2 * theta[other]
         for sign in (1.0, -1.0):
             gradient = np.zeros(primitive.theta_size)
@@ -85,9 +97,12 @@ def edge_information(primitive: Primitive, theta: np.ndarray, density: float) ->
     return information
 
 
-def bounds_by_name(primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float) -> dict[str, float]:
-    """Least standard deviations: entries of theta (`q0` is the top or eave height), place along and across the ridge,
-    and theta_p (metres) by the delta rule."""
+def bounds_by_name(
+    primitive: Primitive, theta: np.ndarray, density: float, sigma_m: float
+) -> dict[str, float]:
+    """Least standard deviations: entries of theta (`q0` is the top or eave height), place along and
+    across the ridge, and theta_p (metres) by the delta rule.
+    """
     theta = np.asarray(theta, float)
     size = primitive.theta_size
     covariance = best_covariance(primitive, theta, density, sigma_m)
@@ -110,7 +125,9 @@ def parameter_gradient(primitive: Primitive, theta: np.ndarray, name: str) -> np
         high, low = theta.copy(), theta.copy()
         high[i] += STEP
         low[i] -= STEP
-        gradient[i] = (primitive.from_theta(high)[0][name] - primitive.from_theta(low)[0][name]) / (2 * STEP)
+        gradient[i] = (primitive.from_theta(high)[0][name] - primitive.from_theta(low)[0][name]) / (
+            2 * STEP
+        )
     return gradient
 
 

@@ -1,4 +1,6 @@
-"""The roofs that experiments run on: New York roofs and RoofN3D where a user has them, simulated ones everywhere."""
+"""The roofs that experiments run on: New York roofs and RoofN3D where a user has them, simulated
+ones everywhere.
+"""
 
 from __future__ import annotations
 
@@ -25,9 +27,12 @@ MOST_ROWS = 910
 
 @dataclass(frozen=True)
 class RoofSample:
-    """One roof: `points` (n, 3) as a method sees them, `is_roof` (n,) those it is judged on; `type` where it is known.
+    """One roof: `points` (n, 3) as a method sees them, `is_roof` (n,) those it is judged on;
 
-    `outline` is the plan polygon to compare with, a footprint or the alpha shape of the roof's points.
+    `type` where it is known.
+
+    `outline` is the plan polygon to compare with, a footprint or the alpha shape of the roof's
+    points.
     """
 
     points: np.ndarray
@@ -43,15 +48,24 @@ def named_samples(options: Options) -> dict[str, list[RoofSample]]:
     if path.is_file():
         found["RoofN3D csv"] = list(roofn3d_roofs(path, 3 if options.quick else MOST_ROWS))
     elif (path / "roofn3d" / "nyc_roofs.npz").is_file():
-        found["New York roofs"] = list(new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 1 if options.quick else None))
+        found["New York roofs"] = list(
+            new_york_roofs(path / "roofn3d" / "nyc_roofs.npz", 1 if options.quick else None)
+        )
     elif options.data is not None:
-        raise InputError(f"expected a RoofN3D csv or a folder with roofn3d/nyc_roofs.npz, got {path}; check --data")
-    found["simulated"] = list(simulated_roofs(options.seed, 1 if options.quick else 20, options.quick))
+        raise InputError(
+            f"expected a RoofN3D csv or a folder with roofn3d/nyc_roofs.npz, got {path}; check "
+            "--data"
+        )
+    found["simulated"] = list(
+        simulated_roofs(options.seed, 1 if options.quick else 20, options.quick)
+    )
     return found
 
 
 def new_york_roofs(path: Path, most: int | None = None) -> Iterator[RoofSample]:
-    """The roofs of `nyc_roofs.npz`; what a published network took for roof (face > 0) is what counts."""
+    """The roofs of `nyc_roofs.npz`; what a published network took for roof (face > 0) is what
+    counts.
+    """
     content = np.load(path)
     for start, end in islice(pairwise(content["offset"]), most):
         points, is_roof = content["points"][start:end].astype(float), content["face"][start:end] > 0
@@ -59,18 +73,28 @@ def new_york_roofs(path: Path, most: int | None = None) -> Iterator[RoofSample]:
 
 
 def roofn3d_roofs(path: Path, most: int) -> Iterator[RoofSample]:
-    """The first buildings of a RoofN3D csv of a class we know, in its order, with at least ten points."""
-    records = (record for record in read_roofn3d(path) if record.type is not None and len(record.points) >= 10)
+    """The first buildings of a RoofN3D csv of a class we know, in its order, with at least ten
+    points.
+    """
+    records = (
+        record
+        for record in read_roofn3d(path)
+        if record.type is not None and len(record.points) >= 10
+    )
     for record in islice(records, most):
         try:
-            outline = record.outline if not record.outline.is_empty else alpha_shape(record.points[:, :2])
+            outline = (
+                record.outline if not record.outline.is_empty else alpha_shape(record.points[:, :2])
+            )
         except FitError:
             continue
         yield RoofSample(record.points, np.ones(len(record.points), bool), outline, record.type)
 
 
 def simulated_roofs(seed: int, roofs: int, quick: bool) -> Iterator[RoofSample]:
-    """`roofs` of every type as an airborne scanner sees them: chimneys, dormers, trees, missing strips, no neighbours."""
+    """`roofs` of every type as an airborne scanner sees them: chimneys, dormers, trees, missing
+    strips, no neighbours.
+    """
     settings = ScanSettings(density=5.0, defects=Defects(neighbour=0.0), margin_m=0.0)
     for index, kind in enumerate(ROOFN3D_TYPES if quick else ROOF_TYPES):
         for roof in range(roofs):

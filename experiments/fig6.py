@@ -16,8 +16,13 @@ def run(options: Options) -> Result:
     tables, pictures = [], {}
     samples, verdicts = judged_samples(options)
     for name in samples:
-        psd = {m: np.array([verdict.psd_mean for verdict in verdicts[name][m].values()]) for m in METHODS}
-        iou = {m: np.array([verdict.iou for verdict in verdicts[name][m].values()]) for m in METHODS}
+        psd = {
+            m: np.array([verdict.psd_mean for verdict in verdicts[name][m].values()])
+            for m in METHODS
+        }
+        iou = {
+            m: np.array([verdict.iou for verdict in verdicts[name][m].values()]) for m in METHODS
+        }
         tables.append(percentiles(f"{name}: mean PSD of a roof, m", psd))
         tables.append(percentiles(f"{name}: outline IoU", iou))
         stem = "fig6_" + name.split()[0].lower()
@@ -29,5 +34,9 @@ def run(options: Options) -> Result:
 
 def percentiles(title: str, values: dict[str, np.ndarray]) -> Table:
     known = {method: numbers[np.isfinite(numbers)] for method, numbers in values.items()}
-    rows = [(method, *map(float, np.percentile(numbers, SHARES))) for method, numbers in known.items() if len(numbers)]
+    rows = [
+        (method, *map(float, np.percentile(numbers, SHARES)))
+        for method, numbers in known.items()
+        if len(numbers)
+    ]
     return Table(title, ("method", *(f"p{share}" for share in SHARES)), rows)

@@ -11,7 +11,14 @@ from .methods import OBJECTIVES, fit_model, in_parallel
 from .output import Options, Result, Table
 
 PRIMITIVES = ("gable", "asymmetric_gable")
-COLUMNS = ("objective", "primitive", "roofs", "PSD mean", "PSD p90 over roofs", "height RMSE of the surface")
+COLUMNS = (
+    "objective",
+    "primitive",
+    "roofs",
+    "PSD mean",
+    "PSD p90 over roofs",
+    "height RMSE of the surface",
+)
 DENSITY, NOISE_M = 4.72, 0.12
 
 
@@ -37,10 +44,14 @@ def run(options: Options) -> Result:
             )
             rows.append(row)
     note = (
-        "Metres. The surface's error is against the true heights over the true outline; its median over roofs is given."
+        "Metres. The surface's error is against the true heights over the true outline; its median "
+        "over roofs is given."
     )
     table = Table("Symmetric and asymmetric primitive on asymmetric gables", COLUMNS, rows, note)
-    data = f"{roofs} simulated asymmetric gables (unequal slopes or eaves), {DENSITY} points/m2, noise {NOISE_M} m"
+    data = (
+        f"{roofs} simulated asymmetric gables (unequal slopes or eaves), {DENSITY} points/m2, "
+        f"noise {NOISE_M} m"
+    )
     return Result("the asymmetric gable", data, (table,), {"fig7": section(options.seed)})
 
 
@@ -60,7 +71,9 @@ def errors_of_roof(method: str, primitive: str, seed: int, roof: int) -> tuple[f
 
 
 def unequal_slopes(building) -> bool:
-    """Whether the eaves are level with each other, so that the slopes differ (of equal slopes the gable gets the planes)."""
+    """Whether the eaves are level with each other, so that the slopes differ (of equal slopes the
+    gable gets the planes).
+    """
     return abs(building.parameters["eave_step"]) < 0.2
 
 
@@ -69,18 +82,32 @@ def section(seed: int):
     from .charts import new_figure
 
     building, points = next(
-        drawn for drawn in (roof_and_points(seed, roof) for roof in range(100)) if unequal_slopes(drawn[0])
+        drawn
+        for drawn in (roof_and_points(seed, roof) for roof in range(100))
+        if unequal_slopes(drawn[0])
     )
     part = building.roof.parts[0]
     across = np.array([-np.sin(part.kappa), np.cos(part.kappa)])
     centre = part.translation[:2] + building.roof.frame.origin[:2]
     figure, (axis,) = new_figure(width=7, height=3)
-    axis.plot((points[:, :2] - centre) @ across, points[:, 2], ".", color="#7f8c9b", markersize=3, label="points")
+    axis.plot(
+        (points[:, :2] - centre) @ across,
+        points[:, 2],
+        ".",
+        color="#7f8c9b",
+        markersize=3,
+        label="points",
+    )
     width = part.parameters["width"] / 2
     offsets = np.linspace(-width, width, 400)
     for primitive, colour in zip(PRIMITIVES, ("#d1495b", "#2e86ab"), strict=True):
         fit: Fit = fit_model("likelihood", points, (primitive,)).fit
-        axis.plot(offsets, fit.height_at(centre + offsets[:, None] * across), color=colour, label=primitive)
+        axis.plot(
+            offsets,
+            fit.height_at(centre + offsets[:, None] * across),
+            color=colour,
+            label=primitive,
+        )
     axis.set_xlabel("across the ridge, m")
     axis.set_ylabel("height, m")
     axis.set_aspect("equal")

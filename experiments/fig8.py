@@ -1,8 +1,10 @@
-"""Figure 8: RANSAC plane detection against the parametric fit on hip roofs, as the points get worse.
+"""Figure 8: RANSAC plane detection against the parametric fit on hip roofs, as the points get
+worse.
 
-For every roof: how many of its four planes are found, how many found planes are wrong or doubles, and whether a closed
-model comes out. Planes make a closed model only when each true face is found once and nothing else is; the parametric
-fit is closed by construction, so of it we ask that its four faces are the true ones by the same measure.
+For every roof: how many of its four planes are found, how many found planes are wrong or doubles,
+and whether a closed model comes out. Planes make a closed model only when each true face is found
+once and nothing else is; the parametric fit is closed by construction, so of it we ask that its
+four faces are the true ones by the same measure.
 """
 
 from __future__ import annotations
@@ -25,13 +27,23 @@ LEVELS = {
     "missing share at a corner": (0.0, 0.2, 0.4, 0.6),
 }
 BASE_DENSITY, BASE_NOISE_M = 4.72, 0.12
-COLUMNS = ("what", "level", "method", "faces found of 4", "wrong planes", "closed and right, share of roofs")
+COLUMNS = (
+    "what",
+    "level",
+    "method",
+    "faces found of 4",
+    "wrong planes",
+    "closed and right, share of roofs",
+)
 
 
 def run(options: Options) -> Result:
     """One axis of trouble at a time, both methods on the same points."""
     if not available():
-        remark = "Not run: it needs pyransac3d, the extra `experiments` (pip install 'hiproof[experiments]')."
+        remark = (
+            "Not run: it needs pyransac3d, the extra `experiments` (pip install "
+            "'hiproof[experiments]')."
+        )
         return Result("against RANSAC plane detection", "none", (), remarks=remark)
     roofs = 1 if options.quick else 40
     rows = []
@@ -39,13 +51,28 @@ def run(options: Options) -> Result:
         for level in levels[-2:] if options.quick else levels:
             for method in ("ransac", "likelihood"):
                 work = [(method, what, level, options.seed, roof) for roof in range(roofs)]
-                found, wrong, closed = np.array(in_parallel(planes_of_roof, work, options.jobs), float).T
-                rows.append((what, level, method, float(found.mean()), float(wrong.mean()), float(closed.mean())))
+                found, wrong, closed = np.array(
+                    in_parallel(planes_of_roof, work, options.jobs), float
+                ).T
+                rows.append(
+                    (
+                        what,
+                        level,
+                        method,
+                        float(found.mean()),
+                        float(wrong.mean()),
+                        float(closed.mean()),
+                    )
+                )
     note = (
-        "A face is found when a plane lies within 10 degrees and 0.3 m (at its centre) of it; a double is wrong. RANSAC's "
+        "A face is found when a plane lies within 10 degrees and 0.3 m (at its centre) of it; a "
+        "double is wrong. RANSAC's "
         "threshold is 0.2 m throughout; twice the noise, as it would be told, found fewer."
     )
-    data = f"{roofs} simulated hip roofs a level; otherwise {BASE_DENSITY} points/m2 and noise {BASE_NOISE_M} m"
+    data = (
+        f"{roofs} simulated hip roofs a level; otherwise {BASE_DENSITY} points/m2 and noise "
+        f"{BASE_NOISE_M} m"
+    )
     table = Table("Planes found on hip roofs", COLUMNS, rows, note)
     return Result("against RANSAC plane detection", data, (table,), {"fig8": picture(rows)})
 
@@ -64,16 +91,22 @@ class Trouble:
         return cls(**{name: level})
 
     def points(self, building: SimBuilding, rng: np.random.Generator) -> np.ndarray:
-        return without_corner(uniform_points(building, rng, self.density, self.noise_m), building, self.missing_share)
+        return without_corner(
+            uniform_points(building, rng, self.density, self.noise_m), building, self.missing_share
+        )
 
 
 def without_corner(points: np.ndarray, building: SimBuilding, share: float) -> np.ndarray:
-    """Points (n, 3) less the given share of them nearest to one corner, as a tree's crown hides them.
+    """Points (n, 3) less the given share of them nearest to one corner, as a tree's crown hides
+    them.
 
-    Distances are in units of the sides, so that the same parts of both sides remain whatever the roof's proportions.
+    Distances are in units of the sides, so that the same parts of both sides remain whatever the
+    roof's proportions.
     """
     part = building.roof.parts[0]
-    uv = placed_back(points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa)
+    uv = placed_back(
+        points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa
+    )
     uv = uv / [part.parameters["length"], part.parameters["width"]]
     order = np.argsort(np.linalg.norm(uv - 0.5, axis=1), kind="stable")
     return points[np.sort(order[int(share * len(points)) :])]
@@ -84,7 +117,9 @@ def placed_back(xy: np.ndarray, kappa: float) -> np.ndarray:
     return xy @ np.array([[np.cos(kappa), -np.sin(kappa)], [np.sin(kappa), np.cos(kappa)]])
 
 
-def planes_of_roof(method: str, what: str, level: float, seed: int, roof: int) -> tuple[int, int, bool]:
+def planes_of_roof(
+    method: str, what: str, level: float, seed: int, roof: int
+) -> tuple[int, int, bool]:
     """(true faces found, wrong planes, whether exactly the true faces came out)."""
     rng = np.random.default_rng([seed, roof, 88])
     building = random_building(rng, "hip")
@@ -106,7 +141,11 @@ def true_faces(building: SimBuilding) -> list[np.ndarray]:
     """The roof surfaces (m, 3) in world metres."""
     part = building.roof.parts[0]
     primitive = CATALOGUE[part.type]
-    vertices = placed(primitive.vertices(part.parameters), part.kappa, part.translation + building.roof.frame.origin)
+    vertices = placed(
+        primitive.vertices(part.parameters),
+        part.kappa,
+        part.translation + building.roof.frame.origin,
+    )
     return [vertices[list(face)] for face in primitive.faces]
 
 

@@ -17,7 +17,10 @@ METHODS = ("paper", "likelihood", *(("ransac",) if available() else ()))
 
 @dataclass(frozen=True)
 class Verdict:
-    """Figures of one roof: PSD mean and standard deviation over its points (m), outline IoU; NaN without a model."""
+    """Figures of one roof: PSD mean and standard deviation over its points (m), outline IoU;
+
+    NaN without a model.
+    """
 
     type: str
     psd_mean: float
@@ -28,9 +31,10 @@ class Verdict:
 def judge(method: str, sample: RoofSample) -> Verdict:
     """Fit, and judge on the roof's points.
 
-    The likelihood and RANSAC see all points; the likelihood chooses among the whole catalogue. The paper's objective has
-    its network before it: it is given the roof's points alone, and the type (the true one; where nobody knows it, the
-    one that the likelihood prefers among RoofN3D's three, for J itself always prefers the type with more planes).
+    The likelihood and RANSAC see all points; the likelihood chooses among the whole catalogue. The
+    paper's objective has its network before it: it is given the roof's points alone, and the type
+    (the true one; where nobody knows it, the one that the likelihood prefers among RoofN3D's three,
+    for J itself always prefers the type with more planes).
     """
     roof_points = sample.points[sample.is_roof]
     types, points = None, sample.points
@@ -43,12 +47,18 @@ def judge(method: str, sample: RoofSample) -> Verdict:
         return Verdict("none", np.nan, np.nan, 0.0)
     distances = model.psd(roof_points)
     kind = model.fit.type if model.fit is not None else "planes"
-    return Verdict(kind, float(distances.mean()), float(distances.std()), model.outline_iou(sample.outline))
+    return Verdict(
+        kind, float(distances.mean()), float(distances.std()), model.outline_iou(sample.outline)
+    )
 
 
 @lru_cache(maxsize=1)
-def judged_samples(options: Options) -> tuple[dict[str, list[RoofSample]], dict[str, dict[str, dict[int, Verdict]]]]:
-    """All data sets at hand, and for each the verdicts by method and sample index; kept for the next to ask."""
+def judged_samples(
+    options: Options,
+) -> tuple[dict[str, list[RoofSample]], dict[str, dict[str, dict[int, Verdict]]]]:
+    """All data sets at hand, and for each the verdicts by method and sample index; kept for the
+    next to ask.
+    """
     samples = named_samples(options)
     verdicts: dict = {name: {} for name in samples}
     for name, roofs in samples.items():
@@ -59,4 +69,8 @@ def judged_samples(options: Options) -> tuple[dict[str, list[RoofSample]], dict[
     return samples, verdicts
 
 
-NO_RANSAC = "" if available() else "The RANSAC baseline is left out: pyransac3d (extra `experiments`) is not installed."
+NO_RANSAC = (
+    ""
+    if available()
+    else "The RANSAC baseline is left out: pyransac3d (extra `experiments`) is not installed."
+)

@@ -1,4 +1,6 @@
-"""The methods under comparison behind one verb: points in, bounded roof surfaces and parameters out."""
+"""The methods under comparison behind one verb: points in, bounded roof surfaces and parameters
+out.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,9 @@ OBJECTIVES = ("paper", "likelihood")
 
 @dataclass(frozen=True)
 class Model:
-    """Roof surfaces (rings (m, 3)) and, of a parametric method, its `fit`; both in the frame of the points."""
+    """Roof surfaces (rings (m, 3)) and, of a parametric method, its `fit`; both in the frame of the
+    points.
+    """
 
     polygons: list[np.ndarray] = field(default_factory=list)
     fit: Fit | None = None
@@ -35,9 +39,14 @@ class Model:
 
 
 def fit_model(
-    method: str, points: np.ndarray, types: Sequence[str] | None = None, outline: shapely.Polygon | None = None
+    method: str,
+    points: np.ndarray,
+    types: Sequence[str] | None = None,
+    outline: shapely.Polygon | None = None,
 ) -> Model:
-    """Model of `points` (n, 3) by `method` ("paper", "likelihood" or "ransac"); empty where the method finds none."""
+    """Model of `points` (n, 3) by `method` ("paper", "likelihood" or "ransac"); empty where the
+    method finds none.
+    """
     if method == "ransac":
         from .ransac import detect_planes
 
@@ -55,9 +64,13 @@ def fit_model(
 
 
 def in_parallel(function: Callable[..., Any], work: Iterable[tuple], jobs: int) -> list[Any]:
-    """`function(*item)` for every item, in order; with several processes the work is shared out in small chunks."""
+    """`function(*item)` for every item, in order; with several processes the work is shared out in
+    small chunks.
+    """
     work = list(work)
     if jobs <= 1 or len(work) < 2:
         return [function(*item) for item in work]
     with ProcessPoolExecutor(jobs) as pool:
-        return list(pool.map(function, *zip(*work, strict=True), chunksize=max(1, len(work) // (20 * jobs))))
+        return list(
+            pool.map(function, *zip(*work, strict=True), chunksize=max(1, len(work) // (20 * jobs)))
+        )

@@ -1,4 +1,6 @@
-"""What an experiment hands back, and the files that become of it: Markdown, CSV a table, PNG a picture."""
+"""What an experiment hands back, and the files that become of it: Markdown, CSV a table, PNG a
+picture.
+"""
 
 from __future__ import annotations
 
@@ -12,9 +14,11 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Options:
-    """How to run: `quick` takes seconds, `data` overrides the data's place, `jobs` processes share the work.
+    """How to run: `quick` takes seconds, `data` overrides the data's place, `jobs` processes share
+    the work.
 
-    `paper_share` of the fits are made with the paper's objective too, which takes nine tenths of the time.
+    `paper_share` of the fits are made with the paper's objective too, which takes nine tenths of
+    the time.
     """
 
     quick: bool = False
@@ -24,7 +28,9 @@ class Options:
     paper_share: float = 1.0
 
     def covers(self, method: str, index: int) -> bool:
-        """Whether `method` takes the roof of this index: the paper's objective an even share of them."""
+        """Whether `method` takes the roof of this index: the paper's objective an even share of
+        them.
+        """
         if method != "paper":
             return True
         return int((index + 1) * self.paper_share) > int(index * self.paper_share)
@@ -32,7 +38,9 @@ class Options:
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of numbers and words under `columns`; a number shows with three decimals, None as a dash."""
+    """Rows of numbers and words under `columns`; a number shows with three decimals, None as a
+    dash.
+    """
 
     title: str
     columns: tuple[str, ...]
@@ -40,7 +48,12 @@ class Table:
     note: str = ""
 
     def to_markdown(self) -> str:
-        lines = [f"### {self.title}", "", "| " + " | ".join(self.columns) + " |", "|" + " --- |" * len(self.columns)]
+        lines = [
+            f"### {self.title}",
+            "",
+            "| " + " | ".join(self.columns) + " |",
+            "|" + " --- |" * len(self.columns),
+        ]
         lines += ["| " + " | ".join(map(shown, row)) + " |" for row in self.rows]
         return "\n".join([*lines, *(("", self.note) if self.note else ())]) + "\n"
 
@@ -54,7 +67,10 @@ class Table:
 
 @dataclass(frozen=True)
 class Result:
-    """Tables and pictures (matplotlib figures by name) of one experiment; `data` says in words what it was run on."""
+    """Tables and pictures (matplotlib figures by name) of one experiment;
+
+    `data` says in words what it was run on.
+    """
 
     title: str
     data: str

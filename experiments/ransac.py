@@ -1,6 +1,8 @@
-"""The plane-based baseline: RANSAC plane after plane (pyransac3d), as the paper's Figure 8 compares with.
+"""The plane-based baseline: RANSAC plane after plane (pyransac3d), as the paper's Figure 8 compares
+with.
 
-The library draws from Python's global generator, which is seeded here so that a run can be repeated.
+The library draws from Python's global generator, which is seeded here so that a run can be
+repeated.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ STEEPEST = 0.2
 
 @dataclass(frozen=True)
 class DetectedPlane:
-    """Unit `normal` pointing up and `offset`: normal . x + offset = 0; `inliers` index the points given."""
+    """Unit `normal` pointing up and `offset`: normal . x + offset = 0;
+
+    `inliers` index the points given.
+    """
 
     normal: np.ndarray
     offset: float
@@ -47,14 +52,18 @@ def available() -> bool:
     return importlib.util.find_spec("pyransac3d") is not None
 
 
-def detect_planes(points: np.ndarray, threshold_m: float = THRESHOLD_M, seed: int = 0) -> list[DetectedPlane]:
-    """Planes of `points` (n, 3), the one with the most inliers first, until too few points are left.
+def detect_planes(
+    points: np.ndarray, threshold_m: float = THRESHOLD_M, seed: int = 0
+) -> list[DetectedPlane]:
+    """Planes of `points` (n, 3), the one with the most inliers first, until too few points are
+    left.
 
     Each plane is refitted to its inliers by least squares. Raises HiproofError without pyransac3d.
     """
     if not available():
         raise HiproofError(
-            "expected the package pyransac3d for the RANSAC baseline; pip install 'hiproof[experiments]'"
+            "expected the package pyransac3d for the RANSAC baseline; pip install "
+            "'hiproof[experiments]'"
         )
     import pyransac3d
 
@@ -64,7 +73,9 @@ def detect_planes(points: np.ndarray, threshold_m: float = THRESHOLD_M, seed: in
     for _ in range(MOST_PLANES):
         if len(left) < max(least, 3):
             break
-        _, chosen = pyransac3d.Plane().fit(points[left], thresh=threshold_m, maxIteration=ITERATIONS)
+        _, chosen = pyransac3d.Plane().fit(
+            points[left], thresh=threshold_m, maxIteration=ITERATIONS
+        )
         inliers = left[chosen]
         if len(inliers) < least:
             break
@@ -84,9 +95,13 @@ def least_squares_plane(points: np.ndarray) -> tuple[np.ndarray, float]:
 
 
 def match_faces(
-    planes: list[DetectedPlane], faces: list[np.ndarray], angle_deg: float = 10.0, distance_m: float = 0.3
+    planes: list[DetectedPlane],
+    faces: list[np.ndarray],
+    angle_deg: float = 10.0,
+    distance_m: float = 0.3,
 ) -> tuple[int, int]:
-    """(found, wrong): true `faces` (rings (m, 3)) with a plane of their direction and height; planes of no face.
+    """(found, wrong): true `faces` (rings (m, 3)) with a plane of their direction and height;
+    planes of no face.
 
     A plane that doubles a face already found is wrong too.
     """

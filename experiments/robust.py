@@ -1,4 +1,6 @@
-"""Robustness: dimension errors of gables and hips against density, noise, missing parts, outliers, and shifted footprints."""
+"""Robustness: dimension errors of gables and hips against density, noise, missing parts, outliers,
+and shifted footprints.
+"""
 
 from __future__ import annotations
 
@@ -41,7 +43,14 @@ def run(options: Options) -> Result:
     for what, levels in AXES.items():
         for level in levels[-1:] if options.quick else levels:
             work = [
-                (what, level, kind, options.seed, roof, tuple(m for m in METHODS if options.covers(m, roof)))
+                (
+                    what,
+                    level,
+                    kind,
+                    options.seed,
+                    roof,
+                    tuple(m for m in METHODS if options.covers(m, roof)),
+                )
                 for kind in kinds
                 for roof in range(roofs)
             ]
@@ -54,21 +63,31 @@ def run(options: Options) -> Result:
 
 
 NOTE = (
-    "Metres, the type given. 'Missing at a corner': the given share of points nearest to one corner, in units of the "
-    "sides; 'missing strip': a band across the ridge at a random place, not at its ends; 'outliers': so many points in "
-    "place of the roof's, anywhere in its box and up to 2 m over and under it; 'footprint': the fit is given the true "
-    "footprint shifted that far in a random direction. RANSAC has no dimensions: the share of true faces without a plane "
+    "Metres, the type given. 'Missing at a corner': the given share of points nearest to one "
+    "corner, in units of the "
+    "sides; 'missing strip': a band across the ridge at a random place, not at its ends; "
+    "'outliers': so many points in "
+    "place of the roof's, anywhere in its box and up to 2 m over and under it; 'footprint': the "
+    "fit is given the true "
+    "footprint shifted that far in a random direction. RANSAC has no dimensions: the share of true "
+    "faces without a plane "
     "of their own stands for it."
 )
 
 
 def figures(outcomes: list[dict]) -> tuple:
-    """RMSE and median of the absolute dimension errors of each method, and RANSAC's missed share."""
+    """RMSE and median of the absolute dimension errors of each method, and RANSAC's missed
+    share.
+    """
     cells: list[float | None] = []
     for method in METHODS:
         errors = np.concatenate([outcome.get(method, [math.nan]) for outcome in outcomes])
         errors = errors[np.isfinite(errors)]
-        cells += [float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))] if len(errors) else [None, None]
+        cells += (
+            [float(np.sqrt(np.mean(errors**2))), float(np.median(np.abs(errors)))]
+            if len(errors)
+            else [None, None]
+        )
     missed = [outcome["missed"] for outcome in outcomes if outcome["missed"] is not None]
     return (*cells, float(np.mean(missed)) if missed else None)
 
@@ -84,7 +103,9 @@ def errors_of_roof(
     outcome: dict = {}
     for method in methods:
         fit = fit_model(method, points, (kind,), outline).fit if len(points) > 3 else None
-        outcome[method] = np.array([fit.parameters[name] - v if fit else math.nan for name, v in truth.items()])
+        outcome[method] = np.array(
+            [fit.parameters[name] - v if fit else math.nan for name, v in truth.items()]
+        )
     outcome["missed"] = missed_share(points, building) if available() else None
     return outcome
 
@@ -98,7 +119,9 @@ def missed_share(points: np.ndarray, building: SimBuilding) -> float:
 def troubled(
     building: SimBuilding, what: str, level: float, rng: np.random.Generator
 ) -> tuple[np.ndarray, shapely.Polygon | None]:
-    """Points of the building with one kind of trouble, and the footprint the fit is given, if any."""
+    """Points of the building with one kind of trouble, and the footprint the fit is given,
+    if any.
+    """
     density = level if what.startswith("density") else BASE_DENSITY
     noise_m = level if what.startswith("noise") else BASE_NOISE_M
     points = uniform_points(building, rng, density, noise_m)
@@ -115,11 +138,16 @@ def troubled(
     return points, None
 
 
-def without_strip(points: np.ndarray, building: SimBuilding, share: float, rng: np.random.Generator) -> np.ndarray:
-    """Points less those in a band across the ridge that takes the given share of the length, a tenth left at each end
-    (a band at the end would only make a shorter roof)."""
+def without_strip(
+    points: np.ndarray, building: SimBuilding, share: float, rng: np.random.Generator
+) -> np.ndarray:
+    """Points less those in a band across the ridge that takes the given share of the length, a
+    tenth left at each end (a band at the end would only make a shorter roof).
+    """
     part = building.roof.parts[0]
-    along = placed_back(points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa)[:, 0]
+    along = placed_back(
+        points[:, :2] - building.roof.frame.origin[:2] - part.translation[:2], part.kappa
+    )[:, 0]
     length = part.parameters["length"]
     start = rng.uniform(-0.4 * length, (0.4 - share) * length)
     return points[(along < start) | (along > start + share * length)]

@@ -1,4 +1,6 @@
-"""Table 1: what the network makes of the points: labels (IoU) and roof types (accuracy, balanced accuracy, recalls)."""
+"""Table 1: what the network makes of the points: labels (IoU) and roof types (accuracy, balanced
+accuracy, recalls).
+"""
 
 from __future__ import annotations
 
@@ -19,21 +21,29 @@ UNSEEN = 90_001
 """Added to the seed, so that these roofs are not those the network was trained on."""
 
 REMARKS = (
-    "The paper's Table 1 is on RoofN3D itself (three types, 118,073 roofs), which is not ours to ship; its network and ours "
-    "are compared there only by whoever has the data. Always answering gable is right for 75.4 % of RoofN3D, hence the "
+    "The paper's Table 1 is on RoofN3D itself (three types, 118,073 roofs), which is not ours to "
+    "ship; its network and ours "
+    "are compared there only by whoever has the data. Always answering gable is right for 75.4 % "
+    "of RoofN3D, hence the "
     "balanced accuracy and the recalls."
 )
 
 
 def run(options: Options) -> Result:
-    """The shipped network on simulated roofs it never saw, and on the labelled real ones where they are at hand."""
+    """The shipped network on simulated roofs it never saw, and on the labelled real ones where they
+    are at hand.
+    """
     count = 4 if options.quick else 1000
     rng = np.random.default_rng(options.seed + UNSEEN)
     samples = [training_sample(rng, TYPES) for _ in range(count)]
     answers = [segment(points) for points, _, _ in samples]
     true_labels = np.concatenate([labels for _, labels, _ in samples])
-    labels = Scores.of(true_labels, np.concatenate([labels_of(answer) for answer in answers]), LABELS)
-    types = Scores.of(np.array([kind for _, _, kind in samples]), np.array([type_of(a) for a in answers]), TYPES)
+    labels = Scores.of(
+        true_labels, np.concatenate([labels_of(answer) for answer in answers]), LABELS
+    )
+    types = Scores.of(
+        np.array([kind for _, _, kind in samples]), np.array([type_of(a) for a in answers]), TYPES
+    )
     tables = [label_table(labels), *type_tables("simulated", types)]
     data = f"{count} simulated roofs of ten types, not trained on, with clutter, trees and gaps"
     labelled = list(labelled_roofs(options))
@@ -46,10 +56,13 @@ def run(options: Options) -> Result:
 
 
 def labelled_roofs(options: Options) -> Iterator[tuple[str, np.ndarray]]:
-    """(type, points (n, 3)) of the RoofN3D csv given, else of the few labelled roofs in the shared data."""
+    """(type, points (n, 3)) of the RoofN3D csv given, else of the few labelled roofs in the shared
+    data.
+    """
     if options.data is not None and options.data.is_file():
         yield from (
-            (roof.type, roof.points) for roof in roofn3d_roofs(options.data, 20 if options.quick else MOST_ROWS)
+            (roof.type, roof.points)
+            for roof in roofn3d_roofs(options.data, 20 if options.quick else MOST_ROWS)
         )
         return
     for kind in ROOFN3D_TYPES:
@@ -69,7 +82,11 @@ def type_of(answer: Segmentation) -> int:
 
 def label_table(scores: Scores) -> Table:
     """IoU of each label over all points, and the mean."""
-    truth, told, both = scores.confusion.sum(axis=1), scores.confusion.sum(axis=0), np.diag(scores.confusion)
+    truth, told, both = (
+        scores.confusion.sum(axis=1),
+        scores.confusion.sum(axis=0),
+        np.diag(scores.confusion),
+    )
     rows: list[Sequence] = []
     for name, t, a, b in zip(scores.names, truth, told, both, strict=True):
         rows.append((name, int(t), float(b / (t + a - b)) if t + a > b else None))
@@ -81,7 +98,11 @@ def type_tables(name: str, scores: Scores) -> list[Table]:
     """Accuracy, balanced accuracy and recalls, and the confusion matrix."""
     rows = [("accuracy", scores.accuracy), ("balanced accuracy", scores.balanced_accuracy)]
     rows += [(f"recall of {kind}", value) for kind, value in scores.recalls.items()]
-    used = [i for i in range(len(scores.names)) if scores.confusion[i].any() or scores.confusion[:, i].any()]
+    used = [
+        i
+        for i in range(len(scores.names))
+        if scores.confusion[i].any() or scores.confusion[:, i].any()
+    ]
     confusion = [(scores.names[i], *(int(scores.confusion[i, j]) for j in used)) for i in used]
     columns = ("true", *(scores.names[j] for j in used))
     figures = Table(f"{name}: roof types", ("figure", "value"), rows)

@@ -1,4 +1,6 @@
-"""Table 2: distance of the points to the models (PSD) and IoU of the outlines, per roof type and overall."""
+"""Table 2: distance of the points to the models (PSD) and IoU of the outlines, per roof type and
+overall.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +12,25 @@ from .data import RoofSample
 from .judge import METHODS, NO_RANSAC, Verdict, judged_samples
 from .output import Options, Result, Table
 
-COLUMNS = ("method", "type", "roofs", "PSD mean", "PSD std", "median of means", "p90 of means", "IoU mean")
+COLUMNS = (
+    "method",
+    "type",
+    "roofs",
+    "PSD mean",
+    "PSD std",
+    "median of means",
+    "p90 of means",
+    "IoU mean",
+)
 NOTE = (
-    "Metres; means over roofs of each roof's mean and standard deviation. Published: paper 0.0805 (910 other RoofN3D roofs), "
-    "RoofN3DNet 0.162 mean, 0.088 median, 0.295 p90 (the New York roofs). The paper's objective gets the roof's points and "
-    "type alone (its network's part), the others all points. RANSAC's surfaces are the convex hulls of its "
-    "planes' points, as many planes as it likes, and no closed model; its PSD is that of patches, not of buildings."
+    "Metres; means over roofs of each roof's mean and standard deviation. Published: paper 0.0805 "
+    "(910 other RoofN3D roofs), "
+    "RoofN3DNet 0.162 mean, 0.088 median, 0.295 p90 (the New York roofs). The paper's objective "
+    "gets the roof's points and "
+    "type alone (its network's part), the others all points. RANSAC's surfaces are the convex "
+    "hulls of its "
+    "planes' points, as many planes as it likes, and no closed model; its PSD is that of patches, "
+    "not of buildings."
 )
 UNEXPLAINED_M = 0.2
 
@@ -29,15 +44,21 @@ def run(options: Options) -> Result:
         tables.append(Table(name, COLUMNS, rows, NOTE))
         remarks.append(unexplained(name, verdicts[name]["likelihood"]))
     data = ", ".join(f"{len(roofs)} {name}" for name, roofs in samples.items())
-    return Result("residuals and outlines", data, tuple(tables), remarks="\n\n".join(filter(None, remarks)))
+    return Result(
+        "residuals and outlines", data, tuple(tables), remarks="\n\n".join(filter(None, remarks))
+    )
 
 
-def rows_of(method: str, samples: Sequence[RoofSample], verdicts: dict[int, Verdict]) -> list[tuple]:
+def rows_of(
+    method: str, samples: Sequence[RoofSample], verdicts: dict[int, Verdict]
+) -> list[tuple]:
     """Overall, then by true type where it is known, else by the type the method chose."""
     groups: dict[str, list[Verdict]] = {"all": list(verdicts.values())}
     for index, verdict in verdicts.items():
         groups.setdefault(samples[index].type or verdict.type, []).append(verdict)
-    return [(method, kind, *figures(groups[kind])) for kind in ("all", *sorted(groups.keys() - {"all"}))]
+    return [
+        (method, kind, *figures(groups[kind])) for kind in ("all", *sorted(groups.keys() - {"all"}))
+    ]
 
 
 def figures(verdicts: Sequence[Verdict]) -> tuple:
@@ -64,6 +85,7 @@ def unexplained(name: str, verdicts: dict[int, Verdict]) -> str:
         return f"{name}: a single primitive fits every roof within {UNEXPLAINED_M} m in the mean."
     listed = ", ".join(map(str, far[:40])) + (" ..." if len(far) > 40 else "")
     return (
-        f"{name}: no single primitive comes within {UNEXPLAINED_M} m in the mean of {len(far)} of {len(verdicts)} roofs "
+        f"{name}: no single primitive comes within {UNEXPLAINED_M} m in the mean of {len(far)} of "
+        f"{len(verdicts)} roofs "
         f"(by their place in the data, from 0): {listed}."
     )

@@ -1,7 +1,8 @@
 """Table 3: stability under simulated points, beside the best that any estimator could do.
 
-For each type twenty roofs, each sampled thirty times as the paper does: 4.72 points/m2, noise "RMSE" 0.12 m (90 % of the
-errors within 1, 9 % within 1-2, 1 % within 2-3 of it). The type is known to the fit, as in the paper.
+For each type twenty roofs, each sampled thirty times as the paper does: 4.72 points/m2, noise
+"RMSE" 0.12 m (90 % of the errors within 1, 9 % within 1-2, 1 % within 2-3 of it). The type is known
+to the fit, as in the paper.
 """
 
 from __future__ import annotations
@@ -21,26 +22,43 @@ from .output import Options, Result, Table
 
 DENSITY, NOISE_M = 4.72, 0.12
 SIGMA_M = NOISE_M * math.sqrt((0.90 * 1 + 0.09 * 7 + 0.01 * 19) / 3)
-"""Standard deviation of the protocol's errors: each band is uniform, so its mean square is (b^3 - a^3) / 3."""
+"""Standard deviation of the protocol's errors: each band is uniform, so its mean square is (b^3 -
+a^3) / 3.
+"""
 
-PUBLISHED = {"pyramid": (0.120, 4.37, 0.020), "gable": (0.217, 5.55, 0.046), "hip": (0.462, 5.90, 0.030)}
+PUBLISHED = {
+    "pyramid": (0.120, 4.37, 0.020),
+    "gable": (0.217, 5.55, 0.046),
+    "hip": (0.462, 5.90, 0.030),
+}
 OVERALL = (0.266, 5.27, 0.032)
 ROOFS, TRIALS, TRIALS_OF_SLOW = 20, 30, 5
 
 
 def run(options: Options) -> Result:
-    """Both objectives on all types; the paper's, a hundred times slower, with five trials for types it did not test."""
+    """Both objectives on all types; the paper's, a hundred times slower, with five trials for types
+    it did not test.
+    """
     tables, errors = [], {}
     for method in OBJECTIVES:
         for kind in ("gable", "hip") if options.quick else ROOF_TYPES:
             errors[method, kind] = errors_of_type(method, kind, options)
     kinds = list(dict.fromkeys(kind for _, kind in errors))
-    tables.append(Table("Errors by type", ERROR_COLUMNS, [error_row(kind, errors) for kind in kinds], ERROR_NOTE))
+    tables.append(
+        Table(
+            "Errors by type", ERROR_COLUMNS, [error_row(kind, errors) for kind in kinds], ERROR_NOTE
+        )
+    )
     rows = [row for kind in kinds for row in bound_rows(kind, errors)]
     tables.append(Table("Against the Cramer-Rao bound", BOUND_COLUMNS, rows, BOUND_NOTE))
     roofs = "2 roofs x 1 trial" if options.quick else f"{ROOFS} roofs x {TRIALS} trials a type"
-    data = f"simulated, {roofs}, {DENSITY} points/m2, height errors of standard deviation {SIGMA_M:.4f} m"
-    return Result("stability under simulated points", data, tuple(tables), {"table3": picture(kinds, errors)})
+    data = (
+        f"simulated, {roofs}, {DENSITY} points/m2, height errors of standard deviation "
+        f"{SIGMA_M:.4f} m"
+    )
+    return Result(
+        "stability under simulated points", data, tuple(tables), {"table3": picture(kinds, errors)}
+    )
 
 
 def errors_of_type(method: str, kind: str, options: Options) -> list[dict[str, float]]:
@@ -50,28 +68,38 @@ def errors_of_type(method: str, kind: str, options: Options) -> list[dict[str, f
         trials = max(1, round(trials * options.paper_share))
     roofs, trials = (2, 1) if options.quick else (ROOFS, trials)
     work = [(method, kind, options.seed, roof, trials) for roof in range(roofs)]
-    return [record for records in in_parallel(errors_of_roof, work, options.jobs) for record in records]
+    return [
+        record for records in in_parallel(errors_of_roof, work, options.jobs) for record in records
+    ]
 
 
-def errors_of_roof(method: str, kind: str, seed: int, roof: int, trials: int) -> list[dict[str, float]]:
+def errors_of_roof(
+    method: str, kind: str, seed: int, roof: int, trials: int
+) -> list[dict[str, float]]:
     """Fits of one roof; both methods see the same points."""
     rng = np.random.default_rng([seed, list(CATALOGUE).index(kind), roof])
     building = random_building(rng, kind)
     part = building.roof.parts[0]
     primitive = CATALOGUE[kind].variant(part.parameters)
-    truth = primitive.canonical_theta(primitive.to_theta(part.parameters, part.kappa, part.translation))
+    truth = primitive.canonical_theta(
+        primitive.to_theta(part.parameters, part.kappa, part.translation)
+    )
     bounds = bounds_by_name(primitive, truth, DENSITY, SIGMA_M)
     records = []
     for _ in range(trials):
         fit = fit_model(method, uniform_points(building, rng, DENSITY, NOISE_M), (kind,)).fit
         if fit is not None:
             place = fit.translation + fit.global_translation
-            found = CATALOGUE[kind].variant(fit.parameters).to_theta(fit.parameters, fit.kappa, place)
+            found = (
+                CATALOGUE[kind].variant(fit.parameters).to_theta(fit.parameters, fit.kappa, place)
+            )
             records.append(record_of(primitive, truth, found, bounds))
     return records
 
 
-def record_of(primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds: dict[str, float]) -> dict[str, float]:
+def record_of(
+    primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds: dict[str, float]
+) -> dict[str, float]:
     """Errors of `found` against `truth` (theta (9,)), each name with its `bound:` beside it."""
     twin = same_way_round(primitive, truth, found)
     if twin is not truth:
@@ -81,9 +109,15 @@ def record_of(primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds
     period = math.pi if primitive.half_turn_symmetric else 2 * math.pi
     errors["kappa"] = (errors["kappa"] + period / 2) % period - period / 2
     (given, _, place), (fitted, _, at) = primitive.from_theta(truth), primitive.from_theta(found)
-    errors |= {f"dimension:{name}": fitted[name] - value for name, value in given.items() if name != "teeth"}
     errors |= {
-        f"relative:{name}": (fitted[name] - v) / v for name, v in given.items() if abs(v) > 0.5 and name != "teeth"
+        f"dimension:{name}": fitted[name] - value
+        for name, value in given.items()
+        if name != "teeth"
+    }
+    errors |= {
+        f"relative:{name}": (fitted[name] - v) / v
+        for name, v in given.items()
+        if abs(v) > 0.5 and name != "teeth"
     }
     top = (at[2] + fitted.get("height", 0.0)) - (place[2] + given.get("height", 0.0))
     errors |= {"place:x": at[0] - place[0], "place:y": at[1] - place[1], "place:top": top}
@@ -91,7 +125,9 @@ def record_of(primitive: Primitive, truth: np.ndarray, found: np.ndarray, bounds
 
 
 def same_way_round(primitive: Primitive, truth: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """`truth`, or its twin turned by half a turn: which eave of an asymmetric gable is the lower one may be chance."""
+    """`truth`, or its twin turned by half a turn: which eave of an asymmetric gable is the lower
+    one may be chance.
+    """
     turn = abs((found[KAPPA] - truth[KAPPA] + math.pi) % (2 * math.pi) - math.pi)
     if primitive.name != "asymmetric_gable" or turn < math.pi / 2:
         return truth
@@ -104,17 +140,24 @@ def same_way_round(primitive: Primitive, truth: np.ndarray, found: np.ndarray) -
 
 def rmse(records: Sequence[dict[str, float]], prefix: str) -> float | None:
     """Root mean square of all errors whose name starts with `prefix`."""
-    values = [value for record in records for name, value in record.items() if name.startswith(prefix)]
+    values = [
+        value for record in records for name, value in record.items() if name.startswith(prefix)
+    ]
     return float(np.sqrt(np.mean(np.square(values)))) if values else None
 
 
 ERROR_COLUMNS = ("type", "paper: dim. m", "%", "transl. m") + tuple(
-    f"{method}: {figure}" for method in OBJECTIVES for figure in ("fits", "dim. m", "%", "transl. m")
+    f"{method}: {figure}"
+    for method in OBJECTIVES
+    for figure in ("fits", "dim. m", "%", "transl. m")
 )
 ERROR_NOTE = (
-    "Root mean squares over all fits and parameters; % of the true value, where that is above 0.5 m. Translation: the "
-    "centre's x and y and the top's height (the paper does not say which point; the eave's height errs with the width). "
-    "Column 'paper' is what the paper published, 'paper:' columns with fits are its objective written again."
+    "Root mean squares over all fits and parameters; % of the true value, where that is above 0.5 "
+    "m. Translation: the "
+    "centre's x and y and the top's height (the paper does not say which point; the eave's height "
+    "errs with the width). "
+    "Column 'paper' is what the paper published, 'paper:' columns with fits are its objective "
+    "written again."
 )
 
 
@@ -124,21 +167,37 @@ def error_row(kind: str, errors: dict) -> tuple:
     for method in OBJECTIVES:
         records = errors[method, kind]
         relative = rmse(records, "relative:")
-        row += [len(records), rmse(records, "dimension:"), relative and 100 * relative, rmse(records, "place:")]
+        row += [
+            len(records),
+            rmse(records, "dimension:"),
+            relative and 100 * relative,
+            rmse(records, "place:"),
+        ]
     return tuple(row)
 
 
-BOUND_COLUMNS = ("type", "parameter", "kind", "bound", *(f"{method}: RMS of error / bound" for method in OBJECTIVES))
+BOUND_COLUMNS = (
+    "type",
+    "parameter",
+    "kind",
+    "bound",
+    *(f"{method}: RMS of error / bound" for method in OBJECTIVES),
+)
 BOUND_NOTE = (
-    "q0 is the height of the ridge, top or eave, q1 to q3 are slopes (and the fraction of an asymmetric ridge, the height of "
-    "a break or hip). Their bound is Cramer and Rao's for normal errors of the same variance; that of half_width and "
-    "half_length is the sampling limit of uniform points (experiments/cramer_rao.py). Ratios just below 1 are chance; those of "
+    "q0 is the height of the ridge, top or eave, q1 to q3 are slopes (and the fraction of an "
+    "asymmetric ridge, the height of "
+    "a break or hip). Their bound is Cramer and Rao's for normal errors of the same variance; that "
+    "of half_width and "
+    "half_length is the sampling limit of uniform points (experiments/cramer_rao.py). Ratios just "
+    "below 1 are chance; those of "
     "kappa lie below because the edges tell the rotation too, which the bound leaves out."
 )
 
 
 def bound_rows(kind: str, errors: dict) -> list[tuple]:
-    """One row a parameter: the root mean square bound over the roofs, and each method's errors in units of their bounds."""
+    """One row a parameter: the root mean square bound over the roofs, and each method's errors in
+    units of their bounds.
+    """
     rows = []
     names = THETA_NAMES[2 : CATALOGUE[kind].theta_size]
     for name in names:
@@ -153,10 +212,14 @@ def bound_rows(kind: str, errors: dict) -> list[tuple]:
 
 
 def ratio(records: Sequence[dict[str, float]], name: str) -> float | None:
-    """Root mean square over the fits of error / bound: 1 at the bound, each roof counting the same."""
+    """Root mean square over the fits of error / bound: 1 at the bound, each roof counting
+    the same.
+    """
     if not records:
         return None
-    errors, bounds = (np.array([record[key] for record in records]) for key in (name, f"bound:{name}"))
+    errors, bounds = (
+        np.array([record[key] for record in records]) for key in (name, f"bound:{name}")
+    )
     return float(np.sqrt(np.mean((errors / bounds) ** 2)))
 
 
@@ -164,6 +227,9 @@ def picture(kinds: Sequence[str], errors: dict):
     """Bars: dimension errors of both objectives and of the paper."""
     from .charts import grouped_bars
 
-    series = {method: [rmse(errors[method, kind], "dimension:") for kind in kinds] for method in OBJECTIVES}
+    series = {
+        method: [rmse(errors[method, kind], "dimension:") for kind in kinds]
+        for method in OBJECTIVES
+    }
     series["published"] = [PUBLISHED.get(kind, (math.nan,))[0] for kind in kinds]
     return grouped_bars(kinds, series, "RMSE of the dimensions, m", log=True)

@@ -2,9 +2,10 @@
 
 python release/compiled_wheel.py dist/hiproof-1.0.0-py3-none-any.whl dist
 
-The code is for this Python, for processors of the kind in `hiproof.compiled.kinds` and for the versions of numba, llvmlite and NumPy that are
-installed here with hiproof. The wheel's extra `compiled` pins these versions; beside others its code is passed over, and
-the first run compiles as ever. It is tagged as numba's own wheel: where that runs, the code does.
+The code is for this Python, for processors of the kind in `hiproof.compiled.kinds` and for the
+versions of numba, llvmlite and NumPy that are installed here with hiproof. The wheel's extra
+`compiled` pins these versions; beside others its code is passed over, and the first run compiles as
+ever. It is tagged as numba's own wheel: where that runs, the code does.
 """
 
 from __future__ import annotations
@@ -25,7 +26,9 @@ WARM = ("-m", "hiproof", "warm", "--all")
 
 
 def compiled_wheel(wheel: Path, out: Path, command: Sequence[str] = WARM) -> Path:
-    """Write the wheel with the code that `command`, arguments of Python, compiles of its package; where it lies."""
+    """Write the wheel with the code that `command`, arguments of Python, compiles of its package;
+    where it lies.
+    """
     with tempfile.TemporaryDirectory() as folder:
         python("-m", "wheel", "unpack", str(wheel), "--dest", folder)
         (root,) = Path(folder).iterdir()
@@ -39,7 +42,9 @@ def compiled_wheel(wheel: Path, out: Path, command: Sequence[str] = WARM) -> Pat
 
 def compile_in(root: Path, command: Sequence[str]) -> None:
     """Have the code of the packages in `root` compiled and kept beside their sources."""
-    environment = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"} | {
+    environment = {
+        name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"
+    } | {
         "NUMBA_CPU_NAME": KIND,
         "NUMBA_CPU_FEATURES": "",
         "PYTHONDONTWRITEBYTECODE": "1",
@@ -51,17 +56,25 @@ def compile_in(root: Path, command: Sequence[str]) -> None:
 
 
 def describe(root: Path) -> None:
-    """Say in the wheel's own words which Pythons and systems it is for, and which versions its code fits."""
+    """Say in the wheel's own words which Pythons and systems it is for, and which versions its code
+    fits.
+    """
     (info,) = root.glob("*.dist-info")
     kind = info / "WHEEL"
-    kept = [line for line in kind.read_text(encoding="utf-8").splitlines() if line and not line.startswith("Tag:")]
+    kept = [
+        line
+        for line in kind.read_text(encoding="utf-8").splitlines()
+        if line and not line.startswith("Tag:")
+    ]
     of_numba = (distribution("numba").read_text("WHEEL") or "").splitlines()
     tags = [line for line in of_numba if line.startswith("Tag:")]
     kind.write_text("\n".join([*kept, *tags, ""]), encoding="utf-8")
     described = info / "METADATA"
     head, _, text = described.read_text(encoding="utf-8").partition("\n\n")
     pins = [f"Requires-Dist: {name}=={version(name)}; extra == 'compiled'" for name in VERSIONS]
-    described.write_text("\n".join([head.rstrip(), "Provides-Extra: compiled", *pins, "", text]), encoding="utf-8")
+    described.write_text(
+        "\n".join([head.rstrip(), "Provides-Extra: compiled", *pins, "", text]), encoding="utf-8"
+    )
 
 
 def python(*arguments: str) -> None:

@@ -43,7 +43,9 @@ def town_files(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def undisturbed(town_files, tmp_path_factory):
-    """The output folder of a run over the tiny town that nothing disturbs: what every other run has to give."""
+    """The output folder of a run over the tiny town that nothing disturbs: what every other run has
+    to give.
+    """
     out = tmp_path_factory.mktemp("undisturbed")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(city_run, "solve_tile", planted.solve_quickly)

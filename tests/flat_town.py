@@ -1,4 +1,7 @@
-"""A finished run over the tiny town whose roofs are all wrong: flat, as nothing else was allowed. What a person mends."""
+"""A finished run over the tiny town whose roofs are all wrong: flat, as nothing else was allowed.
+
+What a person mends.
+"""
 
 from pathlib import Path
 
@@ -7,8 +10,14 @@ import hiproof
 WRONG = hiproof.Settings.from_dict({"segment": {"enabled": False}, "fit": {"types": ["flat"]}})
 
 
-def request_over(town_files: list[str], out: Path, overrides: Path | None = None) -> hiproof.Request:
+def request_over(
+    town_files: list[str], out: Path, overrides: Path | None = None
+) -> hiproof.Request:
     """The run's request, and with `overrides` that of the next one."""
     return hiproof.Request(
-        (town_files[0],), out, town_files[1], settings=WRONG, overrides=str(overrides) if overrides else None
+        (town_files[0],),
+        out,
+        town_files[1],
+        settings=WRONG,
+        overrides=str(overrides) if overrides else None,
     )

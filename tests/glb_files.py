@@ -29,9 +29,14 @@ def accessor_values(document, binary, index):
     """The values (n,) or (n, k) of an accessor, whose bounds are those it says."""
     accessor = document["accessors"][index]
     width = WIDTHS[accessor["type"]]
-    values = np.frombuffer(view_bytes(document, binary, accessor["bufferView"]), KINDS[accessor["componentType"]])
+    values = np.frombuffer(
+        view_bytes(document, binary, accessor["bufferView"]), KINDS[accessor["componentType"]]
+    )
     values = values.reshape(-1, width) if width > 1 else values
     assert len(values) == accessor["count"]
     if "min" in accessor:
-        assert values.min(axis=0).tolist() == accessor["min"] and values.max(axis=0).tolist() == accessor["max"]
+        assert (
+            values.min(axis=0).tolist() == accessor["min"]
+            and values.max(axis=0).tolist() == accessor["max"]
+        )
     return values

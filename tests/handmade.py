@@ -6,14 +6,28 @@ import numpy as np
 import shapely
 
 from hiproof.frames import LocalFrame
-from hiproof.model import GROUND, ROOF, WALL, Building, Face, Model, Part, Piece, Quality, Roof, Solid
+from hiproof.model import (
+    GROUND,
+    ROOF,
+    WALL,
+    Building,
+    Face,
+    Model,
+    Part,
+    Piece,
+    Quality,
+    Roof,
+    Solid,
+)
 from hiproof.status import Grade, Status
 
 RD_ORIGIN = np.array([85000.0, 446000.0, 0.0])
 
 
 def prism(rings: list[list[tuple[float, float]]], low: float, high: float) -> Solid:
-    """A flat block over plan `rings` (outer counter-clockwise, holes clockwise) between two heights."""
+    """A flat block over plan `rings` (outer counter-clockwise, holes clockwise) between two
+    heights.
+    """
     plan = [xy for ring in rings for xy in ring]
     n = len(plan)
     vertices = np.array([(*xy, low) for xy in plan] + [(*xy, high) for xy in plan], float)
@@ -40,10 +54,21 @@ def courtyard() -> Solid:
     return prism([[(0, 0), (10, 0), (10, 10), (0, 10)], [(3, 3), (3, 7), (7, 7), (7, 3)]], 0.0, 5.0)
 
 
-def gable_house(width: float = 8.0, length: float = 12.0, eave: float = 3.0, ridge: float = 7.0) -> Solid:
+def gable_house(
+    width: float = 8.0, length: float = 12.0, eave: float = 3.0, ridge: float = 7.0
+) -> Solid:
     """Ridge along y at x = width / 2."""
     w, l, m = width, length, width / 2
-    vertices = [(0, 0, 0), (w, 0, 0), (w, l, 0), (0, l, 0), (0, 0, eave), (w, 0, eave), (w, l, eave), (0, l, eave)]
+    vertices = [
+        (0, 0, 0),
+        (w, 0, 0),
+        (w, l, 0),
+        (0, l, 0),
+        (0, 0, eave),
+        (w, 0, eave),
+        (w, l, eave),
+        (0, l, eave),
+    ]
     vertices += [(m, 0, ridge), (m, l, ridge)]
     faces = (
         Face(((3, 2, 1, 0),), GROUND),
@@ -58,22 +83,36 @@ def gable_house(width: float = 8.0, length: float = 12.0, eave: float = 3.0, rid
 
 
 def modelled(
-    solid: Solid, id: str = "a", kinds: tuple[str, ...] = ("gable",), origin: np.ndarray = RD_ORIGIN, **changes
+    solid: Solid,
+    id: str = "a",
+    kinds: tuple[str, ...] = ("gable",),
+    origin: np.ndarray = RD_ORIGIN,
+    **changes,
 ) -> Building:
     """A building of `solid`, moved to `origin`, whose roof has a part of each of `kinds`."""
     outline = shapely.box(*solid.vertices[:, :2].min(axis=0), *solid.vertices[:, :2].max(axis=0))
     planes = np.array([[1.0, 0.0, 3.0], [-1.0, 0.0, 11.0]])
     parts = tuple(
-        Part(kind, (Piece(outline, planes),), {"width": 8.0, "height": 4.0}, 0.25, np.array([0.1, -0.2, 3.0]))
+        Part(
+            kind,
+            (Piece(outline, planes),),
+            {"width": 8.0, "height": 4.0},
+            0.25,
+            np.array([0.1, -0.2, 3.0]),
+        )
         for kind in kinds
     )
     values = {
-        "quality": Quality(points=321, density=4.5, psd_mean=0.05, rmse=0.06, share_within_20cm=0.99),
+        "quality": Quality(
+            points=321, density=4.5, psd_mean=0.05, rmse=0.06, share_within_20cm=0.99
+        ),
         "grade": Grade.GOOD,
         "z_ground": float(origin[2]),
         "ground_source": "ground class",
         "types": {kinds[0]: 0.97},
-        "terrain_intersection": (np.array([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 0, 0.0]]) + origin,),
+        "terrain_intersection": (
+            np.array([[0, 0, 0], [1, 0, 0.1], [1, 1, 0], [0, 0, 0.0]]) + origin,
+        ),
         "attributes": {"bouwjaar": 1930, "naam": "Café <&>"},
     }
     roof = Roof(parts, outline, LocalFrame(np.asarray(origin, float)))

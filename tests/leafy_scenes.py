@@ -1,4 +1,6 @@
-"""Simulated scenes with more than buildings in them: a neighbourhood as it is scanned, a forest, a house under a tree."""
+"""Simulated scenes with more than buildings in them: a neighbourhood as it is scanned, a forest, a
+house under a tree.
+"""
 
 import numpy as np
 import shapely
@@ -23,7 +25,11 @@ def town(density: float = 8.0, seed: int = 5) -> tuple[Scan, list]:
     patch = [(low, low + (90.0, 50.0))]
     flight = Flight(heading=1.2, origin=low - 250.0)
     (cloud,) = survey(patch, lots, terrain, flight, seed, ScanSettings(density=density))
-    own = [lot for lot in lots if shapely.box(*low, *(low + (90.0, 50.0))).contains(lot.building.footprint)]
+    own = [
+        lot
+        for lot in lots
+        if shapely.box(*low, *(low + (90.0, 50.0))).contains(lot.building.footprint)
+    ]
     return cloud, own
 
 
@@ -32,7 +38,9 @@ def crowns_over(rng: np.random.Generator, side_m: float, apart_m: float = 5.0) -
     steps = np.arange(-side_m / 2, side_m / 2, apart_m)
     x, y = (axis.ravel() + rng.normal(0, 1, axis.size) for axis in np.meshgrid(steps, steps))
     half = rng.uniform(2.5, 5.0, len(x))
-    return np.column_stack([x, y, rng.uniform(3, 8, len(x)) + half, rng.uniform(2.5, 4.0, len(x)), half])
+    return np.column_stack(
+        [x, y, rng.uniform(3, 8, len(x)) + half, rng.uniform(2.5, 4.0, len(x)), half]
+    )
 
 
 def forest(rng: np.random.Generator, side_m: float = 60.0, density: float = 8.0) -> Scan:
@@ -43,13 +51,20 @@ def forest(rng: np.random.Generator, side_m: float = 60.0, density: float = 8.0)
 
 
 def house_under_a_tree(rng: np.random.Generator, share: float, density: float = 10.0):
-    """A gable house in the middle of a lawn, `share` of it under crowns; the scan and the building."""
+    """A gable house in the middle of a lawn, `share` of it under crowns; the scan and the
+    building.
+    """
     building = random_building(rng, "gable", kappa=0.0)
     x0, y0, x1, y1 = building.outline.bounds
     crowns = crowns_over(rng, 60.0, 3.0)
     crowns[:, 2] += 6.0
     covered = x0 + share * (x1 - x0) - 1.0
-    near = (crowns[:, 0] > x0 - 6) & (crowns[:, 0] < covered - 2) & (crowns[:, 1] > y0 - 5) & (crowns[:, 1] < y1 + 5)
+    near = (
+        (crowns[:, 0] > x0 - 6)
+        & (crowns[:, 0] < covered - 2)
+        & (crowns[:, 1] > y0 - 5)
+        & (crowns[:, 1] < y1 + 5)
+    )
     scene = scene_of(building_bodies(building), crowns[near])
     area = shapely.box(x0 - 20, y0 - 20, x1 + 20, y1 + 20)
     cloud = scan_scene(scene, area, 6.0, rng, ScanSettings(density=density, defects=Defects.none()))
@@ -57,12 +72,18 @@ def house_under_a_tree(rng: np.random.Generator, share: float, density: float = 
 
 
 def drone(rng: np.random.Generator, type: str = "gable", density: float = 300.0):
-    """A house on a lawn from a drone: dense, and seen from all sides so that its walls are full of points."""
+    """A house on a lawn from a drone: dense, and seen from all sides so that its walls are full of
+    points.
+    """
     building = random_building(rng, type)
     x0, y0, x1, y1 = building.outline.bounds
     swaths = random_swaths(rng, density, 0.9, 0.0, 0.0, 30.0)
     beams = joined([beams_of(rng, swath, np.zeros(2), 30.0, 4.0) for swath in swaths])
-    settings = ScanSettings(density=density, range_noise_m=0.015, horizontal_noise_m=0.015, beam_radius_m=0.02)
+    settings = ScanSettings(
+        density=density, range_noise_m=0.015, horizontal_noise_m=0.015, beam_radius_m=0.02
+    )
     cloud = returns(scene_of(building_bodies(building)), beams, rng, settings)
-    inside = shapely.contains_xy(shapely.box(x0 - 8, y0 - 8, x1 + 8, y1 + 8), *cloud.points[:, :2].T)
+    inside = shapely.contains_xy(
+        shapely.box(x0 - 8, y0 - 8, x1 + 8, y1 + 8), *cloud.points[:, :2].T
+    )
     return cloud.chosen(inside).moved(building.roof.frame.origin), building

@@ -1,4 +1,6 @@
-"""Stand-ins for `solve_tile` that worker processes can import: one that costs nothing, and some that go wrong."""
+"""Stand-ins for `solve_tile` that worker processes can import: one that costs nothing, and some
+that go wrong.
+"""
 
 import os
 import signal
@@ -17,12 +19,16 @@ DEADLY = "house-2"
 
 
 def counted(points, footprint, terrain, settings, id, ground=None, unused=None):
-    """No roof, but everything that a building's neighbours, tile or files could change: its points and its ground."""
+    """No roof, but everything that a building's neighbours, tile or files could change: its points
+    and its ground.
+    """
     points = np.unique(points, axis=0)
     corner = np.array([footprint.polygon.bounds[:2]])
     ground = float(terrain.height_at(corner)[0])
     quality = Quality(points=len(points), rmse=float(points.sum()) if len(points) else float("nan"))
-    return Building(id, Status.NO_POINTS, f"{len(points)} points", None, quality, ground, terrain.source)
+    return Building(
+        id, Status.NO_POINTS, f"{len(points)} points", None, quality, ground, terrain.source
+    )
 
 
 def solve_with(reconstruct, folder, tile, terrain, avoid):
@@ -80,7 +86,9 @@ def solve_hungry(folder, tile, terrain=None, avoid=()):
 
 
 def jobs_of(path):
-    """A stand-in for reading footprints that takes those of `path`, whatever address is asked for."""
+    """A stand-in for reading footprints that takes those of `path`, whatever address is
+    asked for.
+    """
     return lambda *_: (jobs_of_footprints(read_footprints(path)), (), None)
 
 

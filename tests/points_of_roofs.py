@@ -7,7 +7,9 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.contract import HALF_LENGTH, HALF_WIDTH
 
 
-def typical_theta(name, width=8.0, length=13.0, height=3.0, kappa=0.4, translation=(0.6, -0.3, 5.0), teeth=None):
+def typical_theta(
+    name, width=8.0, length=13.0, height=3.0, kappa=0.4, translation=(0.6, -0.3, 5.0), teeth=None
+):
     """theta (9,) of a typical roof of type `name`."""
     primitive = CATALOGUE[name]
     theta_p = primitive.typical(width, length, height)
@@ -17,7 +19,9 @@ def typical_theta(name, width=8.0, length=13.0, height=3.0, kappa=0.4, translati
 
 
 def points_on(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=0, teeth=2):
-    """Points (n, 3) uniform over the plan of `theta`, with normal noise of the heights and outliers around."""
+    """Points (n, 3) uniform over the plan of `theta`, with normal noise of the heights and outliers
+    around.
+    """
     rng = np.random.default_rng(seed)
     half = np.array([theta[HALF_LENGTH], theta[HALF_WIDTH]])
     uv = rng.uniform(-half, half, (round(density * 4 * half.prod()), 2))
@@ -27,7 +31,9 @@ def points_on(name, theta, density=5.0, noise_m=0.05, outlier_share=0.0, seed=0,
     z = primitive.height_at(theta, xy) + rng.normal(0, noise_m, len(xy))
     points = np.column_stack([xy, z])
     outlier = rng.random(len(points)) < outlier_share
-    points[outlier] = rng.uniform(points.min(axis=0) - 1, points.max(axis=0) + 1, (outlier.sum(), 3))
+    points[outlier] = rng.uniform(
+        points.min(axis=0) - 1, points.max(axis=0) + 1, (outlier.sum(), 3)
+    )
     return points
 
 

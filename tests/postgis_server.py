@@ -1,4 +1,6 @@
-"""A PostgreSQL with PostGIS of the tests' own: a new cluster in a temporary folder, reached through its socket alone."""
+"""A PostgreSQL with PostGIS of the tests' own: a new cluster in a temporary folder, reached through
+its socket alone.
+"""
 
 import os
 import shutil
@@ -12,15 +14,29 @@ def programs() -> Path | None:
     """Folder of initdb and postgres, None where PostgreSQL is not installed."""
     folders = sorted(Path("/usr/lib/postgresql").glob("*/bin"), reverse=True)
     found = shutil.which("initdb")
-    return next((f for f in [*folders, *([Path(found).parent] if found else [])] if (f / "postgres").exists()), None)
+    return next(
+        (
+            f
+            for f in [*folders, *([Path(found).parent] if found else [])]
+            if (f / "postgres").exists()
+        ),
+        None,
+    )
 
 
 def why_not() -> str | None:
     """The reason why no server can be started here, None where it can."""
     if programs() is None:
-        return "PostgreSQL is not installed (Debian: apt-get install postgresql postgresql-15-postgis-3)"
+        return (
+            "PostgreSQL is not installed (Debian: apt-get install postgresql "
+            "postgresql-15-postgis-3)"
+        )
     extension = list(Path("/usr/share/postgresql").glob("*/extension/postgis.control"))
-    return None if extension else "PostGIS is not installed (Debian: apt-get install postgresql-15-postgis-3)"
+    return (
+        None
+        if extension
+        else "PostGIS is not installed (Debian: apt-get install postgresql-15-postgis-3)"
+    )
 
 
 @contextmanager
@@ -35,7 +51,9 @@ def running():
 
     def call(program: str, *arguments: str) -> None:
         command = [*as_user, str(binaries / program), *arguments]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder)
+        subprocess.run(
+            command, check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, cwd=folder
+        )
 
     call("initdb", "-D", str(data), "-U", "tester", "--auth=trust", "--no-sync")
     options = f"-c listen_addresses='' -c unix_socket_directories={folder} -c fsync=off"

@@ -1,6 +1,9 @@
-"""`python range_server.py FOLDER LOG`: Python's file server with what it lacks, ranges of bytes. Prints its port.
+"""`python range_server.py FOLDER LOG`: Python's file server with what it lacks, ranges of bytes.
 
-A process of its own: GDAL waits for its answers without letting other Python threads run. Ranges asked for go to LOG.
+Prints its port.
+
+A process of its own: GDAL waits for its answers without letting other Python threads run. Ranges
+asked for go to LOG.
 """
 
 import subprocess
@@ -44,7 +47,9 @@ class RangeHandler(SimpleHTTPRequestHandler):
 @contextmanager
 def serving(folder, log):
     """The address at which `folder` is served until the block ends."""
-    process = subprocess.Popen([sys.executable, __file__, str(folder), str(log)], stdout=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, __file__, str(folder), str(log)], stdout=subprocess.PIPE, text=True
+    )
     try:
         yield f"http://127.0.0.1:{int(process.stdout.readline())}"
     finally:

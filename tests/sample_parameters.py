@@ -1,4 +1,6 @@
-"""A parameters.jsonl written by hand: buildings of several roofs, one with two parts, one with a hole, one without a model."""
+"""A parameters.jsonl written by hand: buildings of several roofs, one with two parts, one with a
+hole, one without a model.
+"""
 
 import json
 from pathlib import Path
@@ -25,7 +27,13 @@ RESIDUALS = {
 
 def part(kind: str, eave: float = 5.0, **parameters: float) -> dict:
     shape = {"width": 8.0, "length": 12.0, **parameters}
-    return {"type": kind, "parameters": shape, "position": [0.0, 0.0, eave], "rotation": 0.0, "sigma": {"width": 0.02}}
+    return {
+        "type": kind,
+        "parameters": shape,
+        "position": [0.0, 0.0, eave],
+        "rotation": 0.0,
+        "sigma": {"width": 0.02},
+    }
 
 
 def house(id: str, number: int, *parts: dict, rings: list | None = None) -> dict:
@@ -58,7 +66,9 @@ def write_parameters_of_each_kind(path: Path) -> Path:
         {"id": "lost", "status": "no_points", "detail": "no points", "parts": [], "attributes": {}},
     ]
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text("".join(json.dumps(line) + "\n" for line in [HEAD, *buildings]), encoding="utf-8")
+    path.write_text(
+        "".join(json.dumps(line) + "\n" for line in [HEAD, *buildings]), encoding="utf-8"
+    )
     record = {
         "inputs": {"clouds": ["gone.laz"], "bbox": [0, 0, 1, 1]},
         "settings": {"reconstruct": {"align": "auto"}},

@@ -1,4 +1,6 @@
-"""What of the data is asked for, and how: options made of settings, a settings file beside the data, --where and --bbox."""
+"""What of the data is asked for, and how: options made of settings, a settings file beside the
+data, --where and --bbox.
+"""
 
 import dataclasses
 
@@ -30,7 +32,9 @@ def houses(tmp_path):
     geometry = shapely.to_wkb(list(HOUSES.values()))
     columns = [np.array(list(HOUSES), object), np.arange(1900, 1950, 10)]
     path = tmp_path / "houses.gpkg"
-    pyogrio.raw.write(path, geometry, columns, ["id", "year"], geometry_type="Polygon", crs="EPSG:28992")
+    pyogrio.raw.write(
+        path, geometry, columns, ["id", "year"], geometry_type="Polygon", crs="EPSG:28992"
+    )
     return path
 
 
@@ -44,7 +48,9 @@ def test_an_option_tells_what_its_setting_tells(one):
 def test_options_and_settings_are_told_once():
     own = {p.name for p in PARAMETERS.values()} - {one.parameter for one in OPTIONED}
     assert own.isdisjoint(
-        field.name for section in dataclasses.fields(Settings) for field in dataclasses.fields(section.default_factory)
+        field.name
+        for section in dataclasses.fields(Settings)
+        for field in dataclasses.fields(section.default_factory)
     )
 
 
@@ -84,7 +90,12 @@ def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
     moved = shapely.transform(list(HOUSES.values()), lambda xy: xy + far)
     path = houses.with_name("moved.gpkg")
     pyogrio.raw.write(
-        path, shapely.to_wkb(moved), [np.array(list(HOUSES), object)], ["id"], geometry_type="Polygon", crs="EPSG:28992"
+        path,
+        shapely.to_wkb(moved),
+        [np.array(list(HOUSES), object)],
+        ["id"],
+        geometry_type="Polygon",
+        crs="EPSG:28992",
     )
     here = read_footprints(path, target_crs="EPSG:32631")
     box = tuple(here[2].polygon.buffer(1.0).bounds)
@@ -94,7 +105,10 @@ def test_a_box_is_in_the_coordinates_of_the_clouds(houses):
 @pytest.mark.parametrize(
     ("chosen", "message"),
     [
-        ({"where": "height > 3"}, r"--where in SQL on the attributes of .* \(id, year\), got: no such column: height"),
+        (
+            {"where": "height > 3"},
+            r"--where in SQL on the attributes of .* \(id, year\), got: no such column: height",
+        ),
         ({"where": "year ="}, "--where in SQL"),
         ({"where": "year > 3000"}, r"\(-?\d.*\) that --where let through, got none"),
         ({"bbox": (500.0, 500.0, 501.0, 501.0)}, "that --bbox let through, got none"),
@@ -109,15 +123,28 @@ def test_a_choice_that_leaves_nothing_gets_a_sentence(chosen, message, houses):
 def test_a_condition_that_no_database_reads_gets_the_same_sentence(ending, houses, tmp_path):
     path = tmp_path / f"houses.{ending}"
     geometry = pyogrio.raw.read(houses)[2]
-    pyogrio.raw.write(path, geometry, [np.arange(len(geometry))], ["year"], geometry_type="Polygon", crs="EPSG:28992")
-    with pytest.raises(InputError, match=r"--where in SQL on the attributes of .*\(year\), got: 'height > 3'"):
+    pyogrio.raw.write(
+        path,
+        geometry,
+        [np.arange(len(geometry))],
+        ["year"],
+        geometry_type="Polygon",
+        crs="EPSG:28992",
+    )
+    with pytest.raises(
+        InputError, match=r"--where in SQL on the attributes of .*\(year\), got: 'height > 3'"
+    ):
         read_footprints(path, where="height > 3")
 
 
 @pytest.mark.parametrize("text", ["1,2,3", "3,2,1,4", "a,b,c,d", "1,2,nan,4", ""])
 def test_a_box_that_is_none_gets_a_sentence(text, tmp_path):
-    done = CliRunner().invoke(app, ["reconstruct", "a.laz", "--out", str(tmp_path), f"--bbox={text}"])
-    assert isinstance(done.exception, SettingsError) and "--bbox as xmin,ymin,xmax,ymax" in str(done.exception)
+    done = CliRunner().invoke(
+        app, ["reconstruct", "a.laz", "--out", str(tmp_path), f"--bbox={text}"]
+    )
+    assert isinstance(done.exception, SettingsError) and "--bbox as xmin,ymin,xmax,ymax" in str(
+        done.exception
+    )
 
 
 def test_without_footprints_the_box_chooses_among_what_is_found(town_files, tmp_path):
@@ -130,11 +157,21 @@ def test_without_footprints_the_box_chooses_among_what_is_found(town_files, tmp_
     x, y, *_ = everything[2].area.buffer(5.0).bounds
     with pytest.raises(InputError, match=r"buildings in --bbox .*, got none"):
         make_plan(dataclasses.replace(request, bbox=(x, y, x + 0.01, y + 0.01)))
-    with pytest.raises(InputError, match=r"meets the clouds, which lie in [\d.,]+, got -9,-9,-8,-8"):
+    with pytest.raises(
+        InputError, match=r"meets the clouds, which lie in [\d.,]+, got -9,-9,-8,-8"
+    ):
         make_plan(dataclasses.replace(request, bbox=(-9.0, -9.0, -8.0, -8.0)))
 
 
 def test_a_plan_holds_the_footprints_chosen(town_files, tmp_path):
-    request = Request((town_files[0],), tmp_path, town_files[1], where="id in ('house-1', 'house-3')")
-    expected = [f for f in read_footprints(town_files[1], target_crs="EPSG:7415") if f.id in ("house-1", "house-3")]
-    assert [job.id for job in make_plan(request).jobs] == [job.id for job in jobs_of_footprints(tuple(expected))]
+    request = Request(
+        (town_files[0],), tmp_path, town_files[1], where="id in ('house-1', 'house-3')"
+    )
+    expected = [
+        f
+        for f in read_footprints(town_files[1], target_crs="EPSG:7415")
+        if f.id in ("house-1", "house-3")
+    ]
+    assert [job.id for job in make_plan(request).jobs] == [
+        job.id for job in jobs_of_footprints(tuple(expected))
+    ]

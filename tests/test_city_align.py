@@ -1,4 +1,6 @@
-"""Footprints beside their roofs: all of a data set are moved by one shift, a row of houses moves as one, or nothing moves."""
+"""Footprints beside their roofs: all of a data set are moved by one shift, a row of houses moves as
+one, or nothing moves.
+"""
 
 import json
 from dataclasses import replace
@@ -29,7 +31,9 @@ def scattered_houses(rows: int = 5, columns: int = 5) -> Town:
         size = rng.uniform((8, 7), (16, 12))
         inside = ((xy >= corner) & (xy <= corner + size)).all(axis=1)
         classes[inside], z[inside] = 6, 6.0
-        footprints[f"house-{i}"] = shapely.box(*(corner + ORIGIN[:2]), *(corner + size + ORIGIN[:2]))
+        footprints[f"house-{i}"] = shapely.box(
+            *(corner + ORIGIN[:2]), *(corner + size + ORIGIN[:2])
+        )
     return Town(np.round(np.column_stack([xy, z]) + ORIGIN, 3), classes, footprints)
 
 
@@ -41,11 +45,18 @@ def row_of_houses(houses: int = 4) -> Town:
     z = np.where(inside, 9 - 0.6 * np.abs(xy[:, 1] - 16), 0.0)
     places = [np.array([12 + 6.0 * i, 12.0]) + ORIGIN[:2] for i in range(houses)]
     footprints = {f"house-{i}": shapely.box(x, y, x + 6, y + 8) for i, (x, y) in enumerate(places)}
-    return Town(np.round(np.column_stack([xy, z]) + ORIGIN, 3), np.where(inside, 6, 2).astype(np.uint8), footprints)
+    return Town(
+        np.round(np.column_stack([xy, z]) + ORIGIN, 3),
+        np.where(inside, 6, 2).astype(np.uint8),
+        footprints,
+    )
 
 
 def moved(town: Town, shift) -> Town:
-    polygons = {id: shapely.transform(polygon, lambda xy: xy + shift) for id, polygon in town.footprints.items()}
+    polygons = {
+        id: shapely.transform(polygon, lambda xy: xy + shift)
+        for id, polygon in town.footprints.items()
+    }
     return replace(town, footprints=polygons)
 
 
@@ -53,7 +64,10 @@ def request_of(folder, town: Town, pieces: int = 1, **options) -> Request:
     """A run on the town, whose cloud is cut into so many files."""
     folder.mkdir(exist_ok=True)
     parts = np.array_split(np.random.default_rng(0).permutation(len(town.xyz)), pieces)
-    clouds = [write_cloud(folder / f"{n}.laz", town.xyz[p], town.classification[p]) for n, p in enumerate(parts)]
+    clouds = [
+        write_cloud(folder / f"{n}.laz", town.xyz[p], town.classification[p])
+        for n, p in enumerate(parts)
+    ]
     footprints = write_footprints(folder / "footprints.gpkg", town.footprints)
     return Request(tuple(map(str, clouds)), folder / "out", str(footprints), **options)
 
@@ -99,7 +113,10 @@ def test_the_plan_keeps_what_was_moved(shifted, tmp_path):
     again = WorkPlan.load(tmp_path / "plan.jsonl")
     assert again.registration == plan.registration and len(again.others) == len(plan.others) > 0
     for job, other in zip(plan.jobs, again.jobs, strict=True):
-        assert job.area.wkb == other.area.wkb and job.footprint.polygon.wkb == other.footprint.polygon.wkb
+        assert (
+            job.area.wkb == other.area.wkb
+            and job.footprint.polygon.wkb == other.footprint.polygon.wkb
+        )
         assert job.footprint.shift == other.footprint.shift == plan.registration.shift
 
 
@@ -134,7 +151,10 @@ def test_a_row_moves_as_one_whichever_of_its_houses_are_asked_for(tmp_path):
     whole = records_of(request.out)
     shifts = {tuple(building["shift"]) for building in whole.values()}
     assert len(shifts) == 1 and np.abs(np.subtract(shifts.pop(), (0.7, -0.4))).max() < 0.1
-    assert all("was moved with the 4 of its row by (0.7" in building["detail"] for building in whole.values())
+    assert all(
+        "was moved with the 4 of its row by (0.7" in building["detail"]
+        for building in whole.values()
+    )
     one = replace(request, out=tmp_path / "one", where="id = 'house-2'")
     reconstruct_area(one)
     assert records_of(one.out)["house-2"] == whole["house-2"]
@@ -145,4 +165,6 @@ def test_one_house_of_a_row_is_not_moved_away_from_the_others(tmp_path):
     alone = {**town.footprints, "house-1": moved(town, (0.0, 1.0)).footprints["house-1"]}
     request = request_of(tmp_path, replace(town, footprints=alone))
     reconstruct_area(request)
-    assert {tuple(building["shift"]) for building in records_of(request.out).values()} == {(0.0, 0.0)}
+    assert {tuple(building["shift"]) for building in records_of(request.out).values()} == {
+        (0.0, 0.0)
+    }

@@ -1,4 +1,6 @@
-"""Runs over footprints that hold bare ground, or nothing but it: yards are cut out, and what is gone gets no model."""
+"""Runs over footprints that hold bare ground, or nothing but it: yards are cut out, and what is
+gone gets no model.
+"""
 
 import numpy as np
 import pytest
@@ -21,7 +23,9 @@ WALLS_M = 5.0
 
 
 def scan(has_house=True, density=6.0, seed=0):
-    """Points and classes of level ground at ORIGIN's height with a flat house, its yard at a corner, in the middle."""
+    """Points and classes of level ground at ORIGIN's height with a flat house, its yard at a
+    corner, in the middle.
+    """
     rng = np.random.default_rng(seed)
     xy = rng.uniform((X - 25, Y - 25), (X + 41, Y + 37), (int(density * 66 * 62), 2))
     on_roof = shapely.intersects_xy(HOUSE - YARD, *xy.T) & has_house
@@ -35,7 +39,9 @@ def run(folder, xyz, classes, **settings):
     cloud = write_cloud(folder / "cloud.laz", xyz, classes)
     footprints = write_footprints(folder / "footprints.geojson", {"a": HOUSE})
     chosen = Settings.from_dict({"reconstruct": settings})
-    summary = reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), settings=chosen))
+    summary = reconstruct_area(
+        Request((str(cloud),), folder / "out", str(footprints), settings=chosen)
+    )
     return by_id(folder / "out")["a"], summary
 
 
@@ -48,7 +54,10 @@ def volume(record):
 def test_a_yard_is_cut_out_of_its_footprint(tmp_path, has_classes):
     xyz, classes = scan()
     record, summary = run(tmp_path, xyz, classes if has_classes else np.ones_like(classes))
-    assert record["status"] == "modelled" and "m2 of bare ground inside its footprint was cut out" in record["detail"]
+    assert (
+        record["status"] == "modelled"
+        and "m2 of bare ground inside its footprint was cut out" in record["detail"]
+    )
     assert volume(record) == pytest.approx((HOUSE.area - YARD.area) * WALLS_M, rel=0.04)
     assert not check_solid(hiproof.build(record).solid)
     assert summary.doubts == {Doubt.BARE_GROUND_INSIDE: 1}
@@ -57,7 +66,8 @@ def test_a_yard_is_cut_out_of_its_footprint(tmp_path, has_classes):
 def test_a_footprint_that_is_trusted_is_roofed_over_and_that_is_said(tmp_path):
     record, _ = run(tmp_path, *scan(), footprint_trust="full")
     assert (
-        "of bare ground inside its footprint is roofed over; --footprint-trust points cuts it out" in record["detail"]
+        "of bare ground inside its footprint is roofed over; --footprint-trust points cuts it out"
+        in record["detail"]
     )
     assert volume(record) == pytest.approx(HOUSE.area * WALLS_M, rel=0.02)
 
@@ -66,7 +76,10 @@ def test_leaves_over_a_yard_leave_it_to_the_footprint(tmp_path):
     xyz, classes = scan()
     over = shapely.intersects_xy(YARD, *xyz[:, :2].T)
     leaves = xyz[over] + [0.2, 0.1, 6.0]
-    both = np.concatenate([xyz, leaves]), np.concatenate([classes, np.full(len(leaves), 5, np.uint8)])
+    both = (
+        np.concatenate([xyz, leaves]),
+        np.concatenate([classes, np.full(len(leaves), 5, np.uint8)]),
+    )
     record, _ = run(tmp_path, *both)
     assert "bare ground" not in record["detail"] and record["status"] == "modelled"
 
@@ -77,27 +90,43 @@ def test_where_a_cloud_without_classes_holds_ground_alone_there_is_no_building(t
     xyz = np.concatenate([xyz, town.xyz + [100, 0, 0]])
     with pytest.warns(InputWarning):
         record, summary = run(tmp_path, xyz, np.ones(len(xyz), np.uint8))
-    assert record["status"] == "no_building" and not record["parts"] and "ground" in record["detail"]
+    assert (
+        record["status"] == "no_building" and not record["parts"] and "ground" in record["detail"]
+    )
     assert summary.exit_code == 0 and summary.by_status == {"no_building": 1}
     amount, reasons = vars(doubt_of(record)).values()
     assert amount >= 0.5 and reasons == ("nothing stands on the footprint",)
     with pytest.warns(InputWarning):
-        asked, _ = run(tmp_path / "asked", xyz, np.ones(len(xyz), np.uint8), empty_footprints="model")
-    assert asked["parts"] and "perhaps nothing stands there: 100 % of its points lie on the ground" in asked["detail"]
+        asked, _ = run(
+            tmp_path / "asked", xyz, np.ones(len(xyz), np.uint8), empty_footprints="model"
+        )
+    assert (
+        asked["parts"]
+        and "perhaps nothing stands there: 100 % of its points lie on the ground" in asked["detail"]
+    )
 
 
 def with_heaps(xyz, classes, class_of_heaps):
-    """The cloud with three heaps of rubble and bushes, up to 2 m high, on a quarter of the footprint."""
-    heaps = shapely.union_all(shapely.buffer(shapely.points([(X + 3, Y + 8), (X + 9, Y + 4), (X + 14, Y + 9)]), 2.3))
+    """The cloud with three heaps of rubble and bushes, up to 2 m high, on a quarter of the
+    footprint.
+    """
+    heaps = shapely.union_all(
+        shapely.buffer(shapely.points([(X + 3, Y + 8), (X + 9, Y + 4), (X + 14, Y + 9)]), 2.3)
+    )
     heap = shapely.intersects_xy(heaps, *xyz[:, :2].T)
     high = np.random.default_rng(1).uniform(0.2, 2.0, len(xyz))
-    return xyz + np.outer(heap * high, (0, 0, 1)), np.where(heap, class_of_heaps, classes).astype(np.uint8)
+    return xyz + np.outer(heap * high, (0, 0, 1)), np.where(heap, class_of_heaps, classes).astype(
+        np.uint8
+    )
 
 
 def test_heaps_of_the_building_class_on_bare_ground_are_no_building(tmp_path):
     xyz, classes = with_heaps(*scan(has_house=False), 6)
     record, _ = run(tmp_path, xyz, classes)
-    assert record["status"] == "no_building" and "% of its points lie on the ground" in record["detail"]
+    assert (
+        record["status"] == "no_building"
+        and "% of its points lie on the ground" in record["detail"]
+    )
 
 
 class Level:
@@ -114,7 +143,9 @@ def test_from_python_ground_points_cut_and_a_terrain_tells_what_is_gone():
     roof, ground = xyz[classes == 6], xyz[classes == 2]
     cut = hiproof.reconstruct(roof, HOUSE, Level(), ground=ground)
     assert cut.volume == pytest.approx((HOUSE.area - YARD.area) * WALLS_M, rel=0.04)
-    assert hiproof.reconstruct(roof, HOUSE, Level()).volume == pytest.approx(HOUSE.area * WALLS_M, rel=0.02)
+    assert hiproof.reconstruct(roof, HOUSE, Level()).volume == pytest.approx(
+        HOUSE.area * WALLS_M, rel=0.02
+    )
     gone = hiproof.reconstruct(scan(has_house=False)[0], HOUSE, Level())
     assert gone.status is Status.NO_BUILDING and gone.built is None
 
@@ -131,6 +162,10 @@ def test_an_override_says_that_a_building_stands(tmp_path):
     xyz, classes = with_heaps(*scan(has_house=False), 6)
     cloud = write_cloud(tmp_path / "cloud.laz", xyz, classes)
     footprints = write_footprints(tmp_path / "footprints.geojson", {"a": HOUSE})
-    reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints), overrides=str(tmp_path / "o.jsonl")))
+    reconstruct_area(
+        Request(
+            (str(cloud),), tmp_path / "out", str(footprints), overrides=str(tmp_path / "o.jsonl")
+        )
+    )
     (row,) = read_parameters(tmp_path / "out" / "parameters.jsonl")
     assert row["parts"] and "overridden: type flat" in row["detail"]

@@ -1,4 +1,6 @@
-"""What a run keeps of buildings that hiproof failed on: enough to repeat the failure, no attributes, and never too much."""
+"""What a run keeps of buildings that hiproof failed on: enough to repeat the failure, no
+attributes, and never too much.
+"""
 
 import errno
 import json
@@ -28,13 +30,17 @@ SECRET = "J. Smith, 5 Mill Lane"
 
 @pytest.fixture
 def fail_for(monkeypatch):
-    """A function that lets the fit of some buildings fail, with the sum of their points in the message."""
+    """A function that lets the fit of some buildings fail, with the sum of their points in the
+    message.
+    """
 
     def set_failing(*ids):
         def failing(points, footprint, terrain, settings, id, ground, unused):
             if id in ids:
                 corner = np.array([footprint.polygon.bounds[:2]]) if footprint else points[:1, :2]
-                raise KeyError(f"{len(points)} points, {points.sum():.9f}, {terrain.height_at(corner)[0]:.9f}")
+                raise KeyError(
+                    f"{len(points)} points, {points.sum():.9f}, {terrain.height_at(corner)[0]:.9f}"
+                )
             return reconstruct(points, footprint, terrain, settings, id, ground, unused)
 
         monkeypatch.setattr(solve, "reconstruct", failing)
@@ -53,12 +59,19 @@ def repeat(bundle, out):
 
 @pytest.mark.parametrize("with_footprints", [True, False])
 @pytest.mark.parametrize("has_classes", [True, False])
-def test_a_bundle_repeats_the_failure_to_the_last_digit(with_footprints, has_classes, tmp_path, fail_for):
-    """All that the building saw is in it: roof, ground and low points. Without the fault it comes out as in a run."""
+def test_a_bundle_repeats_the_failure_to_the_last_digit(
+    with_footprints, has_classes, tmp_path, fail_for
+):
+    """All that the building saw is in it: roof, ground and low points.
+
+    Without the fault it comes out as in a run.
+    """
     town = make_town(3, density=5.0)
     classes = town.classification if has_classes else np.full(len(town.xyz), NO_CLASS, np.uint8)
     cloud = str(write_cloud(tmp_path / "cloud.laz", town.xyz, classes))
-    footprints = str(write_footprints(tmp_path / "fp.geojson", town.footprints)) if with_footprints else None
+    footprints = (
+        str(write_footprints(tmp_path / "fp.geojson", town.footprints)) if with_footprints else None
+    )
     request = Request((cloud,), tmp_path / "out", footprints, restart=True)
     reconstruct_area(request)
     expected = solved(request.out)
@@ -80,7 +93,9 @@ def test_a_bundle_repeats_the_failure_to_the_last_digit(with_footprints, has_cla
 
 
 def test_a_bundle_holds_the_terrain_where_it_was_asked(tmp_path, fail_for):
-    rasterio = pytest.importorskip("rasterio", reason="terrain models need rasterio (extra `terrain`)")
+    rasterio = pytest.importorskip(
+        "rasterio", reason="terrain models need rasterio (extra `terrain`)"
+    )
     town = make_town(2, density=3.0)
     cloud, footprints = map(str, write_town(tmp_path, town))
     x, y = np.floor(town.xyz[:, :2].min(axis=0)) - 50.0
@@ -120,16 +135,29 @@ def test_a_bundle_has_no_attributes_and_its_files_open_anywhere(tmp_path, fail_f
     (outline,) = town.footprints.values()
     fields = [np.array(["a"], object), np.array([SECRET], object)]
     pyogrio.raw.write(
-        footprints, shapely.to_wkb([outline]), fields, ["id", "owner"], geometry_type="Polygon", crs="EPSG:28992"
+        footprints,
+        shapely.to_wkb([outline]),
+        fields,
+        ["id", "owner"],
+        geometry_type="Polygon",
+        crs="EPSG:28992",
     )
     fail_for("a")
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     (bundle,) = bundles.bundles_in(tmp_path / "out")
     files = {path.name: path.read_bytes() for path in bundle.iterdir()}
-    assert set(files) == {"points.laz", "footprint.geojson", "settings.toml", "failure.json", "traceback.txt"}
+    assert set(files) == {
+        "points.laz",
+        "footprint.geojson",
+        "settings.toml",
+        "failure.json",
+        "traceback.txt",
+    }
     assert not [name for name, content in files.items() if SECRET.encode() in content]
     las = laspy.read(bundle / "points.laz")
-    near = shapely.intersects_xy(outline, np.asarray(las.x), np.asarray(las.y)) & (np.asarray(las.classification) == 6)
+    near = shapely.intersects_xy(outline, np.asarray(las.x), np.asarray(las.y)) & (
+        np.asarray(las.classification) == 6
+    )
     assert near.sum() == (town.classification == 6).sum()
     _, _, geometry, _ = pyogrio.raw.read(bundle / "footprint.geojson")
     assert shapely.from_wkb(geometry[0]).equals(outline)
@@ -145,9 +173,14 @@ def test_ids_may_be_anything(tmp_path, fail_for):
     fail_for(*ids)
     summary = reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints)))
     assert summary.by_status == {"internal_error": len(ids)}
-    kept = {json.loads((b / "failure.json").read_text())["id"]: b.name for b in bundles.bundles_in(tmp_path / "out")}
+    kept = {
+        json.loads((b / "failure.json").read_text())["id"]: b.name
+        for b in bundles.bundles_in(tmp_path / "out")
+    }
     assert set(kept) == set(ids)
-    assert all(re.fullmatch(r"[a-z0-9][a-z0-9_-]*", name) and len(name) <= 60 for name in kept.values())
+    assert all(
+        re.fullmatch(r"[a-z0-9][a-z0-9_-]*", name) and len(name) <= 60 for name in kept.values()
+    )
     assert len(set(kept.values()) - {"con", "nul"}) == len(ids)
     assert {path.name for path in tmp_path.iterdir()} == {"cloud.laz", "footprints.geojson", "out"}
 
@@ -177,7 +210,8 @@ def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, fail_
     mine.mkdir()
     (mine / "notes.txt").touch()
     fail_for("house-1")
-    reconstruct_area(Request((cloud,), out, footprints))  # it is finished: nothing is solved, and nothing goes
+    # it is finished: nothing is solved, and nothing goes
+    reconstruct_area(Request((cloud,), out, footprints))
     assert len(bundles.bundles_in(out)) == 2
     (tmp_path / "known.jsonl").write_text(json.dumps({"id": "house-0", "block_height": 5.0}) + "\n")
     reconstruct_area(Request((cloud,), out, footprints, overrides=str(tmp_path / "known.jsonl")))
@@ -188,8 +222,12 @@ def test_bundles_go_with_the_failure_and_leave_other_files_alone(tmp_path, fail_
     assert (mine / "notes.txt").exists()
 
 
-@pytest.mark.parametrize("error", [OSError(errno.ENOSPC, "No space left on device"), ValueError("odd"), MemoryError()])
-def test_a_bundle_that_cannot_be_written_ends_no_run(error, town_files, tmp_path, fail_for, monkeypatch, caplog):
+@pytest.mark.parametrize(
+    "error", [OSError(errno.ENOSPC, "No space left on device"), ValueError("odd"), MemoryError()]
+)
+def test_a_bundle_that_cannot_be_written_ends_no_run(
+    error, town_files, tmp_path, fail_for, monkeypatch, caplog
+):
     def refuse(*_):
         raise error
 
@@ -208,12 +246,16 @@ def test_the_traceback_is_in_the_log(town_files, tmp_path, fail_for, caplog):
     fail_for("house-2")
     with caplog.at_level("INFO", logger="hiproof"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
-    (told,) = [record for record in caplog.records if "building house-2 failed" in record.getMessage()]
+    (told,) = [
+        record for record in caplog.records if "building house-2 failed" in record.getMessage()
+    ]
     assert "Traceback (most recent call last)" in told.getMessage()
     assert "raise KeyError" in told.getMessage()
 
 
-@pytest.mark.parametrize("damage", ["no folder", "no points", "cut off", "no outline", "no settings", "other JSON"])
+@pytest.mark.parametrize(
+    "damage", ["no folder", "no points", "cut off", "no outline", "no settings", "other JSON"]
+)
 def test_a_damaged_bundle_is_refused_in_one_sentence(damage, town_files, tmp_path, fail_for):
     fail_for("house-0")
     reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1]))
@@ -225,7 +267,11 @@ def test_a_damaged_bundle_is_refused_in_one_sentence(damage, town_files, tmp_pat
     elif damage == "other JSON":
         (bundle / "failure.json").write_text("[1]")
     else:
-        name = {"no points": "points.laz", "no outline": "footprint.geojson", "no settings": "settings.toml"}[damage]
+        name = {
+            "no points": "points.laz",
+            "no outline": "footprint.geojson",
+            "no settings": "settings.toml",
+        }[damage]
         (bundle / name).unlink()
     with pytest.raises((InputError, Exception), match=r"^expected .*, got.*") as caught:
         bundles.load_bundle(bundle)

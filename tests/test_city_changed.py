@@ -1,4 +1,6 @@
-"""A run whose footprints changed redoes what changed and nothing else, and gives what a run from the start gives."""
+"""A run whose footprints changed redoes what changed and nothing else, and gives what a run from
+the start gives.
+"""
 
 import dataclasses
 
@@ -60,14 +62,22 @@ def changes(houses):
         "one moved": ({**houses, second: moved(houses[second], (0.3, 0.0))}, [second]),
         "one is new, far away": ({**houses, "new": far}, ["new"]),
         "another order": (dict(reversed(houses.items())), []),
-        "two swap their names": ({**houses, first: houses[second], second: houses[first]}, [first, second]),
-        "all are others": ({f"{id}x": polygon for id, polygon in houses.items()}, [f"{id}x" for id in houses]),
+        "two swap their names": (
+            {**houses, first: houses[second], second: houses[first]},
+            [first, second],
+        ),
+        "all are others": (
+            {f"{id}x": polygon for id, polygon in houses.items()},
+            [f"{id}x" for id in houses],
+        ),
     }
 
 
 @pytest.mark.parametrize("name", changes(make_town().footprints))
 @pytest.mark.filterwarnings("ignore::UserWarning")
-def test_changed_footprints_redo_what_changed_and_end_as_a_run_from_the_start(name, town, solved, tmp_path):
+def test_changed_footprints_redo_what_changed_and_end_as_a_run_from_the_start(
+    name, town, solved, tmp_path
+):
     houses, request, run = town
     footprints, expected = changes(houses)[name]
     solved.clear()

@@ -1,4 +1,6 @@
-"""Runs of clouds without a building class: roofs and ground are found, and what hides a roof is said."""
+"""Runs of clouds without a building class: roofs and ground are found, and what hides a roof is
+said.
+"""
 
 import json
 import warnings
@@ -80,11 +82,16 @@ def test_how_points_are_cut_into_files_changes_no_building(tmp_path):
         whole = run(tmp_path, town.xyz, np.ones(len(town.xyz)), town.footprints)
     mixed = np.random.default_rng(0).permutation(town.xyz)
     parts = [
-        write_cloud(tmp_path / f"{i}.laz", part, np.ones(len(part))) for i, part in enumerate(np.split(mixed, [2000]))
+        write_cloud(tmp_path / f"{i}.laz", part, np.ones(len(part)))
+        for i, part in enumerate(np.split(mixed, [2000]))
     ]
     with pytest.warns(InputWarning):
-        reconstruct_area(Request(tuple(map(str, parts)), tmp_path / "cut", str(tmp_path / "footprints.geojson")))
-    assert {row["id"]: row for row in read_parameters(tmp_path / "cut" / "parameters.jsonl")} == whole
+        reconstruct_area(
+            Request(tuple(map(str, parts)), tmp_path / "cut", str(tmp_path / "footprints.geojson"))
+        )
+    assert {
+        row["id"]: row for row in read_parameters(tmp_path / "cut" / "parameters.jsonl")
+    } == whole
 
 
 @pytest.mark.parametrize("kind", [2, 3, 7, 9, 17])
@@ -96,7 +103,10 @@ def test_a_cloud_of_one_class_that_holds_no_roof_is_refused(tmp_path, kind):
 
 def test_a_cloud_of_trees_without_footprints_is_refused(tmp_path):
     cloud = forest(np.random.default_rng(0), 40.0, 5.0)
-    with pytest.warns(InputWarning), pytest.raises(InputError, match="none of which lies on a smooth surface"):
+    with (
+        pytest.warns(InputWarning),
+        pytest.raises(InputError, match="none of which lies on a smooth surface"),
+    ):
         run(tmp_path, cloud.points + (85000, 446000, 0), np.ones(len(cloud)))
 
 
@@ -113,7 +123,9 @@ def test_a_tree_beside_a_roof_that_was_cut_out_is_no_part_of_it(tmp_path, roofs)
     cloud, building = house_under_a_tree(np.random.default_rng(2), 0.4)
     points = cloud.points + (85000, 446000, 0)
     outline = shapely.transform(building.footprint, lambda xy: xy + (85000, 446000))
-    cut = shapely.contains_xy(outline.buffer(1.5), *points[:, :2].T) & (cloud.source != SOURCES.index("ground"))
+    cut = shapely.contains_xy(outline.buffer(1.5), *points[:, :2].T) & (
+        cloud.source != SOURCES.index("ground")
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)  # auto says what it takes the cloud for
         (row,) = run(tmp_path, points[cut], np.ones(cut.sum()), settings=asked(roofs)).values()
@@ -139,7 +151,9 @@ def test_sparse_points_of_a_shed_are_its_roof_where_a_footprint_is_and_none_is_l
         points = rng.uniform((0, 0, 2.2), (3.0, 2.7, 2.6), (26, 3))
         points[:10, 1], points[:10, 2] = rng.normal(2.6, 0.1, 10), rng.uniform(0.5, 4.2, 10)
         unknown = np.full(len(points), np.nan)
-        found, asked_for = (found_roof(points, area, unknown, is_asked_for) for is_asked_for in (False, True))
+        found, asked_for = (
+            found_roof(points, area, unknown, is_asked_for) for is_asked_for in (False, True)
+        )
         assert asked_for.is_seen
         assert not found.is_seen or len(found.points) <= len(asked_for.points)
         more += not found.is_seen
@@ -149,7 +163,12 @@ def test_sparse_points_of_a_shed_are_its_roof_where_a_footprint_is_and_none_is_l
 def test_a_footprint_in_a_forest_holds_no_roof_and_says_so(tmp_path):
     points = forest(np.random.default_rng(0), 40.0, 5.0).points + (85000, 446000, 0)
     with pytest.warns(InputWarning):
-        rows = run(tmp_path, points, np.ones(len(points)), {"wood": shapely.box(84994, 445995, 85006, 446004)})
+        rows = run(
+            tmp_path,
+            points,
+            np.ones(len(points)),
+            {"wood": shapely.box(84994, 445995, 85006, 446004)},
+        )
     assert rows["wood"]["status"] == "no_roof"
     assert "no roof seen: its points are leaves" in rows["wood"]["detail"]
 
@@ -174,7 +193,9 @@ def test_a_house_under_a_tree_is_its_roof_or_mostly_not_seen(tmp_path, share, re
     assert ("mostly not seen" in row["detail"]) == remarks
     at = shapely.get_coordinates(building.outline.centroid)
     truth = building.roof.height_at(at) + building.roof.frame.origin[2]
-    assert abs(height_of(row, at + building.roof.frame.origin[:2] + (85000, 446000)) - truth)[0] < 0.3
+    assert (
+        abs(height_of(row, at + building.roof.frame.origin[:2] + (85000, 446000)) - truth)[0] < 0.3
+    )
 
 
 def test_a_drones_cloud_is_as_good_as_it_is_dense(tmp_path):
@@ -208,16 +229,21 @@ def test_a_sparse_cloud_gets_models_as_good_as_it_allows(tmp_path, density):
     for i, row in enumerate(rows.values()):
         assert row["status"] in ("modelled", "sparse")
         corners = shapely.get_coordinates(town.footprints[f"house-{i}"].buffer(-1.0))
-        assert (height_of(row, corners) > 2.0 + 4.5).all()  # the eave lies 5 m above the ground at 2 m
+        # the eave lies 5 m above the ground at 2 m
+        assert (height_of(row, corners) > 2.0 + 4.5).all()
 
 
 def test_where_classes_tell_the_ground_nothing_low_beside_a_roof_is_taken_for_one(tmp_path):
-    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(-10.0, 24.0, 0.4), np.arange(-10.0, 16.0, 0.4)))
+    x, y = (
+        axis.ravel()
+        for axis in np.meshgrid(np.arange(-10.0, 24.0, 0.4), np.arange(-10.0, 16.0, 0.4))
+    )
     inside, roof = (x > 0) & (x < 14) & (y > 0) & (y < 6), (x > 0) & (x < 9) & (y > 0) & (y < 6)
     z = np.where(roof, 5.0, np.where(inside, 0.2, 0.0))  # beside the house a bed of plants
     house = {"house": shapely.box(0, 0, 14, 6)}
     rows = run(tmp_path, np.column_stack([x, y, z]), np.where(inside, 1, 2), house, asked("shape"))
     (row,) = rows.values()
     assert all(
-        part["type"] == "flat" and abs(part["position"][2] + row["origin"][2] - 5.0) < 0.1 for part in row["parts"]
+        part["type"] == "flat" and abs(part["position"][2] + row["origin"][2] - 5.0) < 0.1
+        for part in row["parts"]
     )

@@ -17,7 +17,9 @@ distributed = pytest.importorskip("distributed", reason="needs dask[distributed]
 
 @pytest.fixture(scope="module")
 def cluster():
-    with distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster:
+    with distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    ) as cluster:
         # a worker that dies while its nanny still starts it is not started again by the nanny
         cluster.adapt(minimum=2, maximum=2)
         yield cluster
@@ -28,20 +30,28 @@ def small_tiles(monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 1)
 
 
-def test_a_cluster_whose_worker_is_killed_changes_no_byte(town_files, undisturbed, cluster, tmp_path, monkeypatch):
+def test_a_cluster_whose_worker_is_killed_changes_no_byte(
+    town_files, undisturbed, cluster, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
-    reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address))
+    reconstruct_area(
+        Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address)
+    )
     assert (tmp_path / ".hiproof" / "killed").exists()
     assert records(tmp_path) == records(undisturbed)
 
 
-def test_a_building_that_kills_dask_workers_is_left_out_alone(town_files, cluster, tmp_path, monkeypatch):
+def test_a_building_that_kills_dask_workers_is_left_out_alone(
+    town_files, cluster, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_deadly)
     # one death is enough to blame a task here: each costs the start of a worker
     monkeypatch.setattr(cluster.scheduler, "allowed_failures", 0)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
     monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
-    summary = reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address))
+    summary = reconstruct_area(
+        Request((town_files[0],), tmp_path, town_files[1], scheduler=cluster.scheduler_address)
+    )
     assert summary.buildings == 4
     assert [id for id, _ in summary.failures] == [planted.DEADLY]
 
@@ -49,23 +59,34 @@ def test_a_building_that_kills_dask_workers_is_left_out_alone(town_files, cluste
 def test_an_address_without_a_scheduler_gets_one_sentence(town_files, tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.executors.CONNECT_S", 1)
     with pytest.raises(InputError, match=r"Dask scheduler at tcp://127.0.0.1:9"):
-        reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler="tcp://127.0.0.1:9"))
+        reconstruct_area(
+            Request((town_files[0],), tmp_path, town_files[1], scheduler="tcp://127.0.0.1:9")
+        )
 
 
-def test_a_cluster_without_workers_ends_the_run_with_one_sentence(town_files, tmp_path, monkeypatch):
+def test_a_cluster_without_workers_ends_the_run_with_one_sentence(
+    town_files, tmp_path, monkeypatch
+):
     monkeypatch.setattr("hiproof.city.executors.WORKERLESS_S", 1)
     monkeypatch.setattr("hiproof.city.executors.POLL_S", 0.5)
     with (
         distributed.LocalCluster(n_workers=0, processes=True, dashboard_address=":0") as empty,
         pytest.raises(OutputError, match="expected workers at the Dask scheduler"),
     ):
-        reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], scheduler=empty.scheduler_address))
+        reconstruct_area(
+            Request((town_files[0],), tmp_path, town_files[1], scheduler=empty.scheduler_address)
+        )
 
 
 def test_the_example_runs(town_files, tmp_path):
     example = [sys.executable, "examples/dask_two_workers.py", str(tmp_path / "out"), *town_files]
     got = subprocess.run(
-        example, capture_output=True, text=True, env={**os.environ, "PYTHONPATH": "src"}, check=False, timeout=300
+        example,
+        capture_output=True,
+        text=True,
+        env={**os.environ, "PYTHONPATH": "src"},
+        check=False,
+        timeout=300,
     )
     assert got.returncode == 0, got.stderr
     assert "4 buildings by two Dask workers" in got.stdout

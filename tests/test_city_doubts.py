@@ -1,4 +1,6 @@
-"""What a run says of inputs that fit one another badly: heights of two kinds, a terrain elsewhere, a CRS whose metres are none."""
+"""What a run says of inputs that fit one another badly: heights of two kinds, a terrain elsewhere,
+a CRS whose metres are none.
+"""
 
 from pathlib import Path
 
@@ -21,8 +23,17 @@ TOWN = make_town(houses=1)
 
 
 def write_terrain(path, height, east=0.0):
-    """A terrain model of that height, or those heights (80, 80), around the town, or so far east of it."""
-    options = {"driver": "GTiff", "width": 80, "height": 80, "count": 1, "dtype": "float32", "crs": "EPSG:28992"}
+    """A terrain model of that height, or those heights (80, 80), around the town, or so far east of
+    it.
+    """
+    options = {
+        "driver": "GTiff",
+        "width": 80,
+        "height": 80,
+        "count": 1,
+        "dtype": "float32",
+        "crs": "EPSG:28992",
+    }
     transform = from_origin(ORIGIN[0] - 20 + east, ORIGIN[1] + 60, 1.0, 1.0)
     with rasterio.open(path, "w", transform=transform, **options) as file:
         file.write(np.broadcast_to(np.asarray(height, "float32"), (1, 80, 80)))
@@ -62,7 +73,9 @@ def test_a_terrain_whose_heights_are_others_is_told_of(tmp_path, height, told):
 
 
 def row_over_half(folder, code, with_ground=True):
-    """What the run writes of a building of whose terrain model the western half holds `code`, the rest the true ground."""
+    """What the run writes of a building of whose terrain model the western half holds `code`, the
+    rest the true ground.
+    """
     height = 40.0
     xyz = TOWN.xyz + [0, 0, height - ORIGIN[2]]
     kept = slice(None) if with_ground else TOWN.classification == 6
@@ -80,13 +93,18 @@ def row_over_half(folder, code, with_ground=True):
 def test_undeclared_codes_under_part_of_a_building_are_no_ground(tmp_path, code):
     row = row_over_half(tmp_path, code)
     assert row["z_ground"] == pytest.approx(40.0, abs=0.1)
-    assert "holds values that are no heights under part of the building; the ground points are used" in row["detail"]
+    assert (
+        "holds values that are no heights under part of the building; the ground points are used"
+        in row["detail"]
+    )
 
 
 @pytest.mark.parametrize("code", [-9999.0, 0.0])
 def test_without_ground_points_the_rest_of_the_terrain_model_decides(tmp_path, code):
     row = row_over_half(tmp_path, code, with_ground=False)
-    assert row["z_ground"] == pytest.approx(40.0, abs=0.01) and "it is not used there" in row["detail"]
+    assert (
+        row["z_ground"] == pytest.approx(40.0, abs=0.01) and "it is not used there" in row["detail"]
+    )
 
 
 @pytest.mark.parametrize("nothing", [np.nan, -9999.0])
@@ -96,26 +114,46 @@ def test_a_terrain_model_without_any_height_is_told_of_once(tmp_path, nothing):
     ) as told:
         row = row_over(tmp_path, nothing)
     assert len([w for w in told if issubclass(w.category, InputWarning)]) == 1
-    assert row["z_ground"] == pytest.approx(ORIGIN[2] + 0.08, abs=0.05) and row["ground_source"] == "ground points"
+    assert (
+        row["z_ground"] == pytest.approx(ORIGIN[2] + 0.08, abs=0.05)
+        and row["ground_source"] == "ground points"
+    )
 
 
 @pytest.mark.parametrize("has_footprints", [True, False])
-def test_a_terrain_model_cut_off_in_its_pixels_ends_the_run_before_points_are_sorted(tmp_path, has_footprints):
+def test_a_terrain_model_cut_off_in_its_pixels_ends_the_run_before_points_are_sorted(
+    tmp_path, has_footprints
+):
     cloud, footprints = write_town(tmp_path, TOWN)
     terrain = write_terrain(tmp_path / "dtm.tif", ORIGIN[2])
     whole = Path(terrain).read_bytes()
     Path(terrain).write_bytes(whole[: len(whole) // 2])
     with pytest.raises(InputError, match=r"expected a complete raster at .*dtm\.tif"):
-        make_plan(Request((str(cloud),), tmp_path / "out", str(footprints) if has_footprints else None, terrain))
+        make_plan(
+            Request(
+                (str(cloud),),
+                tmp_path / "out",
+                str(footprints) if has_footprints else None,
+                terrain,
+            )
+        )
 
 
 def test_a_terrain_on_which_no_building_stands_is_told_of(tmp_path, recwarn):
     cloud, footprints = write_town(tmp_path, TOWN)
-    make_plan(Request((str(cloud),), tmp_path / "a", str(footprints), write_terrain(tmp_path / "here.tif", 2.0)))
+    make_plan(
+        Request(
+            (str(cloud),),
+            tmp_path / "a",
+            str(footprints),
+            write_terrain(tmp_path / "here.tif", 2.0),
+        )
+    )
     assert not [warning for warning in recwarn if issubclass(warning.category, InputWarning)]
     elsewhere = write_terrain(tmp_path / "there.tif", 2.0, east=5000.0)
     with pytest.warns(
-        InputWarning, match=r"there\.tif: no building stands on it, so the ground is taken from the points"
+        InputWarning,
+        match=r"there\.tif: no building stands on it, so the ground is taken from the points",
     ):
         make_plan(Request((str(cloud),), tmp_path / "b", str(footprints), elsewhere))
 
@@ -123,15 +161,26 @@ def test_a_terrain_on_which_no_building_stands_is_told_of(tmp_path, recwarn):
 def test_web_mercators_metres_are_told_of(tmp_path):
     to_web = pyproj.Transformer.from_crs("EPSG:28992", "EPSG:3857", always_xy=True)
     xyz = np.column_stack([*to_web.transform(*TOWN.xyz[:, :2].T), TOWN.xyz[:, 2]])
-    cloud = write_cloud(tmp_path / "cloud.laz", xyz, TOWN.classification, "EPSG:3857", origin=xyz.min(axis=0))
+    cloud = write_cloud(
+        tmp_path / "cloud.laz", xyz, TOWN.classification, "EPSG:3857", origin=xyz.min(axis=0)
+    )
     footprints = write_footprints(tmp_path / "footprints.geojson", TOWN.footprints)
-    with pytest.warns(InputWarning, match=r"cloud\.laz: in EPSG:3857 .* a metre on the ground is 1\.62 m long there"):
+    with pytest.warns(
+        InputWarning,
+        match=r"cloud\.laz: in EPSG:3857 .* a metre on the ground is 1\.62 m long there",
+    ):
         make_plan(Request((str(cloud),), tmp_path / "out", str(footprints)))
 
 
 @pytest.mark.parametrize(
     ("epsg", "lon_lat"),
-    [(28992, (4.4, 52.0)), (7415, (4.4, 52.0)), (25832, (6.0, 51.0)), (2154, (2.3, 48.8)), (2263, (-74.0, 40.7))],
+    [
+        (28992, (4.4, 52.0)),
+        (7415, (4.4, 52.0)),
+        (25832, (6.0, 51.0)),
+        (2154, (2.3, 48.8)),
+        (2263, (-74.0, 40.7)),
+    ],
 )
 def test_national_grids_and_utm_keep_lengths(epsg, lon_lat):
     crs = pyproj.CRS(epsg)

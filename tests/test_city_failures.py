@@ -46,17 +46,25 @@ WRITERS = (
 @pytest.fixture(scope="module")
 def town(tmp_path_factory):
     """Paths of the cloud and the footprints of twenty houses."""
-    return [str(path) for path in write_town(tmp_path_factory.mktemp("town"), make_town(HOUSES, density=3.0))]
+    return [
+        str(path)
+        for path in write_town(tmp_path_factory.mktemp("town"), make_town(HOUSES, density=3.0))
+    ]
 
 
 @pytest.fixture(scope="module")
 def small_town(tmp_path_factory):
     """The path of the cloud of four houses."""
-    return [str(path) for path in write_town(tmp_path_factory.mktemp("small"), make_town(4, density=2.0))]
+    return [
+        str(path)
+        for path in write_town(tmp_path_factory.mktemp("small"), make_town(4, density=2.0))
+    ]
 
 
 def run(town, out, with_footprints):
-    return reconstruct_area(Request((town[0],), out, town[1] if with_footprints else None, restart=True))
+    return reconstruct_area(
+        Request((town[0],), out, town[1] if with_footprints else None, restart=True)
+    )
 
 
 def fail_in(stage, victim, patch):
@@ -66,7 +74,9 @@ def fail_in(stage, victim, patch):
 
     def raising(*args, **keywords):
         written = getattr(args[0], "building", args[0]) if stage in WRITERS else None
-        if current == [victim] and (written is None or written.footprint is not None or written.built is not None):
+        if current == [victim] and (
+            written is None or written.footprint is not None or written.built is not None
+        ):
             raise KeyError((False, 0, 0))
         return original(*args, **keywords)
 
@@ -82,7 +92,9 @@ def fail_in(stage, victim, patch):
 
 
 @pytest.mark.parametrize("with_footprints", [True, False])
-def test_a_failure_in_any_stage_is_one_buildings_and_changes_no_other(town, with_footprints, tmp_path):
+def test_a_failure_in_any_stage_is_one_buildings_and_changes_no_other(
+    town, with_footprints, tmp_path
+):
     run(town, tmp_path / "undisturbed", with_footprints)
     expected = by_id(tmp_path / "undisturbed")
     assert len(expected) == HOUSES
@@ -121,7 +133,9 @@ def test_an_outline_that_cannot_be_written_leaves_the_id_and_the_message(monkeyp
             raise AttributeError("no attribute 'exterior'")
 
     monkeypatch.setattr(parameters, "outline_record", refuse)
-    job = solve.Job(0, "a", shapely.box(0, 0, 4, 4), Footprint("a", shapely.box(0, 0, 4, 4), {"year": 1950}))
+    job = solve.Job(
+        0, "a", shapely.box(0, 0, 4, 4), Footprint("a", shapely.box(0, 0, 4, 4), {"year": 1950})
+    )
     plan = solve.WorkPlan((job,), {"0_0_0": (0,)}, None, stages.Settings(), {}, np.zeros(3))
     building, texts = solve.failed(plan, job, "ValueError: first")
     assert (building.id, building.detail, building.footprint) == ("a", "ValueError: first", None)
@@ -143,12 +157,16 @@ def fail_at(monkeypatch, owner, name, xy):
 
 def repeat_failure(out, id):
     """Run `hiproof repro` for the building `id`; return its exit code and output."""
-    result = CliRunner().invoke(app, ["repro", str(out / "failures" / folder_name(id)), "--out", str(out / "again")])
+    result = CliRunner().invoke(
+        app, ["repro", str(out / "failures" / folder_name(id)), "--out", str(out / "again")]
+    )
     return result.exit_code, result.output
 
 
 @pytest.mark.parametrize("stage", ["told_apart", "cell_area"])
-def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(small_town, stage, tmp_path, monkeypatch):
+def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(
+    small_town, stage, tmp_path, monkeypatch
+):
     run(small_town, tmp_path / "undisturbed", with_footprints=False)
     expected = by_id(tmp_path / "undisturbed")
     victim = list(expected)[2]
@@ -161,7 +179,9 @@ def test_a_block_that_cannot_be_split_is_one_failure_and_changes_no_other(small_
     assert list(found) == list(expected)
     assert {id for id in found if found[id] != expected[id]} == {victim}
     assert found[victim]["status"] == "internal_error"
-    assert found[victim]["detail"].startswith("ZeroDivisionError: division by zero (test_city_failures.py:")
+    assert found[victim]["detail"].startswith(
+        "ZeroDivisionError: division by zero (test_city_failures.py:"
+    )
     trace = (tmp_path / "disturbed/failures" / folder_name(victim) / "traceback.txt").read_text()
     assert "in houses_of" in trace
     assert code == 1
@@ -179,7 +199,12 @@ def test_a_square_in_which_no_roofs_can_be_found_is_one_failure(tmp_path, monkey
     expected = by_id(tmp_path / "undisturbed")
     x = {id: float(id.split("_")[1]) for id in expected}
     border = 250.0 * np.ceil(min(x.values()) / 250.0)
-    fail_at(monkeypatch, buildings, "classes_of_square", np.array([border + 60.0, scene.xyz[:, 1].mean()]))
+    fail_at(
+        monkeypatch,
+        buildings,
+        "classes_of_square",
+        np.array([border + 60.0, scene.xyz[:, 1].mean()]),
+    )
     summary = run([cloud], tmp_path / "disturbed", with_footprints=False)
     found = by_id(tmp_path / "disturbed")
     failed = {id for id, row in found.items() if row["status"] == "internal_error"}

@@ -5,7 +5,12 @@ import pytest
 import shapely
 
 from hiproof import read_parameters
-from hiproof.city.other_classes import OtherPoints, ground_under_roof, roof_of_other_classes, why_no_points
+from hiproof.city.other_classes import (
+    OtherPoints,
+    ground_under_roof,
+    roof_of_other_classes,
+    why_no_points,
+)
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.settings import Settings
 from hiproof.status import Doubt
@@ -21,7 +26,9 @@ def run_of(folder, xyz, classification, settings=None):
     cloud = write_cloud(folder / "cloud.laz", xyz, classification)
     footprints = write_footprints(folder / "footprints.geojson", TOWN.footprints)
     settings = settings or Settings()
-    summary = reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), settings=settings))
+    summary = reconstruct_area(
+        Request((str(cloud),), folder / "out", str(footprints), settings=settings)
+    )
     rows = read_parameters(folder / "out" / "parameters.jsonl")
     return {row["id"]: (row["status"], row["detail"]) for row in rows}, summary.doubts
 
@@ -36,9 +43,15 @@ def test_a_roof_of_another_class_is_not_taken_for_missing(tmp_path):
     told, doubts = run_of(tmp_path, TOWN.xyz, classes)
     status, detail = told["house-0"]
     assert status == "no_points" and "add a cloud" not in detail
-    assert "no points of class 6" in detail and "points of other classes" in detail and "--roofs shape" in detail
+    assert (
+        "no points of class 6" in detail
+        and "points of other classes" in detail
+        and "--roofs shape" in detail
+    )
     assert doubts == {Doubt.POINTS_OF_OTHER_CLASSES: 1}
-    by_shape, _ = run_of(tmp_path / "shape", TOWN.xyz, classes, Settings.from_dict({"read": {"roofs": "shape"}}))
+    by_shape, _ = run_of(
+        tmp_path / "shape", TOWN.xyz, classes, Settings.from_dict({"read": {"roofs": "shape"}})
+    )
     assert by_shape["house-0"][0] == "modelled", "what the detail advises helps"
 
 
@@ -61,15 +74,22 @@ def test_a_house_pulled_down_between_two_flights_is_told_of(tmp_path):
     xyz = np.concatenate([TOWN.xyz, later])
     classes = np.concatenate([TOWN.classification, np.full(len(later), 2, np.uint8)])
     told, doubts = run_of(tmp_path, xyz, classes)
-    assert told["house-0"][0] == "modelled" and "ground points lie under the roof: two dates" in told["house-0"][1]
+    assert (
+        told["house-0"][0] == "modelled"
+        and "ground points lie under the roof: two dates" in told["house-0"][1]
+    )
     assert "ground" not in told["house-1"][1] and doubts == {Doubt.GROUND_UNDER_ROOF: 1}
 
 
 def test_ground_that_nobody_saw_is_told_of(tmp_path):
-    """As of a house in a yard that other houses close in: its walls are drawn 3 m high, whatever its height."""
+    """As of a house in a yard that other houses close in: its walls are drawn 3 m high, whatever
+    its height.
+    """
     roofs = TOWN.classification == 6
     told, doubts = run_of(tmp_path, TOWN.xyz[roofs], TOWN.classification[roofs])
-    assert all("its ground is assumed, for none is seen near it" in detail for _, detail in told.values())
+    assert all(
+        "its ground is assumed, for none is seen near it" in detail for _, detail in told.values()
+    )
     assert doubts == {Doubt.ASSUMED_GROUND: 3}
 
 
@@ -115,7 +135,9 @@ def test_leaves_over_bare_ground_are_no_roof(shift):
     )
     level = Level(shift[2])
     assert "lies bare" in why_no_points(OtherPoints.inside(area, cells, crown, level), (6,))
-    assert "class 6 or 67 inside" in why_no_points(OtherPoints.inside(area, cells[:30], crown, level), (6, 67))
+    assert "class 6 or 67 inside" in why_no_points(
+        OtherPoints.inside(area, cells[:30], crown, level), (6, 67)
+    )
     unknown = OtherPoints.inside(area, cells[:30], crown, Level(np.nan))
     assert why_no_points(unknown, (6,)) == roof_of_other_classes(unknown, cells[:0]) == ""
 

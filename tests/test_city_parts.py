@@ -1,4 +1,6 @@
-"""Laws of the pieces of a city run: tiles own each building once, the ledger keeps what is done, dead workers end nothing."""
+"""Laws of the pieces of a city run: tiles own each building once, the ledger keeps what is done,
+dead workers end nothing.
+"""
 
 from types import SimpleNamespace
 
@@ -8,7 +10,14 @@ import shapely
 
 from hiproof.city import quarantine
 from hiproof.city.executors import InProcess, Processes, WorkerLost
-from hiproof.city.ground import BareAround, Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
+from hiproof.city.ground import (
+    BareAround,
+    Cells,
+    GroundAround,
+    LowestAround,
+    ground_cells,
+    lowest_in_cells,
+)
 from hiproof.city.ledger import Ledger, Outcome, Task
 from hiproof.city.plan import Job, cut_into_tiles, neighbourhood
 from hiproof.city.sort import Reach
@@ -16,7 +25,9 @@ from small_tasks import die_on_two, double
 
 
 def jobs_at(xy):
-    return tuple(Job(i, str(i), shapely.box(x, y, x + 8, y + 8), None) for i, (x, y) in enumerate(xy))
+    return tuple(
+        Job(i, str(i), shapely.box(x, y, x + 8, y + 8), None) for i, (x, y) in enumerate(xy)
+    )
 
 
 @pytest.mark.parametrize("most", [1, 3, 1000])
@@ -78,7 +89,10 @@ def test_ground_of_a_building_ignores_what_lies_outside_its_box(around):
 @pytest.mark.parametrize("share", [1.0, 0.1, 0.01])
 def test_ground_heights_equal_plain_weighted_planes(share):
     rng = np.random.default_rng(6)
-    cells, box = ground_cells(sloped_ground(rng, int(4000 * share))), np.array([20.0, 25.0, 60.0, 70.0])
+    cells, box = (
+        ground_cells(sloped_ground(rng, int(4000 * share))),
+        np.array([20.0, 25.0, 60.0, 70.0]),
+    )
     known = np.isfinite(cells.z)
     xyz = np.column_stack([cells.x[known], cells.y[known], cells.z[known]])
     xyz = xyz[((np.floor(xyz[:, :2]) >= box[:2]) & (np.floor(xyz[:, :2]) < box[2:])).all(axis=1)]
@@ -86,7 +100,9 @@ def test_ground_heights_equal_plain_weighted_planes(share):
         steps = np.abs(np.floor(xyz[:, :2]) - np.floor(at)).max(axis=1)
         low = np.sort(xyz[steps <= 9, 2])
         lowest = low[1 if len(low) >= 10 else 0] if len(low) else np.nan
-        assert np.array_equal(LowestAround(cells, box).height_at(at[None]), [lowest], equal_nan=True)
+        assert np.array_equal(
+            LowestAround(cells, box).height_at(at[None]), [lowest], equal_nan=True
+        )
         reach = next((reach for reach in (2, 5) if (steps <= reach).sum() >= 3), 9)
         near = xyz[steps <= reach]
         weight = 1 / (((near[:, :2] - at) ** 2).sum(axis=1) + 0.25)
@@ -103,7 +119,9 @@ def test_ground_heights_equal_plain_weighted_planes(share):
 def test_ground_without_points_is_unknown():
     box = np.array([0.0, 0.0, 10.0, 10.0])
     for around in (GroundAround, BareAround, LowestAround):
-        assert np.isnan(around(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))).all()
+        assert np.isnan(
+            around(Cells(np.zeros((0, 3))), box).height_at(np.array([[5.0, 5.0]]))
+        ).all()
 
 
 def test_lowest_points_do_not_depend_on_how_they_are_cut():
@@ -111,7 +129,9 @@ def test_lowest_points_do_not_depend_on_how_they_are_cut():
     points = rng.uniform(-5, 5, (500, 3))
     whole = lowest_in_cells(points)
     pieces = lowest_in_cells(
-        np.concatenate([lowest_in_cells(part) for part in np.array_split(rng.permutation(points), 7)])
+        np.concatenate(
+            [lowest_in_cells(part) for part in np.array_split(rng.permutation(points), 7)]
+        )
     )
     assert np.array_equal(whole, pieces)
     cells = {}
@@ -126,7 +146,9 @@ def test_the_ledger_remembers_after_being_closed(tmp_path):
     path = tmp_path / "ledger.sqlite"
     ledger = Ledger(path)
     ledger.add_tasks([Task("solve:a", "solve", 2), Task("solve:b", "solve", 1)])
-    ledger.finish("solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.05, 0.01)])
+    ledger.finish(
+        "solve:a", "done", "", [Outcome(0, "x", "modelled", "good", "gable", "", 0.9, 0.05, 0.01)]
+    )
     ledger.close()
     again = Ledger(path)
     again.add_tasks([Task("solve:a", "solve", 2)])
@@ -148,7 +170,10 @@ def test_a_ledger_in_a_folder_that_cannot_be_written_is_read(tmp_path, monkeypat
 
 @pytest.mark.parametrize("executor", [InProcess(), Processes(2)], ids=["in process", "processes"])
 def test_executors_return_every_task_with_result_or_error(executor):
-    got = {task[0]: (result, type(error)) for task, result, error in executor.run(double, [(i,) for i in range(6)])}
+    got = {
+        task[0]: (result, type(error))
+        for task, result, error in executor.run(double, [(i,) for i in range(6)])
+    }
     executor.close()
     assert got == {i: ((None, ValueError) if i == 3 else (2 * i, type(None))) for i in range(6)}
 
@@ -174,8 +199,12 @@ def test_a_killed_worker_loses_its_tasks_but_not_the_others():
 
 @pytest.mark.parametrize("members", [(1, 2, 3), (2,)], ids=["among others", "alone"])
 def test_a_deadly_building_is_found_by_leaving_out_the_others(members, monkeypatch):
-    """Building 2 ends its process; no task is tried more often than may be chance, and none that is known to be deadly."""
-    monkeypatch.setattr(quarantine, "load_plan", lambda folder: SimpleNamespace(tiles={"tile": members}))
+    """Building 2 ends its process; no task is tried more often than may be chance, and none that is
+    known to be deadly.
+    """
+    monkeypatch.setattr(
+        quarantine, "load_plan", lambda folder: SimpleNamespace(tiles={"tile": members})
+    )
     tried = []
 
     def run(function, tasks):

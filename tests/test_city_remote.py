@@ -1,4 +1,6 @@
-"""A run whose inputs are addresses: served on the loopback address, read in ranges, the same models as from files."""
+"""A run whose inputs are addresses: served on the loopback address, read in ranges, the same models
+as from files.
+"""
 
 import numpy as np
 import pytest
@@ -33,14 +35,23 @@ def write_terrain(path, town):
     columns, rows = np.ceil(high[:2] - low[:2]).astype(int)
     heights = np.full((rows, columns), 1.5, np.float32)
     with rasterio.open(
-        path, "w", driver="GTiff", width=columns, height=rows, count=1, dtype="float32", crs="EPSG:28992",
+        path,
+        "w",
+        driver="GTiff",
+        width=columns,
+        height=rows,
+        count=1,
+        dtype="float32",
+        crs="EPSG:28992",
         transform=from_origin(low[0], high[1], 1, 1),
-    ) as file:  # fmt: skip
+    ) as file:
         file.write(heights, 1)
     return path
 
 
-def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(served, tmp_path, monkeypatch):
+def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(
+    served, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     folder, address, log = served
     town = make_town()
@@ -48,12 +59,18 @@ def test_clouds_footprints_and_terrain_by_address_give_the_same_bytes(served, tm
     terrain = write_terrain(folder / "terrain.tif", town)
     reconstruct_area(Request((str(cloud),), tmp_path / "files", str(footprints), str(terrain)))
     remote = Request(
-        (f"{address}/cloud.laz",), tmp_path / "remote", f"{address}/footprints.geojson", f"{address}/terrain.tif"
+        (f"{address}/cloud.laz",),
+        tmp_path / "remote",
+        f"{address}/footprints.geojson",
+        f"{address}/terrain.tif",
     )
     reconstruct_area(remote)
     for name in RECORDS:
         assert (tmp_path / "remote" / name).read_bytes() == (tmp_path / "files" / name).read_bytes()
-    assert {line.split()[0] for line in log.read_text().splitlines()} >= {"/cloud.laz", "/terrain.tif"}
+    assert {line.split()[0] for line in log.read_text().splitlines()} >= {
+        "/cloud.laz",
+        "/terrain.tif",
+    }
     assert b"terrain model terrain.tif" in (tmp_path / "remote" / "parameters.jsonl").read_bytes()
 
 
@@ -61,7 +78,9 @@ def test_copc_by_address_is_read_in_ranges(served, tmp_path):
     folder, address, log = served
     town = make_town()
     write_copc(folder / "a.copc.laz", town.xyz, town.classification)
-    cloud = read_points(f"{address}/a.copc.laz", box=(*town.xyz[:, :2].min(axis=0), *town.xyz[:, :2].max(axis=0)))
+    cloud = read_points(
+        f"{address}/a.copc.laz", box=(*town.xyz[:, :2].min(axis=0), *town.xyz[:, :2].max(axis=0))
+    )
     assert len(cloud) == len(town.xyz)
     assert "/a.copc.laz" in log.read_text()
 
@@ -72,11 +91,15 @@ def test_text_and_ply_by_address_are_what_the_files_hold(served, name):
     xyz = np.random.default_rng(1).uniform(0, 1000, (40000, 3)).round(3)
     classes = np.arange(40000, dtype=np.uint8) % 7
     if name.endswith("ply"):
-        write_ply(folder / name, xyz, classes, "ascii" if name == "a.ply" else "binary_little_endian")
+        write_ply(
+            folder / name, xyz, classes, "ascii" if name == "a.ply" else "binary_little_endian"
+        )
     else:
         write_text(folder / name, xyz, classes)
     here, there = read_points(folder / name), read_points(f"{address}/{name}?token=1")
-    assert np.array_equal(here.xyz, there.xyz) and np.array_equal(here.classification, there.classification)
+    assert np.array_equal(here.xyz, there.xyz) and np.array_equal(
+        here.classification, there.classification
+    )
 
 
 @pytest.mark.parametrize("name", ["page.ply", "page.xyz"])

@@ -1,4 +1,6 @@
-"""An output folder belongs to one request and to one run at a time, and holds what the run says it holds."""
+"""An output folder belongs to one request and to one run at a time, and holds what the run says it
+holds.
+"""
 
 import dataclasses
 import os
@@ -56,7 +58,13 @@ def other(value):
         return not value
     if isinstance(value, (int, float)):
         return value + 1
-    return (*value, 99) if isinstance(value, tuple) else Path("else") if isinstance(value, Path) else f"{value} else"
+    return (
+        (*value, 99)
+        if isinstance(value, tuple)
+        else Path("else")
+        if isinstance(value, Path)
+        else f"{value} else"
+    )
 
 
 def mark(request):
@@ -79,9 +87,13 @@ def test_a_field_added_later_is_in_the_mark():
 def test_every_setting_is_in_the_mark(section):
     values = getattr(Settings(), section)
     for declared in dataclasses.fields(values):
-        changed = dataclasses.replace(values, **{declared.name: other(getattr(values, declared.name))})
+        changed = dataclasses.replace(
+            values, **{declared.name: other(getattr(values, declared.name))}
+        )
         settings = dataclasses.replace(Settings(), **{section: changed})
-        assert inputs_of(dataclasses.replace(REQUEST, settings=settings)) != inputs_of(REQUEST), declared.name
+        assert inputs_of(dataclasses.replace(REQUEST, settings=settings)) != inputs_of(REQUEST), (
+            declared.name
+        )
 
 
 def leaves(value, name=""):
@@ -95,10 +107,19 @@ def leaves(value, name=""):
 
 
 def test_every_text_is_known_to_name_files_or_not():
-    texts = {name: d for name, d, _ in leaves(REQUEST) if "str" in str(d.type) and not d.metadata.get("choices")}
+    texts = {
+        name: d
+        for name, d, _ in leaves(REQUEST)
+        if "str" in str(d.type) and not d.metadata.get("choices")
+    }
     files = {name for name, declared in texts.items() if declared.metadata.get("names") == "files"}
     assert files == {"clouds", "footprints", "terrain", "settings.segment.weights"}
-    named = {"settings.read.crs", "settings.read.override_columns", "settings.fit.types", "settings.write.out_crs"}
+    named = {
+        "settings.read.crs",
+        "settings.read.override_columns",
+        "settings.fit.types",
+        "settings.write.out_crs",
+    }
     assert set(texts) - files - NO_MATTER - WHICH == named
 
 
@@ -132,7 +153,9 @@ def test_a_folder_is_stamped_by_its_files_and_no_text_by_accident(tmp_path):
     assert file_stamps(Path("x" * 5000)) == file_stamps(Path("a\0b")) == []
 
 
-def test_another_setting_is_refused_by_name_and_the_same_request_is_not(town_files, tmp_path, quick):
+def test_another_setting_is_refused_by_name_and_the_same_request_is_not(
+    town_files, tmp_path, quick
+):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
     assert reconstruct_area(request).buildings == 4
@@ -170,7 +193,9 @@ def test_a_lock_holds_across_processes_and_ends_with_kill_9(tmp_path):
     code = "import sys, time\nfrom pathlib import Path\nfrom hiproof.city.lock import held\n"
     code += "with held(Path(sys.argv[1])):\n    print('held', flush=True)\n    time.sleep(60)"
     path = {**os.environ, "PYTHONPATH": str(Path(hiproof.__file__).parents[1])}
-    with subprocess.Popen([sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, env=path) as other:
+    with subprocess.Popen(
+        [sys.executable, "-c", code, str(tmp_path)], stdout=subprocess.PIPE, env=path
+    ) as other:
         assert other.stdout.readline() == b"held\n"
         with pytest.raises(OutputError, match="wait for its end"), held(tmp_path):
             pass
@@ -188,7 +213,9 @@ def test_a_folder_that_cannot_be_locked_says_so(tmp_path):
 
 @pytest.mark.parametrize("harm", ["removed", "cut", "one byte"])
 @pytest.mark.parametrize("name", ["buildings.gml", "parameters.jsonl", "buildings.gpkg"])
-def test_a_file_that_was_lost_or_damaged_is_made_again(harm, name, town_files, undisturbed, tmp_path, quick):
+def test_a_file_that_was_lost_or_damaged_is_made_again(
+    harm, name, town_files, undisturbed, tmp_path, quick
+):
     request = Request((town_files[0],), tmp_path, town_files[1])
     reconstruct_area(request)
     file = tmp_path / name
@@ -263,7 +290,10 @@ class Bomb:
 
 
 def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, quick):
-    request, exploded = Request((town_files[0],), tmp_path / "out", town_files[1]), tmp_path / "exploded"
+    request, exploded = (
+        Request((town_files[0],), tmp_path / "out", town_files[1]),
+        tmp_path / "exploded",
+    )
 
     def stopped(step, done, total):
         if step == "merge":
@@ -274,7 +304,9 @@ def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, 
     state = tmp_path / "out" / ".hiproof"
     for file in [state / "plan.jsonl", *(state / "tiles").iterdir()]:
         whole = file.read_bytes()
-        np.save(bomb := tmp_path / "bomb.npy", np.array([Bomb(exploded)], object), allow_pickle=True)
+        np.save(
+            bomb := tmp_path / "bomb.npy", np.array([Bomb(exploded)], object), allow_pickle=True
+        )
         for planted_bytes in (pickle.dumps(Bomb(exploded)), bomb.read_bytes(), b""):
             file.write_bytes(planted_bytes)
             with pytest.raises(OutputError, match="--restart"):
@@ -287,20 +319,38 @@ def test_what_a_run_finds_in_its_folder_is_never_executed(town_files, tmp_path, 
 def test_no_module_that_runs_cities_knows_pickle():
     home = Path(hiproof.__file__).parent
     for room in ("city", "write", "read"):
-        assert [file.name for file in (home / room).glob("*.py") if "import pickle" in file.read_text()] == []
+        assert [
+            file.name for file in (home / room).glob("*.py") if "import pickle" in file.read_text()
+        ] == []
 
 
 def test_a_plan_comes_back_as_it_was(tmp_path):
     square, hole = shapely.box(0.1, 0.2, 30, 40), shapely.box(3, 3, 5, 5)
-    attributes = {"a": "é\ud800", "b": 1 / 3, "c": 2**70, "d": None, "e": [1, {"f": True}], "": -0.0}
+    attributes = {
+        "a": "é\ud800",
+        "b": 1 / 3,
+        "c": 2**70,
+        "d": None,
+        "e": [1, {"f": True}],
+        "": -0.0,
+    }
     jobs = (
-        Job(0, "one", square.difference(hole), Footprint("one", square.difference(hole), attributes)),
+        Job(
+            0, "one", square.difference(hole), Footprint("one", square.difference(hole), attributes)
+        ),
         Job(1, "empty", shapely.Polygon(), Footprint("empty", shapely.Polygon(), {})),
         Job(2, "of the cloud", square, None),
     )
-    settings = Settings.from_dict({"fit": {"types": ["gable"], "side_softness_m": [0.1]}, "read": {"split_gap_m": 0.3}})
+    settings = Settings.from_dict(
+        {"fit": {"types": ["gable"], "side_softness_m": [0.1]}, "read": {"split_gap_m": 0.3}}
+    )
     plan = WorkPlan(
-        jobs, {"0_0_0": (0, 2), "-1_0_0": (1,)}, "EPSG:7415", settings, {1: ("x", "y")}, np.array([1e5, 0.1, 0])
+        jobs,
+        {"0_0_0": (0, 2), "-1_0_0": (1,)},
+        "EPSG:7415",
+        settings,
+        {1: ("x", "y")},
+        np.array([1e5, 0.1, 0]),
     )
     plan.save(tmp_path / "plan.jsonl")
     again = WorkPlan.load(tmp_path / "plan.jsonl")
@@ -311,7 +361,11 @@ def test_a_plan_comes_back_as_it_was(tmp_path):
 
 def test_texts_of_buildings_come_back_as_they_were(tmp_path):
     odd = {"n": 2**70, "x": 0.1 + 0.2, "no": None, "yes": True, "t": "ä\n\x7f'"}
-    buildings = [modelled(gable_house(), "a", attributes=odd), unmodelled(), modelled(courtyard(), "b")]
+    buildings = [
+        modelled(gable_house(), "a", attributes=odd),
+        unmodelled(),
+        modelled(courtyard(), "b"),
+    ]
     parts = [fragments(b, (b.id, b.id), FileHead(offset=np.zeros(3)))[1] for b in buildings]
     with open(tmp_path / "tile.npz", "wb") as file:
         save_fragments(file, parts)

@@ -1,4 +1,6 @@
-"""What a city run does when workers die, memory or disk ends, or a building is too much: the others come out the same."""
+"""What a city run does when workers die, memory or disk ends, or a building is too much: the others
+come out the same.
+"""
 
 import errno
 import json
@@ -31,15 +33,21 @@ def small_tiles(monkeypatch):
     monkeypatch.setattr("hiproof.city.prepare.MOST_BUILDINGS_A_TILE", 2)
 
 
-def test_a_worker_killed_from_outside_changes_no_byte(town_files, undisturbed, tmp_path, monkeypatch):
+def test_a_worker_killed_from_outside_changes_no_byte(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], processes=2))
     assert (tmp_path / ".hiproof" / "killed").exists()
     assert records(tmp_path) == records(undisturbed)
 
 
-@pytest.mark.parametrize("solve", [planted.solve_deadly, planted.solve_hungry], ids=["kills", "eats memory"])
-def test_a_building_that_ends_its_process_is_left_out_alone(solve, town_files, undisturbed, tmp_path, monkeypatch):
+@pytest.mark.parametrize(
+    "solve", [planted.solve_deadly, planted.solve_hungry], ids=["kills", "eats memory"]
+)
+def test_a_building_that_ends_its_process_is_left_out_alone(
+    solve, town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", solve)
     monkeypatch.setattr(city_run, "MOST_LOSSES", 1)
     monkeypatch.setattr("hiproof.city.quarantine.TRIES", 1)
@@ -52,7 +60,9 @@ def test_a_building_that_ends_its_process_is_left_out_alone(solve, town_files, u
     assert rows == {id: row for id, row in by_id(undisturbed).items() if id != planted.DEADLY}
 
 
-def test_losses_with_the_main_process_lead_to_quarantine(town_files, undisturbed, tmp_path, monkeypatch):
+def test_losses_with_the_main_process_lead_to_quarantine(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
@@ -67,13 +77,17 @@ def test_losses_with_the_main_process_lead_to_quarantine(town_files, undisturbed
     database.commit()
     alone = []
     original = city_run.solve_in_quarantine
-    monkeypatch.setattr(city_run, "solve_in_quarantine", lambda *a: alone.append(a[-1]) or original(*a))
+    monkeypatch.setattr(
+        city_run, "solve_in_quarantine", lambda *a: alone.append(a[-1]) or original(*a)
+    )
     reconstruct_area(request)
     assert len(alone) == 1
     assert records(tmp_path) == records(undisturbed)
 
 
-def test_points_that_somebody_removed_are_sorted_again(town_files, undisturbed, tmp_path, monkeypatch):
+def test_points_that_somebody_removed_are_sorted_again(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
 
@@ -97,7 +111,9 @@ def test_a_damaged_list_of_what_to_redo_ends_in_one_sentence(town_files, tmp_pat
         reconstruct_area(request)
 
 
-def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(town_files, undisturbed, tmp_path, monkeypatch):
+def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     request = Request((town_files[0],), tmp_path, town_files[1])
     original, written = output_files.OutputFile.write, []
@@ -105,7 +121,9 @@ def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(town_files, 
     def full(self, data):
         written.append(len(data))
         if len(written) > 8:
-            raise output_files.output_error(self.path, OSError(errno.ENOSPC, "No space left on device"))
+            raise output_files.output_error(
+                self.path, OSError(errno.ENOSPC, "No space left on device")
+            )
         return original(self, data)
 
     monkeypatch.setattr(output_files.OutputFile, "write", full)
@@ -116,7 +134,9 @@ def test_a_full_disk_ends_in_one_sentence_and_the_run_goes_on_later(town_files, 
     assert records(tmp_path) == records(undisturbed)
 
 
-def test_unfinished_files_of_a_killed_worker_are_not_read(town_files, undisturbed, tmp_path, monkeypatch):
+def test_unfinished_files_of_a_killed_worker_are_not_read(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
 
     def litter(step, done, total):
@@ -130,25 +150,36 @@ def test_unfinished_files_of_a_killed_worker_are_not_read(town_files, undisturbe
     assert not [path for path in tmp_path.iterdir() if path.name.startswith(".buildings")]
 
 
-def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(town_files, tmp_path, monkeypatch):
+def test_a_ledger_that_is_none_is_refused_and_replaced_on_restart(
+    town_files, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     (tmp_path / ".hiproof").mkdir()
-    (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(b"not a database, but long enough to look like one" * 9)
+    (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(
+        b"not a database, but long enough to look like one" * 9
+    )
     with pytest.raises(OutputError, match="--restart"):
         reconstruct_area(Request((town_files[0],), tmp_path, town_files[1]))
-    assert reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True)).buildings == 4
+    assert (
+        reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=True)).buildings
+        == 4
+    )
 
 
 def test_a_full_disk_is_no_fault_of_the_ledger(town_files, tmp_path, monkeypatch):
     (tmp_path / ".hiproof").mkdir()
     (tmp_path / ".hiproof" / "ledger.sqlite").write_bytes(b"cut off where the disk was full" * 9)
-    monkeypatch.setattr("hiproof.city.resume.shutil.disk_usage", lambda _: SimpleNamespace(free=4096))
+    monkeypatch.setattr(
+        "hiproof.city.resume.shutil.disk_usage", lambda _: SimpleNamespace(free=4096)
+    )
     for restart in (False, True):
         with pytest.raises(OutputError, match="free some space, the same command then goes on"):
             reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], restart=restart))
 
 
-def test_files_without_points_are_said_and_harm_none(town_files, undisturbed, tmp_path, monkeypatch):
+def test_files_without_points_are_said_and_harm_none(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     empty = str(write_cloud(tmp_path / "empty.laz", np.zeros((0, 3)), np.zeros(0, np.uint8)))
     with pytest.raises(InputError, match=r"expected points in .*empty\.laz, got none"):
@@ -169,7 +200,13 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_pat
     clouds = []
     for name, wanted in (("b", town.xyz[:, 0] < middle + 15), ("a", town.xyz[:, 0] > middle - 15)):
         members = rng.permutation(np.flatnonzero(wanted))
-        clouds.append(str(write_cloud(tmp_path / f"{name}.laz", town.xyz[members], town.classification[members])))
+        clouds.append(
+            str(
+                write_cloud(
+                    tmp_path / f"{name}.laz", town.xyz[members], town.classification[members]
+                )
+            )
+        )
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(clouds), tmp_path / "out", str(footprints)))
     assert min(chunks.count(number) for number in (0, 1)) > 1
@@ -178,19 +215,27 @@ def test_overlapping_tiles_and_small_buffers_change_no_byte(undisturbed, tmp_pat
 
 def test_points_in_several_files_count_once_where_a_footprint_is_moved(tmp_path):
     town = make_town(houses=1)
-    beside = {id: shapely.transform(area, lambda xy: xy + [0.6, -0.5]) for id, area in town.footprints.items()}
+    beside = {
+        id: shapely.transform(area, lambda xy: xy + [0.6, -0.5])
+        for id, area in town.footprints.items()
+    }
     footprints = write_footprints(tmp_path / "footprints.geojson", beside)
     east = town.xyz[:, 0] > np.median(town.xyz[:, 0])
     whole = str(write_cloud(tmp_path / "whole.laz", town.xyz, town.classification))
     part = str(write_cloud(tmp_path / "part.laz", town.xyz[east], town.classification[east]))
-    for name, clouds in (("one", (whole,)), ("three", (whole, part, shutil.copy(part, tmp_path / "again.laz")))):
+    for name, clouds in (
+        ("one", (whole,)),
+        ("three", (whole, part, shutil.copy(part, tmp_path / "again.laz"))),
+    ):
         reconstruct_area(Request(tuple(map(str, clouds)), tmp_path / name, str(footprints)))
     assert any(by_id(tmp_path / "one")["house-0"]["shift"])
     assert records(tmp_path / "three") == records(tmp_path / "one")
 
 
 def test_a_building_with_too_many_points_is_thinned_and_says_so(town_files, tmp_path):
-    settings = Settings.from_dict({"city": {"max_points_a_building": 1000}, "fit": {"parts": "one", "types": ["flat"]}})
+    settings = Settings.from_dict(
+        {"city": {"max_points_a_building": 1000}, "fit": {"parts": "one", "types": ["flat"]}}
+    )
     town = make_town(houses=1, density=20.0)
     cloud, footprints = write_town(tmp_path, town)
     reconstruct_area(Request((str(cloud),), tmp_path / "out", str(footprints), settings=settings))
@@ -205,7 +250,9 @@ def test_thinning_depends_on_the_set_of_points_alone():
     rng = np.random.default_rng(6)
     points = rng.uniform(0, 50, (5000, 3))
     kept = thin_to_count(points, 700)
-    again = thin_to_count(without_repeats(np.concatenate([points, points[:900]])[rng.permutation(5900)]), 700)
+    again = thin_to_count(
+        without_repeats(np.concatenate([points, points[:900]])[rng.permutation(5900)]), 700
+    )
     assert {tuple(p) for p in kept} == {tuple(p) for p in again}
     assert len(kept) == 700
     # evenly: each quarter of the area keeps about a quarter
@@ -226,7 +273,9 @@ def test_the_ledger_tells_losses_from_orderly_ends(tmp_path):
     assert ledger.open_tasks("solve") == ["solve:a", "solve:b"]
 
 
-def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tmp_path, monkeypatch):
+def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(
+    undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
     town = make_town()
@@ -236,7 +285,9 @@ def test_an_indexed_file_is_asked_box_by_box_for_the_same_points(undisturbed, tm
     assert by_id(tmp_path / "out") == by_id(undisturbed)
 
 
-def test_an_index_beside_the_file_saves_points_and_changes_no_byte(undisturbed, tmp_path, monkeypatch):
+def test_an_index_beside_the_file_saves_points_and_changes_no_byte(
+    undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
     town = make_town()
@@ -254,7 +305,9 @@ def test_an_index_beside_the_file_saves_points_and_changes_no_byte(undisturbed, 
     assert json.loads(sort.message)["points"] < 0.6 * len(town.xyz)
 
 
-def test_models_by_work_tile_are_the_merged_ones_cut(town_files, undisturbed, tmp_path, monkeypatch):
+def test_models_by_work_tile_are_the_merged_ones_cut(
+    town_files, undisturbed, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     by_tile, out = Settings.from_dict({"city": {"models": "tiles"}}), tmp_path / "out"
     reconstruct_area(Request((town_files[0],), out, town_files[1], settings=by_tile))
@@ -264,13 +317,20 @@ def test_models_by_work_tile_are_the_merged_ones_cut(town_files, undisturbed, tm
     assert by_id(out) == by_id(undisturbed)
     for ending, merged in ((".gml", "buildings.gml"), (".city.jsonl", "buildings.city.jsonl")):
         cut = [
-            line for name in files if name.endswith(ending) for line in (out / "models" / name).read_text().splitlines()
+            line
+            for name in files
+            if name.endswith(ending)
+            for line in (out / "models" / name).read_text().splitlines()
         ]
-        buildings = [line for line in (undisturbed / merged).read_text().splitlines() if "house-" in line]
+        buildings = [
+            line for line in (undisturbed / merged).read_text().splitlines() if "house-" in line
+        ]
         assert sorted(line for line in cut if "house-" in line) == sorted(buildings)
 
 
-def test_a_new_run_removes_the_models_of_old_work_tiles_and_nothing_else(town_files, tmp_path, monkeypatch):
+def test_a_new_run_removes_the_models_of_old_work_tiles_and_nothing_else(
+    town_files, tmp_path, monkeypatch
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
     both = Settings.from_dict({"city": {"models": "both"}})
     reconstruct_area(Request((town_files[0],), tmp_path, town_files[1], settings=both))

@@ -1,4 +1,6 @@
-"""Laws of compiled code: it is what all its sources say, it is kept, and where it cannot be kept that is said once."""
+"""Laws of compiled code: it is what all its sources say, it is kept, and where it cannot be kept
+that is said once.
+"""
 
 import ast
 import base64
@@ -52,7 +54,9 @@ def number(x):
 
 
 def texts(factor):
-    """A package of three compiled functions, each calling the next; only the innermost knows `factor`."""
+    """A package of three compiled functions, each calling the next; only the innermost knows
+    `factor`.
+    """
     return {
         "town/__init__.py": "",
         "town/outer.py": OUTER,
@@ -93,7 +97,9 @@ def forget():
 
 
 def ask():
-    """(the answer, whether its code was loaded rather than compiled, how often it was said that it cannot be kept)."""
+    """(the answer, whether its code was loaded rather than compiled, how often it was said that it
+    cannot be kept).
+    """
     forget()
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
@@ -108,11 +114,17 @@ def files_in(folder):
 
 def test_kept_code_is_loaded_by_the_next_process(town):
     assert ask() == (61, False, 0)
-    assert [name.split("-")[0] for name in files_in(town)] == ["inner.number", "middle.doubled", "outer.answer"]
+    assert [name.split("-")[0] for name in files_in(town)] == [
+        "inner.number",
+        "middle.doubled",
+        "outer.answer",
+    ]
     assert ask() == (61, True, 0)
 
 
-@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="names a kind of x86-64 processors")
+@pytest.mark.skipif(
+    platform.machine() not in ("x86_64", "AMD64"), reason="names a kind of x86-64 processors"
+)
 def test_code_for_a_kind_of_processors_is_loaded_on_each_of_them(town, monkeypatch):
     """An image is made on one machine and run on others."""
     monkeypatch.setenv("NUMBA_CPU_NAME", "x86-64-v3")
@@ -141,7 +153,12 @@ def run(packages, *command):
     """The output of a process that finds this hiproof and what is in `packages`."""
     environment = {**os.environ, "PYTHONPATH": f"{packages}:{PACKAGE.parent}"}
     done = subprocess.run(
-        [sys.executable, *command], capture_output=True, text=True, check=False, timeout=300, env=environment
+        [sys.executable, *command],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=300,
+        env=environment,
     )
     assert done.returncode == 0, done.stderr
     return done.stdout
@@ -149,13 +166,24 @@ def run(packages, *command):
 
 def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path, monkeypatch):
     pytest.importorskip("pip", reason="needs pip, to install wheels")
-    packages = tmp_path / "lib" / f"python{sys.version_info.major}.{sys.version_info.minor}" / "site-packages"
+    packages = (
+        tmp_path
+        / "lib"
+        / f"python{sys.version_info.major}.{sys.version_info.minor}"
+        / "site-packages"
+    )
     packages.mkdir(parents=True)
     monkeypatch.syspath_prepend(packages)
     answers = []
     for factor in (3, 4):
         wheel = write_wheel(tmp_path, factor)
-        options = ["--no-index", "--no-deps", "--disable-pip-version-check", "--prefix", str(tmp_path)]
+        options = [
+            "--no-index",
+            "--no-deps",
+            "--disable-pip-version-check",
+            "--prefix",
+            str(tmp_path),
+        ]
         run(packages, "-m", "pip", "install", "--upgrade", *options, str(wheel))
         importlib.invalidate_caches()
         answers.append(ask())
@@ -163,7 +191,9 @@ def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path, monkeypatch
     assert answers == [(61, False, 0), (81, False, 0)]
 
 
-HASWELL = dict.fromkeys(("sse4.2", "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), True)
+HASWELL = dict.fromkeys(
+    ("sse4.2", "avx", "avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), True
+)
 NEHALEM = {"sse4.2": True}
 OTHER_VERSIONS = "importlib.metadata.version = lambda name: '0'"
 
@@ -171,7 +201,11 @@ OTHER_VERSIONS = "importlib.metadata.version = lambda name: '0'"
 @pytest.mark.skipif(not kinds.runs_kind(), reason=f"makes code for {kinds.KIND}")
 @pytest.mark.parametrize(
     "name, features, more, is_loaded",
-    [("haswell", HASWELL, "", True), ("nehalem", NEHALEM, "", False), ("haswell", HASWELL, OTHER_VERSIONS, False)],
+    [
+        ("haswell", HASWELL, "", True),
+        ("nehalem", NEHALEM, "", False),
+        ("haswell", HASWELL, OTHER_VERSIONS, False),
+    ],
 )
 def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_passed_over(
     tmp_path, name, features, more, is_loaded
@@ -179,9 +213,21 @@ def test_code_in_a_wheel_is_loaded_where_processor_and_versions_fit_and_else_pas
     pytest.importorskip("wheel", reason="needs wheel, to pack wheels")
     from release.compiled_wheel import compiled_wheel
 
-    wheel = compiled_wheel(write_wheel(tmp_path, 3), tmp_path, ["-c", "from town.outer import answer; answer(10)"])
+    wheel = compiled_wheel(
+        write_wheel(tmp_path, 3), tmp_path, ["-c", "from town.outer import answer; answer(10)"]
+    )
     packages = tmp_path / "installed"
-    run(packages, "-m", "pip", "install", "--no-index", "--no-deps", "--target", str(packages), str(wheel))
+    run(
+        packages,
+        "-m",
+        "pip",
+        "install",
+        "--no-index",
+        "--no-deps",
+        "--target",
+        str(packages),
+        str(wheel),
+    )
     assert "numba==" in (packages / "town-3.dist-info" / "METADATA").read_text()
     script = f"""
 import importlib.metadata, llvmlite.binding as binding
@@ -192,7 +238,9 @@ from town.outer import answer
 print(answer(10), bool(answer._cache_hits))
 """
     assert run(packages, "-c", script).split() == ["61", str(is_loaded)]
-    assert run(packages, "-c", script).split() == ["61", "True"], "what was compiled is kept as ever"
+    assert run(packages, "-c", script).split() == ["61", "True"], (
+        "what was compiled is kept as ever"
+    )
 
 
 def digest_of(text):
@@ -204,7 +252,8 @@ def write_wheel(folder, factor):
     files = {
         **texts(factor),
         f"{info}/METADATA": f"Metadata-Version: 2.1\nName: town\nVersion: {factor}\n",
-        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
+        f"{info}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: "
+        "py3-none-any\n",
     }
     with zipfile.ZipFile(wheel, "w") as archive:
         for name, text in files.items():
@@ -215,7 +264,9 @@ def write_wheel(folder, factor):
 
 
 @pytest.mark.parametrize(
-    "damage", [lambda whole: whole[:100], lambda whole: b"\x8c\x02\xff\xff" + whole], ids=["cut off", "no text"]
+    "damage",
+    [lambda whole: whole[:100], lambda whole: b"\x8c\x02\xff\xff" + whole],
+    ids=["cut off", "no text"],
 )
 def test_a_damaged_file_is_compiled_again(town, damage):
     ask()
@@ -265,7 +316,9 @@ def outside_functions(node):
 
 @pytest.mark.parametrize("source", SOURCES, ids=lambda path: str(path.relative_to(PACKAGE)))
 def test_the_stamp_follows_every_import_at_the_top(source):
-    """The regular expression of imports against Python's own parser: all but those inside functions and for types alone."""
+    """The regular expression of imports against Python's own parser: all but those inside functions
+    and for types alone.
+    """
     found = set()
     for node in outside_functions(ast.parse(source.read_text())):
         if isinstance(node, ast.ImportFrom):
@@ -276,8 +329,12 @@ def test_the_stamp_follows_every_import_at_the_top(source):
             modules = [PACKAGE.parent.joinpath(*alias.name.split(".")) for alias in node.names]
         else:
             continue
-        found |= {file for module in modules for file in (Path(f"{module}.py"), module / "__init__.py")}
-    assert {file for file in found if file.is_file() and file.is_relative_to(PACKAGE)} <= stamp.imported(source)
+        found |= {
+            file for module in modules for file in (Path(f"{module}.py"), module / "__init__.py")
+        }
+    assert {
+        file for file in found if file.is_file() and file.is_relative_to(PACKAGE)
+    } <= stamp.imported(source)
 
 
 def test_a_stamp_does_not_change_with_what_is_imported_inside_functions(tmp_path):
@@ -289,7 +346,9 @@ def test_a_stamp_does_not_change_with_what_is_imported_inside_functions(tmp_path
 
 def test_every_stamp_stands_on_how_code_is_linked(tmp_path):
     (tmp_path / "alone.py").write_text("import math\n")
-    assert {stamp.HERE / "__init__.py", stamp.HERE / "linking.py"} <= stamp.closure(tmp_path / "alone.py")
+    assert {stamp.HERE / "__init__.py", stamp.HERE / "linking.py"} <= stamp.closure(
+        tmp_path / "alone.py"
+    )
 
 
 def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, monkeypatch):
@@ -310,7 +369,9 @@ def test_a_stamp_changes_with_any_source_it_stands_on_and_with_no_other(town, mo
 
 def test_what_is_kept_is_marked_once_and_again_after_a_change(tmp_path, monkeypatch):
     runs = []
-    monkeypatch.setattr(warm, "compiled_pieces", lambda left: (piece for piece in left if not runs.append(piece)))
+    monkeypatch.setattr(
+        warm, "compiled_pieces", lambda left: (piece for piece in left if not runs.append(piece))
+    )
     monkeypatch.setattr(kept, "folders", lambda function, file: (tmp_path / "kept",))
     kept.remove_outdated.cache_clear()
     for stamped in ("a", "a", "b", "b"):
@@ -344,7 +405,9 @@ def test_what_came_in_a_wheel_is_compiled_only_when_asked_for_or_on_other_proces
     tmp_path, monkeypatch, runs, compiles
 ):
     asked = []
-    monkeypatch.setattr(warm, "compiled_pieces", lambda left: (piece for piece in left if not asked.append(piece)))
+    monkeypatch.setattr(
+        warm, "compiled_pieces", lambda left: (piece for piece in left if not asked.append(piece))
+    )
     monkeypatch.setattr(warm, "runs_kind", lambda: runs)
     monkeypatch.setattr(warm, "own_processor", lambda: "mine")
     monkeypatch.setattr(warm, "stamp_of_all", lambda: "stamp")
@@ -424,7 +487,8 @@ def test_a_large_function_is_called_and_not_copied(town):
 
     folder, inner = town / "town", town / "town" / "inner.py"
     (folder / "outer.py").write_text(CALLER)
-    for factor in (3, 4):  # the second time the old code is still in this process, under another symbol
+    # the second time the old code is still in this process, under another symbol
+    for factor in (3, 4):
         inner.write_text(LONG.replace("1e9", "1.0").format(factor=factor))
         fast, slow = answers()
         assert fast == pytest.approx(slow, rel=1e-12)
@@ -479,7 +543,10 @@ def test_code_of_two_processes_meets_in_a_third_without_mistaking_one_for_the_ot
     for function in functions:
         (town / "town" / f"{function}.py").write_text(LIBRARY.format(function=function))
     alone = [run(town, "-c", ask.format(function)) for function in functions]
-    numbers = [set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes())) for path in town.rglob("*.nbc")]
+    numbers = [
+        set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes()))
+        for path in town.rglob("*.nbc")
+    ]
     assert len(numbers) == 2 and all(numbers) and not numbers[0] & numbers[1]
     assert run(town, "-c", "\n".join(map(ask.format, functions))) == "".join(alone)
 
@@ -493,7 +560,10 @@ def test_constants_in_a_call_compile_nothing_apart(town):
 
 
 def test_the_pieces_compiled_beforehand_are_all_that_runs_call(tmp_path):
-    """A piece that lacks a function would leave it to be compiled by every worker. With footprints, and without some for a few houses."""
+    """A piece that lacks a function would leave it to be compiled by every worker.
+
+    With footprints, and without some for a few houses.
+    """
     script = f"""
 import sys
 from pathlib import Path
@@ -511,7 +581,8 @@ kept.Kept.load_overload = noted
 files = {{name: str(path) for name, path in demo_files().items()}}
 with_footprints = dict(footprints=files["footprints"], terrain=files["terrain"])
 few = dict(bbox=(91990, 451000, 92034, 451040))
-one = dict(footprints=files["footprints"], settings=Settings().replace({{"fit": {{"parts": "one"}}}}), **few)
+settings = Settings().replace({{"fit": {{"parts": "one"}}}})
+one = dict(footprints=files["footprints"], settings=settings, **few)
 for given in (with_footprints, few, one):
     request = Request((files["cloud"],), Path({str(tmp_path)!r}), restart=True, **given)
     for piece in pieces_of(request):

@@ -71,7 +71,9 @@ def test_a_run_takes_as_many_as_pay_for_what_is_left(tmp_path, town_files, monke
     asked, taken = [], []
     monkeypatch.setattr(run, "as_many_as_pay", lambda *left: asked.append(left) or pay)
     make = run.make_executor
-    monkeypatch.setattr(run, "make_executor", lambda *given: taken.append(make(*given)) or taken[-1])
+    monkeypatch.setattr(
+        run, "make_executor", lambda *given: taken.append(make(*given)) or taken[-1]
+    )
     request = Request((town_files[0],), tmp_path / "out", town_files[1], processes=None)
     summary = run.reconstruct_area(request)
     run.reconstruct_area(request)

@@ -12,9 +12,12 @@ from hiproof.settings import Settings
 from hiproof.write.attribute_list import TABLES
 
 ROOT = Path(__file__).parents[1]
-DOCUMENTS = [*(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))]
+DOCUMENTS = [
+    *(ROOT / name for name in ("README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md"))
+]
 DOCUMENTS += sorted((ROOT / "docs").rglob("*.md"))
-MADE = ("commands.md", "settings.md", "constants.md")  # by docs/generated.py, when the site is built
+# by docs/generated.py, when the site is built
+MADE = ("commands.md", "settings.md", "constants.md")
 COMMANDS = typer.main.get_command(app).commands
 OPTIONS = {
     name
@@ -27,7 +30,8 @@ PLACES = [ROOT, ROOT / "src/hiproof", ROOT / "src/hiproof/primitives", ROOT / "t
 OTHER_PROGRAMS = ("pip ", "dask ", "find ", "git ", "projsync ", "docker ")
 
 ATTRIBUTES = {table.prefix + attribute.name for table in TABLES for attribute in table.attributes}
-ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}  # tables of a database, by the prefix that is the default
+# tables of a database, by the prefix that is the default
+ATTRIBUTES |= {"hiproof_buildings", "hiproof_roofs"}
 
 every_document = pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: path.name)
 
@@ -40,14 +44,20 @@ def spans(path):
 def commands(path):
     """Spans, and lines of indented or fenced code, without their comments."""
     text = path.read_text()
-    fenced = [line for block in re.findall(r"```\w*\n(.*?)```", text, re.DOTALL) for line in block.splitlines()]
+    fenced = [
+        line
+        for block in re.findall(r"```\w*\n(.*?)```", text, re.DOTALL)
+        for line in block.splitlines()
+    ]
     indented = re.findall(r"^    (\S.*)$", text, re.MULTILINE)
     return spans(path) + [line.split(" # ")[0].strip() for line in fenced + indented]
 
 
 @cache
 def source():
-    """All text of the package, its benchmarks and tests, where names of files and values come from."""
+    """All text of the package, its benchmarks and tests, where names of files and values
+    come from.
+    """
     folders = ("src", "benchmarks", "experiments", "tests", "examples")
     files = [file for folder in folders for file in sorted((ROOT / folder).rglob("*.py"))]
     return "\n".join(file.read_text() for file in files if file != Path(__file__))
@@ -56,12 +66,20 @@ def source():
 def module_file(name):
     """The file of a module that `python -m` may be given, None where there is none."""
     path = ROOT / name.replace(".", "/")
-    found = (path.with_suffix(".py"), path / "__main__.py", ROOT / "src" / name.replace(".", "/") / "__main__.py")
+    found = (
+        path.with_suffix(".py"),
+        path / "__main__.py",
+        ROOT / "src" / name.replace(".", "/") / "__main__.py",
+    )
     return next((file for file in found if file.is_file()), None)
 
 
 def is_path(span):
-    return bool(re.fullmatch(r"[\w.-]*(/[\w.-]+)*(/|\.(py|md|toml|json|jsonl|gml|gpkg|parquet|csv|html))", span))
+    return bool(
+        re.fullmatch(
+            r"[\w.-]*(/[\w.-]+)*(/|\.(py|md|toml|json|jsonl|gml|gpkg|parquet|csv|html))", span
+        )
+    )
 
 
 @every_document
@@ -79,7 +97,10 @@ def test_paths_exist(path):
         for span in spans(path)
         if is_path(span)
         and not any((place / span).exists() for place in PLACES)
-        and not (re.search(rf"[\"'/]{re.escape(Path(span).name)}[\"'/]", source()) and not span.endswith(".py"))
+        and not (
+            re.search(rf"[\"'/]{re.escape(Path(span).name)}[\"'/]", source())
+            and not span.endswith(".py")
+        )
     ]
     assert missing == []
 
@@ -88,8 +109,14 @@ def test_paths_exist(path):
 def test_commands_exist(path):
     named = [found for text in commands(path) for found in re.findall(r"^hiproof ([a-z]\w*)", text)]
     assert [name for name in named if name not in COMMANDS] == []
-    modules = [found for text in commands(path) for found in re.findall(r"^python -m ([\w.]+)", text)]
-    assert [name for name in modules if name not in ("pytest", "venv", "pip") and module_file(name) is None] == []
+    modules = [
+        found for text in commands(path) for found in re.findall(r"^python -m ([\w.]+)", text)
+    ]
+    assert [
+        name
+        for name in modules
+        if name not in ("pytest", "venv", "pip") and module_file(name) is None
+    ] == []
     targets = re.findall(r"^(\w[\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
     made = [found for text in commands(path) for found in re.findall(r"^make ([\w-]+)", text)]
     assert [name for name in made if name not in targets] == []
@@ -102,8 +129,14 @@ def test_options_exist(path):
         if text.startswith(OTHER_PROGRAMS) or text.startswith("python -m pytest"):
             continue
         module = re.match(r"python -m ([\w.]+)", text)
-        known = OPTIONS if module is None else set(re.findall(r"--[\w-]+", module_file(module[1]).read_text()))
-        missing += [option for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text) if option not in known]
+        known = (
+            OPTIONS
+            if module is None
+            else set(re.findall(r"--[\w-]+", module_file(module[1]).read_text()))
+        )
+        missing += [
+            option for option in re.findall(r"(?<![\w-])--[a-z][\w-]*", text) if option not in known
+        ]
     assert missing == []
 
 
@@ -118,6 +151,19 @@ def test_attributes_and_settings_exist(path):
 
 @every_document
 def test_names_of_code_occur_in_it(path):
-    """A word between backticks that looks like a name of code, such as `fit_roof` or `model.Part`."""
-    named = {span.split(".")[-1] for span in spans(path) if re.fullmatch(r"@?[a-z]\w*(_|\.[A-Za-z])\w*", span)}
-    assert sorted(name for name in named - ATTRIBUTES if not re.search(rf"\b{re.escape(name)}\b", source())) == []
+    """A word between backticks that looks like a name of code, such as `fit_roof` or
+    `model.Part`.
+    """
+    named = {
+        span.split(".")[-1]
+        for span in spans(path)
+        if re.fullmatch(r"@?[a-z]\w*(_|\.[A-Za-z])\w*", span)
+    }
+    assert (
+        sorted(
+            name
+            for name in named - ATTRIBUTES
+            if not re.search(rf"\b{re.escape(name)}\b", source())
+        )
+        == []
+    )

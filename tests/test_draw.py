@@ -1,4 +1,6 @@
-"""Pictures of models: a notebook's view asks nothing of the network and turns, a plot shows points where they are."""
+"""Pictures of models: a notebook's view asks nothing of the network and turns, a plot shows points
+where they are.
+"""
 
 import re
 
@@ -41,7 +43,10 @@ def test_a_building_is_seen_from_the_same_corner_whichever_way_it_stands(house, 
     turned = gable_house(rotation)
     assert turn_of(turned) == pytest.approx(turn_of(house) - rotation)
     pages = [
-        np.sort(projected(b.solid.vertices - b.solid.vertices.mean(axis=0), turn_of(b), 35.0)[:, :2], axis=0)
+        np.sort(
+            projected(b.solid.vertices - b.solid.vertices.mean(axis=0), turn_of(b), 35.0)[:, :2],
+            axis=0,
+        )
         for b in (house, turned)
     ]
     assert np.allclose(*pages, atol=1e-3)
@@ -60,7 +65,8 @@ def test_a_plot_tells_near_points_from_far_ones(house):
     axes = hiproof.plot(house, house.roof.frame.to_world(local))
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == ["within 0.2 m: 30 points", "further: 10 points"]
-    unknown = np.vstack([house.roof.frame.to_world(local), [[np.nan, 0.0, 0.0]]])  # `reconstruct` leaves it out
+    # `reconstruct` leaves it out
+    unknown = np.vstack([house.roof.frame.to_world(local), [[np.nan, 0.0, 0.0]]])
     assert hiproof.plot(house, unknown).get_xlim() == axes.get_xlim()
     with pytest.raises(InputError, match=r"shape \(n, 3\), got \(40, 2\)"):
         hiproof.plot(house, xy)

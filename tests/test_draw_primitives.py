@@ -1,4 +1,6 @@
-"""The figures of roof types: every parameter is drawn, as long as it is, and the documents hold what the code draws."""
+"""The figures of roof types: every parameter is drawn, as long as it is, and the documents hold
+what the code draws.
+"""
 
 import importlib
 import re
@@ -20,7 +22,9 @@ def test_every_parameter_is_drawn_as_long_as_it_is(kind):
     assert [m.name for m in found] == list(names_of(kind)) == list(parameters)
     for measure in found:
         if measure.end is not None:
-            assert measure.length == pytest.approx(abs(parameters[measure.name]), abs=LEVEL), measure.name
+            assert measure.length == pytest.approx(abs(parameters[measure.name]), abs=LEVEL), (
+                measure.name
+            )
         assert f">{measure.name}" in primitive_svg(kind)
 
 

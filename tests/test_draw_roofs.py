@@ -1,4 +1,6 @@
-"""The sheets of drawn roofs: lines have their kinds, points their heights over the roof, a run becomes a picture."""
+"""The sheets of drawn roofs: lines have their kinds, points their heights over the roof, a run
+becomes a picture.
+"""
 
 import importlib
 from collections import Counter
@@ -19,7 +21,8 @@ def lines_of(building):
 
 
 @pytest.mark.parametrize(
-    ("type", "ridges", "eaves"), [("flat", 0, 4), ("gable", 1, 6), ("hip", 5, 4), ("pyramid", 4, 4), ("mansard", 8, 4)]
+    ("type", "ridges", "eaves"),
+    [("flat", 0, 4), ("gable", 1, 6), ("hip", 5, 4), ("pyramid", 4, 4), ("mansard", 8, 4)],
 )
 def test_a_single_roof_has_its_ridges_and_eaves(type, ridges, eaves):
     building = random_building(np.random.default_rng(1), type)
@@ -29,7 +32,9 @@ def test_a_single_roof_has_its_ridges_and_eaves(type, ridges, eaves):
 def test_valleys_and_steps_are_told_from_ridges():
     hips = random_compound(np.random.default_rng(0), "L_of_hips")
     lines = draw_roofs.roof_lines(compose(hips.roof, 0.0))
-    valley = sum(float(np.linalg.norm(ends[1] - ends[0])) for kind, ends in lines if kind == "valley")
+    valley = sum(
+        float(np.linalg.norm(ends[1] - ends[0])) for kind, ends in lines if kind == "valley"
+    )
     assert valley == pytest.approx(hips.parameters["width"] / np.sqrt(2), abs=0.01)
     assert lines_of(random_compound(np.random.default_rng(0), "two_level"))["step"] >= 1
     assert "step" not in {kind for kind, _ in lines}
@@ -39,9 +44,13 @@ def test_points_have_their_height_over_the_roof():
     building = random_building(np.random.default_rng(2), "gable")
     points = uniform_points(building, np.random.default_rng(3), noise=0.0)
     shift = np.random.default_rng(4).uniform(-0.5, 0.5, len(points))
-    gap = draw_roofs.gaps(compose(building.roof, 0.0), points + np.column_stack([0 * shift, 0 * shift, shift]))
+    gap = draw_roofs.gaps(
+        compose(building.roof, 0.0), points + np.column_stack([0 * shift, 0 * shift, shift])
+    )
     assert np.allclose(gap, shift, atol=2e-3)
-    assert np.isnan(draw_roofs.gaps(compose(building.roof, 0.0), np.array([[99.0, 99.0, 5.0]]))).all()
+    assert np.isnan(
+        draw_roofs.gaps(compose(building.roof, 0.0), np.array([[99.0, 99.0, 5.0]]))
+    ).all()
 
 
 def test_a_run_becomes_sheets(town_files, tmp_path):

@@ -1,4 +1,6 @@
-"""What only some need is an extra: nothing else asks for it, and what does says so in one sentence before any work."""
+"""What only some need is an extra: nothing else asks for it, and what does says so in one sentence
+before any work.
+"""
 
 import re
 import subprocess
@@ -73,7 +75,8 @@ def hidden(monkeypatch):
 
 def told(package):
     return (
-        rf"^expected the package {package}[\w.]* for [^;]+, got: .+; try: pip install 'hiproof\[{PACKAGES[package]}\]'"
+        rf"^expected the package {package}[\w.]* for [^;]+, got: .+; "
+        rf"try: pip install 'hiproof\[{PACKAGES[package]}\]'"
     )
 
 
@@ -86,7 +89,9 @@ def command(*arguments):
 
 
 @pytest.mark.parametrize("name", NEEDY)
-def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(name, hidden, tmp_path, capsys):
+def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(
+    name, hidden, tmp_path, capsys
+):
     package, toml, options = NEEDY[name]
     cloud, config, out = tmp_path / "cloud.laz", tmp_path / "settings.toml", tmp_path / "out"
     cloud.write_bytes(b"nothing that could be read")
@@ -94,18 +99,32 @@ def test_a_run_that_needs_what_is_missing_is_refused_before_it_reads_or_writes(n
     out.mkdir()
     (out / "buildings.gml").write_text("an earlier run's")
     hidden(package)
-    assert command("reconstruct", cloud, "--out", out, "--config", config, "--restart", *options) == 2
+    assert (
+        command("reconstruct", cloud, "--out", out, "--config", config, "--restart", *options) == 2
+    )
     (line,) = capsys.readouterr().err.splitlines()
     assert re.match(told(package), line.removeprefix("hiproof: "))
     assert [path.read_text() for path in out.iterdir()] == ["an earlier run's"]
 
 
 @pytest.mark.parametrize("options", [["--parts", "one"], ["--objective", "paper"]])
-def test_one_primitive_by_the_points_alone_is_said_to_do_without(options, hidden, town_files, tmp_path, capsys):
+def test_one_primitive_by_the_points_alone_is_said_to_do_without(
+    options, hidden, town_files, tmp_path, capsys
+):
     hidden("onnxruntime")
-    arguments = ["reconstruct", town_files[0], "--footprints", town_files[1], "--out", tmp_path, *options]
+    arguments = [
+        "reconstruct",
+        town_files[0],
+        "--footprints",
+        town_files[1],
+        "--out",
+        tmp_path,
+        *options,
+    ]
     assert command(*arguments) == 2
-    assert capsys.readouterr().err.endswith("or --no-network (segment.enabled = false) to go by the points alone\n")
+    assert capsys.readouterr().err.endswith(
+        "or --no-network (segment.enabled = false) to go by the points alone\n"
+    )
     if options == ["--parts", "one"]:
         assert command(*arguments, "--no-network") == 0
 
@@ -119,9 +138,14 @@ def test_points_by_address_are_refused_before_anything_is_written(hidden, tmp_pa
 
 def test_labelling_is_refused_before_it_reads_or_writes(hidden, tmp_path, capsys):
     hidden("onnxruntime")
-    assert command("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz") == 2
+    assert (
+        command("segment", tmp_path / "missing.laz", "--out", tmp_path / "out" / "labelled.laz")
+        == 2
+    )
     (line,) = capsys.readouterr().err.splitlines()
-    assert re.match(told("onnxruntime"), line.removeprefix("hiproof: ")) and line.endswith("'hiproof[network]'")
+    assert re.match(told("onnxruntime"), line.removeprefix("hiproof: ")) and line.endswith(
+        "'hiproof[network]'"
+    )
     assert list(tmp_path.iterdir()) == []
 
 
@@ -142,9 +166,15 @@ def test_a_neighbourhood_is_refused_before_it_is_written(hidden, tmp_path):
         *(
             (
                 "onnxruntime",
-                lambda given=given: hiproof.reconstruct(gable_points(), FOOTPRINT, settings=Settings.from_dict(given)),
+                lambda given=given: hiproof.reconstruct(
+                    gable_points(), FOOTPRINT, settings=Settings.from_dict(given)
+                ),
             )
-            for given in ({"fit": {"parts": "one"}}, {"fit": {"objective": "paper"}}, {"segment": {"always": True}})
+            for given in (
+                {"fit": {"parts": "one"}},
+                {"fit": {"objective": "paper"}},
+                {"segment": {"always": True}},
+            )
         ),
     ],
 )
@@ -156,7 +186,9 @@ def test_python_gets_the_same_sentence(package, call, hidden):
 
 def test_training_names_its_extra(hidden):
     hidden("torch")
-    with pytest.raises(InputError, match=r"expected the package torch for training, got: .+'hiproof\[train\]'$"):
+    with pytest.raises(
+        InputError, match=r"expected the package torch for training, got: .+'hiproof\[train\]'$"
+    ):
         hiproof.learn.train  # noqa: B018
 
 
@@ -173,34 +205,53 @@ def test_the_page_says_at_once_that_a_terrain_model_cannot_be_read(hidden, town_
     files = demo_files()
     inside = shapely.box(91990, 450990, 92015, 451015).bounds
     out, inputs = tmp_path / "out", (str(files["cloud"]),)
-    reconstruct_area(Request(inputs, out, str(files["footprints"]), str(files["terrain"]), bbox=inside))
+    reconstruct_area(
+        Request(inputs, out, str(files["footprints"]), str(files["terrain"]), bbox=inside)
+    )
     assert RunPoints(out).missing == ""
     hidden("rasterio")
     assert "all but refitting works (expected the package rasterio" in RunPoints(out).missing
 
 
 def test_the_demo_asks_for_no_extra(tmp_path):
-    """Whatever is installed: with all of them hidden it runs, and it loads none where they are there."""
+    """Whatever is installed: with all of them hidden it runs, and it loads none where they are
+    there.
+    """
     hide = "import sys; sys.modules.update(dict.fromkeys(sys.argv.pop().split()));"
     run = "from hiproof.cli import main\ntry: main()\nexcept SystemExit as end: code = end.code\n"
     tell = "print(code, [m for m in ('rasterio', 'onnxruntime') if sys.modules.get(m)])"
     for names in (" ".join(PACKAGES), "nothing"):
-        arguments = [sys.executable, "-c", f"{hide}{run}{tell}", "demo", str(tmp_path / names[:7]), names]
-        done = subprocess.run(arguments, capture_output=True, text=True, env=ENVIRONMENT, check=True)
+        arguments = [
+            sys.executable,
+            "-c",
+            f"{hide}{run}{tell}",
+            "demo",
+            str(tmp_path / names[:7]),
+            names,
+        ]
+        done = subprocess.run(
+            arguments, capture_output=True, text=True, env=ENVIRONMENT, check=True
+        )
         assert done.stdout.splitlines()[-1] == "0 []"
     models = [path.read_bytes() for path in tmp_path.glob("*/buildings.gml")]
     assert len(models) == 2 and models[0] == models[1]
 
 
 def names_in(requirements):
-    """The packages that requirements name: `laspy` of "laspy[lazrs]>=2.5.3"; of dask[distributed] what it is there for too."""
-    return {name for text in requirements for name in re.findall(r"[a-z]\w+", text.partition(">=")[0])}
+    """The packages that requirements name: `laspy` of "laspy[lazrs]>=2.5.3"; of dask[distributed]
+    what it is there for too.
+    """
+    return {
+        name for text in requirements for name in re.findall(r"[a-z]\w+", text.partition(">=")[0])
+    }
 
 
-def test_each_sentence_names_an_extra_that_brings_the_package_and_the_core_install_has_none_of_them():
+def test_each_sentence_names_the_extra_that_brings_the_package():
     sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
     assert dict(re.findall(r'(?<!>> )needed\("(\w+)[\w.]*", "(\w+)"', sources)) == PACKAGES
-    assert [package for package, extra in PACKAGES.items() if package not in names_in(OPTIONAL[extra])] == []
+    assert [
+        package for package, extra in PACKAGES.items() if package not in names_in(OPTIONAL[extra])
+    ] == []
     assert names_in(PROJECT["dependencies"]).isdisjoint(PACKAGES)
     assert names_in(OPTIONAL["all"]) == {"hiproof", *PACKAGES.values()}
 

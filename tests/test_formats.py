@@ -1,4 +1,6 @@
-"""A format is one module and one line: whatever writes, converts or explains files learns of it there."""
+"""A format is one module and one line: whatever writes, converts or explains files learns of it
+there.
+"""
 
 import sys
 from pathlib import Path
@@ -9,7 +11,14 @@ import pytest
 
 from handmade import gable_house, modelled, unmodelled
 from hiproof import formats
-from hiproof.formats import FORMATS, Format, asked_files, asked_fragments, asked_tile_files, module_of
+from hiproof.formats import (
+    FORMATS,
+    Format,
+    asked_files,
+    asked_fragments,
+    asked_tile_files,
+    module_of,
+)
 from hiproof.settings import Settings
 from hiproof.write.attribute_list import files_text
 from hiproof.write.citygml.version3 import write_citygml3
@@ -25,7 +34,9 @@ README = Path(__file__).parents[1] / "README.md"
 def test_a_format_has_what_its_kind_needs(name):
     format = FORMATS[name]
     if format.fragment:
-        assert callable(module_of(format.module).writer) and callable(module_of(format.fragment).fragment)
+        assert callable(module_of(format.module).writer) and callable(
+            module_of(format.fragment).fragment
+        )
     else:
         assert callable(module_of(format.module).write_models) and not format.tile_ending
 
@@ -33,7 +44,11 @@ def test_a_format_has_what_its_kind_needs(name):
 def test_files_have_names_of_their_own_and_the_readme_tells_those_of_every_run():
     assert len({format.file for format in FORMATS.values()}) == len(FORMATS)
     told = README.read_text()
-    assert [file.name for file in asked_files(Settings(), Path()).values() if f"`{file.name}`" not in told] == []
+    assert [
+        file.name
+        for file in asked_files(Settings(), Path()).values()
+        if f"`{file.name}`" not in told
+    ] == []
 
 
 def test_models_by_work_tile_need_the_same_parts_of_buildings():
@@ -57,7 +72,9 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     module.writer = lambda path, head: Names(path)
     module.fragment = lambda sheet: Fragment(f"{sheet.building.id}\n".encode())
     monkeypatch.setitem(sys.modules, "hiproof.write.names", module)
-    monkeypatch.setitem(formats.FORMATS, "names", Format("names.txt", "names alone", "names", "names"))
+    monkeypatch.setitem(
+        formats.FORMATS, "names", Format("names.txt", "names alone", "names", "names")
+    )
     buildings = [modelled(gable_house(), "a"), unmodelled("b")]
     write_all(tmp_path / "one", buildings)
     head = FileHead(offset=np.array([85000.0, 446000.0, 0.0]))
@@ -65,9 +82,13 @@ def test_one_line_makes_a_new_format_known_everywhere(tmp_path, monkeypatch):
     join_fragments(asked_files(Settings(), tmp_path / "two"), parts, head)
     for folder in ("one", "two"):
         assert (tmp_path / folder / "names.txt").read_text() == "a\nb\n"
-    for name in (format.file for format in FORMATS.values() if (tmp_path / "one" / format.file).exists()):
+    for name in (
+        format.file for format in FORMATS.values() if (tmp_path / "one" / format.file).exists()
+    ):
         if name != "parameters.jsonl":  # its head tells an offset that is settled beforehand
-            assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+            assert (tmp_path / "one" / name).read_bytes() == (
+                tmp_path / "two" / name
+            ).read_bytes(), name
     assert "| `names.txt` | names alone | `hiproof reconstruct` |" in files_text()
 
 

@@ -33,12 +33,17 @@ def test_lines_fit(page):
 def test_sentences_are_short_on_the_whole():
     words = lengths((ROOT / "README.md").read_text(encoding="utf-8"))
     assert words.mean() <= README_MEAN and sorted(words)[int(0.9 * len(words))] <= README_P90
-    docs = [lengths(page.read_text(encoding="utf-8")) for page in PAGES if page.parent.name == "docs"]
+    docs = [
+        lengths(page.read_text(encoding="utf-8")) for page in PAGES if page.parent.name == "docs"
+    ]
     every = sorted(n for page in docs for n in page)
     assert every[int(0.9 * len(every))] <= DOCS_P90
 
 
 def test_prose_is_told_from_code_and_tables():
-    text = "# A title\n\nOne two. Three four\nfive.\n\n- item one\n- item two\n\n| a | b |\n\n    code here\n"
+    text = (
+        "# A title\n\nOne two. Three four\nfive.\n\n- item one\n- item two\n\n"
+        "| a | b |\n\n    code here\n"
+    )
     assert sentences(text) == ["One two.", "Three four five.", "- item one", "- item two"]
     assert not re.search("code|title|\\|", " ".join(sentences(text)))

@@ -1,4 +1,6 @@
-"""What goes to the console and what to the file, from this process and its workers; no secret to either."""
+"""What goes to the console and what to the file, from this process and its workers; no secret to
+either.
+"""
 
 import logging
 import sys
@@ -50,7 +52,9 @@ def test_secrets_are_masked_in_messages_arguments_and_tracebacks(tmp_path, capsy
 
 
 def test_what_other_packages_say_is_for_debugging_alone(tmp_path, capsys):
-    """NumPy's warnings and rasterio's remarks in their own words help nobody who did not write this."""
+    """NumPy's warnings and rasterio's remarks in their own words help nobody who did not write
+    this.
+    """
     for level, shown in (("warning", 0), ("debug", 1)):
         log.start(log.Level(level), tmp_path / f"{level}.log")
         warnings.warn(f"invalid value encountered in {level}", RuntimeWarning)
@@ -75,13 +79,21 @@ def test_a_file_that_cannot_be_written_gets_one_sentence(tmp_path):
 def test_workers_write_to_the_same_places(tmp_path, capfd):
     log.start(file=tmp_path / "run.log")
     executor = Processes(1)
-    list(executor.run(warnings.warn, [("3 points of https://u:s3cret@host were left out", InputWarning)]))
+    list(
+        executor.run(
+            warnings.warn, [("3 points of https://u:s3cret@host were left out", InputWarning)]
+        )
+    )
     executor.close()
-    assert said(tmp_path / "run.log") == [("WARNING", "3 points of https://u:...@host were left out")]
+    assert said(tmp_path / "run.log") == [
+        ("WARNING", "3 points of https://u:...@host were left out")
+    ]
     assert capfd.readouterr().err == "hiproof: 3 points of https://u:...@host were left out\n"
 
 
-def test_the_file_tells_of_every_step_and_of_lost_workers(town_files, tmp_path, monkeypatch, capsys):
+def test_the_file_tells_of_every_step_and_of_lost_workers(
+    town_files, tmp_path, monkeypatch, capsys
+):
     monkeypatch.setattr(city_run, "solve_tile", planted.solve_killed_once)
     log.start(log.Level.debug, tmp_path / "run.log")
     reconstruct_area(Request((town_files[0],), tmp_path / "out", town_files[1], processes=2))
@@ -89,8 +101,12 @@ def test_the_file_tells_of_every_step_and_of_lost_workers(town_files, tmp_path, 
     told = "\n".join(f"{level} {text}" for level, text in lines)
     assert "INFO version" in told and "4 buildings in 1 work tile\n" in told
     assert "INFO sort:0 is done" in told and "is done: 4 buildings" in told
-    assert "WARNING solve:" in told and "was lost (a worker process died) and is tried again" in told
-    assert sum(level == "DEBUG" and text.startswith("building house-") for level, text in lines) == 4
+    assert (
+        "WARNING solve:" in told and "was lost (a worker process died) and is tried again" in told
+    )
+    assert (
+        sum(level == "DEBUG" and text.startswith("building house-") for level, text in lines) == 4
+    )
     assert lines[-1][1].startswith("4 buildings: {")
 
 
@@ -102,12 +118,16 @@ def test_the_command_line_keeps_its_errors_in_the_file(tmp_path, monkeypatch, ca
     (tmp_path / "a.laz").write_bytes(b"LASF")
     asked = ["reconstruct", str(tmp_path / "a.laz"), "--out", str(tmp_path / "out")]
     monkeypatch.setattr(
-        sys, "argv", ["hiproof", *asked, "--log-file", str(tmp_path / "run.log"), "--log-level", "error"]
+        sys,
+        "argv",
+        ["hiproof", *asked, "--log-file", str(tmp_path / "run.log"), "--log-level", "error"],
     )
     with pytest.raises(SystemExit) as ended:
         main()
     assert ended.value.code == 2
-    assert said(tmp_path / "run.log") == [("ERROR", "expected points at https://u:...@host, got none")]
+    assert said(tmp_path / "run.log") == [
+        ("ERROR", "expected points at https://u:...@host, got none")
+    ]
     assert capsys.readouterr().err == "hiproof: expected points at https://u:...@host, got none\n"
 
 
@@ -123,13 +143,18 @@ def test_lines_of_several_workers_stay_whole(tmp_path):
     assert sorted(said(tmp_path / "run.log")) == sorted(("WARNING", f"task {i}") for i in range(40))
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full, a device that is always full")
+@pytest.mark.skipif(
+    not Path("/dev/full").exists(), reason="no /dev/full, a device that is always full"
+)
 def test_a_full_disk_ends_the_log_and_not_the_work(tmp_path, capsys):
     log.start(file=Path("/dev/full"))
     for number in range(3):
         log.LOGGER.warning("warning %d", number)
     told = capsys.readouterr().err.splitlines()
-    full = "hiproof: expected to write the log to /dev/full, got: No space left on device; the work goes on without the log"
+    full = (
+        "hiproof: expected to write the log to /dev/full, got: No space left on device; the work "
+        "goes on without the log"
+    )
     assert sorted(told) == sorted([full, *(f"hiproof: warning {number}" for number in range(3))])
     log.start(file=tmp_path / "run.log")
     log.LOGGER.warning("kept")

@@ -1,4 +1,6 @@
-"""The servers of `hiproof edit` and `hiproof view` over raw sockets, as a hostile page or program would ask them."""
+"""The servers of `hiproof edit` and `hiproof view` over raw sockets, as a hostile page or program
+would ask them.
+"""
 
 import re
 import socket
@@ -23,7 +25,9 @@ def page(request, tmp_path, monkeypatch, capfd):
     """(port, path of the page) of a live server; nothing may reach the terminal."""
     monkeypatch.setattr(loopback, "QUIET_S", 0.5)
     if request.param == "edit":
-        service = Service(Desk(write_parameters_of_each_kind(tmp_path / "parameters.jsonl").parent, "anna"))
+        service = Service(
+            Desk(write_parameters_of_each_kind(tmp_path / "parameters.jsonl").parent, "anna")
+        )
         server, start = Server(service), f"/{service.token}/"
     else:
         folder = tmp_path / "a.3dtiles"
@@ -60,7 +64,12 @@ def asked(port, text, wait_s=20.0):
 
 
 def request(port, target, method="GET", host=None, *more, body=b""):
-    lines = [f"{method} {target} HTTP/1.1", f"Host: {host or f'127.0.0.1:{port}'}", "Connection: close", *more]
+    lines = [
+        f"{method} {target} HTTP/1.1",
+        f"Host: {host or f'127.0.0.1:{port}'}",
+        "Connection: close",
+        *more,
+    ]
     return ("\r\n".join(lines) + "\r\n\r\n").encode("latin-1") + body
 
 
@@ -73,9 +82,17 @@ def test_the_page_is_answered_with_headers_that_keep_it_to_itself(page):
     answer = asked(port, request(port, start))
     head, body = answer.split(b"\r\n\r\n", 1)
     assert code(answer) == 200 and b"<html" in body
-    for header in (b"X-Content-Type-Options: nosniff", b"frame-ancestors 'none'", b"Referrer-Policy: no-referrer"):
+    for header in (
+        b"X-Content-Type-Options: nosniff",
+        b"frame-ancestors 'none'",
+        b"Referrer-Policy: no-referrer",
+    ):
         assert header in head
-    assert head.count(b"Content-Security-Policy") == 1 and b"unsafe" not in head and b"Python" not in head
+    assert (
+        head.count(b"Content-Security-Policy") == 1
+        and b"unsafe" not in head
+        and b"Python" not in head
+    )
 
 
 def test_head_is_get_without_a_body(page):
@@ -114,8 +131,29 @@ def test_a_request_without_a_host_is_refused(page):
 
 @pytest.mark.parametrize(
     "target",
-    ["%00", "?x", "..", "../secret.txt", "..%2fsecret.txt", "%2e%2e/secret.txt", "tiles", "tiles/", ".hidden", "link"]
-    + ["%2fetc%2fpasswd", "//etc/passwd", "\xff", "%ff", "%", "a" * 60_000, "tiles/../../secret.txt", "C:%5Cx", "a\\b"],
+    [
+        "%00",
+        "?x",
+        "..",
+        "../secret.txt",
+        "..%2fsecret.txt",
+        "%2e%2e/secret.txt",
+        "tiles",
+        "tiles/",
+        ".hidden",
+        "link",
+    ]
+    + [
+        "%2fetc%2fpasswd",
+        "//etc/passwd",
+        "\xff",
+        "%ff",
+        "%",
+        "a" * 60_000,
+        "tiles/../../secret.txt",
+        "C:%5Cx",
+        "a\\b",
+    ],
 )
 def test_no_address_leads_elsewhere(page, target):
     port, start = page
@@ -148,20 +186,32 @@ def test_what_is_no_path_is_refused(page, target):
 )
 def test_what_is_no_request_ends_the_connection(page, text):
     answer = asked(page[0], text)
-    assert answer == b"" or b" 4" in answer[:14] or b" 5" in answer[:14] or answer.startswith(b"<!DOCTYPE")
+    assert (
+        answer == b""
+        or b" 4" in answer[:14]
+        or b" 5" in answer[:14]
+        or answer.startswith(b"<!DOCTYPE")
+    )
 
 
-@pytest.mark.parametrize("length", ["\xb2", "-1", "1e3", "0x10", "9" * 400, "99999999", "+5", "", " ", "5, 5"])
+@pytest.mark.parametrize(
+    "length", ["\xb2", "-1", "1e3", "0x10", "9" * 400, "99999999", "+5", "", " ", "5, 5"]
+)
 def test_a_length_that_is_none_is_refused(page, length):
     port, start = page
-    answer = asked(port, request(port, start + "change", "POST", None, f"Content-Length: {length}", body=b"{}"))
+    answer = asked(
+        port, request(port, start + "change", "POST", None, f"Content-Length: {length}", body=b"{}")
+    )
     assert code(answer) == 413
 
 
 def test_a_chunked_body_is_no_second_request(page):
     port, start = page
-    inner = request(port, start, "POST", None, "Content-Length: 0").replace(b"Connection: close\r\n", b"")
-    outer = f"GET {start} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nTransfer-Encoding: chunked\r\n\r\n".encode()
+    inner = request(port, start, "POST", None, "Content-Length: 0").replace(
+        b"Connection: close\r\n", b""
+    )
+    head = f"GET {start} HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\n"
+    outer = f"{head}Transfer-Encoding: chunked\r\n\r\n".encode()
     assert asked(port, outer + inner).count(b"HTTP/1.1 ") == 1
 
 
@@ -170,7 +220,9 @@ def test_silent_and_slow_connections_are_closed(page):
     begun = time.monotonic()
     assert asked(port, b"") == b""
     assert asked(port, b"GET / HT") == b""
-    body = request(port, start, "POST", None, "Content-Type: application/json", "Content-Length: 9", body=b"{")
+    body = request(
+        port, start, "POST", None, "Content-Type: application/json", "Content-Length: 9", body=b"{"
+    )
     assert asked(port, body) == b""
     with socket.create_connection(("127.0.0.1", port), timeout=20) as line:
         for _ in range(100):  # a byte now and then puts nothing off
@@ -187,7 +239,9 @@ def test_silent_and_slow_connections_are_closed(page):
 
 def test_a_post_of_another_kind_changes_nothing(page):
     port, start = page
-    answer = asked(port, request(port, start + "change", "POST", None, "Content-Length: 2", body=b"{}"))
+    answer = asked(
+        port, request(port, start + "change", "POST", None, "Content-Length: 2", body=b"{}")
+    )
     assert code(answer) in (405, 415)
 
 
@@ -224,7 +278,9 @@ def test_closing_waits_for_an_answer_on_its_way():
     with loopback.LoopbackServer(Slow) as server:
         threading.Thread(target=server.serve_forever, args=(POLL_S,), daemon=True).start()
         port = server.server_port
-        threading.Thread(target=asked, args=(port, request(port, "/", "POST", None, "Content-Length: 0"))).start()
+        threading.Thread(
+            target=asked, args=(port, request(port, "/", "POST", None, "Content-Length: 0"))
+        ).start()
         begun.wait(10)
         server.shutdown()
         assert done == []

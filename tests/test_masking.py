@@ -1,4 +1,6 @@
-"""Passwords in addresses stay where they were given: no output, error, warning or log repeats them."""
+"""Passwords in addresses stay where they were given: no output, error, warning or log
+repeats them.
+"""
 
 import json
 import sys
@@ -68,7 +70,10 @@ def test_what_holds_no_secret_stays_as_it_is(address):
 
 def test_nested_values_are_masked_and_others_kept():
     record = {"a": ["x://u:s3cret@h", 1, None], "b": ({"c": "password=s3cret"}, 2.5, True)}
-    assert masked_values(record) == {"a": ["x://u:...@h", 1, None], "b": [{"c": "password=..."}, 2.5, True]}
+    assert masked_values(record) == {
+        "a": ["x://u:...@h", 1, None],
+        "b": [{"c": "password=..."}, 2.5, True],
+    }
 
 
 @pytest.mark.parametrize("kind", [*HiproofError.__subclasses__(), InputWarning])

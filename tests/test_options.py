@@ -1,4 +1,6 @@
-"""Options are checked before anything runs: each configuration gets one sentence and exit code 2, or the run begins."""
+"""Options are checked before anything runs: each configuration gets one sentence and exit code 2,
+or the run begins.
+"""
 
 import sys
 import warnings
@@ -33,27 +35,35 @@ CONFIGURATIONS = {
     "class of a float": ("[read]\nbuilding_classes = [6.0]", [], "a whole number, got 6.0"),
     "class of a boolean": ("[read]\nbuilding_classes = [true]", [], "a whole number, got True"),
     "class of infinity": ("[read]\nbuilding_classes = [inf]", [], "a whole number, got inf"),
-    "class of a table": ("[read]\nbuilding_classes = [{{a = 1}}]", [], "a whole number, got a dict of 1"),
+    "class of a table": ("[read]\nbuilding_classes = [{{a = "
+                         "1}}]", [], "a whole number, got a dict of 1"),
     "class of a list": ("[read]\nbuilding_classes = [[6]]", [], "a whole number, got a list of 1"),
     "class of a date": ("[read]\nbuilding_classes = [2020-01-01]", [], "a whole number"),
-    "number of 5,000 digits": (f"[read]\nsplit_min_points = {HUGE}", [], "expected a TOML settings file"),
-    "hexadecimal of 5,000 digits": (f"[read]\nbuilding_classes = [0x{HUGE}]", [], "more than 15 digits"),
+    "number of 5,000 "
+    "digits": (f"[read]\nsplit_min_points = {HUGE}", [], "expected a TOML settings file"),
+    "hexadecimal of 5,000 "
+    "digits": (f"[read]\nbuilding_classes = [0x{HUGE}]", [], "more than 15 digits"),
     "number of text": ('[read]\nsplit_min_points = "30"', [], "a whole number, got '30'"),
     "infinite whole number": ("[read]\nsplit_min_points = inf", [], "a whole number, got inf"),
-    "whole number as a boolean": ("[city]\nmax_points_a_building = true", [], "a whole number, got True"),
+    "whole number as a "
+    "boolean": ("[city]\nmax_points_a_building = true", [], "a whole number, got True"),
     "infinite length": ("[compose]\nsnap_m = inf", [], "between 0.001 and 0.05 m, got inf"),
-    "length that is no number": ("[compose]\nsnap_m = nan", [], "between 0.001 and 0.05 m, got nan"),
+    "length that is no "
+    "number": ("[compose]\nsnap_m = nan", [], "between 0.001 and 0.05 m, got nan"),
     "negative length": ("[compose]\nsnap_m = -0.01", [], "between 0.001 and 0.05 m, got -0.01"),
     "length of text": ('[compose]\nsnap_m = "0.01"', [], "a number, got '0.01'"),
     "length of a boolean": ("[compound]\ntolerance_m = true", [], "a number, got True"),
     "length of a list": ("[compound]\ntolerance_m = [0.2]", [], "a number, got a list of 1"),
     "whole length": ("[read]\nsplit_gap_m = 2", [], RUNS),
-    "softness below zero": ("[fit]\nside_softness_m = [-1.0]", [], "between 0.001 and 1.0 m, got -1.0"),
-    "softness no number": ("[fit]\nside_softness_m = [nan]", [], "between 0.001 and 1.0 m, got nan"),
+    "softness below "
+    "zero": ("[fit]\nside_softness_m = [-1.0]", [], "between 0.001 and 1.0 m, got -1.0"),
+    "softness no "
+    "number": ("[fit]\nside_softness_m = [nan]", [], "between 0.001 and 1.0 m, got nan"),
     "softness of text": ('[fit]\nside_softness_m = ["a"]', [], "a number, got 'a'"),
     "softness of all kinds": ('[fit]\nside_softness_m = [-1, nan, "a"]', [], "got -1"),
     "no softness": ("[fit]\nside_softness_m = []", [], "1 or more values"),
-    "points below the least": ("[city]\nmax_points_a_building = 10", [], "between 1000 and 10000000"),
+    "points below the "
+    "least": ("[city]\nmax_points_a_building = 10", [], "between 1000 and 10000000"),
     "boolean of a number": ("[segment]\nenabled = 1", [], "true or false, got 1"),
     "boolean of text": ('[write]\nparquet = "yes"', [], "true or false, got 'yes'"),
     "text of a number": ("[read]\ncrs = 28992", [], "to be text, got 28992"),
@@ -66,17 +76,22 @@ CONFIGURATIONS = {
     "unknown models": ("", ["--models", "none"], "merged, tiles, both, got 'none'"),
     "very long choice": ("", ["--parts", "x" * 5000], "xxx..."),
     "types": ("", ["--types", "gable, hip"], RUNS),
-    "types misspelt": ("", ["--types", "Gable,hipp"], "'Gable' (did you mean gable?), 'hipp' (did you mean hip?)"),
+    "types misspelt": ("", ["--types", "Gable,hipp"], "'Gable' (did you mean gable?), 'hipp' (did "
+                                                      "you mean hip?)"),
     "types of another kind": ("", ["--types", "dome"], "got 'dome'"),
     "types with a comma too many": ("", ["--types", "gable,"], "got ''"),
     "types of numbers": ("[fit]\ntypes = [1]", [], "to be text, got 1"),
     "types misspelt in the file": ('[fit]\ntypes = ["half-hip"]', [], "did you mean half_hip?"),
-    "weights that are missing": ('[segment]\nweights = "missing.onnx"', [], "weights at missing.onnx"),
-    "weights that are no network": ('[segment]\nweights = "{cloud}"', [], "expected an ONNX network"),
-    "missing weights nobody asks for": ('[segment]\nweights = "missing.onnx"', ["--no-network"], RUNS),
+    "weights that are "
+    "missing": ('[segment]\nweights = "missing.onnx"', [], "weights at missing.onnx"),
+    "weights that are no "
+    "network": ('[segment]\nweights = "{cloud}"', [], "expected an ONNX network"),
+    "missing weights nobody asks "
+    "for": ('[segment]\nweights = "missing.onnx"', ["--no-network"], RUNS),
     "no CUDA": ('[segment]\ndevice = "cuda"', [], "expected a CUDA device"),
     "CRS in degrees": ('[read]\ncrs = "EPSG:4326"', [], "projected CRS, got WGS 84 in degrees"),
-    "CRS in degrees as an option": ("", ["--crs", "EPSG:4326"], "projected CRS, got WGS 84 in degrees"),
+    "CRS in degrees as an "
+    "option": ("", ["--crs", "EPSG:4326"], "projected CRS, got WGS 84 in degrees"),
     "CRS of heights": ("", ["--crs", "EPSG:5709"], RUNS),
     "CRS that nobody knows": ("", ["--crs", "EPSG:99999999"], 'such as "EPSG:7415"'),
     "CRS that is noise": ("", ["--crs", "\x01 {{}}"], 'such as "EPSG:7415"'),
@@ -84,7 +99,8 @@ CONFIGURATIONS = {
     "CRS in feet": ("", ["--crs", "EPSG:2263+6360", "--unit", "us-survey-foot"], RUNS),
     "unit": ("", ["--unit", "foot"], RUNS),
     "unknown unit": ("", ["--unit", "yard"], "auto, metre, foot, us-survey-foot, got 'yard'"),
-    "unit against the CRS": ("", ["--crs", "EPSG:7415", "--unit", "foot"], "in foot, as --unit says"),
+    "unit against the "
+    "CRS": ("", ["--crs", "EPSG:7415", "--unit", "foot"], "in foot, as --unit says"),
     "no jobs": ("", ["--jobs", "0"], "--jobs between 1 and 1024, got 0"),
     "negative jobs": ("", ["--jobs", "-4"], "--jobs between 1 and 1024, got -4"),
     "10^12 jobs": ("", ["--jobs", "1000000000000"], "--jobs between 1 and 1024"),
@@ -124,14 +140,26 @@ def begun(monkeypatch):
 
 
 @pytest.mark.parametrize("name", CONFIGURATIONS)
-def test_a_configuration_begins_or_gets_one_sentence(name, begun, town_files, tmp_path, monkeypatch, capsys):
+def test_a_configuration_begins_or_gets_one_sentence(
+    name, begun, town_files, tmp_path, monkeypatch, capsys
+):
     from hiproof.settings import Settings
 
     toml, options, expected = CONFIGURATIONS[name]
     config = tmp_path / "settings.toml"
     config.write_text(toml.format(defaults=Settings().to_toml(), cloud=town_files[0]))
-    arguments = ["reconstruct", town_files[0], "--out", str(tmp_path / "out"), "--config", str(config), *options]
-    monkeypatch.setattr(sys, "argv", ["hiproof", *(option.replace("{{}}", "{}") for option in arguments)])
+    arguments = [
+        "reconstruct",
+        town_files[0],
+        "--out",
+        str(tmp_path / "out"),
+        "--config",
+        str(config),
+        *options,
+    ]
+    monkeypatch.setattr(
+        sys, "argv", ["hiproof", *(option.replace("{{}}", "{}") for option in arguments)]
+    )
     with pytest.raises(SystemExit) as ended:
         main()
     told = capsys.readouterr().err

@@ -1,4 +1,6 @@
-"""Overrides: the fit obeys them and fits the rest; a run with others redoes those buildings alone."""
+"""Overrides: the fit obeys them and fits the rest; a run with others redoes those
+buildings alone.
+"""
 
 import dataclasses
 import doctest
@@ -54,7 +56,9 @@ def test_a_ridge_is_obeyed_and_the_contradiction_is_said(scanned):
     house = obeyed(scanned, ridge_height=12.0)
     assert house.solid.vertices[:, 2].max() == pytest.approx(12.0, abs=0.01)
     assert house.grade is Grade.POOR and "overridden: ridge_height 12.0" in house.detail
-    assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith("ridge_height 8.0 (seen, anna)")
+    assert obeyed(scanned, ridge_height=8.0, who="anna", note="seen").detail.endswith(
+        "ridge_height 8.0 (seen, anna)"
+    )
 
 
 def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(scanned):
@@ -65,7 +69,9 @@ def test_a_ground_given_settles_the_doubt_about_a_terrain_above_the_eaves(scanne
             return np.full(len(xy), 50.0)
 
     for said, is_told in (({"type": "gable"}, True), ({"z_ground": 1.0}, False)):
-        house = overridden(override_of({"id": "a", **said}), *scanned, Above(), settings=PLAIN, id="a")
+        house = overridden(
+            override_of({"id": "a", **said}), *scanned, Above(), settings=PLAIN, id="a"
+        )
         assert ("above its eaves" in house.detail) == is_told
 
 
@@ -88,7 +94,9 @@ def test_no_more_parts_than_asked_for():
 
 
 def test_parts_given_stand_where_the_run_moved_the_footprint():
-    """What a run wrote of a footprint beside its roof is an override that gives the run's own building again, moved and measured."""
+    """What a run wrote of a footprint beside its roof is an override that gives the run's own
+    building again, moved and measured.
+    """
     rng = np.random.default_rng(3)
     xy = rng.uniform((0, 0), (12, 8), (800, 2))
     scan = np.column_stack([xy, 8.0 - 0.75 * np.abs(xy[:, 1] - 4.0) + rng.normal(0, 0.02, len(xy))])
@@ -127,7 +135,9 @@ def test_parts_given_are_the_parts(scanned):
     assert house.type == "hip" and house.parts[0].parameters["ridge_length"] == 5.0
     assert house.quality.points > 500 and house.attributes == {} and "fitted" not in house.detail
     empty = overridden(
-        override_of({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}), np.zeros((0, 3)), scanned[1]
+        override_of({"id": "a", "parts": [part], "origin": [6, 4, 0], "z_ground": 0}),
+        np.zeros((0, 3)),
+        scanned[1],
     )
     assert empty.status is Status.MODELLED and not check_solid(empty.solid)
 
@@ -151,17 +161,26 @@ def test_a_part_list_that_makes_no_roof_is_one_sentence(scanned):
         ({"id": "a", "types": [["hip"]]}, r"got \['hip'\]"),
         ({"id": "a", "type": ["hip"]}, r"got \['hip'\]"),
         ({"id": "a", "leave_out": True, "type": "hip"}, "leave_out without"),
-        ({"id": "a", "leave_out": "false"}, "true or false as leave_out of the override of 'a', got 'false'"),
+        (
+            {"id": "a", "leave_out": "false"},
+            "true or false as leave_out of the override of 'a', got 'false'",
+        ),
         ({"id": "a", "leave_out": ["no"]}, "true or false as leave_out"),
         ({"id": "a", "block_height": 3, "ridge_height": 3}, "block_height without"),
         ({"id": "a", "block_height": -3}, "block_height from 0.1 to 1000 .* got -3"),
         ({"id": "a", "parts": 1.5}, "whole number"),
         ({"id": "a", "parts": 0}, "parts from 1 to"),
         ({"id": "a", "parts": []}, "the origin of its parts"),
-        ({"id": "a", "parts": [], "origin": [0, 0, 0], "type": "hip", "ridge_height": 3}, "list of parts without"),
+        (
+            {"id": "a", "parts": [], "origin": [0, 0, 0], "type": "hip", "ridge_height": 3},
+            "list of parts without",
+        ),
         ({"id": "a", "ridge_height": float("nan")}, "a number as ridge_height"),
         ({"id": "a", "fixed": {"height": "high"}}, "a number as height"),
-        ({"id": "a", "ridge_height": 1e9}, "ridge_height from -600 to 10000 in the override of 'a', got 1e\\+09"),
+        (
+            {"id": "a", "ridge_height": 1e9},
+            "ridge_height from -600 to 10000 in the override of 'a', got 1e\\+09",
+        ),
         ({"id": "a", "z_ground": -9999}, "z_ground from -600 to 10000 in the override of 'a'"),
         ({"id": "a", "block_height": 1e6}, "block_height from 0.1 to 1000 in the override of 'a'"),
         ("hip", "an object as an override"),
@@ -190,7 +209,12 @@ def request(town_files, out, path, *lines, **changes):
         path.write_text("".join(json.dumps(line) + "\n" for line in lines))
     settings = PLAIN.replace(changes.pop("settings", {}))
     return hiproof.Request(
-        (town_files[0],), out, town_files[1], settings=settings, overrides=path and str(path), **changes
+        (town_files[0],),
+        out,
+        town_files[1],
+        settings=settings,
+        overrides=path and str(path),
+        **changes,
     )
 
 
@@ -204,12 +228,16 @@ def test_a_run_with_other_overrides_redoes_those_buildings_alone(town_files, tmp
     run(request(town_files, out, path, {"id": "house-1", "type": "hip"}))
     assert counted == ["house-1"]
     changed = by_id(out)
-    assert {id for id in rows if changed[id] != rows[id]} == {"house-1"} and changed["house-1"]["type"] == "hip"
+    assert {id for id in rows if changed[id] != rows[id]} == {"house-1"} and changed["house-1"][
+        "type"
+    ] == "hip"
     counted.clear()
     run(request(town_files, out, path, {"id": "house-1", "type": "hip"}))
     assert counted == []
     run(request(town_files, out, path, {"id": "house-2", "leave_out": True}))
-    assert sorted(counted) == ["house-1", "house-2"] and by_id(out)["house-2"]["status"] == "left_out"
+    assert (
+        sorted(counted) == ["house-1", "house-2"] and by_id(out)["house-2"]["status"] == "left_out"
+    )
     together = records(out)
     counted.clear()
     run(request(town_files, out, None))
@@ -221,7 +249,9 @@ def test_a_run_with_other_overrides_redoes_those_buildings_alone(town_files, tmp
 def points_read(out):
     """How many points the last run in `out` read."""
     return sum(
-        json.loads(t.message)["points"] for t in Ledger(out / ".hiproof/ledger.sqlite").tasks() if t.kind == "sort"
+        json.loads(t.message)["points"]
+        for t in Ledger(out / ".hiproof/ledger.sqlite").tasks()
+        if t.kind == "sort"
     )
 
 
@@ -274,7 +304,9 @@ def test_a_runs_own_parameters_are_overrides_that_change_nothing(town_files, und
     first = tmp_path / "first"
     city_run.reconstruct_area(request(town_files, first, None))
     ask = request(town_files, tmp_path / "again", None)
-    city_run.reconstruct_area(hiproof.Request(**{**vars(ask), "overrides": str(first / "parameters.jsonl")}))
+    city_run.reconstruct_area(
+        hiproof.Request(**{**vars(ask), "overrides": str(first / "parameters.jsonl")})
+    )
     was, now = by_id(first), by_id(tmp_path / "again")
     for id in was:
         assert now[id]["parts"] == was[id]["parts"] and now[id]["z_ground"] == was[id]["z_ground"]
@@ -282,11 +314,15 @@ def test_a_runs_own_parameters_are_overrides_that_change_nothing(town_files, und
 
 
 def columns_request(town_files, tmp_path, pair):
-    """A run over footprints that have a column `daktype`, of whose settings `pair` is the only one of override_columns."""
+    """A run over footprints that have a column `daktype`, of whose settings `pair` is the only one
+    of override_columns.
+    """
     meta, _, outlines, columns = pyogrio.raw.read(town_files[1])
     types = np.array(["hip", *[None] * (len(outlines) - 1)], object)
     names, path = [*meta["fields"], "daktype"], tmp_path / "footprints.gpkg"
-    pyogrio.raw.write(path, outlines, [*columns, types], names, geometry_type="Polygon", crs=meta["crs"])
+    pyogrio.raw.write(
+        path, outlines, [*columns, types], names, geometry_type="Polygon", crs=meta["crs"]
+    )
     settings = PLAIN.replace({"read": {"override_columns": [pair]}})
     return hiproof.Request((town_files[0],), tmp_path / "out", str(path), settings=settings)
 
@@ -299,13 +335,22 @@ def test_columns_of_the_footprints_override_too(town_files, tmp_path):
 
 
 def columns_run(folder, key, values, town):
-    """What a run writes, by id, of a town whose footprints have a column that holds `values` of the override's `key`."""
+    """What a run writes, by id, of a town whose footprints have a column that holds `values` of the
+    override's `key`.
+    """
     cloud = write_cloud(folder / "cloud.laz", town.xyz, town.classification)
     outlines = shapely.to_wkb(np.array(list(town.footprints.values()), object))
-    columns, path = [np.array(list(town.footprints), object), np.array(values)], folder / "footprints.gpkg"
-    pyogrio.raw.write(path, outlines, columns, ["id", "known"], geometry_type="Polygon", crs="EPSG:28992")
+    columns, path = (
+        [np.array(list(town.footprints), object), np.array(values)],
+        folder / "footprints.gpkg",
+    )
+    pyogrio.raw.write(
+        path, outlines, columns, ["id", "known"], geometry_type="Polygon", crs="EPSG:28992"
+    )
     settings = PLAIN.replace({"read": {"override_columns": [f"known={key}"]}})
-    city_run.reconstruct_area(hiproof.Request((str(cloud),), folder / "out", str(path), settings=settings))
+    city_run.reconstruct_area(
+        hiproof.Request((str(cloud),), folder / "out", str(path), settings=settings)
+    )
     return by_id(folder / "out")
 
 
@@ -313,11 +358,19 @@ def columns_run(folder, key, values, town):
 def test_a_ground_of_0_counts_and_codes_are_left_out_and_told(tmp_path, kind):
     town = make_town(houses=4)
     values = [kind(value) for value in (0.0, -0.5, -9999.0, 3.4e38)]
-    with pytest.warns(InputWarning, match="z_ground from -600 to 10000, left out 2 of its values: -9999"):
+    with pytest.warns(
+        InputWarning, match="z_ground from -600 to 10000, left out 2 of its values: -9999"
+    ):
         rows = columns_run(tmp_path, "z_ground", values, town)
     z = {id: row["z_ground"] for id, row in rows.items()}
-    assert z["house-0"] == 0.0 and z["house-1"] == -0.5 and rows["house-0"]["ground_source"] == "override"
-    assert z["house-2"] == pytest.approx(2.7, abs=0.1) and z["house-3"] == pytest.approx(3.0, abs=0.1)
+    assert (
+        z["house-0"] == 0.0
+        and z["house-1"] == -0.5
+        and rows["house-0"]["ground_source"] == "override"
+    )
+    assert z["house-2"] == pytest.approx(2.7, abs=0.1) and z["house-3"] == pytest.approx(
+        3.0, abs=0.1
+    )
     assert "overridden" not in rows["house-2"]["detail"]
 
 
@@ -327,19 +380,28 @@ def test_a_ridge_at_0_counts(tmp_path):
     (row,) = columns_run(tmp_path, "ridge_height", [0.0], low).values()
     assert "overridden: ridge_height 0.0" in row["detail"]
     (part,) = row["parts"]
-    assert part["position"][2] + row["origin"][2] + part["parameters"]["height"] == pytest.approx(0.0, abs=0.01)
+    assert part["position"][2] + row["origin"][2] + part["parameters"]["height"] == pytest.approx(
+        0.0, abs=0.01
+    )
 
 
-@pytest.mark.parametrize("key, value", [("parts", 0), ("block_height", 0.0), ("block_height", -9999.0)])
+@pytest.mark.parametrize(
+    "key, value", [("parts", 0), ("block_height", 0.0), ("block_height", -9999.0)]
+)
 def test_sizes_of_0_in_a_column_are_left_out_and_told(tmp_path, key, value):
-    with pytest.warns(InputWarning, match=f"expected {key} from .*, left out 1 of its values: .* of house-0"):
+    with pytest.warns(
+        InputWarning, match=f"expected {key} from .*, left out 1 of its values: .* of house-0"
+    ):
         (row,) = columns_run(tmp_path, key, [value], make_town(houses=1)).values()
     assert row["status"] == "modelled" and "overridden" not in row["detail"]
 
 
 def test_a_ground_given_far_from_the_ground_points_is_obeyed_and_told(tmp_path):
     (row,) = columns_run(tmp_path, "z_ground", [-99.0], make_town(houses=1)).values()
-    assert row["z_ground"] == -99.0 and "the ground given lies 101.1 m below the ground points" in row["detail"]
+    assert (
+        row["z_ground"] == -99.0
+        and "the ground given lies 101.1 m below the ground points" in row["detail"]
+    )
 
 
 @pytest.mark.parametrize("said", [{"leave_out": True}, {"block_height": 5.0}, {"types": ["gable"]}])
@@ -348,7 +410,11 @@ def test_where_a_file_says_something_else_than_columns_the_file_counts(town_file
     request = columns_request(town_files, tmp_path, "daktype=type")
     city_run.reconstruct_area(dataclasses.replace(request, overrides=str(tmp_path / "o.jsonl")))
     house = by_id(tmp_path / "out")["house-0"]
-    assert house["type"] != "hip" and "overridden: " in house["detail"] and "hip" not in house["detail"]
+    assert (
+        house["type"] != "hip"
+        and "overridden: " in house["detail"]
+        and "hip" not in house["detail"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -359,7 +425,9 @@ def test_where_a_file_says_something_else_than_columns_the_file_counts(town_file
         ("daktype", "keys of an override .*got ''"),
     ],
 )
-def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(pair, message, town_files, tmp_path):
+def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(
+    pair, message, town_files, tmp_path
+):
     with pytest.raises(InputError, match=message):
         city_run.reconstruct_area(columns_request(town_files, tmp_path, pair))
     (tmp_path / "footprints.gpkg").unlink()
@@ -368,18 +436,25 @@ def test_columns_that_are_not_there_are_refused_and_hold_the_folder_not(pair, me
 
 
 def test_a_table_of_typed_columns_says_what_it_says_where_rows_leave_gaps(tmp_path):
-    """A yes beside a row without one was read as 1.0, which said nothing: the house that was pulled down stayed."""
+    """A yes beside a row without one was read as 1.0, which said nothing: the house that was pulled
+    down stayed.
+    """
     gaps = np.array([True, False, False])
     columns = [np.array([7, 8, 9]), np.array([False, True, False]), np.array([0, 0, 2], np.int32)]
     path = str(tmp_path / "o.gpkg")
     masks = [None, gaps, np.array([True, True, False])]
     pyogrio.raw.write(path, None, columns, ["id", "leave_out", "parts"], masks)
     rows = table_records(path)
-    assert rows == [{"id": "7"}, {"id": "8", "leave_out": True}, {"id": "9", "leave_out": False, "parts": 2}]
+    assert rows == [
+        {"id": "7"},
+        {"id": "8", "leave_out": True},
+        {"id": "9", "leave_out": False, "parts": 2},
+    ]
 
 
 @pytest.mark.parametrize(
-    "text, told", [("yes", True), ("Y", True), ("1.0", True), ("no", False), ("0", False), ("", None)]
+    "text, told",
+    [("yes", True), ("Y", True), ("1.0", True), ("no", False), ("0", False), ("", None)],
 )
 def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, text, told):
     (tmp_path / "o.csv").write_text(f"id,leave_out\na,{text}\n")
@@ -391,11 +466,19 @@ def test_a_table_says_yes_in_many_ways_and_what_is_none_is_refused(tmp_path, tex
 
 
 def test_tables_override_too(town_files, tmp_path):
-    (tmp_path / "o.csv").write_text("id,type,ridge_height,leave_out\nhouse-0,hip,,\nhouse-1,,,true\nelsewhere,,9.5,\n")
-    with pytest.warns(InputWarning, match="no building of this run for 1 of 3 overrides: elsewhere"):
+    (tmp_path / "o.csv").write_text(
+        "id,type,ridge_height,leave_out\nhouse-0,hip,,\nhouse-1,,,true\nelsewhere,,9.5,\n"
+    )
+    with pytest.warns(
+        InputWarning, match="no building of this run for 1 of 3 overrides: elsewhere"
+    ):
         city_run.reconstruct_area(
             hiproof.Request(
-                (town_files[0],), tmp_path / "out", town_files[1], settings=PLAIN, overrides=str(tmp_path / "o.csv")
+                (town_files[0],),
+                tmp_path / "out",
+                town_files[1],
+                settings=PLAIN,
+                overrides=str(tmp_path / "o.csv"),
             )
         )
     rows = by_id(tmp_path / "out")
@@ -410,10 +493,17 @@ def test_tables_override_too(town_files, tmp_path):
         ('\n{"id": "a", "type": "onion"}\n', "line 2 of .*: expected roof types"),
     ],
 )
-def test_overrides_that_cannot_be_read_are_refused_before_anything_is_redone(text, message, town_files, tmp_path):
+def test_overrides_that_cannot_be_read_are_refused_before_anything_is_redone(
+    text, message, town_files, tmp_path
+):
     (tmp_path / "o.jsonl").write_text(text)
     with pytest.raises(InputError, match=message):
         city_run.reconstruct_area(
-            hiproof.Request((town_files[0],), tmp_path / "out", town_files[1], overrides=str(tmp_path / "o.jsonl"))
+            hiproof.Request(
+                (town_files[0],),
+                tmp_path / "out",
+                town_files[1],
+                overrides=str(tmp_path / "o.jsonl"),
+            )
         )
     assert not list((tmp_path / "out").glob("*.gml"))

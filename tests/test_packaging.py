@@ -1,4 +1,6 @@
-"""What is published works by itself: the source archive makes the wheel, and the wheel, alone in an environment, models the demo."""
+"""What is published works by itself: the source archive makes the wheel, and the wheel, alone in an
+environment, models the demo.
+"""
 
 import os
 import shutil
@@ -19,7 +21,9 @@ OURS = {name for name in OURS if "__pycache__" not in name}
 
 
 def run(*command, **options):
-    done = subprocess.run(list(map(str, command)), capture_output=True, text=True, check=False, **options)
+    done = subprocess.run(
+        list(map(str, command)), capture_output=True, text=True, check=False, **options
+    )
     assert done.returncode == 0, done.stderr
     return done.stdout
 
@@ -27,7 +31,9 @@ def run(*command, **options):
 @pytest.fixture(scope="module")
 def built(tmp_path_factory):
     """(source archive, wheel made of nothing else)."""
-    pytest.importorskip("hatchling", reason="building needs hatchling, which the extra `test` brings")
+    pytest.importorskip(
+        "hatchling", reason="building needs hatchling, which the extra `test` brings"
+    )
     folder = tmp_path_factory.mktemp("built")
     run(sys.executable, "-m", "hatchling", "build", "-t", "sdist", "-d", folder, cwd=ROOT)
     (archive,) = folder.glob("*.tar.gz")
@@ -50,17 +56,33 @@ def built(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def installed(built, tmp_path_factory):
-    """The python of an environment that holds the wheel, and beside it only what the wheel depends on."""
+    """The python of an environment that holds the wheel, and beside it only what the wheel depends
+    on.
+    """
     home = tmp_path_factory.mktemp("clean")
     venv.create(home, with_pip=False)
     python = home / ("Scripts/python.exe" if os.name == "nt" else "bin/python")
-    run(sys.executable, "-m", "pip", "--python", python, "install", "--quiet", "--no-deps", "--no-index", built[1])
+    run(
+        sys.executable,
+        "-m",
+        "pip",
+        "--python",
+        python,
+        "install",
+        "--quiet",
+        "--no-deps",
+        "--no-index",
+        built[1],
+    )
     (site,) = [path for path in home.rglob("site-packages") if (path / "hiproof").is_dir()]
     dependencies = [
-        path for path in dict.fromkeys([sysconfig.get_path("purelib"), *sys.path]) if "site-packages" in path
+        path
+        for path in dict.fromkeys([sysconfig.get_path("purelib"), *sys.path])
+        if "site-packages" in path
     ]
     (site / "dependencies.pth").write_text("\n".join(dependencies), encoding="utf-8")
-    for kept in PACKAGE.rglob("*.nbc"):  # compiled code belongs to its sources, and these are the same
+    # compiled code belongs to its sources, and these are the same
+    for kept in PACKAGE.rglob("*.nbc"):
         place = site / "hiproof" / kept.relative_to(PACKAGE)
         place.parent.mkdir(exist_ok=True)
         shutil.copy2(kept, place)
@@ -83,7 +105,9 @@ def test_the_archive_is_small_and_holds_what_builds_and_tests_it(built):
 
 
 def test_the_installed_wheel_is_imported_and_models_the_demo(installed, tmp_path):
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("PYTHON")}
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith("PYTHON")
+    }
     code = "import hiproof; print(hiproof.__file__); print(hiproof.__version__)"
     place, version = run(installed, "-c", code, cwd=tmp_path, env=environment).split()
     assert Path(place).is_relative_to(installed.parents[1])
@@ -96,4 +120,6 @@ def test_the_installed_wheel_is_imported_and_models_the_demo(installed, tmp_path
 def test_a_citation_names_the_version_that_is_there():
     import hiproof
 
-    assert f"version: {hiproof.__version__}\n" in (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"version: {hiproof.__version__}\n" in (ROOT / "CITATION.cff").read_text(
+        encoding="utf-8"
+    )

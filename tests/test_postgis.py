@@ -46,11 +46,15 @@ def table(database):
         shapely.MultiPolygon([shapely.box(20, 0, 30, 10), shapely.box(40, 0, 50, 10)]),
     )
     with psycopg.connect(database) as connection:
-        connection.execute("create table houses (id text, storeys int, geom geometry(Geometry, 28992), extra geometry)")
+        connection.execute(
+            "create table houses (id text, storeys int, geom geometry(Geometry, 28992), extra "
+            "geometry)"
+        )
         for id, storeys, shape in (("a", 2, square), ("b", 3, pair), ("c", None, None)):
             wkb = shapely.to_wkb(shape) if shape is not None else None
             connection.execute(
-                "insert into houses values (%s, %s, ST_SetSRID(%s::geometry, 28992))", (id, storeys, wkb)
+                "insert into houses values (%s, %s, ST_SetSRID(%s::geometry, 28992))",
+                (id, storeys, wkb),
             )
     return f"{database}&table=houses&geometry=geom"
 
@@ -75,7 +79,10 @@ def test_the_reference_system_is_asked_for_without_reading_rows(table, monkeypat
     ("change", "expected"),
     [
         (lambda t: t.replace("houses", "castles"), "castles"),
-        (lambda t: t.replace("&geometry=geom", ""), "one geometry column in houses, got extra, geom|geom, extra"),
+        (
+            lambda t: t.replace("&geometry=geom", ""),
+            "one geometry column in houses, got extra, geom|geom, extra",
+        ),
         (lambda t: t.replace("&table=houses", ""), "table=schema.name"),
         (lambda t: t + "&where=storeys=99", "without rows"),
         (lambda t: t + "&where=nonsense=1", "nonsense"),
@@ -108,7 +115,10 @@ def test_a_comment_in_a_condition_does_not_swallow_the_order(table):
 
 
 def test_no_server_gets_a_sentence_and_hides_the_password(tmp_path):
-    for address in (f"me:secret@/postgres?host={tmp_path}", f"me@/postgres?host={tmp_path}&password=secret"):
+    for address in (
+        f"me:secret@/postgres?host={tmp_path}",
+        f"me@/postgres?host={tmp_path}&password=secret",
+    ):
         with pytest.raises(InputError, match="check address and table") as caught:
             read_footprints(f"postgresql://{address}&table=houses")
         assert "secret" not in str(caught.value)
@@ -143,9 +153,15 @@ def test_models_load_once_however_often_they_are_loaded(database, tmp_path):
 
 
 def reconstructed_gable(rotation=0.0):
-    """A gable of 12 by 8 m whose ridge runs east, or so many degrees to the north of it, built of its parameters."""
+    """A gable of 12 by 8 m whose ridge runs east, or so many degrees to the north of it, built of
+    its parameters.
+    """
     ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
-    part = {"type": "gable", "parameters": {"width": 8, "length": 12, "height": 3}, "position": [0, 0, 5]}
+    part = {
+        "type": "gable",
+        "parameters": {"width": 8, "length": 12, "height": 3},
+        "position": [0, 0, 5],
+    }
     part["rotation"] = rotation
     place = {"origin": [85000, 446000, 0], "outline": [ring], "z_ground": 0}
     return hiproof.build({"id": "south", **place, "parts": [part]})
@@ -154,16 +170,32 @@ def reconstructed_gable(rotation=0.0):
 def nearly_level():
     """A shallow roof, which drains but does not slope to the eye."""
     ring = [[0, 0], [9, 0], [9, 6], [0, 6], [0, 0]]
-    part = {"type": "monopitch", "parameters": {"width": 6, "length": 9, "height": 0.2}, "position": [4.5, 3, 5]}
+    part = {
+        "type": "monopitch",
+        "parameters": {"width": 6, "length": 9, "height": 0.2},
+        "position": [4.5, 3, 5],
+    }
     return hiproof.build(
-        {"id": "level", "origin": [85050, 446000, 0], "outline": [ring], "z_ground": 0, "parts": [part]}
+        {
+            "id": "level",
+            "origin": [85050, 446000, 0],
+            "outline": [ring],
+            "z_ground": 0,
+            "parts": [part],
+        }
     )
 
 
 @pytest.fixture
 def run_of_two(tmp_path):
-    """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without model."""
-    buildings = [modelled(gable_house(), "house"), modelled(courtyard(), "yard", ("flat",)), unmodelled()]
+    """Folder and buildings of a run as our writer leaves it: a gable, a courtyard, one without
+    model.
+    """
+    buildings = [
+        modelled(gable_house(), "house"),
+        modelled(courtyard(), "yard", ("flat",)),
+        unmodelled(),
+    ]
     (tmp_path / "run").mkdir()
     write_cityjson(tmp_path / "run" / "buildings.city.jsonl", buildings, "EPSG:7415")
     write_attributes(tmp_path / "run" / "buildings.gpkg", buildings, "EPSG:7415")
@@ -174,23 +206,40 @@ def test_columns_hold_what_the_models_say(database, run_of_two):
     folder, buildings = run_of_two
     load_postgis(folder, database, "told")
     with psycopg.connect(database) as connection:
-        told = connection.execute("select id, status, roof_type from told_buildings order by id").fetchall()
+        told = connection.execute(
+            "select id, status, roof_type from told_buildings order by id"
+        ).fetchall()
         assert told == sorted((b.id, b.status.code, b.type) for b in buildings)
-        types = connection.execute("select distinct building_id, type from told_roofs order by 1").fetchall()
+        types = connection.execute(
+            "select distinct building_id, type from told_roofs order by 1"
+        ).fetchall()
         assert types == [("house", "gable"), ("yard", "flat")]
-        told = connection.execute("select building_id, part, type, width, ridge_length from told_parts order by 1")
+        told = connection.execute(
+            "select building_id, part, type, width, ridge_length from told_parts order by 1"
+        )
         assert told.fetchall() == [("house", 0, "gable", 8.0, None), ("yard", 0, "flat", 8.0, None)]
-        sql = "select GeometryType(geom), ST_Area(geom), area_m2 from told_parts where building_id = 'house'"
+        sql = (
+            "select GeometryType(geom), ST_Area(geom), area_m2 from told_parts where building_id = "
+            "'house'"
+        )
         assert connection.execute(sql).fetchone() == ("MULTIPOLYGON", 96.0, 96.0)
 
 
 def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
-    """Also where models are written in a map that stretches them, and of faces too level to have an azimuth."""
-    write_parameters(tmp_path / "parameters.jsonl", [reconstructed_gable(30.0), nearly_level()], "EPSG:7415")
-    build_file(tmp_path / "parameters.jsonl", tmp_path / "run", changes={"write": {"out_crs": "EPSG:3857"}})
+    """Also where models are written in a map that stretches them, and of faces too level to have an
+    azimuth.
+    """
+    write_parameters(
+        tmp_path / "parameters.jsonl", [reconstructed_gable(30.0), nearly_level()], "EPSG:7415"
+    )
+    build_file(
+        tmp_path / "parameters.jsonl", tmp_path / "run", changes={"write": {"out_crs": "EPSG:3857"}}
+    )
     load(tmp_path / "run", database, "map")
     names = ["slope_deg", "azimuth_deg", "area_m2"]
-    meta, _, _, columns = pyogrio.raw.read(tmp_path / "run" / "buildings.gpkg", layer="roof_surfaces", columns=names)
+    meta, _, _, columns = pyogrio.raw.read(
+        tmp_path / "run" / "buildings.gpkg", layer="roof_surfaces", columns=names
+    )
     with psycopg.connect(database) as connection:
         sql = f"select {', '.join(meta['fields'])} from map_roofs order by building_id desc, number"
         found = np.array(connection.execute(sql).fetchall(), float)
@@ -199,20 +248,24 @@ def test_roofs_are_measured_as_in_the_geopackage(database, tmp_path):
 
 def documented(number, prefix):
     """A question of docs/tables.md, for the tables of a prefix."""
-    return re.findall(r"```sql\n(.*?)```", (DOCS / "tables.md").read_text(), re.DOTALL)[number].replace(
-        "hiproof_", f"{prefix}_"
-    )
+    return re.findall(r"```sql\n(.*?)```", (DOCS / "tables.md").read_text(), re.DOTALL)[
+        number
+    ].replace("hiproof_", f"{prefix}_")
 
 
 def test_the_documented_question_of_a_solar_map(database, tmp_path):
-    """Roof surfaces of 20 m2 or more that look between south-east and south-west, as docs/tables.md asks for them."""
+    """Roof surfaces of 20 m2 or more that look between south-east and south-west, as docs/tables.md
+    asks for them.
+    """
     house = reconstructed_gable()
     (tmp_path / "run").mkdir()
     write_all(tmp_path / "run", [house], "EPSG:7415")
     load_postgis(tmp_path / "run", database, "solar")
     with psycopg.connect(database) as connection:
         rows = connection.execute(documented(1, "solar")).fetchall()
-    assert [(id, kind, round(azimuth)) for id, kind, azimuth, *_ in rows] == [("south", "gable", 180)]
+    assert [(id, kind, round(azimuth)) for id, kind, azimuth, *_ in rows] == [
+        ("south", "gable", 180)
+    ]
 
 
 def test_the_documented_question_of_rectangles(database, tmp_path):
@@ -234,12 +287,16 @@ def test_postgis_computes_the_volumes_that_the_attributes_name(database, run_of_
     folder, buildings = run_of_two
     load_postgis(folder, database, "volumes")
     with psycopg.connect(database) as connection:
-        if not connection.execute("select 1 from pg_available_extensions where name = 'postgis_sfcgal'").fetchone():
+        if not connection.execute(
+            "select 1 from pg_available_extensions where name = 'postgis_sfcgal'"
+        ).fetchone():
             pytest.skip("PostGIS was built without SFCGAL, which computes volumes")
         extension, question = documented(2, "volumes").split(";\n", 1)
         connection.execute(extension)
         volumes = dict(connection.execute(question).fetchall())
-    assert volumes == pytest.approx({b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.built}, abs=0.0005)
+    assert volumes == pytest.approx(
+        {b.id: roof_figures(b.solid).volume_m3 for b in buildings if b.built}, abs=0.0005
+    )
 
 
 def test_loading_again_replaces_the_run_whatever_its_reference_system(database, run_of_two):
@@ -249,9 +306,13 @@ def test_loading_again_replaces_the_run_whatever_its_reference_system(database, 
     write_attributes(folder / "buildings.gpkg", buildings[1:], "EPSG:25832")
     load_postgis(folder, database, "again")
     with psycopg.connect(database) as connection:
-        left = connection.execute("select distinct id, ST_SRID(geom) from again_buildings order by 1").fetchall()
+        left = connection.execute(
+            "select distinct id, ST_SRID(geom) from again_buildings order by 1"
+        ).fetchall()
         assert left == [("lost", None), ("yard", 25832)]
-        assert connection.execute("select distinct building_id from again_roofs").fetchall() == [("yard",)]
+        assert connection.execute("select distinct building_id from again_roofs").fetchall() == [
+            ("yard",)
+        ]
 
 
 def test_loading_needs_a_run_and_a_database(database, tmp_path):
@@ -287,7 +348,11 @@ def test_first_loads_at_once_wait_for_each_other(empty_database, tmp_path):
     write_sample_run(tmp_path / "run")
     prefixes = ["same", "same", "same", "Same", "one", "two"]
     with ThreadPoolExecutor(len(prefixes)) as pool:
-        counts = list(pool.map(lambda prefix: load_postgis(tmp_path / "run", empty_database, prefix), prefixes))
+        counts = list(
+            pool.map(
+                lambda prefix: load_postgis(tmp_path / "run", empty_database, prefix), prefixes
+            )
+        )
     assert counts == [3] * len(prefixes)
     with psycopg.connect(empty_database) as connection:
         for prefix in {prefix.lower() for prefix in prefixes}:
@@ -300,7 +365,9 @@ def test_the_longest_prefix_keeps_every_index_apart(database, tmp_path):
     load_postgis(tmp_path / "run", database, longest)
     with psycopg.connect(database) as connection:
         found = connection.execute(
-            "select count(*) from pg_indexes where indexname like %s and indexname not like '%%pkey'", (longest + "%",)
+            "select count(*) from pg_indexes where indexname like %s and indexname not like "
+            "'%%pkey'",
+            (longest + "%",),
         )
         assert found.fetchone() == (4,)
 
@@ -325,7 +392,9 @@ def test_a_damaged_building_is_left_out_of_the_tables(database, run_of_two):
     with psycopg.connect(database) as connection:
         ids = connection.execute("select id from damaged_buildings order by id").fetchall()
         assert ids == [("house",), ("lost",)]
-        assert connection.execute("select distinct building_id from damaged_parts").fetchall() == [("house",)]
+        assert connection.execute("select distinct building_id from damaged_parts").fetchall() == [
+            ("house",)
+        ]
 
 
 def test_tables_that_are_none_are_named(database, run_of_two):

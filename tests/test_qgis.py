@@ -1,4 +1,6 @@
-"""The QGIS plugin: the commands it makes are ones that hiproof takes, it hands on what they say, and QGIS itself runs it."""
+"""The QGIS plugin: the commands it makes are ones that hiproof takes, it hands on what they say,
+and QGIS itself runs it.
+"""
 
 import os
 import shutil
@@ -25,7 +27,8 @@ def plugin(monkeypatch):
     kept = {name: module for name, module in sys.modules.items() if name.split(".")[0] == "hiproof"}
     for name in kept:
         del sys.modules[name]
-    from hiproof import commands, process  # the plugin's folder has the package's name, as QGIS shows it
+    # the plugin's folder has the package's name, as QGIS shows it
+    from hiproof import commands, process
 
     yield commands, process
     for name in [name for name in sys.modules if name.split(".")[0] == "hiproof"]:
@@ -55,8 +58,16 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
         "--types 'gable,hip'",
     )
     taken = takes(everything)
-    assert taken["clouds"] == ["a.laz", "b.laz"] and taken["jobs"] == 4 and taken["types"] == "gable,hip"
-    assert taken["bbox"] == "-1.5,2,3,4" and taken["where"] == "year < 1950" and taken["layer"] == "pand"
+    assert (
+        taken["clouds"] == ["a.laz", "b.laz"]
+        and taken["jobs"] == 4
+        and taken["types"] == "gable,hip"
+    )
+    assert (
+        taken["bbox"] == "-1.5,2,3,4"
+        and taken["where"] == "year < 1950"
+        and taken["layer"] == "pand"
+    )
     assert takes(commands.reconstruct("hiproof", ["a.laz"], "out"))["footprints"] is None
     assert takes(commands.evaluate("hiproof", "out", ["a.laz"], "f.gpkg"))["footprints"] == "f.gpkg"
     assert takes(commands.convert("hiproof", "out", "obj"))["format"] == "obj"
@@ -66,7 +77,9 @@ def test_the_commands_are_ones_that_hiproof_takes(plugin, tmp_path):
 def test_what_a_command_says_is_handed_on_and_its_end_told(plugin):
     _, process = plugin
     said = []
-    code = "import sys; print('first'); print('second', file=sys.stderr); sys.exit(int(sys.argv[1]))"
+    code = (
+        "import sys; print('first'); print('second', file=sys.stderr); sys.exit(int(sys.argv[1]))"
+    )
     assert process.run([sys.executable, "-c", code, "1"], said.append, lambda: False) == 1
     assert sorted(said) == ["first", "second"]
     with pytest.raises(process.Failed, match="second"):
@@ -99,7 +112,9 @@ def test_qgis_runs_it(tmp_path):
     profile.mkdir(parents=True)
     (profile / "QGIS3.ini").write_text("[PythonPlugins]\nhiproof=true\n", encoding="utf-8")
     # QGIS leaves statistics beside what it opens
-    files = {name: shutil.copy(file, tmp_path) for name, file in demo_files().items() if name != "truth"}
+    files = {
+        name: shutil.copy(file, tmp_path) for name, file in demo_files().items() if name != "truth"
+    }
     out = tmp_path / "out"
     given = {
         "CLOUDS": files["cloud"],
@@ -109,13 +124,21 @@ def test_qgis_runs_it(tmp_path):
         "OUTPUT": out,
         "PROGRAM": Path(sys.executable).with_name("hiproof"),
     }
-    command = [QGIS, "run", "hiproof:reconstruct", "--", *(f"{name}={value}" for name, value in given.items())]
+    command = [
+        QGIS,
+        "run",
+        "hiproof:reconstruct",
+        "--",
+        *(f"{name}={value}" for name, value in given.items()),
+    ]
     surroundings = {
         "HOME": str(tmp_path),
         "QT_QPA_PLATFORM": "offscreen",
         "QGIS_PLUGINPATH": str(PLUGINS),
         "XDG_RUNTIME_DIR": str(tmp_path),
     }
-    done = subprocess.run(command, capture_output=True, text=True, env={**os.environ, **surroundings}, check=False)
+    done = subprocess.run(
+        command, capture_output=True, text=True, env={**os.environ, **surroundings}, check=False
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     assert (out / "buildings.gml").exists() and "buildings" in done.stdout.partition("Results")[2]

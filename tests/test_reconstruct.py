@@ -1,4 +1,6 @@
-"""Laws of one building's road from points to solid: it moves with the points, and bad points get a status, not a crash."""
+"""Laws of one building's road from points to solid: it moves with the points, and bad points get a
+status, not a crash.
+"""
 
 import numpy as np
 import pytest
@@ -62,7 +64,9 @@ def test_the_answer_moves_with_the_points():
     shift = np.array([251_000.0, 6_700_000.0, -250.0])
     here = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=PLAIN)
     there = hiproof.reconstruct(
-        gable_points() + shift, shapely.transform(FOOTPRINT, lambda xy: xy + shift[:2]), settings=PLAIN
+        gable_points() + shift,
+        shapely.transform(FOOTPRINT, lambda xy: xy + shift[:2]),
+        settings=PLAIN,
     )
     assert there.type == here.type
     assert there.solid.vertices - shift == pytest.approx(here.solid.vertices, abs=2e-3)
@@ -166,11 +170,16 @@ def test_not_finite_points_are_left_out():
     assert np.array_equal(one.solid.vertices, other.solid.vertices)
 
 
-@pytest.mark.parametrize("nowhere", [(6.0, 4.0, -3.4e38), (1e300, 4.0, 5.0), (1.7e308, 1.7e308, 5.0)])
+@pytest.mark.parametrize(
+    "nowhere", [(6.0, 4.0, -3.4e38), (1e300, 4.0, 5.0), (1.7e308, 1.7e308, 5.0)]
+)
 @pytest.mark.parametrize("footprint", [FOOTPRINT, None])
 def test_points_that_are_nowhere_on_earth_are_left_out(nowhere, footprint):
     points = gable_points()
-    one, other = (hiproof.reconstruct(p, footprint, settings=PLAIN) for p in (points, np.vstack([points, nowhere])))
+    one, other = (
+        hiproof.reconstruct(p, footprint, settings=PLAIN)
+        for p in (points, np.vstack([points, nowhere]))
+    )
     assert np.array_equal(one.solid.vertices, other.solid.vertices)
 
 
@@ -203,7 +212,9 @@ def two_level_points():
 
 
 def refused(refuses):
-    """`compose` that refuses roofs of which `refuses` is true, as if its part 1 could not become valid."""
+    """`compose` that refuses roofs of which `refuses` is true, as if its part 1 could not become
+    valid.
+    """
     from hiproof.compose import solid
     from hiproof.errors import CompositionError
 
@@ -229,7 +240,9 @@ def test_a_part_that_cannot_be_composed_is_given_up_and_not_the_roof(monkeypatch
     assert building.status is Status.SIMPLIFIED
     assert "(gable) was made level" in building.detail and "planted" in building.detail
     assert check_solid(building.solid) == ()
-    heights = building.roof.height_at(np.array([[2.0, 4.0], [10.0, 4.0]]) - building.roof.frame.origin[:2])
+    heights = building.roof.height_at(
+        np.array([[2.0, 4.0], [10.0, 4.0]]) - building.roof.frame.origin[:2]
+    )
     gable, annex = heights + building.roof.frame.origin[2]
     assert annex == pytest.approx(4.0, abs=0.02) and 6.6 < gable < 9.0
 
@@ -244,7 +257,9 @@ def test_a_cloud_that_is_no_roof_is_called_poor():
 
 @pytest.mark.parametrize("objective", ["likelihood", "paper"])
 def test_one_primitive_by_either_objective(objective):
-    settings = PLAIN.replace({"fit": {"parts": "one", "objective": objective, "types": ["gable", "flat"]}})
+    settings = PLAIN.replace(
+        {"fit": {"parts": "one", "objective": objective, "types": ["gable", "flat"]}}
+    )
     building = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=settings)
     assert building.type == "gable"
     assert check_solid(building.solid) == ()
@@ -259,7 +274,9 @@ def test_the_network_adds_its_opinion_where_it_is_heeded_or_asked():
     unasked = hiproof.reconstruct(gable_points(), FOOTPRINT)
     assert unasked.recognised == {}
     assert unasked.parts[0].parameters == building.parts[0].parameters
-    alone = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=Settings.from_dict({"fit": {"parts": "one"}}))
+    alone = hiproof.reconstruct(
+        gable_points(), FOOTPRINT, settings=Settings.from_dict({"fit": {"parts": "one"}})
+    )
     assert sum(alone.types.values()) == pytest.approx(1.0)
 
 
@@ -268,7 +285,10 @@ def test_parts_that_became_flat_although_not_asked_for_are_told():
     points = np.column_stack([gable_points()[:, :2], np.full(len(gable_points()), 6.0)])
     building = hiproof.reconstruct(points, FOOTPRINT, settings=asked)
     assert {part.type for part in building.parts} <= {"flat", "hip"}
-    assert building.detail == "1 of 1 part made flat: none of the types asked for (hip) explains the points there"
+    assert (
+        building.detail
+        == "1 of 1 part made flat: none of the types asked for (hip) explains the points there"
+    )
     poor = hiproof.reconstruct(gable_points(), FOOTPRINT, settings=asked)
     assert poor.grade is Grade.POOR
     assert "(hip) explains the points there; only " in poor.detail
@@ -300,7 +320,10 @@ def test_the_papers_objective_fits_only_what_is_asked_for_or_seen():
         ({"points": None}, "got "),
         ({"points": hiproof.PointCloud(gable_points())}, "got PointCloud"),
         ({"footprint": [(0, 0), (12, 0), (12, 8)]}, "polygon of shapely as footprint, got list"),
-        ({"terrain": "dtm.tif"}, r"answers height_at, got str; read a raster by hiproof\.read_terrain"),
+        (
+            {"terrain": "dtm.tif"},
+            r"answers height_at, got str; read a raster by hiproof\.read_terrain",
+        ),
         ({"settings": {"fit": {}}}, r"got dict; make them by Settings\.from_dict"),
     ],
 )

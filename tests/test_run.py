@@ -1,4 +1,6 @@
-"""Laws of a whole run: files in, files out, every building with an outcome, whatever happens on the way."""
+"""Laws of a whole run: files in, files out, every building with an outcome, whatever happens on the
+way.
+"""
 
 import json
 import os
@@ -75,9 +77,22 @@ def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
     cloud, footprints = files
     _, _, geometry, _ = pyogrio.raw.read(footprints)
     numbered = tmp_path / "numbered.gpkg"  # whose features are numbered 1 to 4, and called 4 to 1
-    pyogrio.raw.write(numbered, geometry, [np.arange(4, 0, -1)], ["number"], geometry_type="Polygon", crs="EPSG:28992")
+    pyogrio.raw.write(
+        numbered,
+        geometry,
+        [np.arange(4, 0, -1)],
+        ["number"],
+        geometry_type="Polygon",
+        crs="EPSG:28992",
+    )
     reconstruct_area(
-        Request((str(cloud),), tmp_path / "out", str(numbered), id_attribute="number", where="number <> 2")
+        Request(
+            (str(cloud),),
+            tmp_path / "out",
+            str(numbered),
+            id_attribute="number",
+            where="number <> 2",
+        )
     )
     run = evaluate_run(tmp_path / "out")
     assert [model.id for model in run.models] == ["4", "3", "1"]
@@ -89,7 +104,9 @@ def test_a_run_is_measured_against_the_footprints_that_it_read(files, tmp_path):
 def test_what_a_run_begun_anew_does_not_write_is_not_left_from_before(files, tmp_path):
     def run(**settings):
         told = Settings.from_dict(settings)
-        reconstruct_area(Request((str(files[0]),), tmp_path, str(files[1]), settings=told, restart=True))
+        reconstruct_area(
+            Request((str(files[0]),), tmp_path, str(files[1]), settings=told, restart=True)
+        )
 
     run(write={"citygml": "both"})
     (tmp_path / "buildings.parquet").write_text("not a file of this run")
@@ -105,12 +122,17 @@ def test_the_demo_replaces_itself_and_nobody_elses_run(files, tmp_path):
     reconstruct_area(Request((str(files[0]),), tmp_path / "own", str(files[1])))
     before = records(tmp_path / "own")
     refused = CliRunner().invoke(app, ["demo", str(tmp_path / "own")])
-    assert "expected a folder for the demo" in str(refused.exception) and records(tmp_path / "own") == before
+    assert (
+        "expected a folder for the demo" in str(refused.exception)
+        and records(tmp_path / "own") == before
+    )
     for _ in range(2):
         assert CliRunner().invoke(app, ["demo", str(tmp_path / "demo")]).exit_code == 0
 
 
-def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(files, tmp_path):
+def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_parameters(
+    files, tmp_path
+):
     cloud, footprints = map(str, files)
     asked = ["--citygml", "both", "--osm-tags", "--lods", "0,2.2"]
     run = CliRunner().invoke(
@@ -119,21 +141,32 @@ def test_what_is_written_is_asked_for_in_the_same_words_of_a_run_and_of_its_para
     assert run.exit_code == 0, run.output
     for name, options in (("as told", []), ("asked", ["--citygml", "3.0", "--no-osm-tags"])):
         made = CliRunner().invoke(
-            app, ["build", f"{tmp_path}/run/parameters.jsonl", "--out", f"{tmp_path}/{name}", *options]
+            app,
+            ["build", f"{tmp_path}/run/parameters.jsonl", "--out", f"{tmp_path}/{name}", *options],
         )
         assert made.exit_code == 0, made.output
-    ours = {path.name for path in (tmp_path / "run").iterdir() if path.is_file() and path.name != "run.json"}
+    ours = {
+        path.name
+        for path in (tmp_path / "run").iterdir()
+        if path.is_file() and path.name != "run.json"
+    }
     assert ours == {*RECORDS, "buildings.citygml3.gml", "buildings.gpkg"}
     for name in ours:
         text = (tmp_path / "run" / name).read_bytes()
         assert (tmp_path / "as told" / name).read_bytes() == text, name
         assert (b"roof:shape" in text) == (name != "parameters.jsonl"), name
-    left = {path.name: path.read_bytes() for path in (tmp_path / "asked").iterdir() if path.is_file()}
-    assert ours - left.keys() == {"buildings.gml"} and not any(b"roof:shape" in text for text in left.values())
+    left = {
+        path.name: path.read_bytes() for path in (tmp_path / "asked").iterdir() if path.is_file()
+    }
+    assert ours - left.keys() == {"buildings.gml"} and not any(
+        b"roof:shape" in text for text in left.values()
+    )
 
 
 def test_heights_are_the_towns(finished):
-    heights = {id: solid.vertices[:, 2] for id, solid in read_solids(finished[0] / "buildings.city.jsonl")}
+    heights = {
+        id: solid.vertices[:, 2] for id, solid in read_solids(finished[0] / "buildings.city.jsonl")
+    }
     for i in range(3):
         assert heights[f"house-{i}"].max() == pytest.approx(2 + 8 + 0.3 * i + 0.14, abs=0.35)
         assert heights[f"house-{i}"].min() == pytest.approx(2 + 0.3 * i + 0.08, abs=0.15)
@@ -151,11 +184,16 @@ def test_other_settings_on_the_same_folder_are_refused_unless_restarted(files, t
     request = Request((str(files[0]),), tmp_path, str(files[1]))
     reconstruct_area(request)
     other = Request(
-        request.clouds, tmp_path, request.footprints, settings=Settings.from_dict({"fit": {"parts": "one"}})
+        request.clouds,
+        tmp_path,
+        request.footprints,
+        settings=Settings.from_dict({"fit": {"parts": "one"}}),
     )
     with pytest.raises(OutputError, match="--restart"):
         reconstruct_area(other)
-    anew = Request(request.clouds, tmp_path, request.footprints, settings=other.settings, restart=True)
+    anew = Request(
+        request.clouds, tmp_path, request.footprints, settings=other.settings, restart=True
+    )
     assert reconstruct_area(anew).buildings == 4
 
 
@@ -167,9 +205,17 @@ def test_how_the_area_is_cut_changes_no_byte(finished, tmp_path):
     clouds = []
     for number, name in enumerate(names):
         members = rng.permutation(
-            np.flatnonzero((part == number) | ((part == (number + 1) % 9) & (rng.random(len(part)) < 0.2)))
+            np.flatnonzero(
+                (part == number) | ((part == (number + 1) % 9) & (rng.random(len(part)) < 0.2))
+            )
         )
-        clouds.append(str(write_cloud(tmp_path / f"{name}.laz", town.xyz[members], town.classification[members])))
+        clouds.append(
+            str(
+                write_cloud(
+                    tmp_path / f"{name}.laz", town.xyz[members], town.classification[members]
+                )
+            )
+        )
     footprints = write_footprints(tmp_path / "footprints.geojson", town.footprints)
     reconstruct_area(Request(tuple(sorted(clouds)), tmp_path / "out", str(footprints)))
     assert records(tmp_path / "out") == records(finished[0])
@@ -180,7 +226,9 @@ def test_progress_of_the_papers_objective_is_by_building(town_files, tmp_path, m
     paper, seen = Settings.from_dict({"fit": {"objective": "paper"}}), []
     request = Request((town_files[0],), tmp_path, town_files[1], settings=paper)
     reconstruct_area(request, lambda *progress: seen.append(progress))
-    assert [progress for progress in seen if progress[0] == "solve"][-4:] == [("solve", n, 4) for n in (1, 2, 3, 4)]
+    assert [progress for progress in seen if progress[0] == "solve"][-4:] == [
+        ("solve", n, 4) for n in (1, 2, 3, 4)
+    ]
 
 
 def test_two_workers_change_no_byte_and_compile_nothing(finished, files, tmp_path, monkeypatch):
@@ -204,26 +252,42 @@ def test_an_interrupted_run_goes_on_and_ends_the_same(finished, files, tmp_path,
     assert not (tmp_path / "buildings.gml").exists()
     solved = []
     original = city_run.solve_tile
-    monkeypatch.setattr(city_run, "solve_tile", lambda *task: solved.append(task[1]) or original(*task))
+    monkeypatch.setattr(
+        city_run, "solve_tile", lambda *task: solved.append(task[1]) or original(*task)
+    )
     reconstruct_area(request)
     assert len(solved) == 2
     assert records(tmp_path) == records(finished[0])
 
 
 def test_a_killed_run_goes_on_and_ends_the_same(finished, files, tmp_path):
-    command = [sys.executable, "-m", "hiproof", "reconstruct", str(files[0]), "--footprints", str(files[1]), "--out"]
+    command = [
+        sys.executable,
+        "-m",
+        "hiproof",
+        "reconstruct",
+        str(files[0]),
+        "--footprints",
+        str(files[1]),
+        "--out",
+    ]
     process = subprocess.Popen([*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"})
     while not (tmp_path / ".hiproof" / "plan.jsonl").exists() and process.poll() is None:
         time.sleep(0.02)
     process.send_signal(signal.SIGKILL)
     process.wait()
     assert (
-        subprocess.run([*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"}, check=False).returncode == 0
+        subprocess.run(
+            [*command, str(tmp_path)], env={**os.environ, "PYTHONPATH": "src"}, check=False
+        ).returncode
+        == 0
     )
     assert records(tmp_path) == records(finished[0])
 
 
-def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(files, tmp_path, monkeypatch):
+def test_one_failing_building_stops_no_other_and_the_exit_code_says_so(
+    files, tmp_path, monkeypatch
+):
     from hiproof import stages
 
     original = stages.fit
@@ -246,7 +310,9 @@ def test_strange_footprints_each_get_an_outcome(tmp_path):
     x, y = town.xyz[:, :2].min(axis=0)
     footprints = {
         **town.footprints,
-        "bow-tie": shapely.Polygon([(x + 8, y + 12), (x + 20, y + 20), (x + 20, y + 12), (x + 8, y + 20)]),
+        "bow-tie": shapely.Polygon(
+            [(x + 8, y + 12), (x + 20, y + 20), (x + 20, y + 12), (x + 8, y + 20)]
+        ),
         "empty": shapely.Polygon(),
         "line": shapely.Polygon([(x, y), (x + 5, y), (x + 10, y), (x, y)]),
         "away from points": shapely.box(x + 500, y, x + 510, y + 10),
@@ -288,7 +354,9 @@ def test_a_building_class_that_was_asked_for_and_is_not_there_is_refused(files, 
     settings = Settings.from_dict({"read": {"building_classes": [67]}})
     for footprints in (str(files[1]), None):
         with pytest.raises(InputError, match=r"class 67.*--building-class"):
-            reconstruct_area(Request((str(files[0]),), tmp_path, footprints, settings=settings, restart=True))
+            reconstruct_area(
+                Request((str(files[0]),), tmp_path, footprints, settings=settings, restart=True)
+            )
 
 
 def test_without_a_ground_class_the_ground_is_found(tmp_path):
@@ -299,11 +367,18 @@ def test_without_a_ground_class_the_ground_is_found(tmp_path):
     assert b"ground found by its shape" in (tmp_path / "out" / "buildings.city.jsonl").read_bytes()
 
 
-@pytest.mark.parametrize(("of_cloud", "of_footprints"), [("EPSG:7415", None), (None, "EPSG:28992"), (None, None)])
-def test_the_output_carries_the_reference_system_that_any_input_names(of_cloud, of_footprints, tmp_path):
+@pytest.mark.parametrize(
+    ("of_cloud", "of_footprints"), [("EPSG:7415", None), (None, "EPSG:28992"), (None, None)]
+)
+def test_the_output_carries_the_reference_system_that_any_input_names(
+    of_cloud, of_footprints, tmp_path
+):
     town = make_town(houses=1)
     cloud = write_cloud(tmp_path / "cloud.laz", town.xyz, town.classification, of_cloud)
-    ids, geometry = np.array(["house-0"], object), shapely.to_wkb(np.array(list(town.footprints.values()), object))
+    ids, geometry = (
+        np.array(["house-0"], object),
+        shapely.to_wkb(np.array(list(town.footprints.values()), object)),
+    )
     path = tmp_path / "footprints.gpkg"
     pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Polygon", crs=of_footprints)
     with warnings.catch_warnings():
@@ -311,7 +386,9 @@ def test_the_output_carries_the_reference_system_that_any_input_names(of_cloud, 
         reconstruct_area(Request((str(cloud),), tmp_path / "out", str(path)))
     header = json.loads((tmp_path / "out" / "buildings.city.jsonl").read_text().splitlines()[0])
     expected = next((code.split(":")[1] for code in (of_cloud, of_footprints) if code), None)
-    assert header.get("metadata", {}).get("referenceSystem", "/None").rsplit("/", 1)[1] == str(expected)
+    assert header.get("metadata", {}).get("referenceSystem", "/None").rsplit("/", 1)[1] == str(
+        expected
+    )
 
 
 def invoke(*arguments):
@@ -322,7 +399,10 @@ def test_the_command_line_says_what_it_did(files, tmp_path):
     got = invoke("reconstruct", files[0], "--footprints", files[1], "--out", tmp_path)
     assert got.exit_code == 0, got.output
     assert "4 buildings" in got.output
-    assert invoke("check", tmp_path / "buildings.city.jsonl", tmp_path / "buildings.gml").exit_code == 0
+    assert (
+        invoke("check", tmp_path / "buildings.city.jsonl", tmp_path / "buildings.gml").exit_code
+        == 0
+    )
     assert "buildings done: 4 of 4" in invoke("status", tmp_path).output
 
 
@@ -344,13 +424,21 @@ def test_check_finds_a_broken_solid(files, finished, tmp_path):
     [
         (["reconstruct", "missing.laz", "--out", "{out}"], "missing.laz"),
         (["reconstruct", "{cloud}", "--out", "{cloud}/x"], "--out"),
-        (["reconstruct", "{cloud}", "--out", "{out}", "--footprints", "missing.gpkg"], "missing.gpkg"),
-        (["reconstruct", "{cloud}", "--out", "{out}", "--objective", "pretty"], "likelihood, paper"),
+        (
+            ["reconstruct", "{cloud}", "--out", "{out}", "--footprints", "missing.gpkg"],
+            "missing.gpkg",
+        ),
+        (
+            ["reconstruct", "{cloud}", "--out", "{out}", "--objective", "pretty"],
+            "likelihood, paper",
+        ),
         (["check", "missing.city.jsonl"], "missing.city.jsonl"),
         (["status", "{out}"], "ledger"),
     ],
 )
-def test_wrong_usage_gets_one_sentence_and_exit_code_2(arguments, expected, files, tmp_path, monkeypatch, capsys):
+def test_wrong_usage_gets_one_sentence_and_exit_code_2(
+    arguments, expected, files, tmp_path, monkeypatch, capsys
+):
     filled = [a.format(cloud=files[0], out=tmp_path) for a in arguments]
     monkeypatch.setattr(sys, "argv", ["hiproof", *filled])
     with pytest.raises(SystemExit) as ended:

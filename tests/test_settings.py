@@ -7,7 +7,11 @@ import pytest
 from hiproof.errors import SettingsError
 from hiproof.settings import Settings
 
-ALL = [(s.name, f) for s in dataclasses.fields(Settings) for f in dataclasses.fields(getattr(Settings(), s.name))]
+ALL = [
+    (s.name, f)
+    for s in dataclasses.fields(Settings)
+    for f in dataclasses.fields(getattr(Settings(), s.name))
+]
 
 
 @pytest.mark.parametrize(("section", "declared"), ALL, ids=[f"{s}.{f.name}" for s, f in ALL])
@@ -18,7 +22,9 @@ def test_every_setting_has_help_and_a_default_within_its_own_bounds(section, dec
 
 
 def test_toml_comes_back_the_same(tmp_path):
-    changed = Settings.from_dict({"read": {"building_classes": [6, 67]}, "fit": {"objective": "paper"}})
+    changed = Settings.from_dict(
+        {"read": {"building_classes": [6, 67]}, "fit": {"objective": "paper"}}
+    )
     path = tmp_path / "settings.toml"
     for encoding in ("utf-8", "utf-8-sig"):  # as editors under Windows write it
         path.write_text(changed.to_toml(), encoding=encoding)

@@ -1,4 +1,6 @@
-"""Laws of units: what is measured in feet gives the same buildings as in metres, and is written in feet again."""
+"""Laws of units: what is measured in feet gives the same buildings as in metres, and is written in
+feet again.
+"""
 
 import doctest
 import json
@@ -48,7 +50,9 @@ def write_town_in(folder, units, cloud_crs, plan_crs):
     folder.mkdir()
     xyz, origin = units.from_metres(TOWN.xyz), units.from_metres(ORIGIN)
     cloud = write_cloud(folder / "cloud.laz", xyz, TOWN.classification, cloud_crs, origin)
-    outlines = {id: shapely.transform(outline, units.from_metres) for id, outline in TOWN.footprints.items()}
+    outlines = {
+        id: shapely.transform(outline, units.from_metres) for id, outline in TOWN.footprints.items()
+    }
     return str(cloud), str(write_footprints(folder / "footprints.gpkg", outlines, plan_crs))
 
 
@@ -71,7 +75,13 @@ def lengths(building):
     """Every length of the parts and heights of a building, in metres."""
     parts = [value for part in building["parts"] for value in part["parameters"].values()]
     return np.array(
-        [*parts, *building["parts"][0]["position"], building["z_ground"], *building["residuals"].values()], float
+        [
+            *parts,
+            *building["parts"][0]["position"],
+            building["z_ground"],
+            *building["residuals"].values(),
+        ],
+        float,
     )
 
 
@@ -81,7 +91,9 @@ def in_metres(tmp_path_factory):
 
 
 def test_examples_in_the_docstrings_run():
-    assert doctest.testmod(hiproof.frames).failed == doctest.testmod(hiproof.write.naming).failed == 0
+    assert (
+        doctest.testmod(hiproof.frames).failed == doctest.testmod(hiproof.write.naming).failed == 0
+    )
 
 
 @pytest.mark.parametrize("units", [METRES, FEET, MIXED])
@@ -105,10 +117,16 @@ def test_there_and_back_is_the_identity(units):
     ids=["compound", "plan only", "heights in metres", "--unit", "--crs", "CRS of the footprints"],
 )
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning", "ignore:'crs' was not provided")
-def test_feet_give_the_same_buildings_as_metres(in_metres, tmp_path, units, cloud_crs, plan_crs, options):
+def test_feet_give_the_same_buildings_as_metres(
+    in_metres, tmp_path, units, cloud_crs, plan_crs, options
+):
     out = run(tmp_path / "feet", units, cloud_crs, plan_crs, **options)
     for here, there in zip(parameters(out), parameters(in_metres), strict=True):
-        assert (here["id"], here["type"], len(here["parts"])) == (there["id"], there["type"], len(there["parts"]))
+        assert (here["id"], here["type"], len(here["parts"])) == (
+            there["id"],
+            there["type"],
+            len(there["parts"]),
+        )
         assert np.abs(lengths(here) - lengths(there)).max() < 0.005
     ours, theirs = attributes(out), attributes(in_metres)
     for id, told in ours.items():
@@ -116,14 +134,19 @@ def test_feet_give_the_same_buildings_as_metres(in_metres, tmp_path, units, clou
             assert told[name] == pytest.approx(theirs[id][name], rel=2e-3)
         assert "US survey foot" in told["hiproof_units"] and "hiproof_units" not in theirs[id]
     record = json.loads((out / "run.json").read_text())["units"]
-    assert (record["metres_in_plan_unit"], record["metres_in_height_unit"]) == pytest.approx((units.plan, units.height))
+    assert (record["metres_in_plan_unit"], record["metres_in_height_unit"]) == pytest.approx(
+        (units.plan, units.height)
+    )
 
 
 def extents(out):
-    """Low and high corner (2, 3) of the coordinates as they stand in the CityJSON, in the CityGML and in the table of roof surfaces."""
+    """Low and high corner (2, 3) of the coordinates as they stand in the CityJSON, in the CityGML
+    and in the table of roof surfaces.
+    """
     header = json.loads((out / "buildings.city.jsonl").read_text().splitlines()[0])
     corners = [
-        node.text.split() for node in etree.parse(out / "buildings.gml").iter("{*}lowerCorner", "{*}upperCorner")
+        node.text.split()
+        for node in etree.parse(out / "buildings.gml").iter("{*}lowerCorner", "{*}upperCorner")
     ]
     _, _, roofs, _ = pyogrio.raw.read(out / "buildings.gpkg", layer="roof_surfaces")
     places = shapely.get_coordinates(shapely.from_wkb(roofs), include_z=True)
@@ -135,9 +158,13 @@ def extents(out):
 
 
 def test_coordinates_are_written_in_the_unit_of_the_crs_that_the_file_names(in_metres, tmp_path):
-    """A compound without a code of its own is named by its plan alone in CityJSON, any in tables: heights are then in the plan's unit."""
+    """A compound without a code of its own is named by its plan alone in CityJSON, any in tables:
+    heights are then in the plan's unit.
+    """
     json_m, gml_m, table_m = extents(in_metres)
-    json_ft, gml_ft, table_ft = extents(run(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263"))
+    json_ft, gml_ft, table_ft = extents(
+        run(tmp_path / "feet", MIXED, "EPSG:2263+5703", "EPSG:2263")
+    )
     assert np.allclose(FEET.to_metres(json_ft), json_m, atol=0.02)
     assert np.allclose(MIXED.to_metres(gml_ft), gml_m, atol=0.02)
     assert np.allclose(FEET.to_metres(table_ft), table_m, atol=0.02)
@@ -152,8 +179,12 @@ def areas_to_load(out):
 def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
     out = run(tmp_path / "feet", FEET, "EPSG:2263+6360", "EPSG:2263")
     for name in ("buildings.gml", "buildings.city.jsonl"):
-        for (_, ours), (_, theirs) in zip(read_solids(out / name), read_solids(in_metres / name), strict=True):
-            assert np.allclose(np.ptp(ours.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02)
+        for (_, ours), (_, theirs) in zip(
+            read_solids(out / name), read_solids(in_metres / name), strict=True
+        ):
+            assert np.allclose(
+                np.ptp(ours.vertices, axis=0), np.ptp(theirs.vertices, axis=0), atol=0.02
+            )
     assert areas_to_load(out) == pytest.approx(areas_to_load(in_metres), rel=2e-3)
     cloud, footprints = tmp_path / "feet/cloud.laz", tmp_path / "feet/footprints.gpkg"
     for figures in evaluate_run(out, [str(cloud)], str(footprints)).figures:
@@ -162,7 +193,9 @@ def test_solids_in_feet_are_read_back_in_metres(in_metres, tmp_path):
 
 def test_clouds_of_another_crs_than_the_run_are_not_measured_against(in_metres, tmp_path):
     cloud = write_cloud(tmp_path / "feet.laz", TOWN.xyz, TOWN.classification, "EPSG:2263")
-    with pytest.raises(InputError, match=r"EPSG:7415 .* in the run and EPSG:2263 .* in .*feet\.laz"):
+    with pytest.raises(
+        InputError, match=r"EPSG:7415 .* in the run and EPSG:2263 .* in .*feet\.laz"
+    ):
         evaluate_run(in_metres, [str(cloud)])
 
 
@@ -171,7 +204,9 @@ def test_a_unit_without_a_crs_is_known_again_by_evaluate(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         out = run(tmp_path / "feet", FEET, None, None, settings=settings)
-        run_again = evaluate_run(out, [str(tmp_path / "feet/cloud.laz")], str(tmp_path / "feet/footprints.gpkg"))
+        run_again = evaluate_run(
+            out, [str(tmp_path / "feet/cloud.laz")], str(tmp_path / "feet/footprints.gpkg")
+        )
     assert all(figures.quality.share_within_20cm > 0.95 for figures in run_again.figures)
 
 
@@ -210,13 +245,16 @@ def test_a_terrain_model_in_feet_answers_in_metres(tmp_path, crs, size, height, 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         terrain = read_terrain(path, "EPSG:2263", FEET)
-    here, beyond = [0.0, 0.0], [44 * 0.3048 + 5.0, 0.0]  # the raster ends 45 feet, not metres, from its middle
+    # the raster ends 45 feet, not metres, from its middle
+    here, beyond = [0.0, 0.0], [44 * 0.3048 + 5.0, 0.0]
     heights = terrain.height_at(np.array([here, beyond]))
     assert heights[0] == pytest.approx(expected) and np.isnan(heights[1])
 
 
 def test_the_unit_of_heights_that_geotiff_keys_name_counts(tmp_path):
-    """NAVD88 by its code (metres), while the heights are in feet, as their unit says: seen in many American files."""
+    """NAVD88 by its code (metres), while the heights are in feet, as their unit says: seen in many
+    American files.
+    """
     header = laspy.LasHeader(point_format=1, version="1.2")
     header.add_crs(pyproj.CRS("EPSG:2263"))
     keys = header.vlrs.get("GeoKeyDirectoryVlr")[0]
@@ -244,7 +282,11 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     monkeypatch.setattr("hiproof.city.sort.QUERY_M", 25.0)
     monkeypatch.setattr("hiproof.read.runs.RUN_POINTS", 50)
     along = np.argsort(TOWN.xyz[:, 0].round(-1), kind="stable")
-    xyz, classes, origin = FEET.from_metres(TOWN.xyz[along]), TOWN.classification[along], FEET.from_metres(ORIGIN)
+    xyz, classes, origin = (
+        FEET.from_metres(TOWN.xyz[along]),
+        TOWN.classification[along],
+        FEET.from_metres(ORIGIN),
+    )
     alone = {"house-0": shapely.transform(TOWN.footprints["house-0"], FEET.from_metres)}
     footprints = str(write_footprints(tmp_path / "alone.gpkg", alone, "EPSG:2263"))
     clouds = [
@@ -272,7 +314,9 @@ def test_an_index_in_feet_is_asked_in_feet(tmp_path, monkeypatch):
     assert plain == indexed and some < all_points and of_copc < all_points
 
 
-@pytest.mark.parametrize(("first", "second"), [("EPSG:7415", "EPSG:25832"), ("EPSG:2263+6360", "EPSG:2263+5703")])
+@pytest.mark.parametrize(
+    ("first", "second"), [("EPSG:7415", "EPSG:25832"), ("EPSG:2263+6360", "EPSG:2263+5703")]
+)
 def test_clouds_of_two_reference_systems_are_refused(tmp_path, first, second):
     clouds = [
         str(write_cloud(tmp_path / name, TOWN.xyz, TOWN.classification, crs))
@@ -301,15 +345,23 @@ def test_a_unit_that_is_not_the_crs_is_refused(tmp_path):
 
 
 def test_units_have_names():
-    assert str(METRES) == "metre" and str(Units(0.3048, 1.0, "foot", "metre")) == "foot, heights in metre"
+    assert (
+        str(METRES) == "metre"
+        and str(Units(0.3048, 1.0, "foot", "metre")) == "foot, heights in metre"
+    )
 
 
 def test_a_run_says_that_a_clouds_heights_come_in_coarse_steps(tmp_path):
     xyz = np.column_stack([TOWN.xyz[:, :2], np.rint(TOWN.xyz[:, 2] * 10) / 10])
     np.savetxt(
-        tmp_path / "cloud.xyzc", np.column_stack([xyz, TOWN.classification]), "%.3f", header="x y z classification"
+        tmp_path / "cloud.xyzc",
+        np.column_stack([xyz, TOWN.classification]),
+        "%.3f",
+        header="x y z classification",
     )
     footprints = write_footprints(tmp_path / "footprints.gpkg", TOWN.footprints)
     request = Request((str(tmp_path / "cloud.xyzc"),), tmp_path / "out", str(footprints))
-    with pytest.warns(InputWarning, match=r"cloud\.xyzc: coordinates come in steps of 0\.1 m in height, and roofs"):
+    with pytest.warns(
+        InputWarning, match=r"cloud\.xyzc: coordinates come in steps of 0\.1 m in height, and roofs"
+    ):
         make_plan(request)

@@ -1,4 +1,6 @@
-"""What Windows does otherwise, as far as it can be tried elsewhere: names that are not there, files that are in use, limits."""
+"""What Windows does otherwise, as far as it can be tried elsewhere: names that are not there, files
+that are in use, limits.
+"""
 
 import ast
 import os
@@ -30,7 +32,9 @@ def test_no_module_is_imported_that_windows_lacks():
         for file in PACKAGE.rglob("*.py")
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8")))
         for name in (
-            [a.name for a in node.names] if isinstance(node, ast.Import) else [getattr(node, "module", "") or ""]
+            [a.name for a in node.names]
+            if isinstance(node, ast.Import)
+            else [getattr(node, "module", "") or ""]
         )
         if isinstance(node, (ast.Import, ast.ImportFrom))
     }

@@ -1,4 +1,7 @@
-"""A town of a few houses as files: a LAZ cloud with ground, GeoJSON footprints, their truth. Small enough for any test."""
+"""A town of a few houses as files: a LAZ cloud with ground, GeoJSON footprints, their truth.
+
+Small enough for any test.
+"""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,12 +26,16 @@ class Town:
 
 
 def gable(x, y, width, length, eave, rise):
-    """Height over a gable roof whose ridge runs along x, for points relative to its lower left corner."""
+    """Height over a gable roof whose ridge runs along x, for points relative to its lower left
+    corner.
+    """
     return eave + rise * (1 - np.abs(y - width / 2) / (width / 2))
 
 
 def make_town(houses: int = 4, density: float = 6.0, seed: int = 0) -> Town:
-    """Gables and flat blocks in a row along a street that rises a little; ground around them, a tree, some noise."""
+    """Gables and flat blocks in a row along a street that rises a little; ground around them, a
+    tree, some noise.
+    """
     rng = np.random.default_rng(seed)
     points, classes, footprints = [], [], {}
     area = (30.0 * houses, 40.0)
@@ -39,10 +46,16 @@ def make_town(houses: int = 4, density: float = 6.0, seed: int = 0) -> Town:
         inside = ((xy >= corner) & (xy <= corner + size)).all(axis=1)
         on_roof |= inside
         local = xy[inside] - corner
-        z = gable(local[:, 0], local[:, 1], size[1], size[0], 5.0, 3.0) if i % 4 != 3 else np.full(inside.sum(), 6.0)
+        z = (
+            gable(local[:, 0], local[:, 1], size[1], size[0], 5.0, 3.0)
+            if i % 4 != 3
+            else np.full(inside.sum(), 6.0)
+        )
         points.append(np.column_stack([xy[inside], z + 0.01 * xy[inside, 0]]))
         classes.append(np.full(inside.sum(), 6, np.uint8))
-        footprints[f"house-{i}"] = shapely.box(*(corner + ORIGIN[:2]), *(corner + size + ORIGIN[:2]))
+        footprints[f"house-{i}"] = shapely.box(
+            *(corner + ORIGIN[:2]), *(corner + size + ORIGIN[:2])
+        )
     points.append(np.column_stack([xy[~on_roof], 0.01 * xy[~on_roof, 0]]))
     classes.append(np.full((~on_roof).sum(), 2, np.uint8))
     xyz = np.concatenate(points) + ORIGIN
@@ -51,7 +64,11 @@ def make_town(houses: int = 4, density: float = 6.0, seed: int = 0) -> Town:
 
 
 def write_cloud(
-    path: Path, xyz: np.ndarray, classification: np.ndarray, crs: str | None = CRS, origin: np.ndarray = ORIGIN
+    path: Path,
+    xyz: np.ndarray,
+    classification: np.ndarray,
+    crs: str | None = CRS,
+    origin: np.ndarray = ORIGIN,
 ) -> Path:
     header = laspy.LasHeader(point_format=6, version="1.4")
     header.scales, header.offsets = [0.001] * 3, np.floor(origin)
@@ -64,7 +81,9 @@ def write_cloud(
     return path
 
 
-def write_footprints(path: Path, footprints: dict[str, shapely.Polygon], crs: str | None = "EPSG:28992") -> Path:
+def write_footprints(
+    path: Path, footprints: dict[str, shapely.Polygon], crs: str | None = "EPSG:28992"
+) -> Path:
     ids = np.array(list(footprints), object)
     geometry = shapely.to_wkb(np.array(list(footprints.values()), object))
     pyogrio.raw.write(path, geometry, [ids], ["id"], geometry_type="Unknown", crs=crs)

@@ -1,7 +1,7 @@
 """The QGIS plugin: a Processing provider that calls the installed `hiproof` command.
 
-`commands.py` makes the command lines and `process.py` runs them, both without QGIS; `algorithms.py` asks for the
-parameters, and `results.py` loads what a run has written.
+`commands.py` makes the command lines and `process.py` runs them, both without QGIS; `algorithms.py`
+asks for the parameters, and `results.py` loads what a run has written.
 """
 
 

@@ -42,13 +42,21 @@ class Algorithm(QgsProcessingAlgorithm):
         return " ".join(inspect.cleandoc(self.__doc__).split())
 
     def add_program(self):
-        self.add(QgsProcessingParameterString("PROGRAM", "Program", os.environ.get("HIPROOF_PROGRAM", "hiproof")))
+        self.add(
+            QgsProcessingParameterString(
+                "PROGRAM", "Program", os.environ.get("HIPROOF_PROGRAM", "hiproof")
+            )
+        )
 
     def add(self, parameter):
         self.addParameter(parameter)
 
     def add_clouds(self, label="Point clouds (LAS, LAZ, COPC, text, PLY)", optional=False):
-        self.add(QgsProcessingParameterMultipleLayers("CLOUDS", label, QgsProcessing.TypeFile, optional=optional))
+        self.add(
+            QgsProcessingParameterMultipleLayers(
+                "CLOUDS", label, QgsProcessing.TypeFile, optional=optional
+            )
+        )
 
     def call(self, command, feedback, progress=None):
         """Run a command, its lines into the feedback; the user's Cancel ends it."""
@@ -64,7 +72,11 @@ class Algorithm(QgsProcessingAlgorithm):
         if layer is None:
             return None, None, None
         told = QgsProviderRegistry.instance().decodeUri(layer.dataProvider().name(), layer.source())
-        return told.get("path") or layer.source(), told.get("layerName") or None, layer.subsetString() or None
+        return (
+            told.get("path") or layer.source(),
+            told.get("layerName") or None,
+            layer.subsetString() or None,
+        )
 
     def load(self, folder, raised, context):
         """Have the layers of a run's GeoPackage loaded, with their styles."""
@@ -79,9 +91,11 @@ class Algorithm(QgsProcessingAlgorithm):
 
 
 class Reconstruct(Algorithm):
-    """Models the buildings of point clouds as LoD2 solids with named roofs. Without footprints the cloud is split into
-    buildings. The results (CityGML, CityJSON, parameters, GeoPackage) come into a folder; said again, a run goes on where
-    it stopped."""
+    """Models the buildings of point clouds as LoD2 solids with named roofs.
+
+    Without footprints the cloud is split into buildings. The results (CityGML, CityJSON,
+    parameters, GeoPackage) come into a folder; said again, a run goes on where it stopped.
+    """
 
     def displayName(self):
         return "Reconstruct buildings"
@@ -89,14 +103,26 @@ class Reconstruct(Algorithm):
     def initAlgorithm(self, configuration=None):
         self.add_clouds()
         polygons = [QgsProcessing.TypeVectorPolygon]
-        self.add(QgsProcessingParameterVectorLayer("FOOTPRINTS", "Footprints", polygons, optional=True))
+        self.add(
+            QgsProcessingParameterVectorLayer("FOOTPRINTS", "Footprints", polygons, optional=True)
+        )
         self.add(QgsProcessingParameterRasterLayer("TERRAIN", "Terrain model", optional=True))
-        self.add(QgsProcessingParameterExtent("EXTENT", "Only buildings in (the clouds' coordinates)", optional=True))
+        self.add(
+            QgsProcessingParameterExtent(
+                "EXTENT", "Only buildings in (the clouds' coordinates)", optional=True
+            )
+        )
         self.add(QgsProcessingParameterCrs("CRS", "CRS of clouds that name none", optional=True))
         self.add(
-            QgsProcessingParameterNumber("PROCESSES", "Processes (else as many as pay)", optional=True, minValue=1)
+            QgsProcessingParameterNumber(
+                "PROCESSES", "Processes (else as many as pay)", optional=True, minValue=1
+            )
         )
-        self.add(QgsProcessingParameterString("MORE", "Further options of hiproof reconstruct", "", optional=True))
+        self.add(
+            QgsProcessingParameterString(
+                "MORE", "Further options of hiproof reconstruct", "", optional=True
+            )
+        )
         self.add(QgsProcessingParameterBoolean("LOAD", "Load the buildings", True))
         self.add(QgsProcessingParameterBoolean("RAISED", "Raise them in 2.5D", False))
         self.add_program()
@@ -112,7 +138,10 @@ class Reconstruct(Algorithm):
         )
         if not self.parameterAsBool(parameters, "LOAD", context):
             return {"OUTPUT": folder}
-        return {"OUTPUT": folder, **self.load(folder, self.parameterAsBool(parameters, "RAISED", context), context)}
+        return {
+            "OUTPUT": folder,
+            **self.load(folder, self.parameterAsBool(parameters, "RAISED", context), context),
+        }
 
     def command(self, parameters, context, program, folder):
         footprints, layer, where = self.source_of(parameters, "FOOTPRINTS", context)
@@ -143,23 +172,32 @@ def tell(program, folder, feedback):
 
 
 class Evaluate(Algorithm):
-    """Measures a run's models against points, its own where none are named: distances, shares, overlaps and volumes, a row
-    a building in evaluation.csv."""
+    """Measures a run's models against points, its own where none are named: distances, shares,
+    overlaps and volumes, a row a building in evaluation.csv.
+    """
 
     def displayName(self):
         return "Evaluate models"
 
     def initAlgorithm(self, configuration=None):
-        self.add(QgsProcessingParameterFile("FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder))
+        self.add(
+            QgsProcessingParameterFile(
+                "FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder
+            )
+        )
         self.add_clouds("Point clouds, where not those of the run", optional=True)
         polygons = [QgsProcessing.TypeVectorPolygon]
-        self.add(QgsProcessingParameterVectorLayer("FOOTPRINTS", "Footprints", polygons, optional=True))
+        self.add(
+            QgsProcessingParameterVectorLayer("FOOTPRINTS", "Footprints", polygons, optional=True)
+        )
         self.add_program()
         self.addOutput(QgsProcessingOutputFile("TABLE", "Figures by building"))
 
     def processAlgorithm(self, parameters, context, feedback):
         folder = self.parameterAsString(parameters, "FOLDER", context)
-        clouds = [cloud for cloud in self.parameterAsFileList(parameters, "CLOUDS", context) if cloud]
+        clouds = [
+            cloud for cloud in self.parameterAsFileList(parameters, "CLOUDS", context) if cloud
+        ]
         footprints, layer, _ = self.source_of(parameters, "FOOTPRINTS", context)
         program = self.parameterAsString(parameters, "PROGRAM", context)
         self.call(commands.evaluate(program, folder, clouds, footprints, layer), feedback)
@@ -173,7 +211,11 @@ class Convert(Algorithm):
         return "Convert models"
 
     def initAlgorithm(self, configuration=None):
-        self.add(QgsProcessingParameterFile("FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder))
+        self.add(
+            QgsProcessingParameterFile(
+                "FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder
+            )
+        )
         self.add(QgsProcessingParameterEnum("FORMAT", "Format", FORMATS, defaultValue=0))
         self.add_program()
         self.addOutput(QgsProcessingOutputFile("FILE", "The models"))
@@ -183,7 +225,10 @@ class Convert(Algorithm):
         format = FORMATS[self.parameterAsEnum(parameters, "FORMAT", context)]
         out = os.path.join(folder, f"buildings.{format}")
         self.call(
-            commands.convert(self.parameterAsString(parameters, "PROGRAM", context), folder, format, out), feedback
+            commands.convert(
+                self.parameterAsString(parameters, "PROGRAM", context), folder, format, out
+            ),
+            feedback,
         )
         return {"FILE": out}
 
@@ -195,7 +240,11 @@ class Load(Algorithm):
         return "Load results"
 
     def initAlgorithm(self, configuration=None):
-        self.add(QgsProcessingParameterFile("FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder))
+        self.add(
+            QgsProcessingParameterFile(
+                "FOLDER", "Folder of a run", QgsProcessingParameterFile.Folder
+            )
+        )
         self.add(QgsProcessingParameterBoolean("RAISED", "Raise them in 2.5D", False))
 
     def processAlgorithm(self, parameters, context, feedback):
@@ -203,7 +252,8 @@ class Load(Algorithm):
         found = self.load(folder, self.parameterAsBool(parameters, "RAISED", context), context)
         if not found:
             raise QgsProcessingException(
-                f"expected the folder of a run, got {folder}, which has no buildings.gpkg; choose another"
+                f"expected the folder of a run, got {folder}, which has no buildings.gpkg; choose "
+                "another"
             )
         return found
 

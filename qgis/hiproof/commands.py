@@ -16,7 +16,10 @@ def reconstruct(
     processes=None,
     more="",
 ):
-    """The main job. `bbox` is (xmin, ymin, xmax, ymax) in the clouds' coordinates, `more` further options as typed."""
+    """The main job.
+
+    `bbox` is (xmin, ymin, xmax, ymax) in the clouds' coordinates, `more` further options as typed.
+    """
     given = {
         "--footprints": footprints,
         "--layer": layer,
@@ -31,7 +34,13 @@ def reconstruct(
 
 def evaluate(program, folder, clouds, footprints=None, layer=None):
     """Figures of a run's models against points."""
-    return [program, "evaluate", folder, *clouds, *pairs({"--footprints": footprints, "--layer": layer})]
+    return [
+        program,
+        "evaluate",
+        folder,
+        *clouds,
+        *pairs({"--footprints": footprints, "--layer": layer}),
+    ]
 
 
 def convert(program, folder, format, out=None):
@@ -45,5 +54,7 @@ def status(program, folder):
 
 
 def pairs(given):
-    """Options with their values, those without one left out; a value that begins with a dash cannot be taken for an option."""
+    """Options with their values, those without one left out; a value that begins with a dash cannot
+    be taken for an option.
+    """
     return [f"{name}={value}" for name, value in given.items() if value]

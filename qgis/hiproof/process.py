@@ -18,10 +18,12 @@ class Failed(Exception):
 
 
 def run(command, say, cancelled, progress=None):
-    """Run `command` to its end, handing each line that it says to `say`; what it ends with, 0 or 1 (some building failed).
+    """Run `command` to its end, handing each line that it says to `say`; what it ends with, 0 or 1
+    (some building failed).
 
-    `cancelled()` is asked whether to stop it; `progress()` is called every few seconds. Raises Failed, with what it said
-    last, for a command that cannot be started, is used wrongly (2) or was stopped.
+    `cancelled()` is asked whether to stop it; `progress()` is called every few seconds. Raises
+    Failed, with what it said last, for a command that cannot be started, is used wrongly (2) or was
+    stopped.
     """
     try:
         process = subprocess.Popen(
@@ -34,7 +36,8 @@ def run(command, say, cancelled, progress=None):
         )
     except OSError as error:
         raise Failed(
-            f"expected the program hiproof, got: {error}; install it (pip install hiproof) and name it in the parameter Program"
+            f"expected the program hiproof, got: {error}; install it (pip install hiproof) and "
+            "name it in the parameter Program"
         ) from error
     said = []
     reader = threading.Thread(target=hand_on, args=(process.stdout, say, said), daemon=True)
@@ -52,7 +55,9 @@ def run(command, say, cancelled, progress=None):
     reader.join()
     process.stdout.close()
     if process.returncode not in (0, 1):
-        raise Failed("\n".join(said[-3:]) or f"{command[0]} ended with exit code {process.returncode}")
+        raise Failed(
+            "\n".join(said[-3:]) or f"{command[0]} ended with exit code {process.returncode}"
+        )
     return process.returncode
 
 
@@ -63,13 +68,24 @@ def hand_on(lines, say, said):
 
 
 def surroundings():
-    """QGIS sets variables for its own Python, which are not for another's; on Windows no window is to open."""
-    own = {name: value for name, value in os.environ.items() if name not in ("PYTHONHOME", "PYTHONPATH")}
-    return {"env": own, **({"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {})}
+    """QGIS sets variables for its own Python, which are not for another's; on Windows no window is
+    to open.
+    """
+    own = {
+        name: value
+        for name, value in os.environ.items()
+        if name not in ("PYTHONHOME", "PYTHONPATH")
+    }
+    return {
+        "env": own,
+        **({"creationflags": subprocess.CREATE_NO_WINDOW} if sys.platform == "win32" else {}),
+    }
 
 
 def share_done(program, folder):
     """The share of buildings done [%] of the run in `folder`, None while that is not known."""
-    asked = subprocess.run(commands.status(program, folder), capture_output=True, text=True, **surroundings())
+    asked = subprocess.run(
+        commands.status(program, folder), capture_output=True, text=True, **surroundings()
+    )
     found = DONE.search(asked.stdout)
     return 100.0 * int(found[1]) / int(found[2]) if found and int(found[2]) else None

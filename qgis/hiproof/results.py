@@ -1,4 +1,6 @@
-"""What a run has written, as layers: coloured by the style kept in the file, roofs, or buildings raised in 2.5D."""
+"""What a run has written, as layers: coloured by the style kept in the file, roofs, or buildings
+raised in 2.5D.
+"""
 
 import os
 from typing import ClassVar
@@ -24,7 +26,9 @@ def layers_of(folder):
 
 
 def style_of(name, raised):
-    """A function that styles a layer: buildings raised to their height, or as the file itself keeps it, by roof type."""
+    """A function that styles a layer: buildings raised to their height, or as the file itself keeps
+    it, by roof type.
+    """
     return raise_buildings if raised and name == "buildings" else QgsVectorLayer.loadDefaultStyle
 
 

@@ -1,11 +1,13 @@
-"""hiproof: HolIstic Parametric ROOFs. Airborne LiDAR point clouds into watertight, semantic LoD2 building models.
+"""hiproof: HolIstic Parametric ROOFs.
+
+Airborne LiDAR point clouds into watertight, semantic LoD2 building models.
 
     import hiproof
     fit = hiproof.fit_roof(points)                       # one primitive, all points
     building = hiproof.reconstruct(points, footprint)    # a valid solid, with status and quality
 
-Most names below are imported when first used, so that `import hiproof` stays fast; `reconstruct` is imported at once,
-since a module of the same name would otherwise take its place.
+Most names below are imported when first used, so that `import hiproof` stays fast; `reconstruct` is
+imported at once, since a module of the same name would otherwise take its place.
 """
 
 from collections.abc import Callable

@@ -24,7 +24,9 @@ def is_command() -> bool:
     """Whether this process was started as `hiproof` or `python -m hiproof`, rather than by a
     program that imports the package."""
     started = os.path.basename(sys.argv[0]) if sys.argv else ""
-    return started.removesuffix(".exe") == "hiproof" or (started == "-m" and "hiproof" in sys.orig_argv)
+    return started.removesuffix(".exe") == "hiproof" or (
+        started == "-m" and "hiproof" in sys.orig_argv
+    )
 
 
 def end_at_once_on_interrupt() -> None:

@@ -1,6 +1,8 @@
-"""The few kinds of error hiproof raises; every message is one sentence: what was expected, what came, what to try.
+"""The few kinds of error hiproof raises; every message is one sentence: what was expected, what
+came, what to try.
 
-Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or another process.
+Passwords in addresses are masked where a message is made, so that none reaches a screen, a file or
+another process.
 """
 
 import traceback
@@ -11,22 +13,32 @@ from .masking import masked
 
 
 class HiproofError(Exception):
-    """Base of every error hiproof raises on purpose. Its text is meant for the user, without a traceback."""
+    """Base of every error hiproof raises on purpose.
+
+    Its text is meant for the user, without a traceback.
+    """
 
     def __init__(self, message: str = ""):
         super().__init__(masked(str(message)))
 
 
 class InputError(HiproofError):
-    """A file or an array that cannot be used: unreadable, empty, of the wrong kind, without the classes asked for."""
+    """A file or an array that cannot be used: unreadable, empty, of the wrong kind, without the
+    classes asked for.
+    """
 
 
 class DamagedRaster(InputError):
-    """A terrain model of which a part cannot be read: every building on it needs it, so the run ends."""
+    """A terrain model of which a part cannot be read: every building on it needs it, so the run
+    ends.
+    """
 
 
 class NoModelError(InputError):
-    """A model asked for of a building that got none; `Building.built` is None there, and the status says why."""
+    """A model asked for of a building that got none;
+
+    `Building.built` is None there, and the status says why.
+    """
 
 
 class SettingsError(HiproofError):
@@ -38,21 +50,26 @@ class OutputError(HiproofError):
 
 
 class FitError(HiproofError):
-    """Points from which no roof can be determined (fewer than a plane needs, all in one place, not finite)."""
+    """Points from which no roof can be determined (fewer than a plane needs, all in one place, not
+    finite).
+    """
 
 
 class CompositionError(HiproofError):
     """A roof that cannot become a valid solid; the caller falls back to a simpler roof.
 
-    `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not known.
+    `parts` are the numbers of the roof parts whose faces are at fault, empty where that is not
+    known.
     """
 
     parts: tuple[int, ...] = ()
 
 
 def is_interrupt(error: BaseException) -> bool:
-    """Whether `error` is a Ctrl-C in disguise: of one that comes while compiled code runs Python makes a SystemError, or several one
-    of the other, which what catches an `Exception` would take for a failure."""
+    """Whether `error` is a Ctrl-C in disguise: of one that comes while compiled code runs Python
+    makes a SystemError, or several one of the other, which what catches an `Exception` would take
+    for a failure.
+    """
     cause: BaseException | None = error
     while isinstance(cause, SystemError):
         cause = cause.__cause__
@@ -60,7 +77,9 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 class ErrorReport(NamedTuple):
-    """What is kept of an unexpected error: one line with its place in the code, and the traceback."""
+    """What is kept of an unexpected error: one line with its place in the code, and the
+    traceback.
+    """
 
     detail: str
     trace: str
@@ -88,7 +107,9 @@ class HiproofWarning(UserWarning):
 
 
 class InputWarning(HiproofWarning):
-    """Input that was used after putting something right (points dropped, a CRS assumed); it says what and how much."""
+    """Input that was used after putting something right (points dropped, a CRS assumed); it says
+    what and how much.
+    """
 
 
 class OutputWarning(HiproofWarning):
@@ -96,4 +117,6 @@ class OutputWarning(HiproofWarning):
 
 
 class NotKeptWarning(HiproofWarning):
-    """Compiled functions cannot be kept, so that every process compiles them again; it says what to do."""
+    """Compiled functions cannot be kept, so that every process compiles them again; it says what to
+    do.
+    """

@@ -1,4 +1,6 @@
-"""Packages that only some need: an extra of the install brings each, and one sentence names it where it is missing."""
+"""Packages that only some need: an extra of the install brings each, and one sentence names it
+where it is missing.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +11,20 @@ from .errors import InputError
 
 
 def needed(package: str, extra: str, purpose: str, otherwise: str = "") -> Any:
-    """The module `package` for a `purpose`. Raises InputError where it cannot be imported, with the `extra` that brings it.
+    """The module `package` for a `purpose`.
+
+    Raises InputError where it cannot be imported, with the `extra` that brings it.
 
     `otherwise` is how to do without, where that is another way to what was asked for.
 
     >>> needed("maths", "all", "sums")
     Traceback (most recent call last):
-    hiproof.errors.InputError: expected the package maths for sums, got: No module named 'maths'; try: pip install 'hiproof[all]'
+    hiproof.errors.InputError: ...
     """
     try:
         return import_module(package)
     except ImportError as error:
         advice = f"try: pip install 'hiproof[{extra}]'" + (f", or {otherwise}" if otherwise else "")
-        raise InputError(f"expected the package {package} for {purpose}, got: {error}; {advice}") from error
+        raise InputError(
+            f"expected the package {package} for {purpose}, got: {error}; {advice}"
+        ) from error

@@ -1,14 +1,16 @@
-"""Every kind of output file once: its name, what stands in it, and the module of `write` that makes it.
+"""Every kind of output file once: its name, what stands in it, and the module of `write` that makes
+it.
 
-A run, its merge, `hiproof build`, `hiproof convert`, help and documents derive from FORMATS: a new format is a module and a line
-here. The module of a file that a run writes has
+A run, its merge, `hiproof build`, `hiproof convert`, help and documents derive from FORMATS: a new
+format is a module and a line here. The module of a file that a run writes has
 
-    writer(path, head, **given)      the incremental writer (a write.writer.BuildingWriter) of the file
-    fragment(sheet)                  a building's part of it (a write.fragments.Fragment), made in a worker
+    writer(path, head, **given) the incremental writer (a write.writer.BuildingWriter) of the file
+    fragment(sheet)                  a building's part of it (a write.fragments.Fragment), made in a
+                                     worker
 
 and that of one that `hiproof convert` makes of finished models has
 
-    write_models(path, buildings, crs)      write.meshes.viewed.ViewedModel; returns how many it wrote
+    write_models(path, buildings, crs) write.meshes.viewed.ViewedModel; returns how many it wrote
 
 Modules are imported when a file of theirs is asked for.
 """
@@ -43,10 +45,12 @@ def parquet(write: WriteSettings) -> bool:
 
 @dataclass(frozen=True)
 class Format:
-    """A kind of output file: its `file` name, `what` it holds, and the `module` of `write` that makes it, with `given`.
+    """A kind of output file: its `file` name, `what` it holds, and the `module` of `write` that
+    makes it, with `given`.
 
-    `fragment` is the module that makes a building's part of it, empty for a format of `hiproof convert`; `asked` whether a run of
-    these settings writes it; `tile_ending` that of the files of work tiles, empty where they have none.
+    `fragment` is the module that makes a building's part of it, empty for a format of `hiproof
+    convert`; `asked` whether a run of these settings writes it; `tile_ending` that of the files of
+    work tiles, empty where they have none.
     """
 
     file: str
@@ -61,7 +65,8 @@ class Format:
 FORMATS = {
     "gml": Format(
         file="buildings.gml",
-        what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection curves, roofType",
+        what="CityGML 2.0: LoD2 solids, roof, wall and ground surfaces, terrain intersection "
+        "curves, roofType",
         module="citygml.version2",
         fragment="citygml.version2",
         asked=citygml2,
@@ -77,7 +82,8 @@ FORMATS = {
     ),
     "cityjson": Format(
         file="buildings.city.jsonl",
-        what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG use (`rf_...`)",
+        what="CityJSONSeq 2.0 with the same solids; attributes under the names roofer and 3DBAG "
+        "use (`rf_...`)",
         module="cityjson.features",
         fragment="cityjson.features",
         tile_ending=".city.jsonl",
@@ -119,7 +125,9 @@ FORMATS = {
     ),
     "glb": Format(file="buildings.glb", what="binary glTF 2.0", module="meshes.gltf"),
     "obj": Format(file="buildings.obj", what="Wavefront OBJ, with its .mtl", module="meshes.obj"),
-    "3dtiles": Format(file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="meshes.tiles"),
+    "3dtiles": Format(
+        file="buildings.3dtiles", what="3D Tiles 1.1 on the globe, a folder", module="meshes.tiles"
+    ),
 }
 OF_MODELS = {name: format for name, format in FORMATS.items() if not format.fragment}
 """What `hiproof convert` makes of the models of a run."""
@@ -131,29 +139,40 @@ TILE_FOLDER = "models"  # in a run's folder: the models of work tiles, where a r
 
 
 def asked_files(settings: Settings, folder: Path) -> dict[str, Path]:
-    """Paths in `folder` of the files that a run of these settings writes for the whole area, by format.
+    """Paths in `folder` of the files that a run of these settings writes for the whole area, by
+    format.
 
     >>> [path.name for path in asked_files(Settings(), Path("models")).values()]
     ['buildings.gml', 'buildings.city.jsonl', 'parameters.jsonl', 'buildings.gpkg']
     """
     by_tile_alone = settings.city.models == "tiles"
     written = {
-        n: format for n, format in asked_formats(settings.write).items() if not (by_tile_alone and format.tile_ending)
+        n: format
+        for n, format in asked_formats(settings.write).items()
+        if not (by_tile_alone and format.tile_ending)
     }
     return {name: folder / format.file for name, format in written.items()}
 
 
 def asked_tile_files(settings: Settings, folder: Path, tile: str) -> dict[str, Path]:
-    """Paths in `folder` of the files of a work tile's own, by format; none where such a run writes none."""
+    """Paths in `folder` of the files of a work tile's own, by format; none where such a run writes
+    none.
+    """
     by_tile = settings.city.models != "merged"
-    asked = {name: format for name, format in asked_formats(settings.write).items() if by_tile and format.tile_ending}
+    asked = {
+        name: format
+        for name, format in asked_formats(settings.write).items()
+        if by_tile and format.tile_ending
+    }
     return {name: folder / f"{tile}{format.tile_ending}" for name, format in asked.items()}
 
 
 def places_of_models(settings: Settings, folder: Path) -> list[Path]:
-    """Where the models of such a run stand in `folder`: files of the whole area, the folder of those of work tiles.
+    """Where the models of such a run stand in `folder`: files of the whole area, the folder of
+    those of work tiles.
 
-    >>> [path.name for path in places_of_models(Settings.from_dict({"write": {"citygml": "3.0"}}), Path("out"))]
+    >>> [path.name for path in places_of_models(Settings.from_dict({"write": {"citygml": "3.0"}}),
+    ...     Path("out"))]
     ['buildings.citygml3.gml', 'buildings.city.jsonl']
     """
     whole = [path for name, path in asked_files(settings, folder).items() if name in OF_TILES]
@@ -161,13 +180,17 @@ def places_of_models(settings: Settings, folder: Path) -> list[Path]:
 
 
 def asked_fragments(write: WriteSettings) -> list[str]:
-    """The modules that make a building's parts of all files of such a run, those of its work tiles included."""
+    """The modules that make a building's parts of all files of such a run, those of its work tiles
+    included.
+    """
     return list(dict.fromkeys(format.fragment for format in asked_formats(write).values()))
 
 
 def asked_formats(write: WriteSettings) -> dict[str, Format]:
     """What a run of these settings writes, as whole files or by work tile."""
-    return {name: format for name, format in FORMATS.items() if format.fragment and format.asked(write)}
+    return {
+        name: format for name, format in FORMATS.items() if format.fragment and format.asked(write)
+    }
 
 
 def module_of(name: str) -> ModuleType:

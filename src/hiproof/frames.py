@@ -1,8 +1,9 @@
 """The only place that shifts, turns and scales coordinates.
 
-Files count in the unit of their reference system; `Units` makes them metres where they are read and the files' own
-again where they are written. In between, the world is in metres, and each building has a local origin, so that all
-geometry runs on small float64; the search for its roof turns that into the roof's own axes.
+Files count in the unit of their reference system; `Units` makes them metres where they are read and
+the files' own again where they are written. In between, the world is in metres, and each building
+has a local origin, so that all geometry runs on small float64; the search for its roof turns that
+into the roof's own axes.
 """
 
 from dataclasses import dataclass
@@ -12,7 +13,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Units:
-    """Metres in one unit of a file's coordinates, in plan and in height, and the names of these units.
+    """Metres in one unit of a file's coordinates, in plan and in height, and the names of these
+    units.
 
     >>> feet = Units(0.3048, 0.3048, "foot", "foot")
     >>> feet.to_metres([[10, 20, 30]]).round(4).tolist()
@@ -45,7 +47,11 @@ class Units:
         return np.array([self.plan, self.plan, self.height])
 
     def __str__(self) -> str:
-        return self.plan_name if self.plan == self.height else f"{self.plan_name}, heights in {self.height_name}"
+        return (
+            self.plan_name
+            if self.plan == self.height
+            else f"{self.plan_name}, heights in {self.height_name}"
+        )
 
 
 METRES = Units()
@@ -53,7 +59,8 @@ METRES = Units()
 
 @dataclass(frozen=True)
 class LocalFrame:
-    """A frame with the world's axes and its origin at `origin` (3,), in metres of the world frame (the paper's T_G).
+    """A frame with the world's axes and its origin at `origin` (3,), in metres of the world frame
+    (the paper's T_G).
 
     >>> frame = LocalFrame.around(np.array([[85000.0, 446000.0, 3.0], [85002.0, 446002.0, 5.0]]))
     >>> frame.to_local(np.array([[85001.0, 446001.0, 4.0]])).tolist()
@@ -64,7 +71,9 @@ class LocalFrame:
 
     @classmethod
     def around(cls, points_world: np.ndarray) -> "LocalFrame":
-        """Frame at the centroid of `points_world` (n, 3), rounded to the millimetre so that it writes out exactly."""
+        """Frame at the centroid of `points_world` (n, 3), rounded to the millimetre so that it
+        writes out exactly.
+        """
         return cls(np.round(np.asarray(points_world, float)[:, :3].mean(axis=0), 3))
 
     def to_local(self, world: np.ndarray) -> np.ndarray:
@@ -80,7 +89,9 @@ class LocalFrame:
 
 @dataclass(frozen=True)
 class PlanFrame:
-    """A roof's own axes: origin (3,) in local coordinates, `rotation` (2, 2) with uv = rotation @ (xy - origin)."""
+    """A roof's own axes: origin (3,) in local coordinates, `rotation` (2, 2) with uv = rotation @
+    (xy - origin).
+    """
 
     origin: np.ndarray
     rotation: np.ndarray

@@ -122,12 +122,24 @@ def started() -> tuple:
     console = next((handler for handler in LOGGER.handlers if isinstance(handler, Console)), None)
     if console is None:
         return ()
-    file = next((Path(handler.baseFilename) for handler in LOGGER.handlers if hasattr(handler, "baseFilename")), None)
+    file = next(
+        (
+            Path(handler.baseFilename)
+            for handler in LOGGER.handlers
+            if hasattr(handler, "baseFilename")
+        ),
+        None,
+    )
     return Level(logging.getLevelName(console.level).lower()), file
 
 
 def log_warning(
-    message: Warning | str, category: type, filename: str, lineno: int, file: object = None, line: str | None = None
+    message: Warning | str,
+    category: type,
+    filename: str,
+    lineno: int,
+    file: object = None,
+    line: str | None = None,
 ) -> None:
     """A warning as users read it: the sentence alone, without the place in the source. Other
     packages' are for `debug`."""

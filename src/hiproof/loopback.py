@@ -27,7 +27,8 @@ MOST_BYTES = 20_000_000  # bytes of a request: many times what any building's pa
 HTML = "text/html; charset=utf-8"
 TEXT = "text/plain; charset=utf-8"
 SAFE = {
-    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' "
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src "
+    "'self' "
     "data:; connect-src 'self'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'",
     "Referrer-Policy": "no-referrer",
     "X-Content-Type-Options": "nosniff",
@@ -63,7 +64,9 @@ class LoopbackServer(ThreadingHTTPServer):
         try:
             super().__init__((LOOPBACK, port), handler)
         except (OSError, OverflowError) as error:
-            raise InputError(f"expected a free port, got {port}: {error}; leave --port out to get any") from error
+            raise InputError(
+                f"expected a free port, got {port}: {error}; leave --port out to get any"
+            ) from error
 
     @property
     def address(self) -> str:
@@ -72,7 +75,8 @@ class LoopbackServer(ThreadingHTTPServer):
     def serve_until_stopped(self) -> None:
         """Serve until Ctrl-C, or until the process is asked to end."""
         asked = {
-            name: signal.signal(name, stop) for name in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
+            name: signal.signal(name, stop)
+            for name in (signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))
         }
         try:
             with suppress(KeyboardInterrupt):
@@ -190,7 +194,10 @@ class LoopbackHandler(BaseHTTPRequestHandler):
     def send(self, answer: Answer) -> None:
         self.connection.settimeout(QUIET_S)
         self.send_response(answer.code)
-        for name, value in {"Content-Type": answer.kind, "Content-Length": str(len(answer.body))}.items():
+        for name, value in {
+            "Content-Type": answer.kind,
+            "Content-Length": str(len(answer.body)),
+        }.items():
             self.send_header(name, value)
         self.own = answer.headers
         self.end_headers()
@@ -216,13 +223,16 @@ def refusal(headers: Headers, port: int) -> str:
     """Say why those who ask with these headers may not: they must call this machine by its own
     name, as a page of its own.
 
-    >>> refusal({"Host": "localhost:8000"}, 8000), refusal({"Host": "localhost:8000", "Origin": "null"}, 8000)
+    >>> refusal({"Host": "localhost:8000"}, 8000), refusal({"Host": "localhost:8000",
+    ...     "Origin": "null"}, 8000)
     ('', 'expected a request of this page, got one of another origin')
     """
     own = own_hosts(port)
     hosts = headers.get_all("Host") if isinstance(headers, Message) else [headers.get("Host")]
     if not hosts or len(hosts) > 1 or hosts[0] not in own:
-        return f"expected a request to {LOOPBACK}, got another host; use the address that was printed"
+        return (
+            f"expected a request to {LOOPBACK}, got another host; use the address that was printed"
+        )
     origin = headers.get("Origin")
     if origin is not None and origin not in {f"http://{name}" for name in own}:
         return "expected a request of this page, got one of another origin"

@@ -19,11 +19,15 @@ from urllib.parse import quote, quote_plus, unquote, unquote_plus
 
 HIDDEN = "..."
 
-# user:password@, up to the last @ before the query; up to the word's last where what follows the colon is no port
+# user:password@, up to the last @ before the query; up to the word's last where what follows the
+# colon is no port
 AFTER_USER = re.compile(r"(://[^\s:@/?#\[]*):(?:[^\s?#]*@|(?!\d*(?:[/?#\s]|$))\S*@)")
 TOKEN_AS_USER = re.compile(r"(https?://)[^\s:@/?#]+@", re.IGNORECASE)
 ENCODED = re.compile(r"(%3A%2F%2F)[^\s&/]*%40", re.IGNORECASE)
-NAME = r"(?<![a-z])(?:[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)|pass|sig|key|accesskeyid)\s*=\s*"
+NAME = (
+    r"(?<![a-z])(?:[\w-]*(?:password|passwd|pwd|secret|token|signature|credential|api_?key)"
+    r"|pass|sig|key|accesskeyid)\s*=\s*"
+)
 NAMED = re.compile(
     rf"({NAME})" r"""(?:'(?:\\.|[^'\\])*'|"(?:\\.|[^"\\])*"|[^&\s]*[^&\s,;:.)'"])""",
     re.IGNORECASE,
@@ -40,7 +44,8 @@ WHOLE_WORD_BELOW = 4
 # What is hidden in addresses only: single letters and small numbers stand in most sentences.
 NO_SECRET = re.compile(r"\W*.?\W*|\d{1,3}")
 ADDRESS = re.compile(
-    r"//|@|%2F%2F|^/vsi|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=", re.IGNORECASE
+    r"//|@|%2F%2F|^/vsi|(?:^|[\s:;?&])(?:host|hostaddr|dbname|user|service|server|uid|password|pwd)\s*=",
+    re.IGNORECASE,
 )
 
 
@@ -62,7 +67,9 @@ class Secrets:
         found = sorted(held, key=len, reverse=True)
         if not found:
             return text
-        return re.sub("|".join(pattern_of(form) for form in found), HIDDEN, text, flags=re.IGNORECASE)
+        return re.sub(
+            "|".join(pattern_of(form) for form in found), HIDDEN, text, flags=re.IGNORECASE
+        )
 
 
 SECRETS = Secrets()
@@ -90,14 +97,20 @@ def secrets_of(address: str) -> set[str]:
     """The secrets in an address, however malformed, with the pieces into which a program may cut
     them.
 
-    >>> sorted(secrets_of("postgresql//adm:S3cr3t@127.0.0.1/t")), sorted(secrets_of("host=h password=S3c r3t user=me"))
-    (['S3cr3t'], ['S3c', 'S3c r3t', 'r3t'])
+    >>> addresses = "postgresql//adm:S3cr3t@127.0.0.1/t", "host=h password=S3c r3t user=me"
+    >>> [sorted(secrets_of(address)) for address in addresses]
+    [['S3cr3t'], ['S3c', 'S3c r3t', 'r3t']]
     >>> secrets_of("tiles/a.laz"), secrets_of("https://host:8080/tile.laz"), secrets_of("postgresql://me@host/db")
     (set(), set(), set())
     """
     decoded = unquote(address)
     whole = {secret for text in {address, decoded, unquote(decoded)} for secret in candidates(text)}
-    pieces = {piece for secret in whole for text in (secret, unquote(secret)) for piece in BREAKS.split(text)}
+    pieces = {
+        piece
+        for secret in whole
+        for text in (secret, unquote(secret))
+        for piece in BREAKS.split(text)
+    }
     return {secret for secret in whole | pieces if not NO_SECRET.fullmatch(secret)}
 
 
@@ -140,9 +153,13 @@ def forms_of(secret: str) -> set[str]:
         quote(text, safe="") for text in plain
     }
     quoted = {repr(text)[1:-1] for text in plain} | {json.dumps(text)[1:-1] for text in plain}
-    doubled = {text.replace("'", "''") for text in plain} | {text.replace("\\", "\\\\") for text in plain}
+    doubled = {text.replace("'", "''") for text in plain} | {
+        text.replace("\\", "\\\\") for text in plain
+    }
     as_bytes = {repr(text.encode("utf-8", "replace"))[2:-1] for text in plain}
-    return {form for form in plain | encoded | quoted | doubled | as_bytes if re.search(r"\w", form)}
+    return {
+        form for form in plain | encoded | quoted | doubled | as_bytes if re.search(r"\w", form)
+    }
 
 
 def pattern_of(form: str) -> str:

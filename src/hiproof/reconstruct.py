@@ -27,17 +27,20 @@ def reconstruct(
     ground: np.ndarray | None = None,
     unused: np.ndarray | None = None,
 ) -> Building:
-    """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3, with our fits).
+    """Reconstruct one building from its roof points (Li, Zhang and Shan 2020, sections 3.1-3.3,
+    with our fits).
 
-    points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed; repeated ones
-    and those that are nowhere on Earth (not finite, 3.4e38) are dropped. footprint: plan polygon in the same frame, moved where points around it show clearly that it lies
-    beside its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything of the protocol
-    `hiproof.Terrain`; without one the ground is assumed below the lowest point, or at the foot of walls that are seen.
-    ground: (m, 3) ground points in and around the footprint, by which bare ground inside it is cut out (`footprint_trust`).
-    unused: further points (m, 3) of the building that are not fitted, thinned out or of a noise class; the verdict on the
-    model names them where they lie together off the roof.
-    What the data hold never raises: the outcome is the Building's `status`, and its `detail` says why. Raises InputError
-    for points of another shape, for a footprint, a terrain or settings of another kind, and for settings that ask the network
+    points: (n, 3) world coordinates in metres, in any order, facade and clutter returns allowed;
+    repeated ones and those that are nowhere on Earth (not finite, 3.4e38) are dropped. footprint:
+    plan polygon in the same frame, moved where points around it show clearly that it lies beside
+    its roof; without one the outline is estimated. terrain: what `read_terrain` gives, or anything
+    of the protocol `hiproof.Terrain`; without one the ground is assumed below the lowest point, or
+    at the foot of walls that are seen. ground: (m, 3) ground points in and around the footprint, by
+    which bare ground inside it is cut out (`footprint_trust`). unused: further points (m, 3) of the
+    building that are not fitted, thinned out or of a noise class; the verdict on the model names
+    them where they lie together off the roof. What the data hold never raises: the outcome is the
+    Building's `status`, and its `detail` says why. Raises InputError for points of another shape,
+    for a footprint, a terrain or settings of another kind, and for settings that ask the network
     where the extra `network` is not installed.
 
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))

@@ -1,4 +1,7 @@
-"""Every setting once: default, unit, bounds, help. Command line, TOML file and error texts derive from here."""
+"""Every setting once: default, unit, bounds, help.
+
+Command line, TOML file and error texts derive from here.
+"""
 
 from __future__ import annotations
 
@@ -25,13 +28,23 @@ def setting(
     option: str = "",
     names: str = "",
 ) -> Any:
-    """Declare one setting of a section; `low` and `high` are inclusive bounds, `choices` the allowed values.
+    """Declare one setting of a section;
 
-    Of a setting of several values they hold for each, and there are at least `fewest`. With an `option` (such as
-    "--roofs") the command line has it, its help and default made of this; settings that share one are set together. One that
-    `names` "files" is another where other bytes stand in them.
+    `low` and `high` are inclusive bounds, `choices` the allowed values.
+
+    Of a setting of several values they hold for each, and there are at least `fewest`. With an
+    `option` (such as "--roofs") the command line has it, its help and default made of this;
+    settings that share one are set together. One that `names` "files" is another where other bytes
+    stand in them.
     """
-    metadata = {"help": help, "unit": unit, "low": low, "high": high, "choices": choices, "fewest": fewest}
+    metadata = {
+        "help": help,
+        "unit": unit,
+        "low": low,
+        "high": high,
+        "choices": choices,
+        "fewest": fewest,
+    }
     return field(default=default, metadata=metadata | {"option": option, "names": names})
 
 
@@ -40,41 +53,63 @@ class ReadSettings:
     """[read] which points count."""
 
     building_classes: tuple[int, ...] = setting(
-        (6,), "LAS classes of roof points (ASPRS 6; IGN uses 67)", "", 0, 255, fewest=1, option="--building-class"
+        (6,),
+        "LAS classes of roof points (ASPRS 6; IGN uses 67)",
+        "",
+        0,
+        255,
+        fewest=1,
+        option="--building-class",
     )
     ground_classes: tuple[int, ...] = setting(
         (2,), "LAS classes of terrain points", "", 0, 255, option="--ground-class"
     )
     roofs: str = setting(
         "auto",
-        "class: roofs are the points of the building classes; shape: they are looked for among all others that may be roofs; "
-        "alone: all of these are, but leaves, of clouds that hold roofs alone, cut out beforehand; auto: by shape where no point has "
+        "class: roofs are the points of the building classes; shape: they are looked for among all "
+        "others that may be roofs; "
+        "alone: all of these are, but leaves, of clouds that hold roofs alone, cut out beforehand; "
+        "auto: by shape where no point has "
         "the building class, or alone where nothing looks like ground",
         choices=("auto", "class", "shape", "alone"),
         option="--roofs",
     )
-    crs: str = setting("", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say', option="--crs")
+    crs: str = setting(
+        "", 'CRS of the clouds, such as "EPSG:7415"; empty means as their files say', option="--crs"
+    )
     unit: str = setting(
         "auto",
-        "unit of the clouds' coordinates; auto is that of their CRS, and metre where they name none",
+        "unit of the clouds' coordinates; auto is that of their CRS, and metre where they name "
+        "none",
         choices=("auto", "metre", "foot", "us-survey-foot"),
         option="--unit",
     )
     override_columns: tuple[str, ...] = setting(
-        (), 'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" (docs/overrides.md)'
+        (),
+        'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" '
+        "(docs/overrides.md)",
     )
     split_gap_m: float = setting(
-        0.0, "without footprints: clear space that separates buildings; 0 adapts it to the density", "m", 0.0, 20.0
+        0.0,
+        "without footprints: clear space that separates buildings; 0 adapts it to the density",
+        "m",
+        0.0,
+        20.0,
     )
     split_houses: bool = setting(
         True,
-        "without footprints: tell touching houses apart where a step or another ridge or eave runs across the block",
+        "without footprints: tell touching houses apart where a step or another ridge or eave runs "
+        "across the block",
     )
-    split_min_points: int = setting(30, "without footprints: groups of fewer points are no building", "", 3, 100000)
+    split_min_points: int = setting(
+        30, "without footprints: groups of fewer points are no building", "", 3, 100000
+    )
 
     @property
     def by_class(self) -> bool:
-        """Whether roofs are the points of the building classes, of whole clouds or, with "auto", where there are such."""
+        """Whether roofs are the points of the building classes, of whole clouds or, with "auto",
+        where there are such.
+        """
         return self.roofs in ("auto", "class")
 
 
@@ -98,7 +133,8 @@ class FitSettings:
     )
     parts: str = setting(
         "compound",
-        "as many primitives as the evidence pays for, or one (extra `network`, unless --no-network)",
+        "as many primitives as the evidence pays for, or one (extra `network`, unless "
+        "--no-network)",
         choices=("compound", "one"),
         option="--parts",
     )
@@ -110,13 +146,20 @@ class CompoundSettings:
 
     detail: str = setting(
         "full",
-        "how much structure: fine keeps small dormers and steps, main leaves dormers and small parts out",
+        "how much structure: fine keeps small dormers and steps, main leaves dormers and small "
+        "parts out",
         choices=("fine", "full", "main"),
         option="--detail",
     )
-    tolerance_m: float = setting(0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0)
-    evidence_points: float = setting(1.0, "points that one unit of structure must explain at least", "", 0.1, 100.0)
-    evidence_area_m2: float = setting(0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0)
+    tolerance_m: float = setting(
+        0.25, "height residual at which a point counts as unexplained", "m", 0.05, 1.0
+    )
+    evidence_points: float = setting(
+        1.0, "points that one unit of structure must explain at least", "", 0.1, 100.0
+    )
+    evidence_area_m2: float = setting(
+        0.25, "area of points that one unit of structure must explain", "m2", 0.01, 10.0
+    )
 
 
 @dataclass(frozen=True)
@@ -124,14 +167,19 @@ class SegmentSettings:
     """[segment] recognising the roof before fitting it."""
 
     enabled: bool = setting(
-        True, "let the network weigh points and types where one primitive is fitted to a building", option="--network"
+        True,
+        "let the network weigh points and types where one primitive is fitted to a building",
+        option="--network",
     )
     always: bool = setting(
         False,
-        "ask it of every building and write its answer, though a fit of several does without (extra `network`)",
+        "ask it of every building and write its answer, though a fit of several does without "
+        "(extra `network`)",
         option="--network",
     )
-    weights: str = setting("", "ONNX file with the network's weights; empty means the shipped ones", names="files")
+    weights: str = setting(
+        "", "ONNX file with the network's weights; empty means the shipped ones", names="files"
+    )
     device: str = setting("cpu", "where the network runs", choices=("cpu", "cuda"))
 
 
@@ -141,9 +189,15 @@ class ComposeSettings:
 
     snap_m: float = setting(0.001, "plan vertices closer than this are one", "m", 0.001, 0.05)
     min_face_area_m2: float = setting(0.01, "smaller roof faces join a neighbour", "m2", 0.0, 10.0)
-    min_face_width_m: float = setting(0.25, "thinner roof faces, which nobody draws, join a neighbour", "m", 0.0, 1.0)
-    ground_clearance_m: float = setting(0.1, "the ground lies at least this far below the lowest eave", "m", 0.01, 10.0)
-    planarity_m: float = setting(0.001, "vertices of a face lie within this of its plane", "m", 0.0005, 0.05)
+    min_face_width_m: float = setting(
+        0.25, "thinner roof faces, which nobody draws, join a neighbour", "m", 0.0, 1.0
+    )
+    ground_clearance_m: float = setting(
+        0.1, "the ground lies at least this far below the lowest eave", "m", 0.01, 10.0
+    )
+    planarity_m: float = setting(
+        0.001, "vertices of a face lie within this of its plane", "m", 0.0005, 0.05
+    )
 
 
 @dataclass(frozen=True)
@@ -158,14 +212,16 @@ class ReconstructSettings:
     )
     footprint_trust: str = setting(
         "points",
-        "points: bare ground inside a footprint (a yard that is no hole, a wing pulled down) is cut out of it; full: it is "
+        "points: bare ground inside a footprint (a yard that is no hole, a wing pulled down) is "
+        "cut out of it; full: it is "
         "roofed over, and a remark says so",
         choices=("points", "full"),
         option="--footprint-trust",
     )
     empty_footprints: str = setting(
         "skip",
-        "skip: a footprint whose points lie on the ground gets no model and the status no_building; model: it gets the model "
+        "skip: a footprint whose points lie on the ground gets no model and the status "
+        "no_building; model: it gets the model "
         "of whatever points it has",
         choices=("skip", "model"),
         option="--empty-footprints",
@@ -177,17 +233,23 @@ class CitySettings:
     """[city] many buildings."""
 
     max_points_a_building: int = setting(
-        20000, "a building with more points is thinned to so many, evenly and by a fixed rule", "", 1000, 10**7
+        20000,
+        "a building with more points is thinned to so many, evenly and by a fixed rule",
+        "",
+        1000,
+        10**7,
     )
     models: str = setting(
         "merged",
-        "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or both",
+        "one CityGML and one CityJSONSeq, a pair for each work tile (models/) as it is solved, or "
+        "both",
         choices=("merged", "tiles", "both"),
         option="--models",
     )
     keep_failures: bool = setting(
         True,
-        "keep points, outline and settings of up to 20 buildings that hit an internal error in the folder failures of the "
+        "keep points, outline and settings of up to 20 buildings that hit an internal error in the "
+        "folder failures of the "
         "output, to be sent with a report (`hiproof repro` runs them again)",
         option="--keep-failures",
     )
@@ -199,7 +261,8 @@ class WriteSettings:
 
     lods: tuple[str, ...] = setting(
         ("2.2",),
-        "levels of detail: 0 footprint and roof edge, 1.2 one block, 1.3 a block for each building part, 2.2 roofs; CityJSON "
+        "levels of detail: 0 footprint and roof edge, 1.2 one block, 1.3 a block for each building "
+        "part, 2.2 roofs; CityJSON "
         "always has the footprint, CityGML one LoD1, the finer",
         choices=("0", "1.2", "1.3", "2.2"),
         fewest=1,
@@ -207,33 +270,46 @@ class WriteSettings:
     )
     parts_as: str = setting(
         "one",
-        "buildingparts: roofs that meet at walls alone become building parts, each with a solid of its own; one: a solid a building",
+        "buildingparts: roofs that meet at walls alone become building parts, each with a solid of "
+        "its own; one: a solid a building",
         choices=("one", "buildingparts"),
         option="--parts-as",
     )
     roof_codes: str = setting(
-        "sig3d", "code list of CityGML's roofType: SIG3D's or AdV's", choices=("sig3d", "adv"), option="--roof-codes"
+        "sig3d",
+        "code list of CityGML's roofType: SIG3D's or AdV's",
+        choices=("sig3d", "adv"),
+        option="--roof-codes",
     )
-    citygml: str = setting("2.0", "version of CityGML, or both", choices=("2.0", "3.0", "both"), option="--citygml")
+    citygml: str = setting(
+        "2.0", "version of CityGML, or both", choices=("2.0", "3.0", "both"), option="--citygml"
+    )
     osm_tags: bool = setting(
         False,
-        "write OpenStreetMap's Simple 3D tags as attributes too: roof:shape, roof:height, roof:direction, roof:angle, height; they "
+        "write OpenStreetMap's Simple 3D tags as attributes too: roof:shape, roof:height, "
+        "roof:direction, roof:angle, height; they "
         "replace the input's own of these names",
         option="--osm-tags",
     )
-    parquet: bool = setting(False, "write the tables as GeoParquet too (extra `parquet`)", option="--parquet")
+    parquet: bool = setting(
+        False, "write the tables as GeoParquet too (extra `parquet`)", option="--parquet"
+    )
     out_crs: str = setting(
         "",
-        'CRS of the coordinates in all files but parameters.jsonl, such as "EPSG:25832"; empty means that of the clouds; heights stay as '
+        'CRS of the coordinates in all files but parameters.jsonl, such as "EPSG:25832"; empty '
+        "means that of the clouds; heights stay as "
         "they are where it names none",
         option="--out-crs",
     )
     terrain_intersection: bool = setting(
-        True, "write into CityGML the line along which walls meet the terrain", option="--terrain-intersection"
+        True,
+        "write into CityGML the line along which walls meet the terrain",
+        option="--terrain-intersection",
     )
     gml_surfaces: bool = setting(
         True,
-        "write a solid's surfaces into CityGML by value too, last of all geometry, for GDAL and QGIS, which follow no links",
+        "write a solid's surfaces into CityGML by value too, last of all geometry, for GDAL and "
+        "QGIS, which follow no links",
         option="--gml-surfaces",
     )
 
@@ -259,17 +335,25 @@ class Settings:
 
     @classmethod
     def from_dict(cls, values: dict[str, dict[str, Any]]) -> Settings:
-        """Settings with the given sections replaced. Raises SettingsError for unknown names or values out of bounds."""
+        """Settings with the given sections replaced.
+
+        Raises SettingsError for unknown names or values out of bounds.
+        """
         return cls().replace(values)
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Settings:
-        """Settings from a TOML file with one table a section. Raises SettingsError when it cannot be read."""
+        """Settings from a TOML file with one table a section.
+
+        Raises SettingsError when it cannot be read.
+        """
         try:
             values = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-        except (OSError, ValueError, RecursionError) as error:  # undecodable, no TOML, or a number of 5,000 digits
+        # undecodable, no TOML, or a number of 5,000 digits
+        except (OSError, ValueError, RecursionError) as error:
             raise SettingsError(
-                f"expected a TOML settings file at {path}, got: {error}; `hiproof settings` prints one"
+                f"expected a TOML settings file at {path}, got: {error}; `hiproof settings` prints "
+                "one"
             ) from error
         return cls.from_dict(values)
 
@@ -280,16 +364,24 @@ class Settings:
             section: Any = getattr(self, section_name, None)
             names = [f.name for f in fields(self)]
             if section_name not in names or not isinstance(changes, dict):
-                got = f"[{section_name}]" if isinstance(changes, dict) else f"{section_name} = {shown(changes)}"
+                got = (
+                    f"[{section_name}]"
+                    if isinstance(changes, dict)
+                    else f"{section_name} = {shown(changes)}"
+                )
                 raise SettingsError(
-                    f"expected a settings section (one of {', '.join(names)}), got {got}; `hiproof settings` lists them"
+                    f"expected a settings section (one of {', '.join(names)}), got {got}; `hiproof "
+                    "settings` lists them"
                 )
             known = {f.name: f for f in fields(section)}
             for name in changes:
                 if name not in known:
-                    raise SettingsError(f"expected a setting of [{section_name}] ({', '.join(known)}), got {name!r}")
+                    raise SettingsError(
+                        f"expected a setting of [{section_name}] ({', '.join(known)}), got {name!r}"
+                    )
             checked = {
-                name: check_value(f"{section_name}.{name}", known[name], value) for name, value in changes.items()
+                name: check_value(f"{section_name}.{name}", known[name], value)
+                for name, value in changes.items()
             }
             sections[section_name] = dataclasses.replace(section, **checked)
         return dataclasses.replace(self, **sections)
@@ -297,7 +389,10 @@ class Settings:
     def to_dict(self) -> dict[str, dict[str, Any]]:
         """Plain nested dictionary, ready for JSON."""
         return {
-            s.name: {f.name: plain(getattr(getattr(self, s.name), f.name)) for f in fields(getattr(self, s.name))}
+            s.name: {
+                f.name: plain(getattr(getattr(self, s.name), f.name))
+                for f in fields(getattr(self, s.name))
+            }
             for s in fields(self)
         }
 
@@ -315,13 +410,18 @@ class Settings:
 
 
 def check_value(name: str, declared: dataclasses.Field, value: Any) -> Any:
-    """`value` as the declared setting's type. Raises SettingsError with the full sentence when it does not fit."""
+    """`value` as the declared setting's type.
+
+    Raises SettingsError with the full sentence when it does not fit.
+    """
     default, told = declared.default, declared.metadata
     if not isinstance(default, tuple):
         return checked_one(name, default, told, value)
     values = tuple(value) if isinstance(value, (list, tuple)) else (value,)
     if len(values) < told["fewest"]:
-        raise SettingsError(f"expected {name} to hold {told['fewest']} or more values, got none; {told['help']}")
+        raise SettingsError(
+            f"expected {name} to hold {told['fewest']} or more values, got none; {told['help']}"
+        )
     return tuple(checked_one(name, KINDS[declared.type], told, one) for one in values)
 
 
@@ -339,7 +439,9 @@ def checked_one(name: str, like: Any, told: Any, value: Any) -> Any:
     else:
         fits = whole or isinstance(value, float)
     if not fits:
-        kind = {bool: "true or false", str: "text", int: "a whole number", float: "a number"}[type(like)]
+        kind = {bool: "true or false", str: "text", int: "a whole number", float: "a number"}[
+            type(like)
+        ]
         raise SettingsError(f"expected {name} to be {kind}, got {shown(value)}; {told['help']}")
     low, high, choices = told["low"], told["high"], told["choices"]
     # so written that NaN is in no bounds; a number without bounds must still be finite
@@ -349,12 +451,16 @@ def checked_one(name: str, like: Any, told: Any, value: Any) -> Any:
             bounds = " ".join(f"between {low} and {high} {told['unit']}".split())
             raise SettingsError(f"expected {name} {bounds}, got {shown(value)}; {told['help']}")
     if choices and value not in choices:
-        raise SettingsError(f"expected {name} to be one of {', '.join(map(str, choices))}, got {shown(value)}")
+        raise SettingsError(
+            f"expected {name} to be one of {', '.join(map(str, choices))}, got {shown(value)}"
+        )
     return type(like)(value)
 
 
 def shown(value: Any) -> str:
-    """A value as a message shows it: whole numbers of thousands of digits and long texts cut short."""
+    """A value as a message shows it: whole numbers of thousands of digits and long texts
+    cut short.
+    """
     if isinstance(value, int) and abs(value) > MOST:
         return f"a number of more than {len(str(MOST)) - 1} digits"
     if isinstance(value, (list, tuple, dict)):

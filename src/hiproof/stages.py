@@ -1,4 +1,6 @@
-"""What each line of `reconstruct` does: every step takes values and returns values, and a failure becomes a status."""
+"""What each line of `reconstruct` does: every step takes values and returns values, and a failure
+becomes a status.
+"""
 
 from __future__ import annotations
 
@@ -33,25 +35,34 @@ FEWEST_POINTS = 4
 """A roof plane and one point to doubt it; below that a building is a flat block."""
 
 MOST_OUTLINE_VERTICES = 500
-"""Of an outline that roofs are fitted over; the time grows with the square of them, and a building has no more corners."""
+"""Of an outline that roofs are fitted over; the time grows with the square of them, and a building
+has no more corners.
+"""
 
 PIECE_VERTICES = 64
-"""Of an outline of thousands that are simplified at once: teeth take Douglas and Peucker the square of them."""
+"""Of an outline of thousands that are simplified at once: teeth take Douglas and Peucker the square
+of them.
+"""
 
 SUNK_M = 0.2
-"""Of ground above the lowest eave; less is how well both are known, where a roof comes down to the ground."""
+"""Of ground above the lowest eave; less is how well both are known, where a roof comes down to the
+ground.
+"""
 
 ASSUMED_WALL_M = 3.0
 """Height of the lowest wall where nothing is known of the terrain."""
 
 WALLS_SEEN_M = 1.5
-"""Of the lowest point below all of the roof, from which on walls are seen; a gutter or a bay hangs less far down."""
+"""Of the lowest point below all of the roof, from which on walls are seen; a gutter or a bay hangs
+less far down.
+"""
 
 
 @dataclass(frozen=True)
 class Recognised:
-    """What the network says: probabilities by roof type, empty without it, and a weight (n,) a point (1 roof, 0 not)
-    for a fit of one primitive; a fit of several weighs all points alike."""
+    """What the network says: probabilities by roof type, empty without it, and a weight (n,) a
+    point (1 roof, 0 not) for a fit of one primitive; a fit of several weighs all points alike.
+    """
 
     weights: np.ndarray | None = None
     types: dict[str, float] = field(default_factory=dict)
@@ -59,7 +70,9 @@ class Recognised:
 
 @dataclass(frozen=True)
 class Fitted:
-    """Parts over an outline in the local frame, how they were chosen, and what became of the fit."""
+    """Parts over an outline in the local frame, how they were chosen, and what became of
+    the fit.
+    """
 
     parts: tuple[Part, ...]
     outline: shapely.Polygon
@@ -71,7 +84,9 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Ground:
-    """Where the walls end: height in the world, the source of it, and the terrain's line along the outline."""
+    """Where the walls end: height in the world, the source of it, and the terrain's line along the
+    outline.
+    """
 
     z: float
     source: str
@@ -79,18 +94,23 @@ class Ground:
 
 
 def refuse_other_kinds(footprint: object, terrain: object, settings: object) -> None:
-    """Raise InputError for arguments of another kind, by their own names: what they hold may be anything."""
+    """Raise InputError for arguments of another kind, by their own names: what they hold may be
+    anything.
+    """
     if footprint is not None and not isinstance(footprint, (shapely.Geometry, Footprint)):
         raise InputError(
-            f"expected a polygon of shapely as footprint, got {type(footprint).__name__}; make a shapely.Polygon of it"
+            f"expected a polygon of shapely as footprint, got {type(footprint).__name__}; make a "
+            "shapely.Polygon of it"
         )
     if settings is not None and not isinstance(settings, Settings):
         raise InputError(
-            f"expected hiproof.Settings as settings, got {type(settings).__name__}; make them by Settings.from_dict"
+            f"expected hiproof.Settings as settings, got {type(settings).__name__}; make them by "
+            "Settings.from_dict"
         )
     if terrain is not None and not hasattr(terrain, "height_at"):
         raise InputError(
-            f"expected a terrain that answers height_at, got {type(terrain).__name__}; read a raster by hiproof.read_terrain"
+            f"expected a terrain that answers height_at, got {type(terrain).__name__}; read a "
+            "raster by hiproof.read_terrain"
         )
 
 
@@ -100,34 +120,50 @@ def fits_one(settings: Settings) -> bool:
 
 
 def asks_network(settings: Settings) -> bool:
-    """Whether the network is asked: where one primitive is fitted it is heeded, where several are its opinion may be wanted beside."""
+    """Whether the network is asked: where one primitive is fitted it is heeded, where several are
+    its opinion may be wanted beside.
+    """
     return settings.segment.enabled and (fits_one(settings) or settings.segment.always)
 
 
 def refuse_without_network(settings: Settings) -> None:
-    """Raise InputError where the network is to be asked and cannot be. Evidence alone names other types, and builds other roofs,
-    in some buildings: what is installed must not decide that unsaid, so who wants it has to say so."""
+    """Raise InputError where the network is to be asked and cannot be.
+
+    Evidence alone names other types, and builds other roofs, in some buildings: what is installed
+    must not decide that unsaid, so who wants it has to say so.
+    """
     if asks_network(settings):
         from .segment.inference import import_onnxruntime
 
-        import_onnxruntime(otherwise="--no-network (segment.enabled = false) to go by the points alone")
+        import_onnxruntime(
+            otherwise="--no-network (segment.enabled = false) to go by the points alone"
+        )
 
 
 def asked_for(footprint: shapely.Polygon | Footprint | None, id: str) -> Building:
-    """The outcome to start from: the building's name, its footprint and the attributes it came with."""
+    """The outcome to start from: the building's name, its footprint and the attributes it came
+    with.
+    """
     if isinstance(footprint, Footprint):
-        known = {"footprint": footprint.polygon, "attributes": footprint.attributes, "shift": footprint.shift}
+        known = {
+            "footprint": footprint.polygon,
+            "attributes": footprint.attributes,
+            "shift": footprint.shift,
+        }
         return Building(footprint.id, Status.MODELLED, **known)
     if footprint is not None and footprint.geom_type != "Polygon":
         footprint = largest_polygon(footprint)  # of several a building has one, and files hold one
     return Building(id, Status.MODELLED, footprint=footprint)
 
 
-def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple[Building, shapely.Polygon | None, str]:
-    """The building with its footprint's shift onto its points, the footprint there, and a remark: on points in and around it.
+def aligned(
+    building: Building, points: np.ndarray, settings: Settings
+) -> tuple[Building, shapely.Polygon | None, str]:
+    """The building with its footprint's shift onto its points, the footprint there, and a remark:
+    on points in and around it.
 
-    It stays where it is unless the evidence is clear, or its shift is known. Of thousands of vertices it keeps those that
-    matter.
+    It stays where it is unless the evidence is clear, or its shift is known. Of thousands of
+    vertices it keeps those that matter.
     """
     footprint, simplified = without_needless_vertices(building.footprint)
     if footprint is None or not (math.isfinite(footprint.area) and footprint.area):
@@ -140,7 +176,9 @@ def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple
 
     polygon = largest_polygon(footprint)
     origin = np.floor(polygon.bounds[:2])
-    found = find_shift(finite(points[:, :2]) - origin, shapely.transform(polygon, lambda c: c - origin))
+    found = find_shift(
+        finite(points[:, :2]) - origin, shapely.transform(polygon, lambda c: c - origin)
+    )
     if found.is_clear:
         shift = (round(float(found.xy[0]), 3), round(float(found.xy[1]), 3))
         building = dataclasses.replace(building, shift=shift)
@@ -149,21 +187,30 @@ def aligned(building: Building, points: np.ndarray, settings: Settings) -> tuple
 
 
 def shift_remark(found: Shift, of_row: int = 1) -> str:
-    """What is said of a footprint that was moved, alone or with a row of so many, and of a roof of another size; empty
-    where there is neither."""
+    """What is said of a footprint that was moved, alone or with a row of so many, and of a roof of
+    another size; empty where there is neither.
+    """
     remarks = []
     if found.is_clear:
-        error, row = float(np.hypot(*found.sigma)), f" with the {of_row} of its row" if of_row > 1 else ""
+        error, row = (
+            float(np.hypot(*found.sigma)),
+            f" with the {of_row} of its row" if of_row > 1 else "",
+        )
         remarks.append(
-            f"its footprint was moved{row} by ({found.xy[0]:.2f}, {found.xy[1]:.2f}) m, within {error:.2f} m, onto its roof"
+            f"its footprint was moved{row} by ({found.xy[0]:.2f}, {found.xy[1]:.2f}) m, within "
+            f"{error:.2f} m, onto its roof"
         )
     if found.is_size_clear:
         reach = "reaches {:.1f} m beyond" if found.beyond > 0 else "stays {:.1f} m inside"
-        remarks.append(f"its roof {reach.format(abs(found.beyond))} its footprint on every side that shows")
+        remarks.append(
+            f"its roof {reach.format(abs(found.beyond))} its footprint on every side that shows"
+        )
     return "; ".join(remarks)
 
 
-def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
+def usable(
+    points: np.ndarray, footprint: shapely.Polygon | None
+) -> tuple[np.ndarray, shapely.Polygon | None, Status]:
     """Finite, distinct points inside the footprint, in one order whatever order they came in."""
     if footprint is not None:
         footprint = largest_polygon(footprint)
@@ -171,7 +218,9 @@ def usable(points: np.ndarray, footprint: shapely.Polygon | None) -> tuple[np.nd
             return np.zeros((0, 3)), None, Status.BAD_FOOTPRINT
     points = finite(points)
     if footprint is not None:
-        points = points.compress(shapely.intersects_xy(footprint, points[:, 0], points[:, 1]), axis=0)
+        points = points.compress(
+            shapely.intersects_xy(footprint, points[:, 0], points[:, 1]), axis=0
+        )
     points = distinct(points)
     if len(points) == 0:
         return points, footprint, Status.NO_POINTS
@@ -190,20 +239,27 @@ def largest_polygon(geometry: shapely.Geometry) -> shapely.Polygon:
 
 
 def finite(points: np.ndarray) -> np.ndarray:
-    """Those of the points (n, 2 or 3) whose coordinates are numbers, and of this Earth: what stands for no value may be 3.4e38."""
+    """Those of the points (n, 2 or 3) whose coordinates are numbers, and of this Earth: what stands
+    for no value may be 3.4e38.
+    """
     known = is_plausible(points)
     return points if known.all() else points[known]
 
 
 def distinct(points: np.ndarray) -> np.ndarray:
     """Points (n, 3) sorted by x, y, z without repeats: the same set gives the same array."""
-    plan = np.ascontiguousarray(points[:, :2]).view(complex)[:, 0]  # complex numbers are in order by x, then by y
+    # complex numbers are in order by x, then by y
+    plan = np.ascontiguousarray(points[:, :2]).view(complex)[:, 0]
     order = np.argsort(plan)
     if (plan[order[1:]] != plan[order[:-1]]).all():  # none over another, as nearly always
         return points.take(order, axis=0)
     points = points[np.lexsort(points.T[::-1])]
     differs = points[1:] != points[:-1]
-    return points[np.r_[True, differs[:, 0] | differs[:, 1] | differs[:, 2]]] if len(points) else points
+    return (
+        points[np.r_[True, differs[:, 0] | differs[:, 1] | differs[:, 2]]]
+        if len(points)
+        else points
+    )
 
 
 def on_a_line(xy: np.ndarray, width_m: float = 0.05) -> bool:
@@ -216,27 +272,42 @@ def to_local(outline: shapely.Polygon | None, frame: LocalFrame) -> shapely.Poly
     return None if outline is None else shapely.transform(outline, frame.to_local)
 
 
-def without_needless_vertices(outline: shapely.Polygon | None) -> tuple[shapely.Polygon | None, str]:
-    """The outline to fit over, and what was left out: of more than MOST_OUTLINE_VERTICES those within 1 cm of the line
-    between their neighbours (Douglas and Peucker), or within 2, 4, 8 cm, ... until no more are left, and with them
-    courtyards narrower than that."""
+def without_needless_vertices(
+    outline: shapely.Polygon | None,
+) -> tuple[shapely.Polygon | None, str]:
+    """The outline to fit over, and what was left out: of more than MOST_OUTLINE_VERTICES those
+    within 1 cm of the line between their neighbours (Douglas and Peucker), or within 2, 4, 8 cm,
+    ... until no more are left, and with them courtyards narrower than that.
+    """
     if outline is None or (count := shapely.get_num_coordinates(outline)) <= MOST_OUTLINE_VERTICES:
         return outline, ""
     whole = largest_polygon(outline)
     simple, tolerance_m = whole, 0.005
     while shapely.get_num_coordinates(simple) > MOST_OUTLINE_VERTICES:
         tolerance_m *= 2
-        courtyards = [ring for ring in whole.interiors if shapely.Polygon(ring).area > tolerance_m**2]
-        simple = largest_polygon(simplified_within(shapely.Polygon(whole.exterior, courtyards), tolerance_m))
+        courtyards = [
+            ring for ring in whole.interiors if shapely.Polygon(ring).area > tolerance_m**2
+        ]
+        simple = largest_polygon(
+            simplified_within(shapely.Polygon(whole.exterior, courtyards), tolerance_m)
+        )
     left = shapely.get_num_coordinates(simple)
-    apart_m = shapely.distance(shapely.points(shapely.get_coordinates(whole.exterior)), simple.exterior).max()
+    apart_m = shapely.distance(
+        shapely.points(shapely.get_coordinates(whole.exterior)), simple.exterior
+    ).max()
     if len(simple.interiors) < len(whole.interiors):
         apart_m = max(apart_m, tolerance_m)
-    return simple, f"its outline of {count} vertices was simplified to {left}, within {apart_m:.2g} m"
+    return (
+        simple,
+        f"its outline of {count} vertices was simplified to {left}, within {apart_m:.2g} m",
+    )
 
 
 def simplified_within(polygon: shapely.Polygon, tolerance_m: float) -> shapely.Polygon:
-    """The polygon by Douglas and Peucker. Their time grows with the square of the vertices, so thousands go piece by piece."""
+    """The polygon by Douglas and Peucker.
+
+    Their time grows with the square of the vertices, so thousands go piece by piece.
+    """
     rings = []
     for ring in (polygon.exterior, *polygon.interiors):
         before, xy = math.inf, shapely.get_coordinates(ring)
@@ -253,14 +324,21 @@ def simplified_within(polygon: shapely.Polygon, tolerance_m: float) -> shapely.P
 
 
 def simplified_in_pieces(xy: np.ndarray, tolerance_m: float) -> np.ndarray:
-    """A ring's coordinates (n, 2) whose pieces of PIECE_VERTICES edges are simplified each by itself."""
+    """A ring's coordinates (n, 2) whose pieces of PIECE_VERTICES edges are simplified each by
+    itself.
+    """
     ends = np.append(np.arange(0, len(xy) - 2, PIECE_VERTICES), len(xy) - 1)
-    vertices = np.concatenate([np.arange(first, last + 1) for first, last in itertools.pairwise(ends)])
-    pieces = shapely.linestrings(xy[vertices], indices=np.repeat(np.arange(len(ends) - 1), np.diff(ends) + 1))
+    vertices = np.concatenate(
+        [np.arange(first, last + 1) for first, last in itertools.pairwise(ends)]
+    )
+    pieces = shapely.linestrings(
+        xy[vertices], indices=np.repeat(np.arange(len(ends) - 1), np.diff(ends) + 1)
+    )
     simple, piece = shapely.get_coordinates(
         shapely.simplify(pieces, tolerance_m, preserve_topology=False), return_index=True
     )
-    return simple[np.append(piece[1:] == piece[:-1], True)]  # each piece begins where the one before it ends
+    # each piece begins where the one before it ends
+    return simple[np.append(piece[1:] == piece[:-1], True)]
 
 
 def look_at_ground(
@@ -271,7 +349,9 @@ def look_at_ground(
     terrain: Terrain | None,
     settings: Settings,
 ) -> Site:
-    """Points and outline, both in the local frame, without bare ground inside the outline; or that nothing stands there."""
+    """Points and outline, both in the local frame, without bare ground inside the outline; or that
+    nothing stands there.
+    """
     from .fit.site import Site, look_at_ground
 
     if outline is None or (terrain is None and ground is None):
@@ -283,7 +363,9 @@ def look_at_ground(
 def remarked(building: Building, remark: str) -> Building:
     """The building with a remark added to what is said of it."""
     return (
-        dataclasses.replace(building, detail=f"{building.detail or building.status.value}; {remark}")
+        dataclasses.replace(
+            building, detail=f"{building.detail or building.status.value}; {remark}"
+        )
         if remark
         else building
     )
@@ -295,7 +377,9 @@ def without_doubt(detail: str, doubt: Doubt) -> str:
 
 
 def recognise(points: np.ndarray, settings: Settings) -> Recognised:
-    """The network's opinion of the points (paper section 3.1), none where nobody heeds or asks for it, or it cannot tell."""
+    """The network's opinion of the points (paper section 3.1), none where nobody heeds or asks for
+    it, or it cannot tell.
+    """
     if not asks_network(settings):
         return Recognised()
     from .segment import segment
@@ -307,8 +391,12 @@ def recognise(points: np.ndarray, settings: Settings) -> Recognised:
     return Recognised(found.weights if fits_one(settings) else None, found.types)
 
 
-def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
-    """Roof parts that explain the points: one primitive (the paper's case) or as many as the evidence pays for."""
+def fit(
+    points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
+) -> Fitted:
+    """Roof parts that explain the points: one primitive (the paper's case) or as many as the
+    evidence pays for.
+    """
     if len(points) < FEWEST_POINTS:
         return flat(points, outline, Status.FLAT_FALLBACK)
     road = fit_one if fits_one(settings) else fit_several
@@ -323,42 +411,63 @@ def fit(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recogni
 def fit_several(
     points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
 ) -> Fitted:
-    """As many volumes as the evidence pays for; what the network says of the whole building does not bear on them."""
+    """As many volumes as the evidence pays for; what the network says of the whole building does
+    not bear on them.
+    """
     from .fit.union import fit_building
 
     found = fit_building(points, outline, settings)
-    return Fitted(found.roof_parts, found.outline, found.objective, detail=last_resort(found.roof_parts, settings))
+    return Fitted(
+        found.roof_parts,
+        found.outline,
+        found.objective,
+        detail=last_resort(found.roof_parts, settings),
+    )
 
 
 def last_resort(parts: tuple[Part, ...], settings: Settings) -> str:
-    """A sentence where parts became flat although only other types were asked for; empty otherwise."""
+    """A sentence where parts became flat although only other types were asked for; empty
+    otherwise.
+    """
     types = settings.fit.types
     flat = sum(part.type == "flat" for part in parts)
     if not types or "flat" in types or not flat:
         return ""
-    return f"{flat} of {counted(len(parts), 'part')} made flat: none of the types asked for ({', '.join(types)}) explains the points there"
+    return (
+        f"{flat} of {counted(len(parts), 'part')} made flat: none of the types asked for "
+        f"({', '.join(types)}) explains the points there"
+    )
 
 
-def fit_one(points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings) -> Fitted:
+def fit_one(
+    points: np.ndarray, outline: shapely.Polygon | None, recognised: Recognised, settings: Settings
+) -> Fitted:
     """One primitive for the whole building (paper section 3.2)."""
     from .fit import fit_roof
     from .segment import most_probable
 
     def fit(types: tuple[str, ...]) -> Fit:
-        allowed = settings.replace({"fit": {"types": types or candidates(recognised.types, settings)}})
+        allowed = settings.replace(
+            {"fit": {"types": types or candidates(recognised.types, settings)}}
+        )
         return fit_roof(points, outline, allowed, weights=recognised.weights)
 
     found, types = most_probable(fit, recognised.types)
     shift = found.global_translation
     part = dataclasses.replace(
-        found.part, translation=found.part.translation + shift, pieces=tuple(p.moved(shift) for p in found.part.pieces)
+        found.part,
+        translation=found.part.translation + shift,
+        pieces=tuple(p.moved(shift) for p in found.part.pieces),
     )
-    outline = shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
+    outline = (
+        shapely.union_all([piece.outline for piece in part.pieces]) if outline is None else outline
+    )
     return Fitted((part,), outline, found.value, types)
 
 
 def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, ...]:
-    """Types to fit by one primitive, empty for all: those asked for, by the paper's objective only what the network sees.
+    """Types to fit by one primitive, empty for all: those asked for, by the paper's objective only
+    what the network sees.
 
     So the paper has it (section 3.1), and a fit by its objective takes half a second a type.
 
@@ -369,42 +478,69 @@ def candidates(recognised: dict[str, float], settings: Settings) -> tuple[str, .
     asked = tuple(settings.fit.types)
     if settings.fit.objective != "paper":
         return asked
-    likely = [name for name, share in recognised.items() if share >= LIKELY and name in (asked or recognised)]
+    likely = [
+        name
+        for name, share in recognised.items()
+        if share >= LIKELY and name in (asked or recognised)
+    ]
     return tuple(likely) or asked
 
 
 def flat(points: np.ndarray, outline: shapely.Polygon, status: Status, detail: str = "") -> Fitted:
-    """A flat roof at the median height: what a building becomes when nothing better can be told or built."""
-    height = float(np.sort(points[:, 2])[len(points) // 2])  # the upper median: what strays lies below a roof
-    part = Part("flat", (Piece(outline, np.array([[0.0, 0.0, height]])),), {}, 0.0, np.array([0.0, 0.0, height]))
+    """A flat roof at the median height: what a building becomes when nothing better can be told or
+    built.
+    """
+    # the upper median: what strays lies below a roof
+    height = float(np.sort(points[:, 2])[len(points) // 2])
+    part = Part(
+        "flat",
+        (Piece(outline, np.array([[0.0, 0.0, height]])),),
+        {},
+        0.0,
+        np.array([0.0, 0.0, height]),
+    )
     return Fitted((part,), outline, status=status, detail=detail or status.value)
 
 
 def find_ground(
-    outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Terrain | None, roof: Roof | None = None
+    outline: shapely.Polygon,
+    points: np.ndarray,
+    frame: LocalFrame,
+    terrain: Terrain | None,
+    roof: Roof | None = None,
 ) -> Ground:
-    """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the terrain's line around them.
+    """z_min: the lowest terrain under the roof's eave vertices (paper section 3.3), and the
+    terrain's line around them.
 
-    Where no terrain is known it is assumed as low as a low wall's foot, or as the lowest points of the walls that are seen below `roof`.
+    Where no terrain is known it is assumed as low as a low wall's foot, or as the lowest points of
+    the walls that are seen below `roof`.
     """
     from .compose import terrain_intersection
     from .compose.settle import PLAN_DIGITS, settled
 
     if terrain is not None:
-        corners = np.concatenate([np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)])
+        corners = np.concatenate(
+            [np.asarray(ring.coords)[:, :2] for ring in (outline.exterior, *outline.interiors)]
+        )
         heights, source = asked(terrain, frame.to_world(corners))
         if np.isfinite(heights).any():
             z = settled(np.nanmin(heights), PLAN_DIGITS)
             lines = terrain_intersection(
-                outline, lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2], z - frame.origin[2]
+                outline,
+                lambda xy: terrain.height_at(frame.to_world(xy)) - frame.origin[2],
+                z - frame.origin[2],
             )
-            return Ground(z, source, tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines))
+            return Ground(
+                z, source, tuple(np.round(frame.to_world(line), PLAN_DIGITS) for line in lines)
+            )
     assumed, source = assumed_ground(points, roof)
     return Ground(settled(assumed + frame.origin[2], PLAN_DIGITS), source)
 
 
 def assumed_ground(points: np.ndarray, roof: Roof | None) -> tuple[float, str]:
-    """Height in the frame of the points (n, 3) where nothing tells it but them, and what it goes by."""
+    """Height in the frame of the points (n, 3) where nothing tells it but them, and what it goes
+    by.
+    """
     lowest, usual = float(points[:, 2].min()), f"assumed {ASSUMED_WALL_M:g} m below"
     eave = math.inf if roof is None else lowest_over(points, roof)
     if not math.isfinite(eave) or lowest >= eave - WALLS_SEEN_M:
@@ -455,7 +591,13 @@ def solid_or_simpler(
     try:
         simpler, solid, given_up = compose_simpler(roof, z_ground, points, failure, settings)
         detail = f"{Status.SIMPLIFIED.value}: {given_up} ({failure})"
-        return simpler, solid, dataclasses.replace(fitted, parts=simpler.parts, status=Status.SIMPLIFIED, detail=detail)
+        return (
+            simpler,
+            solid,
+            dataclasses.replace(
+                fitted, parts=simpler.parts, status=Status.SIMPLIFIED, detail=detail
+            ),
+        )
     except CompositionError as error:
         why = f"{Status.SIMPLIFIED.value}: a flat block ({error})"
     fitted = flat(points, roof.outline, Status.SIMPLIFIED, why)
@@ -463,7 +605,11 @@ def solid_or_simpler(
     try:
         return roof, compose(roof, z_ground, settings), fitted
     except CompositionError as error:
-        return roof, None, dataclasses.replace(fitted, status=Status.BAD_FOOTPRINT, detail=str(error))
+        return (
+            roof,
+            None,
+            dataclasses.replace(fitted, status=Status.BAD_FOOTPRINT, detail=str(error)),
+        )
 
 
 def judge(
@@ -476,8 +622,9 @@ def judge(
     settings: Settings,
     unused: np.ndarray | None = None,
 ) -> Building:
-    """The finished building: quality measured on its solid, an honest status, the verdict and what is in doubt, everything back
-    in the world's frame."""
+    """The finished building: quality measured on its solid, an honest status, the verdict and what
+    is in doubt, everything back in the world's frame.
+    """
     from .compose.settle import settled_building
     from .evaluate.metrics import quality, well_inside
 
@@ -496,11 +643,15 @@ def judge(
         objective=fitted.objective,
         types=fitted.types,
     )
-    return cautioned(graded(settled_building(measured), points, unused_within(roof, unused)), points, inner)
+    return cautioned(
+        graded(settled_building(measured), points, unused_within(roof, unused)), points, inner
+    )
 
 
 def unused_within(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
-    """Those of the `unused` world points (m, 3) that are finite and inside a roof's outline, in the roof's frame."""
+    """Those of the `unused` world points (m, 3) that are finite and inside a roof's outline, in the
+    roof's frame.
+    """
     if unused is None:
         return np.zeros((0, 3))
     local = roof.frame.to_local(finite(as_xyz(unused)))
@@ -508,8 +659,9 @@ def unused_within(roof: Roof, unused: np.ndarray | None) -> np.ndarray:
 
 
 def graded(building: Building, points: np.ndarray, unused: np.ndarray | None = None) -> Building:
-    """The building with the verdict on its model by its `points` (n, 3), in the roof's frame, and by those that its fit left
-    `unused` (m, 3)."""
+    """The building with the verdict on its model by its `points` (n, 3), in the roof's frame, and
+    by those that its fit left `unused` (m, 3).
+    """
     from .evaluate.verdict import verdict_of
 
     grade, reasons = verdict_of(building.model, points, unused)
@@ -517,22 +669,29 @@ def graded(building: Building, points: np.ndarray, unused: np.ndarray | None = N
 
 
 def cautioned(building: Building, points: np.ndarray, inner: Inner) -> Building:
-    """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in the roof's frame and those well
-    `inner`, two surfaces one over the other."""
+    """The building with what is in doubt of it: ground above its eaves; by its points (n, 3), in
+    the roof's frame and those well `inner`, two surfaces one over the other.
+    """
     from .evaluate.layers import two_surfaces
 
-    roof = [building.solid.vertices[list(ring), 2] for face in building.solid.of_kind(ROOF) for ring in face.rings]
+    roof = [
+        building.solid.vertices[list(ring), 2]
+        for face in building.solid.of_kind(ROOF)
+        for ring in face.rings
+    ]
     sunk = building.z_ground - float(np.concatenate(roof).min())
     if sunk > SUNK_M:
         building = remarked(
             building,
-            f"the ground ({building.ground_source}) lies {sunk:.1f} {Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
+            f"the ground ({building.ground_source}) lies {sunk:.1f} "
+            f"{Doubt.GROUND_ABOVE_EAVES.value}: heights of other kinds",
         )
     share, apart_m = two_surfaces(points, building.roof, inner)
     if share:
         building = remarked(
             building,
-            f"over {100 * share:.0f} % of its area {Doubt.TWO_SURFACES.value}, {apart_m:.2f} m apart: two flights, two "
+            f"over {100 * share:.0f} % of its area {Doubt.TWO_SURFACES.value}, {apart_m:.2f} m "
+            "apart: two flights, two "
             "dates, glass or leaves; use a cloud of one",
         )
     return building

@@ -7,8 +7,13 @@ class Status(Enum):
     """Outcome of one building. `is_model` tells whether a solid exists."""
 
     MODELLED = "modelled"
-    SIMPLIFIED = "simplified: the fitted roof could not become a valid solid, a simpler one stands in for it"
-    FLAT_FALLBACK = "flat block: too few points to determine a roof shape, its height is the median of the points"
+    SIMPLIFIED = (
+        "simplified: the fitted roof could not become a valid solid, a simpler one stands in for it"
+    )
+    FLAT_FALLBACK = (
+        "flat block: too few points to determine a roof shape, its height is the median of the "
+        "points"
+    )
     NO_POINTS = "no model: no usable points inside the footprint; add a cloud that covers it"
     NO_BUILDING = "no model: nothing stands on the footprint, its points lie on the ground"
     BAD_FOOTPRINT = "no model: the footprint has no usable area; repair or remove it"
@@ -41,7 +46,9 @@ class Grade(Enum):
 
 
 class Doubt(Enum):
-    """What the detail of a building may leave to doubt, by the words that stand in it; a run counts them at its end."""
+    """What the detail of a building may leave to doubt, by the words that stand in it; a run counts
+    them at its end.
+    """
 
     TWO_SURFACES = "points lie on two surfaces"
     PLACES_WITHOUT_POINTS = "of its outline hold no points"

@@ -7,7 +7,8 @@ TEXT = '"""Größen."""\nMOST, LEAST_M = 7, 0.5  # größer\nNAMES = ("a",)\nTIL
 
 
 @pytest.mark.parametrize(
-    ("name", "factor", "now"), [("MOST", 2.0, "14, 0.5"), ("LEAST_M", 0.5, "7, 0.25"), ("TILE_M", 2.0, "500.0")]
+    ("name", "factor", "now"),
+    [("MOST", 2.0, "14, 0.5"), ("LEAST_M", 0.5, "7, 0.25"), ("TILE_M", 2.0, "500.0")],
 )
 def test_one_number_is_changed(name, factor, now):
     text = changed(TEXT, name, factor)

@@ -1,4 +1,6 @@
-"""The curve of share against parts: prices multiply what the defaults say, and a picture comes out."""
+"""The curve of share against parts: prices multiply what the defaults say, and a
+picture comes out.
+"""
 
 import pytest
 
@@ -12,7 +14,9 @@ def test_a_price_of_one_is_the_default_and_others_multiply_it():
 
     assert priced(1.0) == Settings()
     for name in PRICE:
-        assert getattr(priced(4.0).compound, name) == pytest.approx(4.0 * getattr(Settings().compound, name))
+        assert getattr(priced(4.0).compound, name) == pytest.approx(
+            4.0 * getattr(Settings().compound, name)
+        )
 
 
 def test_the_curve_is_drawn(tmp_path):

@@ -1,4 +1,6 @@
-"""Benchmarks are run seldom, and by hand: what moves in the package must not leave one behind unnoticed."""
+"""Benchmarks are run seldom, and by hand: what moves in the package must not leave one behind
+unnoticed.
+"""
 
 import importlib
 from pathlib import Path

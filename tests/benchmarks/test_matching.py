@@ -1,4 +1,6 @@
-"""Laws of comparing fitted parts with true ones: the truth is right in any order, what is hidden decides nothing."""
+"""Laws of comparing fitted parts with true ones: the truth is right in any order, what is hidden
+decides nothing.
+"""
 
 import dataclasses
 
@@ -32,7 +34,9 @@ def test_the_truth_is_right_in_any_order(kind):
         shuffled = [parts[k] for k in order]
         wanted, right, _ = compared(roof, tuple(shuffled))
         assert wanted == len(parts) and right
-        assert [order[j] for j in matched(parts, shuffled, raster(roof.outline))] == list(range(len(parts)))
+        assert [order[j] for j in matched(parts, shuffled, raster(roof.outline))] == list(
+            range(len(parts))
+        )
 
 
 def test_a_missing_a_needless_and_a_wrongly_named_part_are_wrong():
@@ -66,7 +70,10 @@ def test_only_ends_under_another_part_are_hidden():
     house = part(length=12.0, width=8.0, height=4.0)
     wing = part(y=4.0, kappa=np.pi / 2, length=8.0, width=5.0, height=2.5)
     assert hidden_end(wing, [house]) and not hidden_end(house, [wing]) and not hidden_end(house, [])
-    assert right_types(part("hip", length=9.0, width=6.0, height=3.0, ridge_length=3.0), True) == {"hip", "side_hip"}
+    assert right_types(part("hip", length=9.0, width=6.0, height=3.0, ridge_length=3.0), True) == {
+        "hip",
+        "side_hip",
+    }
     assert right_types(wing, True) == {"gable"}
 
 
@@ -74,7 +81,9 @@ def test_an_asymmetric_gable_of_equal_slopes_may_be_called_a_gable():
     size = {"length": 9.0, "width": 8.0, "height": 3.0, "ridge_offset": 1.0}
     even = part("asymmetric_gable", **size, eave_step=3.0 * (1 - 3.0 / 5.0))
     assert right_types(even, False) == {"asymmetric_gable", "gable"}
-    assert right_types(part("asymmetric_gable", **size, eave_step=0.0), False) == {"asymmetric_gable"}
+    assert right_types(part("asymmetric_gable", **size, eave_step=0.0), False) == {
+        "asymmetric_gable"
+    }
 
 
 def test_errors_are_counted_in_sigmas_and_not_along_what_is_hidden():
@@ -91,8 +100,14 @@ def test_errors_are_counted_in_sigmas_and_not_along_what_is_hidden():
 
 def test_normal_errors_of_their_sigma_have_a_root_mean_square_of_one():
     rng, truth = np.random.default_rng(0), part()
-    heights = [part(length=6.0, width=8.0, height=3.0 + 0.05 * error) for error in rng.standard_normal(2000)]
-    ratios = [errors_in_sigmas(truth, dataclasses.replace(p, sigma={"height": 0.05}), False) for p in heights]
+    heights = [
+        part(length=6.0, width=8.0, height=3.0 + 0.05 * error)
+        for error in rng.standard_normal(2000)
+    ]
+    ratios = [
+        errors_in_sigmas(truth, dataclasses.replace(p, sigma={"height": 0.05}), False)
+        for p in heights
+    ]
     rms = np.sqrt(np.mean([ratio["height"] ** 2 for ratio in ratios]))
     assert rms == pytest.approx(1.0, abs=0.05)
 
@@ -102,7 +117,9 @@ def test_no_standard_deviations_are_said_so():
 
 
 def standing(roof, id="house"):
-    return Building(id, Status.MODELLED, built=Model(roof, compose(roof, 0.0).moved(roof.frame.origin)))
+    return Building(
+        id, Status.MODELLED, built=Model(roof, compose(roof, 0.0).moved(roof.frame.origin))
+    )
 
 
 def test_areas_that_show_make_up_the_outline():
@@ -111,8 +128,12 @@ def test_areas_that_show_make_up_the_outline():
         assert visible_areas(roof).sum() == pytest.approx(roof.outline.area)
     roof = random_building(np.random.default_rng(0), "hip").roof
     model = standing(roof)
-    assert named_share([model]) == 1.0 and area_by_type([model])["hip"] == pytest.approx(roof.outline.area)
-    free = standing(dataclasses.replace(roof, parts=(dataclasses.replace(roof.parts[0], type="free"),)))
+    assert named_share([model]) == 1.0 and area_by_type([model])["hip"] == pytest.approx(
+        roof.outline.area
+    )
+    free = standing(
+        dataclasses.replace(roof, parts=(dataclasses.replace(roof.parts[0], type="free"),))
+    )
     assert named_share([free]) == 0.0 and named_share([model, free]) == pytest.approx(0.5)
 
 
@@ -120,7 +141,9 @@ def test_a_roof_keeps_its_place_in_another_frame():
     roof = random_compound(np.random.default_rng(2), "L", origin=(500.0, 700.0, 20.0)).roof
     origin = np.array([490.0, 720.0, 3.0])
     moved = Roof(
-        parts_in(roof, origin), shapely.transform(roof.outline, lambda xy: xy + (10.0, -20.0)), LocalFrame(origin)
+        parts_in(roof, origin),
+        shapely.transform(roof.outline, lambda xy: xy + (10.0, -20.0)),
+        LocalFrame(origin),
     )
     xy = raster(roof.outline)[::7]
     assert np.allclose(moved.height_at(xy + (10.0, -20.0)), roof.height_at(xy) + 17.0)
@@ -131,7 +154,13 @@ def test_the_demos_truth_is_right_and_a_flat_block_is_not():
         assert len(points) > 50
         model = standing(truth.roof)
         assert judged(truth, model) == (True, True)
-        assert truth.footprint.symmetric_difference(footprint.polygon).area < 0.05 * truth.footprint.area
+        assert (
+            truth.footprint.symmetric_difference(footprint.polygon).area
+            < 0.05 * truth.footprint.area
+        )
         flat = dataclasses.replace(truth.roof.parts[0], type="flat")
         block = standing(dataclasses.replace(truth.roof, parts=(flat,)))
-        assert judged(truth, block) == (truth.type == "flat", truth.type == "flat" and truth.kind == "single")
+        assert judged(truth, block) == (
+            truth.type == "flat",
+            truth.type == "flat" and truth.kind == "single",
+        )

@@ -1,4 +1,6 @@
-"""Laws of the towns' benchmark: a true model is right in everything, a draw is always the same, grounds apart are buildings."""
+"""Laws of the towns' benchmark: a true model is right in everything, a draw is always the same,
+grounds apart are buildings.
+"""
 
 from pathlib import Path
 
@@ -7,7 +9,16 @@ import pytest
 import shapely
 from benchmarks.delft import asked_footprints
 from benchmarks.judging import SHARED, raster
-from benchmarks.towns import TOWNS, all_modelled, chosen, composed, ground_of, read_town, touching, write_truth
+from benchmarks.towns import (
+    TOWNS,
+    all_modelled,
+    chosen,
+    composed,
+    ground_of,
+    read_town,
+    touching,
+    write_truth,
+)
 from benchmarks.wireframes import Score, WireframeCounts, count_wireframes, summed, table_by_size
 
 from handmade import box
@@ -19,12 +30,16 @@ from hiproof.write import write_cityjson
 
 needs_judge = pytest.mark.skipif(not (SHARED / "tools").is_dir(), reason="needs ../shared/tools")
 needs_towns = pytest.mark.skipif(not TOWNS["essen"].is_file(), reason="needs ../shared/data/towns")
-needs_delft = pytest.mark.skipif(not (SHARED / "data/delft").is_dir(), reason="needs ../shared/data/delft")
+needs_delft = pytest.mark.skipif(
+    not (SHARED / "data/delft").is_dir(), reason="needs ../shared/data/delft"
+)
 
 
 def simulated(kind, seed):
     """A simulated compound with its solid, as a reconstruction would return it."""
-    made = random_compound(np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0))
+    made = random_compound(
+        np.random.default_rng(seed), kind, origin=(85000.0 + 50.0 * seed, 446000.0, 2.0)
+    )
     solid = compose(made.roof, 0.0).moved(made.roof.frame.origin)
     return Building(f"{kind}-{seed}", Status.MODELLED, built=Model(made.roof, solid))
 
@@ -33,7 +48,9 @@ def simulated(kind, seed):
 def small_town(tmp_path) -> Path:
     """Three simulated compounds as a CityJSON file."""
     path = tmp_path / "town.city.json"
-    write_cityjson(path, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))])
+    write_cityjson(
+        path, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))]
+    )
     return path
 
 
@@ -54,7 +71,9 @@ def test_a_scan_lies_on_the_building_and_is_always_the_same(small_town):
     local = made.roof.frame.to_local(points)
     inside = shapely.contains_xy(made.roof.outline.buffer(-0.4), *local[:, :2].T)
     gap = made.roof.height_at(local[inside, :2]) - local[inside, 2]
-    assert inside.sum() > 3.0 * made.roof.outline.buffer(-0.4).area and np.median(np.abs(gap)) < 0.08
+    assert (
+        inside.sum() > 3.0 * made.roof.outline.buffer(-0.4).area and np.median(np.abs(gap)) < 0.08
+    )
 
 
 @needs_judge
@@ -62,12 +81,18 @@ def test_true_models_are_right_in_everything(small_town, tmp_path):
     buildings = read_town(small_town)
     truth, models = tmp_path / "truth.city.json", tmp_path / "models.city.jsonl"
     write_truth(truth, small_town, buildings)
-    write_cityjson(models, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))])
+    write_cityjson(
+        models, [simulated(kind, seed) for seed, kind in enumerate(("L", "dormered", "two_level"))]
+    )
     counts = count_wireframes(models, truth)
     assert counts.keys() == {building.id for building in buildings} and len(counts) == 3
     for one in (*counts.values(), summed(counts.values())):
         assert one.edge_f1 == one.corner_f1 == 100.0
-        assert (one.edges, one.corners, one.faces) == (one.true_edges, one.true_corners, one.true_faces)
+        assert (one.edges, one.corners, one.faces) == (
+            one.true_edges,
+            one.true_corners,
+            one.true_faces,
+        )
         assert one.height_rmse_m < 0.01
 
 
@@ -76,7 +101,10 @@ def test_true_roofs_composed_anew_have_the_true_heights(small_town):
         kind, seed = building.id.rsplit("-", 1)
         truth, again = simulated(kind, int(seed)), composed(building)
         xy = raster(truth.roof.outline.buffer(-0.05)) + truth.roof.frame.origin[:2]
-        heights = [b.roof.height_at(xy - b.roof.frame.origin[:2]) + b.roof.frame.origin[2] for b in (truth, again)]
+        heights = [
+            b.roof.height_at(xy - b.roof.frame.origin[:2]) + b.roof.frame.origin[2]
+            for b in (truth, again)
+        ]
         assert np.mean(np.abs(heights[0] - heights[1]) < 0.02) > 0.98
         assert again.solid.of_kind("RoofSurface")
 
@@ -88,7 +116,8 @@ def test_a_missing_model_counts_as_missed(tmp_path):
     write_truth(tmp_path / "truth.city.json", TOWNS["essen"], buildings)
     solids = [next(iter(building.solids.values())) for building in buildings]
     models = [
-        Building(b.id, Status.MODELLED, built=Model(flat_roof(b), s)) for b, s in zip(buildings, solids, strict=True)
+        Building(b.id, Status.MODELLED, built=Model(flat_roof(b), s))
+        for b, s in zip(buildings, solids, strict=True)
     ]
     write_cityjson(tmp_path / "models.city.jsonl", models[1:])
     counts = count_wireframes(tmp_path / "models.city.jsonl", tmp_path / "truth.city.json")
@@ -111,7 +140,9 @@ def test_solids_whose_grounds_lie_apart_are_buildings_of_their_own():
     found = touching("house", {"a": first, "b": beside, "c": apart})
     assert [building.id for building in found] == ["house", "house~2"]
     assert [sorted(building.solids) for building in found] == [["a", "b"], ["c"]]
-    assert found[0].footprint.equals_exact(shapely.box(0, 0, 8, 5).normalize(), 1e-6, normalize=True)
+    assert found[0].footprint.equals_exact(
+        shapely.box(0, 0, 8, 5).normalize(), 1e-6, normalize=True
+    )
     assert ground_of(apart).area == pytest.approx(4.0)
 
 
@@ -147,7 +178,9 @@ def test_towns_have_the_buildings_that_are_known(town, n):
 @needs_delft
 def test_even_and_odd_footprints_are_all_footprints():
     path = SHARED / "data/delft/footprints.gpkg"
-    even, odd, every = ({f.id for f in asked_footprints(path, parity)} for parity in ("even", "odd", None))
+    even, odd, every = (
+        {f.id for f in asked_footprints(path, parity)} for parity in ("even", "odd", None)
+    )
     assert even | odd == every and not even & odd and min(len(even), len(odd)) > 0.4 * len(every)
 
 

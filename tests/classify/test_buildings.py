@@ -30,7 +30,9 @@ def test_the_order_of_points_does_not_matter():
 def test_a_place_is_the_same_whatever_lies_far_from_it():
     cloud, _ = town(3.0)
     far = cloud.points + (400.0, 0.0, 12.0)
-    assert np.array_equal(classify(np.concatenate([cloud.points, far]))[: len(cloud)], classify(cloud.points))
+    assert np.array_equal(
+        classify(np.concatenate([cloud.points, far]))[: len(cloud)], classify(cloud.points)
+    )
 
 
 def test_a_drones_walls_are_the_buildings():

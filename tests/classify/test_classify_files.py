@@ -1,4 +1,6 @@
-"""`hiproof classify`: classes of a copy, everything else as it was, and files that cannot be classified."""
+"""`hiproof classify`: classes of a copy, everything else as it was, and files that cannot be
+classified.
+"""
 
 import laspy
 import numpy as np
@@ -35,15 +37,21 @@ def test_a_copy_differs_in_its_classes_alone(tmp_path):
     before, after = laspy.read(path), laspy.read(out)
     for name in before.point_format.dimension_names:
         assert name == "classification" or np.array_equal(before[name], after[name]), name
-    notes = [[v.record_data_bytes() for v in las.vlrs if v.record_id != 4] for las in (before, after)]
-    assert notes[0] == notes[1] and b"kept as it is" in notes[1]  # 4 tells of the further dimensions
+    notes = [
+        [v.record_data_bytes() for v in las.vlrs if v.record_id != 4] for las in (before, after)
+    ]
+    # 4 tells of the further dimensions
+    assert notes[0] == notes[1] and b"kept as it is" in notes[1]
     found, asked = np.asarray(after.classification), classes != 9
     assert (found[~asked] == 9).all()
     assert (found[asked] == town.classification[asked]).mean() > 0.97
 
 
 def test_points_that_are_neither_keep_their_class_unless_it_was_one_of_the_two():
-    before, found = np.array([1, 5, 2, 6, 5, 0, 6], np.uint8), np.array([1, 1, 1, 1, 6, 2, 6], np.uint8)
+    before, found = (
+        np.array([1, 5, 2, 6, 5, 0, 6], np.uint8),
+        np.array([1, 1, 1, 1, 6, 2, 6], np.uint8),
+    )
     assert classes_after(before, found).tolist() == [1, 5, 1, 1, 6, 2, 6]
 
 
@@ -60,7 +68,9 @@ def test_degrees_are_refused_although_no_crs_names_them(tmp_path):
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.offsets, header.scales = [4.0, 52.0, 0.0], [1e-7, 1e-7, 1e-3]
     las = laspy.LasData(header)
-    las.x, las.y, las.z = np.random.default_rng(0).uniform([4.8, 52.3, 0], [4.81, 52.31, 9], (100, 3)).T
+    las.x, las.y, las.z = (
+        np.random.default_rng(0).uniform([4.8, 52.3, 0], [4.81, 52.31, 9], (100, 3)).T
+    )
     las.write(tmp_path / "in.laz")
     with pytest.raises(InputError, match="which look like degrees; reproject it"):
         classify_file(tmp_path / "in.laz", tmp_path / "out.laz", Settings())

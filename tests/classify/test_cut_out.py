@@ -1,4 +1,6 @@
-"""Roofs cut out along their outlines are told from scenes with their ground, at any density, with walls and without."""
+"""Roofs cut out along their outlines are told from scenes with their ground, at any density, with
+walls and without.
+"""
 
 import numpy as np
 import pytest
@@ -11,12 +13,26 @@ from hiproof.simulate import SOURCES, Defects, ScanSettings, random_building, ra
 from leafy_scenes import drone, forest
 
 ROOF, GROUND = SOURCES.index("roof"), SOURCES.index("ground")
-KINDS = ["gable", "hip", "pyramid", "mansard", "monopitch", "L", "T", "U", "row", "two_level", "dormered"]
+KINDS = [
+    "gable",
+    "hip",
+    "pyramid",
+    "mansard",
+    "monopitch",
+    "L",
+    "T",
+    "U",
+    "row",
+    "two_level",
+    "dormered",
+]
 
 
 def scanned(kind, density, seed=0, at=(0.0, 0.0, 0.0)):
     rng = np.random.default_rng(seed)
-    building = random_compound(rng, kind, at) if kind in KINDS[5:] else random_building(rng, kind, at)
+    building = (
+        random_compound(rng, kind, at) if kind in KINDS[5:] else random_building(rng, kind, at)
+    )
     return scan(building, rng, ScanSettings(density=density, defects=Defects.none(), margin_m=4.0))
 
 
@@ -68,7 +84,9 @@ def test_the_next_cell_with_points_is_that_of_a_plain_search():
 
 
 def test_several_roofs_cut_out_are_a_building_each_with_all_of_their_points():
-    clouds = [scanned(kind, 5.0, 3, (40.0 * k, 0.0, 0.0)) for k, kind in enumerate(("gable", "L", "T"))]
+    clouds = [
+        scanned(kind, 5.0, 3, (40.0 * k, 0.0, 0.0)) for k, kind in enumerate(("gable", "L", "T"))
+    ]
     points = np.concatenate([cloud.points[cloud.source == ROOF] for cloud in clouds])
     found = split_buildings(PointCloud(points))
     assert len(found) == 3 and all(building.is_cut_out for building in found)

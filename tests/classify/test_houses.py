@@ -15,7 +15,9 @@ WIDTH, DEPTH = 16.0, 9.0
 
 
 def block(height, density=6.0, width=WIDTH, depth=DEPTH, seed=0, turn=0.4):
-    """Points of a roof of `height(x, y)` over a rectangle, its area, and what takes its plan into the world."""
+    """Points of a roof of `height(x, y)` over a rectangle, its area, and what takes its plan into
+    the world.
+    """
     rng = np.random.default_rng(seed)
     xy = rng.uniform([0, 0], [width, depth], (int(density * width * depth), 2))
     z = height(*xy.T) + rng.normal(0.0, 0.03, len(xy))
@@ -24,7 +26,11 @@ def block(height, density=6.0, width=WIDTH, depth=DEPTH, seed=0, turn=0.4):
     def world(plan):
         return plan @ np.array([[cosine, sine], [-sine, cosine]]) + PLACE
 
-    return np.column_stack([world(xy), z]), shapely.transform(shapely.box(0, 0, width, depth), world), world
+    return (
+        np.column_stack([world(xy), z]),
+        shapely.transform(shapely.box(0, 0, width, depth), world),
+        world,
+    )
 
 
 def gable(x, y):
@@ -42,7 +48,9 @@ ONE_HOUSE = {
     "hip": lambda x, y: 8.0 - 0.7 * np.maximum(abs(y - DEPTH / 2), abs(x - 8.0) - 3.5),
     "flat": lambda x, y: np.full_like(x, 5.0),
     "valley": lambda x, y: 6.0 + 0.6 * abs(x - 8.0),
-    "a chimney's breadth higher": lambda x, y: gable(x, y) + np.where((abs(x - 8) < 1) & (abs(y - 4) < 1), 1.5, 0.0),
+    "a chimney's breadth higher": lambda x, y: (
+        gable(x, y) + np.where((abs(x - 8) < 1) & (abs(y - 4) < 1), 1.5, 0.0)
+    ),
     "a shallow extension": lambda x, y: np.where(y > 3.0, gable(x, y), 3.0),
     "a row of equal houses": gable,
 }
@@ -55,7 +63,10 @@ def test_houses_that_differ_are_told_apart_at_their_wall(height):
     assert len(houses) == 2
     for own in (shapely.box(0, 0, 8.6, DEPTH), shapely.box(8.6, 0, WIDTH, DEPTH)):
         own = shapely.transform(own, world)
-        assert max(shapely.intersection(own, h).area / shapely.union(own, h).area for h in houses) > 0.93
+        assert (
+            max(shapely.intersection(own, h).area / shapely.union(own, h).area for h in houses)
+            > 0.93
+        )
     assert sum(house.area for house in houses) == pytest.approx(area.area)
 
 
@@ -82,14 +93,20 @@ def test_every_point_of_a_split_cloud_is_one_house_s():
     cloud = PointCloud(points, np.full(len(points), 6, np.uint8))
     houses = split_buildings(cloud)
     assert len(houses) == 2
-    assert np.array_equal(np.sort(np.concatenate([house.index for house in houses])), np.arange(len(points)))
-    assert all(shapely.intersects_xy(house.area, *points[house.index, :2].T).all() for house in houses)
+    assert np.array_equal(
+        np.sort(np.concatenate([house.index for house in houses])), np.arange(len(points))
+    )
+    assert all(
+        shapely.intersects_xy(house.area, *points[house.index, :2].T).all() for house in houses
+    )
     assert len(split_buildings(cloud, Settings.from_dict({"read": {"split_houses": False}}))) == 1
 
 
 @pytest.mark.parametrize(("width", "count"), [(0.8, 2), (3.0, 1)])
 def test_a_neck_of_returns_joins_no_houses_but_a_wing_does(width, count):
-    area = shapely.union_all([shapely.box(0, 0, 8, 9), shapely.box(10, 0, 18, 9), shapely.box(8, 4, 10, 4 + width)])
+    area = shapely.union_all(
+        [shapely.box(0, 0, 8, 9), shapely.box(10, 0, 18, 9), shapely.box(8, 4, 10, 4 + width)]
+    )
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 18, 0.4), np.arange(0.2, 9, 0.4)))
     xy = np.column_stack([x, y])[shapely.contains_xy(area, x, y)]
     houses = told_apart(np.column_stack([xy, np.full(len(xy), 6.0)]), area, 1.0)

@@ -1,4 +1,6 @@
-"""Clouds without footprints: as many buildings as were put there, each with all its points and about its plan."""
+"""Clouds without footprints: as many buildings as were put there, each with all its points and
+about its plan.
+"""
 
 from pathlib import Path
 
@@ -38,11 +40,18 @@ def iou(a, b):
 
 def street(density=8.0):
     """Five houses, the second and third sharing a wall, with ground of class 2 around them."""
-    houses = [turned(shapely.box(x, 0, x + w, 9), 20) for x, w in ((0, 8), (11, 8), (19, 8), (30, 8), (41, 8))]
+    houses = [
+        turned(shapely.box(x, 0, x + w, 9), 20)
+        for x, w in ((0, 8), (11, 8), (19, 8), (30, 8), (41, 8))
+    ]
     roofs = [points_in(house, density, seed, 8.0 + seed) for seed, house in enumerate(houses)]
-    ground = points_in(turned(shapely.box(-5, -15, 55, 20), 20) - shapely.union_all(houses), 4, 9, 1.0)
+    ground = points_in(
+        turned(shapely.box(-5, -15, 55, 20), 20) - shapely.union_all(houses), 4, 9, 1.0
+    )
     xyz = np.concatenate([*roofs, ground])
-    return PointCloud(xyz, np.repeat([6, 2], [len(xyz) - len(ground), len(ground)]).astype(np.uint8)), houses
+    return PointCloud(
+        xyz, np.repeat([6, 2], [len(xyz) - len(ground), len(ground)]).astype(np.uint8)
+    ), houses
 
 
 @pytest.mark.parametrize("density", [4.0, 8.0, 25.0])
@@ -54,7 +63,9 @@ def test_houses_apart_are_told_apart_and_blocks_stay_together_where_asked(densit
     for building, house in zip(found, wanted, strict=True):
         assert iou(building.area.convex_hull, house.convex_hull) > 0.75
         assert shapely.intersects_xy(building.area, *cloud.xyz[building.index, :2].T).all()
-    assert np.array_equal(np.sort(np.concatenate([b.index for b in found])), np.flatnonzero(cloud.classification == 6))
+    assert np.array_equal(
+        np.sort(np.concatenate([b.index for b in found])), np.flatnonzero(cloud.classification == 6)
+    )
 
 
 def test_ids_and_areas_depend_neither_on_order_nor_on_the_other_houses():
@@ -66,7 +77,10 @@ def test_ids_and_areas_depend_neither_on_order_nor_on_the_other_houses():
     assert {b.id for b in shuffled} == set(whole)
     assert all(b.area.equals(whole[b.id]) for b in shuffled)
     east = cloud.xyz[:, 0] > cloud.xyz[:, 0].min() + 28
-    part = {b.id for b in split_buildings(PointCloud(cloud.xyz[east], cloud.classification[east]), settings)}
+    part = {
+        b.id
+        for b in split_buildings(PointCloud(cloud.xyz[east], cloud.classification[east]), settings)
+    }
     assert len(part & set(whole)) >= 2
 
 
@@ -111,7 +125,8 @@ def test_larger_clouds_without_building_class_are_refused(what):
         points = np.concatenate([points, points + [30, 0, 0]])
     by_class = Settings.from_dict({"read": {"roofs": "class"}})
     with pytest.raises(
-        InputError, match="without classes" if classification is None else r"got classes 1 \([\d,]+ points\)"
+        InputError,
+        match="without classes" if classification is None else r"got classes 1 \([\d,]+ points\)",
     ):
         split_buildings(PointCloud(points, classification), by_class)
 
@@ -132,7 +147,8 @@ def test_the_classes_there_are_named_and_another_may_be_chosen():
     cloud, _ = street()
     other = PointCloud(cloud.xyz, np.where(cloud.classification == 6, 67, 2).astype(np.uint8))
     with pytest.raises(
-        InputError, match=r"class 6 .*got classes 2 \([\d,]+ points\), 67 \([\d,]+ points\).*--building-class"
+        InputError,
+        match=r"class 6 .*got classes 2 \([\d,]+ points\), 67 \([\d,]+ points\).*--building-class",
     ):
         split_buildings(other, Settings.from_dict({"read": {"roofs": "class"}}))
     chosen = Settings.from_dict({"read": {"building_classes": [67], "split_houses": False}})
@@ -142,7 +158,10 @@ def test_the_classes_there_are_named_and_another_may_be_chosen():
 def test_groups_too_small_are_left_out_with_a_warning():
     cloud, _ = street()
     crumbs = np.array([[86000.0, 446000.0, 5.0], [86000.1, 446000.0, 5.0]])
-    cloud = PointCloud(np.concatenate([cloud.xyz, crumbs]), np.append(cloud.classification, [6, 6]).astype(np.uint8))
+    cloud = PointCloud(
+        np.concatenate([cloud.xyz, crumbs]),
+        np.append(cloud.classification, [6, 6]).astype(np.uint8),
+    )
     with pytest.warns(InputWarning, match="1 group of building points left out"):
         assert len(split_buildings(cloud, BLOCKS)) == 4
 

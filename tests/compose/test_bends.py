@@ -1,4 +1,6 @@
-"""Bent faces (204): what is found is what triangulating every face finds, and composing leaves none."""
+"""Bent faces (204): what is found is what triangulating every face finds, and composing leaves
+none.
+"""
 
 import numpy as np
 import pytest
@@ -12,18 +14,26 @@ from roof_zoo import KINDS, generated
 
 
 def widest_angle(rings):
-    """Largest angle (deg) between two triangles of a face's constrained Delaunay triangulation, worked out plainly."""
+    """Largest angle (deg) between two triangles of a face's constrained Delaunay triangulation,
+    worked out plainly.
+    """
     every = np.concatenate(rings)
     centre = every.mean(axis=0)
     axes = np.linalg.svd(every - centre, full_matrices=False)[2]
     flat = [(ring - centre) @ axes[:2].T for ring in rings]
     corner = {tuple(xy): xyz for xy, xyz in zip(np.concatenate(flat), every, strict=True)}
     normals = []
-    for triangle in shapely.constrained_delaunay_triangles(shapely.Polygon(flat[0], flat[1:])).geoms:
+    for triangle in shapely.constrained_delaunay_triangles(
+        shapely.Polygon(flat[0], flat[1:])
+    ).geoms:
         a, b, c = (corner[xy] for xy in list(triangle.exterior.coords)[:3])
         normal = np.cross(b - a, c - a)
         normals.append(normal * np.sign(normal @ axes[2]) / np.linalg.norm(normal))
-    return max(np.degrees(np.arctan2(np.linalg.norm(np.cross(m, n)), m @ n)) for m in normals for n in normals)
+    return max(
+        np.degrees(np.arctan2(np.linalg.norm(np.cross(m, n)), m @ n))
+        for m in normals
+        for n in normals
+    )
 
 
 def faces_of(solid):
@@ -31,10 +41,14 @@ def faces_of(solid):
 
 
 def shaken(solid, rng):
-    """Every face by itself, some of its vertices doubled beside themselves, all off their plane by a few tenths of a millimetre."""
+    """Every face by itself, some of its vertices doubled beside themselves, all off their plane by
+    a few tenths of a millimetre.
+    """
     for face in solid.faces:
         ring = solid.vertices[list(face.rings[0])]
-        beside = ring + (np.roll(ring, -1, axis=0) - ring) * rng.uniform(0.001, 0.02, (len(ring), 1))
+        beside = ring + (np.roll(ring, -1, axis=0) - ring) * rng.uniform(
+            0.001, 0.02, (len(ring), 1)
+        )
         doubled = np.stack((ring, beside), axis=1)[:, : 1 + int(rng.integers(2))].reshape(-1, 3)
         yield doubled + rng.normal(0, 2e-4, doubled.shape)
 
@@ -61,7 +75,9 @@ def test_no_composed_face_is_bent(kind):
 
 
 def test_few_roofs_need_coarser_snapping():
-    """The roofs of `unions` are made to be hard; of these a hundred all but a few become valid at the first attempt."""
+    """The roofs of `unions` are made to be hard; of these a hundred all but a few become valid at
+    the first attempt.
+    """
     options = Settings().compose
     first = 0
     for seed in range(100):
@@ -73,12 +89,16 @@ def test_few_roofs_need_coarser_snapping():
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_flat_corners_turned_in_move_nothing_by_a_millimetre(kind):
-    """Turning in is for roofs that fail otherwise; of those that do not it changes no face and no height to speak of."""
+    """Turning in is for roofs that fail otherwise; of those that do not it changes no face and no
+    height to speak of.
+    """
     options = Settings().compose
     for seed in range(4):
         problem = composing.plan_problem(generated(kind, seed))
         plain, turned = (
-            composing.compose_at(problem, -2.0, options, options.snap_m, merge_walls=False, turn_in=turn)
+            composing.compose_at(
+                problem, -2.0, options, options.snap_m, merge_walls=False, turn_in=turn
+            )
             for turn in (False, True)
         )
         assert [face.kind for face in plain.faces] == [face.kind for face in turned.faces]

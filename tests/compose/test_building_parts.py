@@ -1,4 +1,6 @@
-"""Building parts: cut along walls alone, valid each by itself, side by side without overlap, together the whole."""
+"""Building parts: cut along walls alone, valid each by itself, side by side without overlap,
+together the whole.
+"""
 
 from itertools import combinations
 
@@ -24,21 +26,34 @@ def level(x0, y0, x1, y1, z):
 def gable(x0, y0, x1, y1, eave, slope=0.8):
     """A ridge along x, in the middle."""
     middle = 0.5 * (y0 + y1)
-    planes = np.array([[0.0, s * slope, eave + slope * (middle - y0) - s * slope * middle] for s in (1.0, -1.0)])
+    planes = np.array(
+        [[0.0, s * slope, eave + slope * (middle - y0) - s * slope * middle] for s in (1.0, -1.0)]
+    )
     return Part("gable", (Piece(shapely.box(x0, y0, x1, y1), planes),))
 
 
 def roof(*parts):
-    return Roof(parts, shapely.union_all([piece.outline for part in parts for piece in part.pieces]), FRAME)
+    return Roof(
+        parts, shapely.union_all([piece.outline for part in parts for piece in part.pieces]), FRAME
+    )
 
 
 def together(solids):
     """Solids as the shells of one, over common vertices, as a file holds them."""
     numbers, faces = {}, []
     for solid in solids:
-        number = [numbers.setdefault(tuple(np.round(xyz, 4)), len(numbers)) for xyz in solid.vertices.tolist()]
+        number = [
+            numbers.setdefault(tuple(np.round(xyz, 4)), len(numbers))
+            for xyz in solid.vertices.tolist()
+        ]
         for face in solid.faces:
-            faces.append(Face(tuple(tuple(number[v] for v in ring) for ring in face.rings), face.kind, face.part))
+            faces.append(
+                Face(
+                    tuple(tuple(number[v] for v in ring) for ring in face.rings),
+                    face.kind,
+                    face.part,
+                )
+            )
     return Solid(np.array(list(numbers)), tuple(faces))
 
 
@@ -65,7 +80,9 @@ def test_parts_are_valid_do_not_overlap_and_make_up_the_whole(kind, seed):
 def test_roofs_that_meet_at_a_wall_are_parts_and_those_that_share_an_edge_are_one():
     terrace = compose(roof(gable(0, 0, 6, 8, 6.0), gable(6, 0, 12, 8, 4.0)), 0.0)
     assert [part.members for part in building_parts(terrace)] == [(0,), (1,)]
-    crossing = Part("gable", (Piece(rectangle(6, 4, 5, 14), np.array([[0.8, 0.0, 3.2], [-0.8, 0.0, 12.8]])),))
+    crossing = Part(
+        "gable", (Piece(rectangle(6, 4, 5, 14), np.array([[0.8, 0.0, 3.2], [-0.8, 0.0, 12.8]])),)
+    )
     cross = roof(gable(0, 0, 12, 8, 6.0), crossing)
     assert building_parts(compose(cross, 0.0)) == ()
 
@@ -74,13 +91,19 @@ def test_a_tower_out_of_a_roof_is_a_part_and_the_rest_goes_around_it():
     parts = building_parts(compose(roof(level(0, 0, 12, 10, 5.0), level(4, 3, 8, 7, 9.0)), 0.0))
     around, tower = parts
     assert len(around.outline.interiors) == 1 and len(around.solid.of_kind(GROUND)[0].rings) == 2
-    assert tower.outline.equals(shapely.box(4, 3, 8, 7)) and tower.solid.volume == pytest.approx(16 * 9.0)
+    assert tower.outline.equals(shapely.box(4, 3, 8, 7)) and tower.solid.volume == pytest.approx(
+        16 * 9.0
+    )
 
 
 def test_what_is_smaller_than_a_part_stays_with_its_neighbour():
-    chimney = compose(roof(level(0, 0, 12, 10, 5.0), level(20, 0, 26, 6, 4.0), level(4, 3, 5, 4, 7.0)), 0.0)
+    chimney = compose(
+        roof(level(0, 0, 12, 10, 5.0), level(20, 0, 26, 6, 4.0), level(4, 3, 5, 4, 7.0)), 0.0
+    )
     assert building_parts(chimney) == ()
-    box_on_one = compose(roof(level(0, 0, 8, 10, 5.0), level(8, 0, 14, 10, 3.0), level(2, 3, 3, 4, 7.0)), 0.0)
+    box_on_one = compose(
+        roof(level(0, 0, 8, 10, 5.0), level(8, 0, 14, 10, 3.0), level(2, 3, 3, 4, 7.0)), 0.0
+    )
     assert [sorted(part.members) for part in building_parts(box_on_one)] == [[0, 2], [1]]
     assert all(check_solid(part.solid) == () for part in building_parts(box_on_one))
 
@@ -89,7 +112,10 @@ def test_parts_move_with_the_building():
     solid = compose(roof(gable(0, 0, 6, 8, 6.0), level(6, 0, 10, 8, 3.0)), 0.0)
     shift = np.array([85000.0, 446000.0, 2.0])
     for here, there in zip(building_parts(solid), building_parts(solid.moved(shift)), strict=True):
-        assert np.allclose(here.solid.vertices + shift, there.solid.vertices) and here.solid.faces == there.solid.faces
+        assert (
+            np.allclose(here.solid.vertices + shift, there.solid.vertices)
+            and here.solid.faces == there.solid.faces
+        )
 
 
 @pytest.mark.parametrize(("kind", "seed"), KINDS[::2])
@@ -102,7 +128,9 @@ def test_blocks_are_valid_and_as_large_as_their_outlines_and_heights(kind, seed)
         assert block(outline, 0.0, height).volume == pytest.approx(outline.area * height)
     if len(parts) > 1:
         stepped = blocks(outlines, heights, 0.0)
-        expected = sum(outline.area * height for outline, height in zip(outlines, heights, strict=True))
+        expected = sum(
+            outline.area * height for outline, height in zip(outlines, heights, strict=True)
+        )
         assert check_solid(stepped) == () and stepped.volume == pytest.approx(expected, rel=1e-3)
 
 

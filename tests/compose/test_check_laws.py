@@ -1,4 +1,6 @@
-"""The check names each way of breaking a solid by its code, and finds nothing wrong with a sound one."""
+"""The check names each way of breaking a solid by its code, and finds nothing wrong with a sound
+one.
+"""
 
 from collections import Counter
 
@@ -16,7 +18,9 @@ TOP = 1
 
 def solid_of(vertices, rings):
     """Faces given as a ring or as a list of rings."""
-    faces = [Face(tuple(ring) if isinstance(ring, list) else (ring,), "WallSurface") for ring in rings]
+    faces = [
+        Face(tuple(ring) if isinstance(ring, list) else (ring,), "WallSurface") for ring in rings
+    ]
     return Solid(np.array(vertices, float), tuple(faces))
 
 
@@ -27,14 +31,21 @@ def box(scale=(1, 1, 1), shift=(0, 0, 0)):
 def joined(first, second):
     """Two shells as one."""
     offset = len(first.vertices)
-    faces = [Face(tuple(tuple(v + offset for v in ring) for ring in face.rings), face.kind) for face in second.faces]
+    faces = [
+        Face(tuple(tuple(v + offset for v in ring) for ring in face.rings), face.kind)
+        for face in second.faces
+    ]
     return Solid(np.vstack((first.vertices, second.vertices)), (*first.faces, *faces))
 
 
 def with_top(rings, extra=()):
-    """The ten-metre box with another top face, given as rings over its corners and extra vertices 8, 9, ..."""
+    """The ten-metre box with another top face, given as rings over its corners and extra vertices
+    8, 9, ...
+    """
     vertices = np.vstack((CORNERS * 10, np.array(extra, float).reshape(-1, 3)))
-    return solid_of(vertices, [list(rings) if k == TOP else ring for k, ring in enumerate(BOX_RINGS)])
+    return solid_of(
+        vertices, [list(rings) if k == TOP else ring for k, ring in enumerate(BOX_RINGS)]
+    )
 
 
 def with_vertex(vertex, shift, scale=10):
@@ -51,7 +62,17 @@ def square(x, y, size=2.0, clockwise=True):
 OUTER = (4, 5, 7, 6)
 HOLE, HOLE_2 = (8, 9, 10, 11), (12, 13, 14, 15)
 PYRAMID = [(0, 2, 3, 1), (0, 1, 4), (1, 3, 4), (3, 2, 4), (2, 0, 4)]
-DENT = [*BOX_RINGS[2:], (0, 2, 8), (2, 3, 8), (3, 1, 8), (1, 0, 8), (4, 5, 8), (5, 7, 8), (7, 6, 8), (6, 4, 8)]
+DENT = [
+    *BOX_RINGS[2:],
+    (0, 2, 8),
+    (2, 3, 8),
+    (3, 1, 8),
+    (1, 0, 8),
+    (4, 5, 8),
+    (5, 7, 8),
+    (7, 6, 8),
+    (6, 4, 8),
+]
 CUT_BOX = solid_of([*CORNERS, (0.5, -0.3, 0.5)], [r for r in BOX_RINGS if r != (4, 5, 7, 6)] + [
     (4, 5, 8), (5, 7, 8), (7, 6, 8), (6, 4, 8)])  # fmt: skip
 
@@ -70,12 +91,18 @@ BROKEN = {
     "two holes cross": (201, with_top([OUTER, HOLE, HOLE_2], square(3, 3) + square(4, 4))),
     "ring twice": (202, with_top([OUTER, HOLE, HOLE[1:] + HOLE[:1]], square(3, 3))),
     "outer ring twice": (202, with_top([OUTER, OUTER[::-1]])),
-    "hole from border to border": (205, with_top([OUTER, HOLE], [(0, 5, 10), (5, 6, 10), (10, 5, 10), (5, 4, 10)])),
+    "hole from border to border": (
+        205,
+        with_top([OUTER, HOLE], [(0, 5, 10), (5, 6, 10), (10, 5, 10), (5, 4, 10)]),
+    ),
     "hole outside": (206, with_top([OUTER, HOLE], square(12, 4))),
     "hole in a hole": (207, with_top([OUTER, HOLE, HOLE_2], square(2, 2, 6) + square(4, 4))),
     "hole runs as its ring": (208, with_top([OUTER, HOLE], square(4, 4, clockwise=False))),
     "vertex lifted": (203, with_vertex(7, (0, 0, 0.02))),
-    "fold of a centimetre": (204, with_top([(4, 5, 7, 8, 9, 6)], [(0.02, 10, 10.008), (0.01, 10, 10)])),
+    "fold of a centimetre": (
+        204,
+        with_top([(4, 5, 7, 8, 9, 6)], [(0.02, 10, 10.008), (0.01, 10, 10)]),
+    ),
     "three faces": (301, Solid(CORNERS, box().faces[:3])),
     "face missing": (302, Solid(CORNERS, box().faces[1:])),
     "hole left open": (302, with_top([OUTER, HOLE], square(3, 3))),
@@ -86,7 +113,10 @@ BROKEN = {
     "box in a box": (305, joined(box(), box((0.2, 0.2, 0.2), (0.4, 0.4, 0.4)))),
     "boxes overlap": (306, joined(box(), box(shift=(0.5, 0.4, 0.3)))),
     "dent through a wall": (306, CUT_BOX),
-    "face flipped": (307, solid_of(CORNERS, [ring[::-1] if k == TOP else ring for k, ring in enumerate(BOX_RINGS)])),
+    "face flipped": (
+        307,
+        solid_of(CORNERS, [ring[::-1] if k == TOP else ring for k, ring in enumerate(BOX_RINGS)]),
+    ),
     "inside out": (405, solid_of(CORNERS, [ring[::-1] for ring in BOX_RINGS])),
     "apex under its base": (405, solid_of([*CORNERS[:4], (0.5, 0.5, -1)], PYRAMID)),
     "open ring in the file": (103, Solid(CORNERS, box().faces, ((103, 2),))),
@@ -103,7 +133,9 @@ def test_broken_solid_is_named_by_its_code(name):
     assert all(str(finding.code) in finding.message for finding in findings)
 
 
-@pytest.mark.parametrize("solid", [box(), box((30, 0.01, 200)), solid_of([*CORNERS[:4], (0.5, 0.5, 1)], PYRAMID)])
+@pytest.mark.parametrize(
+    "solid", [box(), box((30, 0.01, 200)), solid_of([*CORNERS[:4], (0.5, 0.5, 1)], PYRAMID)]
+)
 def test_sound_solid_has_no_findings(solid):
     assert check_solid(solid) == ()
 
@@ -144,7 +176,9 @@ def test_findings_do_not_depend_on_where_the_solid_stands(kind):
 
 def broken_edges(solid):
     """Edges not used once each way, counted plainly."""
-    uses = Counter((a, b) for f in solid.faces for r in f.rings for a, b in zip(r, (*r[1:], r[0]), strict=True))
+    uses = Counter(
+        (a, b) for f in solid.faces for r in f.rings for a, b in zip(r, (*r[1:], r[0]), strict=True)
+    )
     return sum(uses[edge] != 1 or uses[edge[::-1]] != 1 for edge in uses)
 
 
@@ -172,7 +206,9 @@ def test_every_single_fault_in_a_composed_solid_is_found(kind):
 
 def field(n):
     """A block under a rough field of n by n squares, two triangles each."""
-    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij"))
+    x, y = (
+        axis.ravel() for axis in np.meshgrid(np.arange(n + 1.0), np.arange(n + 1.0), indexing="ij")
+    )
     top = np.column_stack((x, y, 5 + np.random.default_rng(0).uniform(0, 1, len(x))))
     at = np.arange(len(x)).reshape(n + 1, n + 1)
     rim = [*at[:-1, 0], *at[-1, :-1], *at[:0:-1, -1], *at[0, :0:-1]]
@@ -181,7 +217,9 @@ def field(n):
     rings += [(at[i, j], at[i + 1, j + 1], at[i, j + 1]) for i in range(n) for j in range(n)]
     rings += [(base[a], base[b], b, a) for a, b in zip(rim, rim[1:] + rim[:1], strict=True)]
     rings.append(tuple(base[v] for v in reversed(rim)))
-    return solid_of(np.vstack((top, top[rim] * [1, 1, 0])), [tuple(map(int, ring)) for ring in rings])
+    return solid_of(
+        np.vstack((top, top[rim] * [1, 1, 0])), [tuple(map(int, ring)) for ring in rings]
+    )
 
 
 def test_shell_of_many_faces_is_checked_face_by_face():

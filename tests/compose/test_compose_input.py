@@ -19,10 +19,16 @@ FLAT = np.array([[0.0, 0.0, 5.0]])
     ("roof", "sentence"),
     [
         (Roof((), HOUSE, FRAME), "at least one piece"),
-        (Roof((Part("flat", (Piece(HOUSE, np.zeros((0, 3))),)),), HOUSE, FRAME), "at least one piece"),
+        (
+            Roof((Part("flat", (Piece(HOUSE, np.zeros((0, 3))),)),), HOUSE, FRAME),
+            "at least one piece",
+        ),
         (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.Polygon(), FRAME), "outline"),
         (Roof((Part("flat", (Piece(HOUSE, FLAT * np.nan),)),), HOUSE, FRAME), "finite roof planes"),
-        (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(1e6, 0, 1e6 + 9, 9), FRAME), "local frame"),
+        (
+            Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(1e6, 0, 1e6 + 9, 9), FRAME),
+            "local frame",
+        ),
         (Roof((Part("flat", (Piece(HOUSE, FLAT),)),), shapely.box(0, 0, 10, 1e-5), FRAME), "area"),
     ],
 )
@@ -49,7 +55,9 @@ def test_bow_tie_outline_keeps_its_larger_half():
 
 
 def test_neck_thinner_than_a_millimetre_leaves_the_larger_side():
-    neck = shapely.union_all([shapely.box(0, 0, 5, 5), shapely.box(5, 2, 8, 2.0005), shapely.box(8, 0, 10, 5)])
+    neck = shapely.union_all(
+        [shapely.box(0, 0, 5, 5), shapely.box(5, 2, 8, 2.0005), shapely.box(8, 0, 10, 5)]
+    )
     _, solid = roof_zoo.flat_block(neck, 3.0, 0.0)
     assert solid.volume == pytest.approx(75.0, abs=0.01)
 
@@ -67,10 +75,15 @@ def test_spike_of_the_outline_vanishes():
 
 
 def test_slivers_join_a_neighbour_by_the_settings():
-    pieces = [Piece(shapely.box(0, 0, 5, 8), FLAT), Piece(shapely.box(5, 0, 5.05, 8), FLAT + [[0, 0, 1]])]
+    pieces = [
+        Piece(shapely.box(0, 0, 5, 8), FLAT),
+        Piece(shapely.box(5, 0, 5.05, 8), FLAT + [[0, 0, 1]]),
+    ]
     pieces.append(Piece(shapely.box(5.05, 0, 10, 8), FLAT + [[0, 0, 2]]))
     roof = roof_zoo.roof(pieces, HOUSE)
-    narrow, wide = (Settings.from_dict({"compose": {"min_face_width_m": width}}) for width in (0.01, 0.1))
+    narrow, wide = (
+        Settings.from_dict({"compose": {"min_face_width_m": width}}) for width in (0.01, 0.1)
+    )
     assert len(compose(roof, 0.0, narrow).of_kind("RoofSurface")) == 3
     assert len(compose(roof, 0.0, wide).of_kind("RoofSurface")) == 2
     assert len(compose(roof, 0.0).of_kind("RoofSurface")) == 2

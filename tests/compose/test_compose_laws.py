@@ -1,4 +1,6 @@
-"""Laws every composed solid keeps, over generated roofs that hold everything that makes composing hard."""
+"""Laws every composed solid keeps, over generated roofs that hold everything that makes composing
+hard.
+"""
 
 import numpy as np
 import pytest
@@ -11,7 +13,8 @@ from hiproof.settings import Settings
 from roof_zoo import KINDS, generated, moved
 
 Z_GROUND = -2.0
-# random roofs are full of faces thinner than a person draws, which by default join a neighbour: which one may hang on a rounding
+# random roofs are full of faces thinner than a person draws, which by default join a neighbour:
+# which one may hang on a rounding
 EXACT = Settings.from_dict({"compose": {"min_face_width_m": 0.01}})
 SEEDS = range(12)
 WORLD = np.array([85012.345, 446078.912, 3.217])
@@ -63,7 +66,12 @@ def test_solid_is_valid_also_in_the_world_and_rounded_as_written(composed, kind)
 
 def roof_heights_of(solid):
     """Lowest and highest height of a solid's roof faces."""
-    z = solid.vertices[np.unique([v for face in solid.of_kind("RoofSurface") for ring in face.rings for v in ring]), 2]
+    z = solid.vertices[
+        np.unique(
+            [v for face in solid.of_kind("RoofSurface") for ring in face.rings for v in ring]
+        ),
+        2,
+    ]
     return z.min(), z.max()
 
 
@@ -74,14 +82,17 @@ def thin_faces(solid):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_thin_faces_join_neighbours_that_carry_their_planes_no_further_than_what_is_around(composed, kind):
+def test_thin_faces_join_neighbours_that_carry_their_planes_no_further_than_what_is_around(
+    composed, kind
+):
     before = after = 0
     for seed in SEEDS:
         roof, exact = composed[kind, seed]
         solid = compose(roof, Z_GROUND)
         assert check_solid(solid) == ()
         (low, high), (lowest, highest) = roof_heights_of(solid), roof_heights_of(exact)
-        assert lowest - 0.2 < low and high < highest + 0.2  # a decimetre; two where slivers lie side by side
+        # a decimetre; two where slivers lie side by side
+        assert lowest - 0.2 < low and high < highest + 0.2
         found, covering = roof_height(solid, xy := sample(roof, 1500, seed))
         assert (covering == 1).all()
         wanted = roof.height_at(xy)
@@ -160,16 +171,34 @@ COUNTS = {
     "flat": ([Piece(HOUSE, np.array([[0.0, 0, 5]]))], HOUSE, (1, 4, 1)),
     "gable": ([Piece(HOUSE, GABLE)], HOUSE, (2, 4, 1)),
     "hip": ([Piece(HOUSE, HIP)], HOUSE, (4, 4, 1)),
-    "pyramid": ([Piece(shapely.box(0, 0, 8, 8), HIP - [[0, 0, 0], [0, 0, 1], [0, 0, 0], [0, 0, 1]])], None, (4, 4, 1)),
-    "gable clipped to an L": ([Piece(HOUSE, GABLE)], HOUSE.difference(shapely.box(6, 4.5, 10, 8)), (2, 6, 1)),
-    "gable around a courtyard": ([Piece(HOUSE, GABLE)], HOUSE.difference(shapely.box(3, 3, 5, 5)), (2, 8, 1)),
+    "pyramid": (
+        [Piece(shapely.box(0, 0, 8, 8), HIP - [[0, 0, 0], [0, 0, 1], [0, 0, 0], [0, 0, 1]])],
+        None,
+        (4, 4, 1),
+    ),
+    "gable clipped to an L": (
+        [Piece(HOUSE, GABLE)],
+        HOUSE.difference(shapely.box(6, 4.5, 10, 8)),
+        (2, 6, 1),
+    ),
+    "gable around a courtyard": (
+        [Piece(HOUSE, GABLE)],
+        HOUSE.difference(shapely.box(3, 3, 5, 5)),
+        (2, 8, 1),
+    ),
     "two levels": (
-        [Piece(HOUSE, np.array([[0.0, 0, 5]])), Piece(shapely.box(10, 0, 14, 8), np.array([[0.0, 0, 3]]))],
+        [
+            Piece(HOUSE, np.array([[0.0, 0, 5]])),
+            Piece(shapely.box(10, 0, 14, 8), np.array([[0.0, 0, 3]])),
+        ],
         shapely.box(0, 0, 14, 8),
         (2, 5, 1),
     ),
     "tower in the middle": (
-        [Piece(HOUSE, np.array([[0.0, 0, 5]])), Piece(shapely.box(4, 3, 6, 5), np.array([[0.0, 0, 9]]))],
+        [
+            Piece(HOUSE, np.array([[0.0, 0, 5]])),
+            Piece(shapely.box(4, 3, 6, 5), np.array([[0.0, 0, 9]])),
+        ],
         HOUSE,
         (2, 8, 1),
     ),
@@ -181,14 +210,19 @@ def test_faces_of_small_cases(name):
     pieces, outline, counts = COUNTS[name]
     roof = roof_zoo.roof(pieces, outline or pieces[0].outline)
     solid = compose(roof, 0.0)
-    assert tuple(len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface")) == counts
+    assert (
+        tuple(len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface"))
+        == counts
+    )
     assert len(solid.of_kind("GroundSurface")[0].rings) == 1 + len(roof.outline.interiors)
 
 
 def test_roof_faces_name_their_part():
     pieces, outline, _ = COUNTS["two levels"]
     solid = compose(roof_zoo.roof(pieces, outline), 0.0)
-    heights = {face.part: solid.vertices[face.rings[0][0], 2] for face in solid.of_kind("RoofSurface")}
+    heights = {
+        face.part: solid.vertices[face.rings[0][0], 2] for face in solid.of_kind("RoofSurface")
+    }
     assert heights == {0: 5.0, 1: 3.0}
     assert {face.part for face in solid.faces if face.kind != "RoofSurface"} == {-1}
 
@@ -197,12 +231,16 @@ def test_gap_takes_the_roof_of_the_piece_beside_it():
     outline = shapely.box(-1, -1, 11, 8)
     solid = compose(roof_zoo.roof([Piece(HOUSE, GABLE)], outline), 0.0)
     inside = np.array([[-0.5, 2.0], [10.5, 6.0], [5.0, -0.5]])
-    assert roof_height(solid, inside)[0] == pytest.approx(Piece(HOUSE, GABLE).height_at(inside), abs=1e-3)
+    assert roof_height(solid, inside)[0] == pytest.approx(
+        Piece(HOUSE, GABLE).height_at(inside), abs=1e-3
+    )
 
 
 def test_levels_meeting_crosswise_are_set_back():
     boxes = [shapely.box(x, y, x + 4, y + 4) for x in (0, 4) for y in (0, 4)]
-    pieces = [Piece(box, np.array([[0.0, 0.0, z]])) for box, z in zip(boxes, (9, 5, 5, 8), strict=True)]
+    pieces = [
+        Piece(box, np.array([[0.0, 0.0, z]])) for box, z in zip(boxes, (9, 5, 5, 8), strict=True)
+    ]
     solid = compose(roof_zoo.roof(pieces, shapely.box(0, 0, 8, 8)), 0.0)
     assert check_solid(solid) == ()
     assert solid.volume == pytest.approx(16 * (9 + 5 + 5 + 8), abs=0.01)

@@ -1,4 +1,6 @@
-"""Roofs that once did not become a solid, each a folder of tests/regressions named after what was wrong."""
+"""Roofs that once did not become a solid, each a folder of tests/regressions named after what was
+wrong.
+"""
 
 import json
 from pathlib import Path
@@ -17,7 +19,10 @@ ROOFS = sorted((Path(__file__).parents[1] / "regressions").glob("*/roof.json"))
 def roof_from(path):
     stored = json.loads(path.read_text())
     parts = [
-        Part("free", tuple(Piece(shapely.from_wkt(p["outline"]), np.array(p["planes"])) for p in pieces))
+        Part(
+            "free",
+            tuple(Piece(shapely.from_wkt(p["outline"]), np.array(p["planes"])) for p in pieces),
+        )
         for pieces in stored["parts"]
     ]
     return Roof(tuple(parts), shapely.from_wkt(stored["outline"]), FRAME)

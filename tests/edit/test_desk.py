@@ -1,4 +1,6 @@
-"""What the page may ask, without a browser: edits that change the model, accepted ones that last, two windows that lose nothing."""
+"""What the page may ask, without a browser: edits that change the model, accepted ones that last,
+two windows that lose nothing.
+"""
 
 import base64
 import json
@@ -42,15 +44,20 @@ def test_from_a_wrong_type_to_a_rebuilt_city(town_files, folder, desk):
     fitted = edited(desk, gable["parts"], action="refit")
     assert fitted["type"] == "gable"
     assert fitted["figures"]["share_within_20cm"] > 0.95 > start["figures"]["share_within_20cm"]
-    desk.accept(ID, {"parts": fitted["parts"], "version": start["version"], "note": "seen from the street"})
+    desk.accept(
+        ID, {"parts": fitted["parts"], "version": start["version"], "note": "seen from the street"}
+    )
     hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
     now = by_id(folder)
     assert now[ID]["type"] == "gable" and "(seen from the street, anna, " in now[ID]["detail"]
     assert now[ID]["parts"] == fitted["parts"]
-    assert next(row for row in desk.buildings()["rows"] if row["id"] == ID)["type"] == "gable"  # the page goes on
+    # the page goes on
+    assert next(row for row in desk.buildings()["rows"] if row["id"] == ID)["type"] == "gable"
     assert all(now[id] == was[id] for id in was if id != ID)
     solids = dict(read_solids(folder / "buildings.gml"))
-    assert len(solids) == len(was) and not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
+    assert len(solids) == len(was) and not any(
+        check_solid(solid, planarity_m=0.01) for solid in solids.values()
+    )
 
 
 def test_on_a_level_roof_a_dormer_is_a_block_that_a_hand_can_size(desk):
@@ -62,18 +69,29 @@ def test_on_a_level_roof_a_dormer_is_a_block_that_a_hand_can_size(desk):
         - edited(desk, start["parts"], id="house-3", action="show")["figures"]["ridge_height"]
     )
     assert grown == pytest.approx(2.5, abs=1e-3)
-    wide = edited(desk, block["parts"], id="house-3", action="change", part=1, change={"width": 4.0})
+    wide = edited(
+        desk, block["parts"], id="house-3", action="change", part=1, change={"width": 4.0}
+    )
     assert wide["figures"]["volume_m3"] > block["figures"]["volume_m3"] + 1.0
 
 
 def test_ground_and_leaving_out_are_kept_in_place_of_each_other(desk):
     start = desk.building(ID)
     assert start["said"] == {"z_ground": None, "leave_out": None}
-    raised = desk.change(ID, {"parts": start["parts"], "z_ground": 1.25, "asked": {"action": "show"}})
-    assert raised["figures"]["z_ground"] == 1.25 != edited(desk, start["parts"], action="show")["figures"]["z_ground"]
-    version = desk.accept(ID, {"parts": start["parts"], "z_ground": 1.25, "version": UNTOUCHED})["version"]
+    raised = desk.change(
+        ID, {"parts": start["parts"], "z_ground": 1.25, "asked": {"action": "show"}}
+    )
+    assert (
+        raised["figures"]["z_ground"]
+        == 1.25
+        != edited(desk, start["parts"], action="show")["figures"]["z_ground"]
+    )
+    version = desk.accept(ID, {"parts": start["parts"], "z_ground": 1.25, "version": UNTOUCHED})[
+        "version"
+    ]
     assert desk.building(ID)["said"]["z_ground"] == 1.25 == desk.building(ID)["figures"]["z_ground"]
-    version = desk.accept(ID, {"parts": start["parts"], "version": version})["version"]  # the run's own ground again
+    # the run's own ground again
+    version = desk.accept(ID, {"parts": start["parts"], "version": version})["version"]
     assert "z_ground" not in desk.edits.of(ID)[0]
     desk.accept(ID, {"leave_out": True, "version": version, "note": "torn down"})
     assert {name: desk.edits.of(ID)[0].get(name) for name in ("leave_out", "parts", "note")} == {
@@ -91,7 +109,8 @@ def test_ground_and_leaving_out_are_kept_in_place_of_each_other(desk):
 def test_the_most_doubtful_come_first(desk):
     rows = desk.buildings()["rows"]
     assert [row["doubt"] for row in rows] == sorted((row["doubt"] for row in rows), reverse=True)
-    assert rows[-1]["id"] == "house-3" and rows[-1]["reasons"] == ()  # the only one that is flat indeed
+    # the only one that is flat indeed
+    assert rows[-1]["id"] == "house-3" and rows[-1]["reasons"] == ()
     assert desk.buildings("house-2")["found"] == 1
 
 
@@ -100,17 +119,27 @@ def test_the_most_doubtful_come_first(desk):
     [
         ({"quality": "poor"}, "poor"),
         ({"status": "flat_fallback"}, "flat block"),
-        ({"detail": "modelled; over 60 % of its area points lie on two surfaces, 0.4 m apart"}, "two surfaces"),
+        (
+            {"detail": "modelled; over 60 % of its area points lie on two surfaces, 0.4 m apart"},
+            "two surfaces",
+        ),
         (
             {
                 "status": "no_points",
-                "detail": "no points of class 6, but points of other classes lie high above the ground",
+                "detail": "no points of class 6, but points of other classes lie high above the "
+                "ground",
             },
             "points of other classes",
         ),
         ({"types": {"hip": 0.5, "gable": 0.45}}, "hip or gable"),
-        ({"parts": [{"sigma": {"t_z": 0.5}}, {"sigma": {"rotation": 5.0}}]}, "1 of 2 parts on few points"),
-        ({"unexplained_area_m2": 12.0, "outline": [[[0, 0], [10, 0], [10, 8], [0, 8]]]}, "12 m² unexplained"),
+        (
+            {"parts": [{"sigma": {"t_z": 0.5}}, {"sigma": {"rotation": 5.0}}]},
+            "1 of 2 parts on few points",
+        ),
+        (
+            {"unexplained_area_m2": 12.0, "outline": [[[0, 0], [10, 0], [10, 8], [0, 8]]]},
+            "12 m² unexplained",
+        ),
     ],
 )
 def test_whatever_speaks_against_a_model_adds_to_its_doubt(said, reason):
@@ -121,7 +150,13 @@ def test_whatever_speaks_against_a_model_adds_to_its_doubt(said, reason):
 
 def test_every_edit_gives_a_valid_model(desk):
     start = desk.building(ID)
-    gable = edited(desk, start["parts"], action="change", part=0, change={"type": "gable", "ridge_height": 12.0})
+    gable = edited(
+        desk,
+        start["parts"],
+        action="change",
+        part=0,
+        change={"type": "gable", "ridge_height": 12.0},
+    )
     two = edited(desk, gable["parts"], action="split", part=0)
     assert len(two["parts"]) == 2 and two["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
@@ -130,19 +165,32 @@ def test_every_edit_gives_a_valid_model(desk):
     assert len(one["parts"]) == 1 and one["figures"]["volume_m3"] == pytest.approx(
         gable["figures"]["volume_m3"], abs=0.2
     )
-    assert one["parts"][0]["parameters"]["length"] == pytest.approx(gable["parts"][0]["parameters"]["length"], abs=1e-3)
+    assert one["parts"][0]["parameters"]["length"] == pytest.approx(
+        gable["parts"][0]["parameters"]["length"], abs=1e-3
+    )
     dormer = edited(desk, one["parts"], action="dormer", part=0)
-    assert len(dormer["parts"]) == 2 and dormer["figures"]["volume_m3"] > one["figures"]["volume_m3"] + 0.1
+    assert (
+        len(dormer["parts"]) == 2
+        and dormer["figures"]["volume_m3"] > one["figures"]["volume_m3"] + 0.1
+    )
     again = edited(desk, dormer["parts"], action="remove", part=1)
     assert again["mesh"] == one["mesh"]
 
 
 def test_what_is_held_is_not_refitted(desk):
     start = desk.building(ID)
-    raised = edited(desk, start["parts"], action="change", part=0, change={"type": "gable", "ridge_height": 12.0})
+    raised = edited(
+        desk,
+        start["parts"],
+        action="change",
+        part=0,
+        change={"type": "gable", "ridge_height": 12.0},
+    )
     held = edited(desk, raised["parts"], action="refit", held={"0": ["height", "z"]})
     assert held["figures"]["ridge_height"] == pytest.approx(12.0, abs=0.01)
-    assert edited(desk, raised["parts"], action="refit")["figures"]["ridge_height"] == pytest.approx(10.1, abs=0.1)
+    assert edited(desk, raised["parts"], action="refit")["figures"][
+        "ridge_height"
+    ] == pytest.approx(10.1, abs=0.1)
 
 
 def test_types_are_tried_and_the_right_one_wins(desk):
@@ -179,7 +227,10 @@ def test_an_edit_that_cannot_be_is_one_sentence(desk, asked, message):
 def test_two_windows_lose_nothing(folder):
     one, other = Desk(folder, "anna"), Desk(folder, "ben")
     seen = one.building(ID), other.building(ID)
-    flat, gable = seen[0]["parts"], edited(other, seen[1]["parts"], action="change", part=0, change={"type": "gable"})
+    flat, gable = (
+        seen[0]["parts"],
+        edited(other, seen[1]["parts"], action="change", part=0, change={"type": "gable"}),
+    )
     mine = one.accept(ID, {"parts": flat, "version": seen[0]["version"]})
     with pytest.raises(OtherVersion, match="anna accepted") as caught:
         other.accept(ID, {"parts": gable["parts"], "version": seen[1]["version"]})
@@ -258,7 +309,9 @@ def test_without_its_points_all_but_refitting_works(town_files, tmp_path):
 
 @pytest.fixture
 def run_by_relative_names(town_files, tmp_path, monkeypatch):
-    """A project folder in which a run was made by names that hold only there; the present folder is another afterwards."""
+    """A project folder in which a run was made by names that hold only there; the present folder is
+    another afterwards.
+    """
     project = tmp_path / "project"
     project.mkdir()
     cloud, footprints = (Path(shutil.copy(file, project)).name for file in town_files)
@@ -271,7 +324,9 @@ def run_by_relative_names(town_files, tmp_path, monkeypatch):
 
 def test_a_run_made_by_relative_names_is_known_from_anywhere(run_by_relative_names):
     desk = Desk(run_by_relative_names / "run", "anna")
-    assert desk.cloud(ID)["missing"] == "" and desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"])
+    assert desk.cloud(ID)["missing"] == "" and desk.cloud(ID)["count"] == int(
+        desk.run.record(ID)["points"]
+    )
     assert desk.edits.of("house-1")[0] == {"id": "house-1", "ridge_height": 9.5}
     run = evaluate_run(run_by_relative_names / "run")
     assert len(run.clouds) == 1 and sum(map(len, run.points)) and None not in run.footprints
@@ -294,7 +349,9 @@ def test_a_run_goes_on_where_its_files_were_moved(town_files, run_by_relative_na
     assert Desk(project / "run", "anna").cloud(ID)["count"]
 
 
-def test_files_that_moved_are_found_in_the_folder_that_a_person_names(run_by_relative_names, tmp_path):
+def test_files_that_moved_are_found_in_the_folder_that_a_person_names(
+    run_by_relative_names, tmp_path
+):
     run = (run_by_relative_names / "run").rename(tmp_path / "run")
     files = run_by_relative_names.rename(tmp_path / "archive")
     with pytest.warns(InputWarning, match=r"overrides .* gone \(known\.jsonl\).*--clouds FOLDER"):
@@ -302,7 +359,10 @@ def test_files_that_moved_are_found_in_the_folder_that_a_person_names(run_by_rel
     with pytest.warns(InputWarning, match="points are gone"):
         assert evaluate_run(run).clouds == ()
     desk = Desk(run, "anna", files)
-    assert desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"]) and desk.edits.of("house-1")[0]
+    assert (
+        desk.cloud(ID)["count"] == int(desk.run.record(ID)["points"])
+        and desk.edits.of("house-1")[0]
+    )
 
 
 def test_points_that_can_no_longer_be_read_are_said_once(town_files, tmp_path):
@@ -311,7 +371,12 @@ def test_points_that_can_no_longer_be_read_are_said_once(town_files, tmp_path):
     (tmp_path / "cloud.laz").write_bytes(b"no cloud")
     desk = Desk(tmp_path / "run", "anna")
     assert "cannot be read" in desk.cloud(ID)["missing"]
-    assert edited(desk, desk.building(ID)["parts"], action="change", part=0, change={"type": "hip"})["type"] == "hip"
+    assert (
+        edited(desk, desk.building(ID)["parts"], action="change", part=0, change={"type": "hip"})[
+            "type"
+        ]
+        == "hip"
+    )
 
 
 def test_what_a_folder_must_hold(tmp_path, folder):

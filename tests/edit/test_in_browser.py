@@ -16,16 +16,27 @@ from hiproof.edit.server import Server, Service
 from hiproof.read.solids import read_solids
 from run_records import by_id
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-FLAGS = ["--no-sandbox", "--disable-quic", "--disable-background-networking", "--enable-unsafe-swiftshader"]
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+FLAGS = [
+    "--no-sandbox",
+    "--disable-quic",
+    "--disable-background-networking",
+    "--enable-unsafe-swiftshader",
+]
 WAIT_S = 60
 
-pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
+pytestmark = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium here; apt-get install chromium"
+)
 
 
 @pytest.fixture(scope="module")
 def browser():
-    playwright = pytest.importorskip("playwright.sync_api", reason="no playwright here; pip install playwright")
+    playwright = pytest.importorskip(
+        "playwright.sync_api", reason="no playwright here; pip install playwright"
+    )
     with playwright.sync_playwright() as driver:
         browser = driver.chromium.launch(executable_path=BROWSER, args=FLAGS)
         yield browser
@@ -51,7 +62,9 @@ def page(browser, served):
 
 
 def opened(browser, served):
-    """A window on the page, ready on its first building; its `faults` are what scripts complained of."""
+    """A window on the page, ready on its first building; its `faults` are what scripts complained
+    of.
+    """
     page = browser.new_context(viewport={"width": 1500, "height": 900}).new_page()
     page.set_default_timeout(60_000)
     page.faults = []
@@ -62,7 +75,10 @@ def opened(browser, served):
 
 
 def until(page, expression):
-    """Wait until an expression of the page is true. The page forbids eval, which playwright's own waiting needs."""
+    """Wait until an expression of the page is true.
+
+    The page forbids eval, which playwright's own waiting needs.
+    """
     end = time.monotonic() + WAIT_S
     while not page.evaluate(expression):
         assert time.monotonic() < end, f"still not so after {WAIT_S} s: {expression}"
@@ -72,7 +88,9 @@ def until(page, expression):
 def wait_for(page, title):
     """Wait until a building is there with its points."""
     until(
-        page, f"$('title').textContent.startsWith('{title}') && Boolean(document.querySelector('[data-figure=points]'))"
+        page,
+        f"$('title').textContent.startsWith('{title}') && "
+        "Boolean(document.querySelector('[data-figure=points]'))",
     )
     page.evaluate("() => queue")
 
@@ -114,7 +132,9 @@ def test_from_a_wrong_type_to_a_rebuilt_valid_citygml(town_files, page, folder):
     }
     assert "seen from the street, anna" in rows["house-0"]["detail"]
     solids = dict(read_solids(folder / "buildings.gml"))
-    assert len(solids) == 4 and not any(check_solid(solid, planarity_m=0.01) for solid in solids.values())
+    assert len(solids) == 4 and not any(
+        check_solid(solid, planarity_m=0.01) for solid in solids.values()
+    )
 
 
 def test_keys_go_through_the_buildings(page):
@@ -151,7 +171,8 @@ def test_a_handle_drags_the_ridge_and_undo_brings_it_back(page):
     assert page.is_checked("[data-pin=height]")
     raised = figure(page, "ridge_height")
     key(page, "r")
-    assert figure(page, "ridge_height") == pytest.approx(raised, abs=0.005)  # what a hand set is kept
+    # what a hand set is kept
+    assert figure(page, "ridge_height") == pytest.approx(raised, abs=0.005)
     key(page, "u")
     key(page, "u")
     assert figure(page, "ridge_height") == was and not page.is_checked("[data-pin=height]")
@@ -171,16 +192,22 @@ def test_an_edge_and_a_number_change_the_model(page):
     page.fill("[data-name=width]", "-3")
     page.keyboard.press("Enter")
     page.evaluate("() => queue")
-    assert "expected a positive width" in page.inner_text("#say") and figure(page, "ridge_height") == 11.0
+    assert (
+        "expected a positive width" in page.inner_text("#say")
+        and figure(page, "ridge_height") == 11.0
+    )
 
 
 def test_a_click_on_the_roof_chooses_its_part(page):
     choose(page, "house-0")
     key(page, "s")
-    page.fill("[data-name=ridge_height]", str(figure(page, "ridge_height") + 0.5))  # else both are one face
+    # else both are one face
+    page.fill("[data-name=ridge_height]", str(figure(page, "ridge_height") + 0.5))
     page.keyboard.press("Enter")
     page.evaluate("() => queue")
-    page.evaluate("() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
+    page.evaluate(
+        "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))"
+    )
     middles = page.evaluate(
         "() => now.model.handles.map(h => viewer.project([...h.place, h.ridge])).map(([x, y]) => { "
         "const box = viewer.canvas.getBoundingClientRect(); return [box.left + x, box.top + y]; })"
@@ -192,7 +219,9 @@ def test_a_click_on_the_roof_chooses_its_part(page):
         assert page.get_attribute(f"[data-part='{index}']", "class") == "part current"
 
 
-def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(town_files, page, folder):
+def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(
+    town_files, page, folder
+):
     choose(page, "house-1")
     was = figure(page, "volume_m3")
     page.fill("#ground", "1.25")
@@ -208,7 +237,9 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(town
     assert page.inner_text("#say") == "accepted"
     choose(page, "house-2")
     key(page, "o")
-    assert page.inner_text("#title") == "house-2: left out" and "no model" in page.inner_text("#say")
+    assert page.inner_text("#title") == "house-2: left out" and "no model" in page.inner_text(
+        "#say"
+    )
     key(page, "r")
     assert "left out; keep it in first" in page.inner_text("#say")
     key(page, "u")
@@ -217,7 +248,9 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(town
     key(page, "a")
     said = dict(read_overrides(str(folder / FILE)))
     assert (
-        said["house-1"]["z_ground"] == 1.25 and said["house-2"]["leave_out"] is True and "parts" not in said["house-2"]
+        said["house-1"]["z_ground"] == 1.25
+        and said["house-2"]["leave_out"] is True
+        and "parts" not in said["house-2"]
     )
     hiproof.reconstruct_area(request_over(town_files, folder, folder / FILE))
     rows = by_id(folder)
@@ -226,7 +259,10 @@ def test_the_ground_and_leaving_out_are_accepted_and_obeyed_by_the_next_run(town
     wait_for(page, "house-")
     page.evaluate("() => inTurn(() => open('house-2'))")
     page.evaluate("() => queue")
-    assert page.inner_text("#title") == "house-2: left out" and page.inner_text("#leave-out") == "keep in"
+    assert (
+        page.inner_text("#title") == "house-2: left out"
+        and page.inner_text("#leave-out") == "keep in"
+    )
     page.click("#withdraw")
     page.evaluate("() => queue")
     assert set(dict(read_overrides(str(folder / FILE)))) == {"house-1"}
@@ -248,7 +284,9 @@ def test_undo_back_to_what_was_accepted_leaves_nothing_changed(page):
 
 
 def test_a_server_that_is_gone_is_said_and_costs_nothing(page):
-    """The page's own `fetch` answers otherwise, since to come between it and the network takes the browser a moment."""
+    """The page's own `fetch` answers otherwise, since to come between it and the network takes the
+    browser a moment.
+    """
     choose(page, "house-0")
     shown = page.inner_text("#title"), figure(page, "share_within_20cm")
     page.evaluate("() => { window.reached = window.fetch; }")

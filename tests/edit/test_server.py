@@ -1,4 +1,6 @@
-"""Who may ask the page's server, and what: this machine, the token's bearer, the page itself; and what kill -9 leaves."""
+"""Who may ask the page's server, and what: this machine, the token's bearer, the page itself; and
+what kill -9 leaves.
+"""
 
 import http.client
 import json
@@ -32,7 +34,9 @@ def service(folder):
 def code(service, target=None, method="GET", body=b"", **headers):
     target = f"/{service.token}/buildings" if target is None else target
     told = {**OWN, **{name.replace("_", "-"): value for name, value in headers.items()}}
-    return service.answer(method, target, {k: v for k, v in told.items() if v is not None}, body).code
+    return service.answer(
+        method, target, {k: v for k, v in told.items() if v is not None}, body
+    ).code
 
 
 def test_the_page_and_its_own_requests_are_answered(service):
@@ -65,14 +69,24 @@ def test_the_page_and_its_own_requests_are_answered(service):
     ],
 )
 def test_others_are_refused(service, folder, headers):
-    body = json.dumps({"id": "house-0", "parts": service.desk.building("house-0")["parts"], "version": UNTOUCHED})
+    body = json.dumps(
+        {"id": "house-0", "parts": service.desk.building("house-0")["parts"], "version": UNTOUCHED}
+    )
     assert code(service, **headers) == 403
     assert code(service, f"/{service.token}/accept", "POST", body.encode(), **headers) == 403
     assert not (folder / FILE).exists()
 
 
 def test_without_the_token_nothing_is_told(service):
-    for target in ("/", "/buildings", "//buildings", f"/{service.token[:-1]}/", f"/{service.token}x/", "/é/", "*"):
+    for target in (
+        "/",
+        "/buildings",
+        "//buildings",
+        f"/{service.token[:-1]}/",
+        f"/{service.token}x/",
+        "/é/",
+        "*",
+    ):
         found = service.answer("GET", target, OWN)
         assert found.code == 403 and service.token.encode() not in found.body, target
 
@@ -114,7 +128,9 @@ def test_a_body_that_makes_no_sense_is_one_sentence(service, body, wanted):
 
 
 def test_only_json_is_taken_as_an_edit(service):
-    assert code(service, f"/{service.token}/accept", "POST", b"{}", Content_Type="text/plain") == 415
+    assert (
+        code(service, f"/{service.token}/accept", "POST", b"{}", Content_Type="text/plain") == 415
+    )
     assert code(service, f"/{service.token}/delete", "POST", b'{"id": "house-0"}') == 404
 
 
@@ -166,7 +182,9 @@ def asked(address, method, name, body=None):
 def started(folder):
     """A server in a process of its own, and its address."""
     command = [sys.executable, "-m", "hiproof", "edit", str(folder), "--who", "anna"]
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"})
+    process = subprocess.Popen(
+        command, stdout=subprocess.PIPE, text=True, env={**os.environ, "PYTHONUNBUFFERED": "1"}
+    )
     for line in process.stdout:
         if found := re.match(r"open (\S+)", line):
             return process, found[1]
@@ -174,7 +192,9 @@ def started(folder):
 
 
 def accept_until(folder, number):
-    """Start a server, accept one edit after the other, and send it a signal meanwhile; the process and what it confirmed."""
+    """Start a server, accept one edit after the other, and send it a signal meanwhile; the process
+    and what it confirmed.
+    """
     process, address = started(folder)
     confirmed = {}
 

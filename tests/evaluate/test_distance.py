@@ -55,7 +55,9 @@ def test_moves_with_points_and_polygons(seed):
     shift = np.array([100.0, -50, 7])
     moved = [[ring @ q.T + shift for ring in rings] for rings in polygons]
     np.testing.assert_allclose(
-        point_surface_distances(points @ q.T + shift, moved), point_surface_distances(points, polygons), atol=1e-9
+        point_surface_distances(points @ q.T + shift, moved),
+        point_surface_distances(points, polygons),
+        atol=1e-9,
     )
 
 

@@ -1,4 +1,6 @@
-"""A whole run measured against points, footprints and a reference whose figures are known by hand."""
+"""A whole run measured against points, footprints and a reference whose figures are
+known by hand.
+"""
 
 import csv
 import json
@@ -38,7 +40,9 @@ def run_folder(tmp_path_factory):
 @pytest.fixture(scope="module")
 def run(run_folder):
     return evaluate_run(
-        run_folder, [str(run_folder / "points.xyz")], reference=str(run_folder / "buildings.city.jsonl")
+        run_folder,
+        [str(run_folder / "points.xyz")],
+        reference=str(run_folder / "buildings.city.jsonl"),
     )
 
 
@@ -48,7 +52,9 @@ def test_figures_are_those_the_points_were_made_with(run):
     assert gable.quality.rmse == pytest.approx(0.02 * math.cos(math.atan(0.75)), rel=0.2)
     assert block.quality.rmse == pytest.approx(0.02, rel=0.1)
     assert gable.quality.share_within_20cm == 1
-    assert gable.volume_m3 == pytest.approx(8 * 12 * 5.5) and block.volume_m3 == pytest.approx(336 * 9)
+    assert gable.volume_m3 == pytest.approx(8 * 12 * 5.5) and block.volume_m3 == pytest.approx(
+        336 * 9
+    )
     assert bare.status == "no_points" and bare.quality.points == 0
 
 
@@ -59,7 +65,12 @@ def test_a_model_equals_itself(run):
 
 
 def test_a_reference_from_elsewhere_is_told_of(run_folder, tmp_path):
-    text = (run_folder / "buildings.city.jsonl").read_text().replace('"house-1"', '"a"').replace('"block 2"', '"b"')
+    text = (
+        (run_folder / "buildings.city.jsonl")
+        .read_text()
+        .replace('"house-1"', '"a"')
+        .replace('"block 2"', '"b"')
+    )
     (tmp_path / "other.city.jsonl").write_text(
         text.replace(str(ORIGIN[0]), str(ORIGIN[0] + 5000)).replace('"bare"', '"c"')
     )
@@ -84,7 +95,13 @@ def test_a_reference_without_roof_surfaces_gives_no_figures():
 def test_footprints_bring_points_beyond_the_roof(tmp_path, run_folder):
     path = tmp_path / "areas.geojson"
     west, south = ORIGIN[:2]
-    ring = [[west - 4, south], [west + 8, south], [west + 8, south + 12], [west - 4, south + 12], [west - 4, south]]
+    ring = [
+        [west - 4, south],
+        [west + 8, south],
+        [west + 8, south + 12],
+        [west - 4, south + 12],
+        [west - 4, south],
+    ]
     geometry = {"type": "Polygon", "coordinates": [ring]}
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
@@ -97,7 +114,9 @@ def block(id, x):
     return BuildingModel(id, solid=courtyard_solid().moved(np.array([x, 0.0, 0.0])))
 
 
-@pytest.mark.parametrize(("ids", "expected"), [("ab", [0, 1]), ("ba", [0, 1]), ("cd", [0, 1]), ("ac", [0, 1])])
+@pytest.mark.parametrize(
+    ("ids", "expected"), [("ab", [0, 1]), ("ba", [0, 1]), ("cd", [0, 1]), ("ac", [0, 1])]
+)
 def test_a_number_that_is_anothers_id_elsewhere_is_not_taken_for_it(ids, expected):
     models = [block("a", 0.0), block("b", 18.0)]  # which share a strip
     areas = [plan_outline(model.solid) for model in models]
@@ -106,11 +125,15 @@ def test_a_number_that_is_anothers_id_elsewhere_is_not_taken_for_it(ids, expecte
 
 def test_where_nothing_lies_nearby_the_id_tells():
     far = shapely.box(900, 900, 910, 910)
-    assert match_by_id_or_overlap([block("a", 0.0), BuildingModel("b")], [("b", far), ("a", far)]) == [1, 0]
+    assert match_by_id_or_overlap(
+        [block("a", 0.0), BuildingModel("b")], [("b", far), ("a", far)]
+    ) == [1, 0]
     assert match_by_id_or_overlap([block("a", 0.0)], []) == [None]
 
 
-@pytest.mark.parametrize("is_told", [True, False], ids=["the run tells the column of ids", "ids of another column"])
+@pytest.mark.parametrize(
+    "is_told", [True, False], ids=["the run tells the column of ids", "ids of another column"]
+)
 def test_footprints_are_found_by_the_column_that_named_the_buildings(tmp_path, is_told):
     solids = write_sample_run(tmp_path)
     areas = [own_outline(BuildingModel(id, {}, solid)) for id, solid in solids.items()]
@@ -118,7 +141,12 @@ def test_footprints_are_found_by_the_column_that_named_the_buildings(tmp_path, i
     names = np.array([*solids, "bare"], dtype=object)
     columns = [np.roll(names, 1), names]  # the usual column holds the names of others
     raw.write(
-        tmp_path / "a.gpkg", shapely.to_wkb(areas), columns, ["id", "nr"], geometry_type="Polygon", crs="EPSG:28992"
+        tmp_path / "a.gpkg",
+        shapely.to_wkb(areas),
+        columns,
+        ["id", "nr"],
+        geometry_type="Polygon",
+        crs="EPSG:28992",
     )
     inputs = {"footprints": str(tmp_path / "a.gpkg"), "id_attribute": "nr" if is_told else None}
     (tmp_path / "run.json").write_text(json.dumps({"inputs": inputs, "crs": "EPSG:7415"}))
@@ -155,15 +183,24 @@ def test_nothing_to_summarise():
 def test_a_building_without_a_model_misses_all_its_points():
     points = np.random.default_rng(0).uniform((1, 1, 0), (9, 5, 6), (20, 3))
     figures = evaluate_building(BuildingModel("a"), points, shapely.box(0, 0, 10, 6))
-    assert figures.quality.share_within_20cm == 0 and figures.quality.points == 20 and figures.status == "no_model"
+    assert (
+        figures.quality.share_within_20cm == 0
+        and figures.quality.points == 20
+        and figures.status == "no_model"
+    )
 
 
 def test_the_command_writes_both_tables(run_folder, tmp_path):
     app = typer.Typer()
     app.command()(evaluate)
-    app([str(run_folder), str(run_folder / "points.xyz"), "--out", str(tmp_path)], standalone_mode=False)
+    app(
+        [str(run_folder), str(run_folder / "points.xyz"), "--out", str(tmp_path)],
+        standalone_mode=False,
+    )
     assert len((tmp_path / "evaluation.csv").read_text().splitlines()) == 4
-    assert json.loads((tmp_path / "evaluation.json").read_text())["summary"]["all"]["buildings"] == 3
+    assert (
+        json.loads((tmp_path / "evaluation.json").read_text())["summary"]["all"]["buildings"] == 3
+    )
 
 
 def test_the_tables_fit_a_narrow_terminal(run_folder, tmp_path, monkeypatch, capsys):
@@ -190,7 +227,9 @@ def test_the_clouds_are_the_runs_own_where_none_are_named(run_folder, tmp_path):
     (tmp_path / "run.json").write_text(json.dumps({**record, "inputs": {"clouds": [cloud]}}))
     evaluate(tmp_path, out=tmp_path / "own")
     evaluate(tmp_path, [cloud], out=tmp_path / "named")
-    assert (tmp_path / "own" / "evaluation.csv").read_text() == (tmp_path / "named" / "evaluation.csv").read_text()
+    assert (tmp_path / "own" / "evaluation.csv").read_text() == (
+        tmp_path / "named" / "evaluation.csv"
+    ).read_text()
 
 
 def test_no_cloud_to_measure_against_is_refused(tmp_path):

@@ -1,4 +1,6 @@
-"""Points of two surfaces, one over the other, are told from those of one roof, and a roof of which a part has no points."""
+"""Points of two surfaces, one over the other, are told from those of one roof, and a roof of which
+a part has no points.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,9 @@ SEEDS = st.integers(0, 2**32 - 1)
 def compound(seed, density=6.0, noise_m=0.03):
     """A compound roof, and points (n, 3) on it in its own frame."""
     roof = random_compound(np.random.default_rng(seed)).roof
-    return roof, sampled(lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, noise_m, seed)
+    return roof, sampled(
+        lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, noise_m, seed
+    )
 
 
 @settings(max_examples=40, deadline=None)
@@ -30,8 +34,16 @@ def test_points_of_one_roof_are_one_surface_whatever_their_noise(seed, density, 
 
 
 @settings(max_examples=40, deadline=None)
-@given(SEEDS, st.floats(0.3, 6.0), st.floats(0.35, 0.65), st.sampled_from([-1.0, 1.0]), st.floats(0.0, 1.0))
-def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(seed, apart_m, share, side, between):
+@given(
+    SEEDS,
+    st.floats(0.3, 6.0),
+    st.floats(0.35, 0.65),
+    st.sampled_from([-1.0, 1.0]),
+    st.floats(0.0, 1.0),
+)
+def test_a_second_surface_is_seen_wherever_the_model_lies_between_them(
+    seed, apart_m, share, side, between
+):
     roof, points = compound(seed)
     raised = np.random.default_rng(seed).random(len(points)) < share
     points[:, 2] += side * apart_m * (raised - between)

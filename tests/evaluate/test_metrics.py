@@ -11,7 +11,15 @@ import pytest
 import shapely
 
 from hiproof.city.run import Request, reconstruct_area
-from hiproof.evaluate.metrics import iou, nodata_share, percentile, plan_outline, psd, quality, unexplained_area
+from hiproof.evaluate.metrics import (
+    iou,
+    nodata_share,
+    percentile,
+    plan_outline,
+    psd,
+    quality,
+    unexplained_area,
+)
 from hiproof.evaluate.run import evaluate_run
 from hiproof.model import GROUND, ROOF, WALL, Face, Solid
 
@@ -49,7 +57,8 @@ def test_a_dormer_is_unexplained_by_its_area():
     points[dormer, 2] += 1
     figures = quality(block(), points, shapely.box(0, 0, 10, 6))
     assert figures.unexplained_area_m2 == 6
-    assert figures.share_within_20cm == pytest.approx(1 - 15 / 180)  # of the points 0.3 m inside the outline
+    # of the points 0.3 m inside the outline
+    assert figures.share_within_20cm == pytest.approx(1 - 15 / 180)
 
 
 def test_points_beyond_the_roof_are_misses():
@@ -71,13 +80,28 @@ def test_facade_points_do_not_count_for_the_share():
 
 @pytest.mark.skipif(not AMSTERDAM.is_dir(), reason="needs the real data in ../shared")
 def test_the_share_is_that_of_the_judge(tmp_path):
-    """One definition: `share_within_20cm` of a run equals what ../shared/tools/roof_residuals.py says of its files."""
+    """One definition: `share_within_20cm` of a run equals what ../shared/tools/roof_residuals.py
+    says of its files.
+    """
     clouds, footprints = [str(min(AMSTERDAM.glob("*.laz")))], str(AMSTERDAM / "footprints_bag.gpkg")
     summary = reconstruct_area(Request(tuple(clouds), tmp_path, footprints))
-    tool = [sys.executable, SHARED / "tools/roof_residuals.py", tmp_path / "buildings.city.jsonl", footprints, *clouds]
-    judged = json.loads(subprocess.run([*map(str, tool), "--json"], capture_output=True, text=True, check=True).stdout)
+    tool = [
+        sys.executable,
+        SHARED / "tools/roof_residuals.py",
+        tmp_path / "buildings.city.jsonl",
+        footprints,
+        *clouds,
+    ]
+    judged = json.loads(
+        subprocess.run(
+            [*map(str, tool), "--json"], capture_output=True, text=True, check=True
+        ).stdout
+    )
     assert summary.mean_share == pytest.approx(judged["share_within_20cm"], abs=0.005)
-    shares = [figures.quality.share_within_20cm for figures in evaluate_run(tmp_path, clouds, footprints).figures]
+    shares = [
+        figures.quality.share_within_20cm
+        for figures in evaluate_run(tmp_path, clouds, footprints).figures
+    ]
     assert np.nanmean(shares) == pytest.approx(judged["share_within_20cm"], abs=0.005)
 
 
@@ -106,7 +130,12 @@ def test_cells_are_counted_as_one_by_one(seed):
     own = {}
     for (x, y, _), off in zip(xyz, dz, strict=True):
         own.setdefault((math.floor(x), math.floor(y)), []).append(off > 0.5)
-    cells = [(x, y) for x in range(-10, 10) for y in range(-10, 10) if outline.covers(shapely.Point(x + 0.5, y + 0.5))]
+    cells = [
+        (x, y)
+        for x in range(-10, 10)
+        for y in range(-10, 10)
+        if outline.covers(shapely.Point(x + 0.5, y + 0.5))
+    ]
     assert nodata_share(xyz, outline) == pytest.approx(np.mean([cell not in own for cell in cells]))
     assert unexplained_area(xyz, dz) == sum(np.mean(away) > 0.5 for away in own.values())
 
@@ -122,7 +151,11 @@ def test_figures_do_not_depend_on_the_order_of_points():
     points = roof_points() + rng.normal(0, 0.2, (240, 3))
     a = quality(block(), points, shapely.box(0, 0, 10, 6))
     b = quality(block(), rng.permutation(points), shapely.box(0, 0, 10, 6))
-    assert a.rmse == pytest.approx(b.rmse) and a.p95 == b.p95 and a.unexplained_area_m2 == b.unexplained_area_m2
+    assert (
+        a.rmse == pytest.approx(b.rmse)
+        and a.p95 == b.p95
+        and a.unexplained_area_m2 == b.unexplained_area_m2
+    )
 
 
 def test_iou_laws():

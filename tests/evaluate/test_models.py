@@ -26,7 +26,11 @@ def test_a_document_with_parts_joins_their_solids(tmp_path):
     cube = {"type": "Solid", "lod": "2.2", "boundaries": [[[[0, 1, 2]], [[0, 2, 3]]]]}
     objects = {
         "a": {"type": "Building", "children": ["a-0", "a-1"], "attributes": {"name": "x"}},
-        "a-0": {"type": "BuildingPart", "parents": ["a"], "geometry": [{**cube, "lod": "1.2"}, cube]},
+        "a-0": {
+            "type": "BuildingPart",
+            "parents": ["a"],
+            "geometry": [{**cube, "lod": "1.2"}, cube],
+        },
         "a-1": {"type": "BuildingPart", "parents": ["a"], "geometry": [cube]},
     }
     document = {"type": "CityJSON", "version": "2.0", "CityObjects": objects}
@@ -34,11 +38,16 @@ def test_a_document_with_parts_joins_their_solids(tmp_path):
     path = tmp_path / "part.city.json"
     path.write_text(json.dumps(document))
     (model,) = read_models(path)
-    assert len(model.solid.faces) == 4 and len(model.solid.vertices) == 4 and model.status == "modelled"
+    assert (
+        len(model.solid.faces) == 4
+        and len(model.solid.vertices) == 4
+        and model.status == "modelled"
+    )
 
 
 @pytest.mark.parametrize(
-    "text", ["", "not json", "[]", '{"type": "CityJSON"}', '{"CityObjects": {"a": {}}, "vertices": []}']
+    "text",
+    ["", "not json", "[]", '{"type": "CityJSON"}', '{"CityObjects": {"a": {}}, "vertices": []}'],
 )
 def test_what_is_no_cityjson_is_refused_in_a_sentence(tmp_path, text):
     path = tmp_path / "bad.json"
@@ -53,7 +62,9 @@ def test_a_part_that_is_no_number_is_refused_in_a_sentence(tmp_path, part):
     path = run_models(tmp_path)
     told = json.dumps({"type": "RoofSurface", "hiproof_part": part, "hiproof_part_type": "gable"})
     path.write_text(path.read_text().replace('{"type": "RoofSurface"}', told))
-    with pytest.raises(InputError, match=r"expected building house-1 in line 2 of .* as the number of a part"):
+    with pytest.raises(
+        InputError, match=r"expected building house-1 in line 2 of .* as the number of a part"
+    ):
         list(read_models(path))
 
 

@@ -1,4 +1,6 @@
-"""The report as text, and as a browser shows it: headless Chromium opens the page, clicks, and dumps what came of it."""
+"""The report as text, and as a browser shows it: headless Chromium opens the page, clicks, and
+dumps what came of it.
+"""
 
 import base64
 import json
@@ -15,14 +17,23 @@ from hiproof.cli.report import report
 from hiproof.errors import HiproofError
 from hiproof.evaluate.report import embedded, report_html, worst_indices
 from hiproof.evaluate.report_data import report_data
-from hiproof.evaluate.report_pictures import RESIDUAL_STOPS, building_pictures, histogram, residual_bins
+from hiproof.evaluate.report_pictures import (
+    RESIDUAL_STOPS,
+    building_pictures,
+    histogram,
+    residual_bins,
+)
 from hiproof.evaluate.run import evaluate_run
 from hiproof.write.colours import type_colour
 from sample_models import sample_points, two_parts, write_sample_run
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
 
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium here; apt-get install chromium"
+)
 
 LISTEN = """<script>
 const faults = [];
@@ -39,7 +50,8 @@ say.afterMapClick = details();
 say.webgl = Boolean(viewer.gl);
 const top3 = index => { let best = [0, 0, -1];
   for (let t = 0; t < mesh.owner.length; t++) if (mesh.owner[t] === index && mesh.roof[t]) {
-    best = [0, 1, 2].map(k => (mesh.corners[9 * t + k] + mesh.corners[9 * t + 3 + k] + mesh.corners[9 * t + 6 + k]) / 3); }
+    best = [0, 1, 2].map(k =>
+      (mesh.corners[9 * t + k] + mesh.corners[9 * t + 3 + k] + mesh.corners[9 * t + 6 + k]) / 3); }
   return best; };
 const at = viewer.project(top3(1)), box = viewer.canvas.getBoundingClientRect();
 for (const kind of ["pointerdown", "pointerup"]) viewer.canvas.dispatchEvent(new PointerEvent(kind,
@@ -47,14 +59,16 @@ for (const kind of ["pointerdown", "pointerup"]) viewer.canvas.dispatchEvent(new
 say.afterSceneClick = details();
 const before = document.querySelector('#map [data-building="0"]').getAttribute("fill");
 for (const value of ["residual", "quality", "status", "type"]) {
-  const mode = document.getElementById("mode"); mode.value = value; mode.dispatchEvent(new Event("change"));
+  const mode = document.getElementById("mode");
+  mode.value = value; mode.dispatchEvent(new Event("change"));
   say[value] = document.querySelector('#map [data-building="0"]').getAttribute("fill");
 }
 say.before = before;
 document.querySelector("[data-select]").click();
 say.afterWorstClick = details();
 say.faults = faults;
-const result = document.createElement("pre"); result.id = "said"; result.textContent = JSON.stringify(say);
+const result = document.createElement("pre");
+result.id = "said"; result.textContent = JSON.stringify(say);
 document.body.append(result);
 </script>"""
 
@@ -76,7 +90,13 @@ def in_browser(page, folder, *flags):
     """What the script ACT saw of the page in headless Chromium."""
     acting = page.replace("<head>", "<head>" + LISTEN, 1).replace("</body>", ACT + "</body>", 1)
     (folder / "page.html").write_text(acting)
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    command = [
+        BROWSER,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+    ]
     command += [
         f"--user-data-dir={folder / 'profile'}",
         "--window-size=1500,1200",
@@ -84,7 +104,10 @@ def in_browser(page, folder, *flags):
         *flags,
     ]
     done = subprocess.run(
-        [*command, "--dump-dom", (folder / "page.html").as_uri()], capture_output=True, text=True, timeout=120
+        [*command, "--dump-dom", (folder / "page.html").as_uri()],
+        capture_output=True,
+        text=True,
+        timeout=120,
     )
     said = re.search(r'<pre id="said">(.*?)</pre>', done.stdout, re.DOTALL)
     assert said, f"the page's scripts did not run to their end: {done.stderr[-2000:]}"
@@ -123,13 +146,21 @@ def test_the_worst_leads_to_its_building(said):
 
 @needs_browser
 def test_the_colours_follow_the_choice(said):
-    assert said["type"] == said["before"] and len({said["residual"], said["status"], said["type"]}) == 3
+    assert (
+        said["type"] == said["before"]
+        and len({said["residual"], said["status"], said["type"]}) == 3
+    )
 
 
 @needs_browser
 def test_without_webgl_the_map_still_works(page, tmp_path):
     said = in_browser(page, tmp_path, "--disable-3d-apis")
-    assert not said["webgl"] and said["marks"] == 3 and "house-1" in said["afterMapClick"] and not said["faults"]
+    assert (
+        not said["webgl"]
+        and said["marks"] == 3
+        and "house-1" in said["afterMapClick"]
+        and not said["faults"]
+    )
 
 
 def test_nothing_in_the_page_asks_the_network(page):
@@ -155,7 +186,10 @@ def test_roofs_are_coloured_by_their_parts(run):
 def test_poor_models_are_the_worst_whatever_their_share(run):
     """The block fits its points worse than the gable; the verdicts decide before that."""
     grades = {"house-1": "poor", "block 2": "good"}
-    models = tuple(replace(m, attributes=m.attributes | {"hiproof_quality": grades.get(m.id)}) for m in run.models)
+    models = tuple(
+        replace(m, attributes=m.attributes | {"hiproof_quality": grades.get(m.id)})
+        for m in run.models
+    )
     judged = replace(run, models=models)
     assert [run.models[index].id for index in worst_indices(run)] == ["block 2", "house-1"]
     assert [run.models[index].id for index in worst_indices(judged)] == ["house-1", "block 2"]
@@ -218,6 +252,9 @@ def test_histograms_of_next_to_nothing(values):
 
 
 def test_a_histogram_of_one_value_is_told_and_one_that_is_cut_says_so():
-    assert histogram(np.array([0.99998, 1.0]), "IoU", "") == "<figure><figcaption>IoU: 1 for all</figcaption></figure>"
+    assert (
+        histogram(np.array([0.99998, 1.0]), "IoU", "")
+        == "<figure><figcaption>IoU: 1 for all</figcaption></figure>"
+    )
     assert "and more" in histogram(np.array([*range(100), 1000.0]), "x", "m")
     assert "and more" not in histogram(np.array([1.0, 2.0, 2.0, 2.0]), "x", "m")

@@ -1,4 +1,6 @@
-"""The verdict: good where the points lie on the model, no better than fair where they speak against it, whatever hides that."""
+"""The verdict: good where the points lie on the model, no better than fair where they speak against
+it, whatever hides that.
+"""
 
 import json
 
@@ -31,14 +33,20 @@ def block(height=6.0, outline=OUTLINE):
     ring = shapely.get_coordinates(outline.exterior)[:-1].tolist()
     west, south, east, north = outline.bounds
     sizes = {"width": north - south, "length": east - west}
-    part = {"type": "flat", "parameters": sizes, "position": [(west + east) / 2, (south + north) / 2, height]}
+    part = {
+        "type": "flat",
+        "parameters": sizes,
+        "position": [(west + east) / 2, (south + north) / 2, height],
+    }
     record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": [part]}
     return hiproof.build(record).model
 
 
 def on_block(count=600, height=6.0, seed=0):
     rng = np.random.default_rng(seed)
-    return np.column_stack([rng.uniform((0, 0), (12, 9), (count, 2)), height + rng.normal(0.0, 0.03, count)])
+    return np.column_stack(
+        [rng.uniform((0, 0), (12, 9), (count, 2)), height + rng.normal(0.0, 0.03, count)]
+    )
 
 
 def cluster(count, height, around=(6.0, 5.0), width=2.5):
@@ -51,7 +59,9 @@ def cluster(count, height, around=(6.0, 5.0), width=2.5):
 @given(st.integers(0, 2**32 - 1), st.floats(2.0, 20.0))
 def test_the_true_roof_is_good(seed, density):
     roof = random_compound(np.random.default_rng(seed)).roof
-    points = sampled(lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, 0.03, seed)
+    points = sampled(
+        lambda x, y: roof.height_at(np.column_stack([x, y])), roof.outline, density, 0.03, seed
+    )
     model = Model(roof, compose(roof, 0.0).moved(roof.frame.origin))
     assert verdict_of(model, points).grade is Grade.GOOD
 
@@ -59,12 +69,16 @@ def test_the_true_roof_is_good(seed, density):
 @settings(max_examples=15, deadline=None)
 @given(st.floats(0.4, 20.0), st.sampled_from([-1.0, 1.0]))
 def test_a_roof_with_three_fifths_of_all_its_points_off_is_poor(off_m, side):
-    """Those off lie near the outline of a narrow building, where a share of inner points does not see them."""
+    """Those off lie near the outline of a narrow building, where a share of inner points does not
+    see them.
+    """
     narrow = shapely.box(0.0, 0.0, 12.0, 1.4)
     points = np.random.default_rng(2).uniform((0, 0), (12, 1.4), (400, 2))
     off = (np.arange(400) % 5 < 3) * side * off_m
     found = verdict_of(block(6.0 + 30.0, narrow), np.column_stack([points, 36.0 + off]))
-    assert found.grade is Grade.POOR and any("% of its points lie within 0.2 m" in reason for reason in found.reasons)
+    assert found.grade is Grade.POOR and any(
+        "% of its points lie within 0.2 m" in reason for reason in found.reasons
+    )
 
 
 def test_facade_points_say_nothing_of_a_roof():
@@ -76,9 +90,15 @@ def test_facade_points_say_nothing_of_a_roof():
 @pytest.mark.parametrize("with_footprint", [True, False])
 def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
     rng = np.random.default_rng(4)
-    south = np.column_stack([rng.uniform(0, 12, 300), rng.uniform(0, 0.1, 300), rng.uniform(0, 6, 300)])
-    west = np.column_stack([rng.uniform(0, 0.1, 200), rng.uniform(0, 9, 200), rng.uniform(0, 6, 200)])
-    building = hiproof.reconstruct(np.concatenate([south, west]), OUTLINE if with_footprint else None)
+    south = np.column_stack(
+        [rng.uniform(0, 12, 300), rng.uniform(0, 0.1, 300), rng.uniform(0, 6, 300)]
+    )
+    west = np.column_stack(
+        [rng.uniform(0, 0.1, 200), rng.uniform(0, 9, 200), rng.uniform(0, 6, 200)]
+    )
+    building = hiproof.reconstruct(
+        np.concatenate([south, west]), OUTLINE if with_footprint else None
+    )
     assert building.grade is Grade.POOR
     assert "follows" not in building.detail and "% of its" in building.detail
 
@@ -88,7 +108,10 @@ def test_a_building_with_points_on_two_walls_alone_is_poor(with_footprint):
 def test_points_far_above_a_model_are_named(count, height):
     found = verdict_of(block(), np.concatenate([on_block(3000), cluster(count, height, width=1.5)]))
     assert found.grade is not Grade.GOOD
-    assert f"{count} points up to {height:.{1 if height < 10 else 0}f} m above the model" in found.reasons
+    assert (
+        f"{count} points up to {height:.{1 if height < 10 else 0}f} m above the model"
+        in found.reasons
+    )
 
 
 def test_birds_and_a_chimney_do_not_count():
@@ -118,13 +141,18 @@ def run_over_spire(folder, code, most=20_000):
     west, south, east, north = town.footprints["house-0"].bounds
     rng = np.random.default_rng(5)
     spire = np.column_stack(
-        [rng.uniform(-0.6, 0.6, (60, 2)) + ((west + east) / 2, (south + north) / 2), np.linspace(15, 32, 60)]
+        [
+            rng.uniform(-0.6, 0.6, (60, 2)) + ((west + east) / 2, (south + north) / 2),
+            np.linspace(15, 32, 60),
+        ]
     )
     classes = np.append(town.classification, np.full(60, code, np.uint8))
     cloud = write_cloud(folder / "cloud.laz", np.concatenate([town.xyz, spire]), classes)
     footprints = write_footprints(folder / "footprints.geojson", town.footprints)
     settings = Settings.from_dict({"city": {"max_points_a_building": most}})
-    summary = reconstruct_area(Request((str(cloud),), folder / "out", str(footprints), settings=settings))
+    summary = reconstruct_area(
+        Request((str(cloud),), folder / "out", str(footprints), settings=settings)
+    )
     (row,) = hiproof.read_parameters(folder / "out" / "parameters.jsonl")
     return row, summary
 
@@ -136,4 +164,6 @@ def test_neither_thinning_nor_a_class_of_noise_hides_a_spire(tmp_path, code, mos
     assert f"quality: {graded_words({row['quality']: 1})}" in lines
     assert row["quality"] != "good" and "m above the model" in row["detail"]
     assert summary.by_quality == {row["quality"]: 1}
-    assert json.loads((tmp_path / "out" / "run.json").read_text())["by_quality"] == {row["quality"]: 1}
+    assert json.loads((tmp_path / "out" / "run.json").read_text())["by_quality"] == {
+        row["quality"]: 1
+    }

@@ -1,10 +1,17 @@
-"""The Cramer-Rao bound against formulas by hand, against least squares that reaches it, and its laws."""
+"""The Cramer-Rao bound against formulas by hand, against least squares that reaches it, and its
+laws.
+"""
 
 import math
 
 import numpy as np
 import pytest
-from experiments.cramer_rao import best_covariance, bounds_by_name, edge_information, height_information
+from experiments.cramer_rao import (
+    best_covariance,
+    bounds_by_name,
+    edge_information,
+    height_information,
+)
 
 from hiproof.errors import FitError
 from hiproof.primitives import CATALOGUE
@@ -18,7 +25,13 @@ EXAMPLES = {
     "pyramid": {"width": 8, "length": 9, "height": 3},
     "mansard": {"width": 9, "length": 13, "height": 2.5, "top_width": 6, "top_length": 10},
     "shed": {"width": 15, "length": 10, "height": 2, "teeth": 3},
-    "asymmetric_gable": {"width": 8, "length": 12, "height": 3, "ridge_offset": 1.2, "eave_step": 1},
+    "asymmetric_gable": {
+        "width": 8,
+        "length": 12,
+        "height": 3,
+        "ridge_offset": 1.2,
+        "eave_step": 1,
+    },
     "gambrel": {"width": 9, "length": 12, "height": 4, "break_width": 5, "break_height": 2.8},
 }
 
@@ -30,11 +43,14 @@ def theta_of(kind, kappa=0.4):
 
 def test_a_flat_roofs_height_is_the_mean_of_its_points():
     primitive, theta = theta_of("flat")
-    assert bounds_by_name(primitive, theta, 5.0, 0.1)["q0"] == pytest.approx(0.1 / math.sqrt(5 * 96), rel=1e-6)
+    assert bounds_by_name(primitive, theta, 5.0, 0.1)["q0"] == pytest.approx(
+        0.1 / math.sqrt(5 * 96), rel=1e-6
+    )
 
 
 def test_a_gables_ridge_and_slope_are_those_of_a_straight_line():
-    # By symmetry z = q0 - q1 |v| is a line over |v| uniform in [0, V]: var q1 = s^2 / (n V^2 / 12), var q0 = 4 s^2 / n.
+    # By symmetry z = q0 - q1 |v| is a line over |v| uniform in [0, V]: var q1 = s^2 / (n V^2 / 12),
+    # var q0 = 4 s^2 / n.
     primitive, theta = theta_of("gable")
     n = 4.72 * 96
     bounds = bounds_by_name(primitive, theta, 4.72, 0.09)
@@ -52,7 +68,9 @@ def test_an_edges_limit_is_the_mean_distance_to_its_nearest_point():
 
 @pytest.mark.parametrize("kind", ["gable", "hip", "pyramid", "gambrel"])
 def test_gauss_newton_with_known_sides_reaches_the_bound(kind):
-    """Least squares of the heights, linear about the truth: its covariance is the bound without the edges' part."""
+    """Least squares of the heights, linear about the truth: its covariance is the bound without the
+    edges' part.
+    """
     primitive, theta = theta_of(kind)
     rng = np.random.default_rng(5)
     from experiments.cramer_rao import height_gradient
@@ -89,7 +107,9 @@ def test_less_noise_and_more_points_tell_more():
     base = bounds_by_name(primitive, theta, 4.0, 0.1)
     assert bounds_by_name(primitive, theta, 4.0, 0.2)["q0"] > base["q0"]
     assert bounds_by_name(primitive, theta, 8.0, 0.1)["width"] < base["width"] / 1.9
-    assert bounds_by_name(primitive, theta, 16.0, 0.1)["q1"] == pytest.approx(base["q1"] / 2, rel=0.1)
+    assert bounds_by_name(primitive, theta, 16.0, 0.1)["q1"] == pytest.approx(
+        base["q1"] / 2, rel=0.1
+    )
 
 
 def test_the_covariance_is_symmetric_and_positive():

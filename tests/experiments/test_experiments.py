@@ -21,13 +21,19 @@ from hiproof.errors import InputError
 from hiproof.primitives import CATALOGUE
 from hiproof.simulate import random_building, uniform_points
 
-pytest.importorskip("matplotlib", reason="the experiments draw with matplotlib (extra `experiments`)")
-needs_ransac = pytest.mark.skipif(not available(), reason="pyransac3d is not installed (extra `experiments`)")
+pytest.importorskip(
+    "matplotlib", reason="the experiments draw with matplotlib (extra `experiments`)"
+)
+needs_ransac = pytest.mark.skipif(
+    not available(), reason="pyransac3d is not installed (extra `experiments`)"
+)
 
 
 @pytest.fixture
 def few_steps(monkeypatch):
-    """The paper's objective is followed for two steps alone: where it leads to is what tests/fit/test_paper.py asks."""
+    """The paper's objective is followed for two steps alone: where it leads to is what
+    tests/fit/test_paper.py asks.
+    """
     monkeypatch.setattr(optimize, "minimize", partial(optimize.minimize, options={"maxiter": 2}))
 
 
@@ -64,7 +70,9 @@ def test_a_table_shows_gaps_and_keeps_full_precision_in_csv():
 
 def test_a_roof_found_exactly_has_no_errors():
     primitive = CATALOGUE["hip"]
-    theta = primitive.to_theta({"width": 8, "length": 14, "height": 3, "ridge_length": 6}, 0.3, np.array([1.0, 2, 5]))
+    theta = primitive.to_theta(
+        {"width": 8, "length": 14, "height": 3, "ridge_length": 6}, 0.3, np.array([1.0, 2, 5])
+    )
     record = record_of(primitive, theta, theta, {"q0": 0.01})
     assert record["bound:q0"] == 0.01
     assert all(abs(value) < 1e-12 for name, value in record.items() if not name.startswith("bound"))
@@ -78,7 +86,9 @@ def test_half_a_turn_is_no_error_where_the_roof_does_not_change():
     assert record_of(gable, theta, turned, {})["kappa"] == pytest.approx(0)
     saltbox = CATALOGUE["asymmetric_gable"]
     theta = saltbox.to_theta(
-        {"width": 8, "length": 12, "height": 3, "ridge_offset": 1, "eave_step": 0.0}, 0.2, np.zeros(3)
+        {"width": 8, "length": 12, "height": 3, "ridge_offset": 1, "eave_step": 0.0},
+        0.2,
+        np.zeros(3),
     )
     turned = theta.copy()
     turned[2] += math.pi
@@ -122,15 +132,22 @@ def test_troubles_do_what_they_say():
     points = uniform_points(building, np.random.default_rng(4))
     rng = np.random.default_rng(5)
     assert len(without_corner(points, building, 0.4)) == len(points) - int(0.4 * len(points))
-    assert len(without_strip(points, building, 0.3, rng)) == pytest.approx(0.7 * len(points), rel=0.15)
+    assert len(without_strip(points, building, 0.3, rng)) == pytest.approx(
+        0.7 * len(points), rel=0.15
+    )
     moved = np.any(with_outliers(points, 0.2, rng) != points, axis=1).mean()
     assert moved == pytest.approx(0.2, abs=0.07)
 
 
 def test_roofn3d_csv_is_data_too(tmp_path):
     points = ",".join(f"{x} {y} {10 - abs(y - 4)}" for x in range(12) for y in range(9))
-    header = "id,class,points,outline,unassignedsurfacegrowingpoints,unassignedsubsurfacegrowingpoints,brep"
-    row = f'1,Saddleback roof,"MULTIPOINT Z ({points})","MULTIPOLYGON(((0 0,11 0,11 8,0 8,0 0)))",,,'
+    header = (
+        "id,class,points,outline,unassignedsurfacegrowingpoints,"
+        "unassignedsubsurfacegrowingpoints,brep"
+    )
+    row = (
+        f'1,Saddleback roof,"MULTIPOINT Z ({points})","MULTIPOLYGON(((0 0,11 0,11 8,0 8,0 0)))",,,'
+    )
     path = tmp_path / "roofn3d_buildings.csv"
     path.write_text(header + "\n" + row + "\n")
     samples = named_samples(Options(quick=True, data=path))

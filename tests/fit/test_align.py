@@ -1,4 +1,6 @@
-"""Footprints that lie beside their roofs: found and moved where points show it, left alone where they do not."""
+"""Footprints that lie beside their roofs: found and moved where points show it, left alone where
+they do not.
+"""
 
 import numpy as np
 import pytest

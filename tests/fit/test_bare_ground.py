@@ -1,4 +1,6 @@
-"""Bare ground inside a footprint is cut out along right angles, whatever the frame; a roof is left alone."""
+"""Bare ground inside a footprint is cut out along right angles, whatever the frame; a roof is left
+alone.
+"""
 
 import math
 
@@ -37,10 +39,15 @@ def test_a_yard_is_cut_out_within_a_few_per_cent(place, density, turn, shift):
     def placed(xy):
         return xy @ rotation + shift
 
-    roof, ground = placed(scattered(FOOTPRINT - yard, density)), placed(scattered(yard.buffer(-0.3), 1, 1))
+    roof, ground = (
+        placed(scattered(FOOTPRINT - yard, density)),
+        placed(scattered(yard.buffer(-0.3), 1, 1)),
+    )
     found = find_bare_ground(shapely.transform(FOOTPRINT, placed), roof, ground)
     true = shapely.transform(FOOTPRINT - yard, placed)
-    assert found.outline.is_valid and found.outline.symmetric_difference(true).area < 0.05 * true.area
+    assert (
+        found.outline.is_valid and found.outline.symmetric_difference(true).area < 0.05 * true.area
+    )
     assert found.area_m2 == pytest.approx(yard.area, rel=0.2)
     edges = np.diff(shapely.get_coordinates(found.outline.exterior), axis=0)
     quarter = np.degrees(np.arctan2(edges[:, 1], edges[:, 0]) - turn) % 90
@@ -78,7 +85,11 @@ def test_the_largest_sum_is_that_of_all_rectangles_tried(seed):
     value = np.random.default_rng(seed).integers(-3, 3, (5, 7)).astype(float)
     top, bottom, left, right, total = largest_sum(value)
     every = [
-        value[a:b, c:d].sum() for a in range(5) for b in range(a + 1, 6) for c in range(7) for d in range(c + 1, 8)
+        value[a:b, c:d].sum()
+        for a in range(5)
+        for b in range(a + 1, 6)
+        for c in range(7)
+        for d in range(c + 1, 8)
     ]
     assert total == max([0.0, *every]) == value[top:bottom, left:right].sum()
 

@@ -29,9 +29,15 @@ def plain_value(problem, primitive, theta, noise):
     c, s = np.cos(theta[2]), np.sin(theta[2])
     u, v = c * (x - theta[0]) + s * (y - theta[1]), c * (y - theta[1]) - s * (x - theta[0])
     residual = (z - primitive.height_at(theta, problem.points[:, :2])) / noise.sigma
-    inlier = prior * (1 - noise.eps) * np.exp(-(residual**2) / 2) / (noise.sigma * np.sqrt(2 * np.pi))
+    inlier = (
+        prior * (1 - noise.eps) * np.exp(-(residual**2) / 2) / (noise.sigma * np.sqrt(2 * np.pi))
+    )
     if problem.plan_is_free:
-        inside = 1 / (1 + np.exp(-(theta[4] - abs(u)) / noise.tau)) / (1 + np.exp(-(theta[3] - abs(v)) / noise.tau))
+        inside = (
+            1
+            / (1 + np.exp(-(theta[4] - abs(u)) / noise.tau))
+            / (1 + np.exp(-(theta[3] - abs(v)) / noise.tau))
+        )
         inlier *= inside / (4 * theta[3] * theta[4])
     return -np.log(inlier + (1 - prior * (1 - noise.eps)) * np.exp(problem.log_background)).sum()
 
@@ -48,7 +54,9 @@ def compiled(problem, kind, theta, noise=NOISE):
 @pytest.mark.parametrize("plan_is_free", [True, False])
 def test_compiled_value_equals_plain_numpy(kind, primitive, plan_is_free):
     theta, problem = theta_and_problem(primitive, plan_is_free)
-    assert compiled(problem, kind, theta)[0] == pytest.approx(plain_value(problem, primitive, theta, NOISE), abs=1e-3)
+    assert compiled(problem, kind, theta)[0] == pytest.approx(
+        plain_value(problem, primitive, theta, NOISE), abs=1e-3
+    )
 
 
 @each_variant
@@ -73,7 +81,10 @@ def test_gradient_equals_the_numeric_one(kind, primitive, plan_is_free):
         if primitive.strips > 1 and k in (0, 1, 2, 3):
             continue  # a point that changes its tooth jumps: there is no derivative
         step = 1e-6 * np.eye(9)[k]
-        ahead, behind = compiled(problem, kind, theta + step)[0], compiled(problem, kind, theta - step)[0]
+        ahead, behind = (
+            compiled(problem, kind, theta + step)[0],
+            compiled(problem, kind, theta - step)[0],
+        )
         assert gradient[k] == pytest.approx((ahead - behind) / 2e-6, rel=2e-4, abs=2e-3)
 
 

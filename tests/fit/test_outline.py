@@ -1,4 +1,6 @@
-"""Outlines without footprints: no inward bias, straight edges, and sentences for points that are no roof."""
+"""Outlines without footprints: no inward bias, straight edges, and sentences for points that are no
+roof.
+"""
 
 from itertools import pairwise, product
 
@@ -22,7 +24,14 @@ from hiproof.fit.outline.cost import (
     known_cost,
     structure_cost,
 )
-from hiproof.fit.outline.lines import BACK, dropped, find_corners, lines_through, replaced, replaced_by
+from hiproof.fit.outline.lines import (
+    BACK,
+    dropped,
+    find_corners,
+    lines_through,
+    replaced,
+    replaced_by,
+)
 from hiproof.fit.outline.settle import (
     BLURS_M,
     DEEP_M,
@@ -74,7 +83,9 @@ def test_the_outline_is_found_without_bias_and_with_the_corners_there_are(name, 
 @pytest.mark.parametrize("angle", [0.0, 0.3])
 def test_rows_of_points_along_a_side_do_not_draw_it_in(angle):
     x, y = np.meshgrid(np.arange(0.15, 14, 0.3), np.arange(0.4, 8, 0.8))
-    xy = np.column_stack([x.ravel(), y.ravel()]) + np.random.default_rng(0).normal(0, 0.03, (x.size, 2))
+    xy = np.column_stack([x.ravel(), y.ravel()]) + np.random.default_rng(0).normal(
+        0, 0.03, (x.size, 2)
+    )
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     outline = estimate_outline(xy @ turn.T)
     assert iou(outline, shapely.transform(shapely.box(0, 0, 14, 8), lambda c: c @ turn.T)) > 0.98
@@ -91,21 +102,31 @@ def test_the_outline_turns_and_moves_with_the_points():
 def test_points_on_the_walls_do_not_push_the_sides_out():
     xy, truth = points_in(L_SHAPE, 6.0)
     rng = np.random.default_rng(1)
-    walls = shapely.get_coordinates(truth.exterior.interpolate(rng.uniform(0, truth.exterior.length, 150)))
-    outline = estimate_outline(np.concatenate([xy, walls]) + rng.normal(0, 0.06, (len(xy) + 150, 2)))
+    walls = shapely.get_coordinates(
+        truth.exterior.interpolate(rng.uniform(0, truth.exterior.length, 150))
+    )
+    outline = estimate_outline(
+        np.concatenate([xy, walls]) + rng.normal(0, 0.06, (len(xy) + 150, 2))
+    )
     assert (outline.area - truth.area) / truth.length == pytest.approx(0.0, abs=0.04)
     assert corner_count(outline) == 6
 
 
 def seen_by_a_drone(overhang, roof_density, walls_a_metre):
-    """Points (n, 3) of a level roof and of the walls below, `overhang` metres behind its eaves; and the eaves."""
+    """Points (n, 3) of a level roof and of the walls below, `overhang` metres behind its eaves; and
+    the eaves.
+    """
     rng = np.random.default_rng(4)
     truth = shapely.box(0, 0, 14, 8)
     roof, _ = points_in(truth, roof_density, angle=0.0)
     line = truth.buffer(-overhang, join_style="mitre").exterior
-    walls = shapely.get_coordinates(line.interpolate(rng.uniform(0, line.length, int(walls_a_metre * line.length))))
+    walls = shapely.get_coordinates(
+        line.interpolate(rng.uniform(0, line.length, int(walls_a_metre * line.length)))
+    )
     z = np.concatenate([np.full(len(roof), 6.0), rng.uniform(0.5, 5.5, len(walls))])
-    return np.column_stack([np.concatenate([roof, walls]), z]) + rng.normal(0, 0.02, (len(z), 3)), truth
+    return np.column_stack([np.concatenate([roof, walls]), z]) + rng.normal(
+        0, 0.02, (len(z), 3)
+    ), truth
 
 
 @pytest.mark.parametrize("overhang", [0.5, 0.7])
@@ -128,7 +149,9 @@ def test_an_oblique_wall_is_drawn_as_one():
 
 
 def scanned_block(outline, seed=0, high=6.0, step_at=None):
-    """Points (n, 3), evenly spread, 5 a square metre, of a level roof with walls; beyond x = `step_at` three metres lower."""
+    """Points (n, 3), evenly spread, 5 a square metre, of a level roof with walls; beyond x =
+    `step_at` three metres lower.
+    """
     rng = np.random.default_rng(seed)
     x0, y0, x1, y1 = outline.bounds
     xy = np.stack(np.meshgrid(np.arange(x0, x1, 0.45), np.arange(y0, y1, 0.45)), -1).reshape(-1, 2)
@@ -136,11 +159,18 @@ def scanned_block(outline, seed=0, high=6.0, step_at=None):
     roof = xy[shapely.contains_xy(outline, *xy.T)]
     border = outline.boundary
     if step_at is not None:
-        border = border.union(shapely.LineString([(step_at, y0), (step_at, y1)]).intersection(outline))
-    places = [line.interpolate(rng.uniform(0, line.length, int(3 * line.length))) for line in shapely.get_parts(border)]
+        border = border.union(
+            shapely.LineString([(step_at, y0), (step_at, y1)]).intersection(outline)
+        )
+    places = [
+        line.interpolate(rng.uniform(0, line.length, int(3 * line.length)))
+        for line in shapely.get_parts(border)
+    ]
     walls = shapely.get_coordinates(np.concatenate(places))
     top = np.where(
-        np.concatenate([roof, walls])[:, 0] > (np.inf if step_at is None else step_at + 0.01), high - 3, high
+        np.concatenate([roof, walls])[:, 0] > (np.inf if step_at is None else step_at + 0.01),
+        high - 3,
+        high,
     )
     z = top - np.r_[np.zeros(len(roof)), rng.uniform(0.0, 6.0, len(walls))]
     return np.column_stack([np.concatenate([roof, walls]) + rng.normal(0, 0.05, (len(z), 2)), z])
@@ -158,7 +188,9 @@ def test_walls_of_a_step_inside_are_walls_but_draw_no_side():
     points = scanned_block(shapely.box(0, 0, 14, 8), step_at=9.0)
     wall = on_walls(points, points, 0.4)
     x, y = points[:, :2].T
-    inner = (abs(x - 9.0) < 0.2) & (abs(y - 4.0) < 3.0) & (points[:, 2] < 4.5) & (points[:, 2] > 3.3)
+    inner = (
+        (abs(x - 9.0) < 0.2) & (abs(y - 4.0) < 3.0) & (points[:, 2] < 4.5) & (points[:, 2] > 3.3)
+    )
     deep = (abs(x - 4.0) < 3.0) & (abs(y - 4.0) < 3.0)
     assert wall[inner].mean() > 0.9 and not wall[deep].any()
     assert wall[(x < 0.05) & (points[:, 2] < 4.5)].mean() > 0.8
@@ -170,7 +202,18 @@ def test_a_bay_drawn_as_a_wedge_becomes_one_with_right_angles():
     x, y = points_in(truth, 8.0, angle=0.0)[0].T
     order = np.argsort(y)
     border = Border(
-        x[order], y[order], np.zeros(len(x), bool), 8.0, False, ANYWHERE, 0.15, costs_by_depth(0.02), 3.0, 3.0, 1.0, 6.0
+        x[order],
+        y[order],
+        np.zeros(len(x), bool),
+        8.0,
+        False,
+        ANYWHERE,
+        0.15,
+        costs_by_depth(0.02),
+        3.0,
+        3.0,
+        1.0,
+        6.0,
     )
     wedge = [(0, 0), (14, 0), (14, 8), (8.5, 8), (6.5, 6), (4.5, 8), (0, 8)]
     drawing = drawing_of(lines_through(np.array(wedge, float)), 0.0, border)
@@ -184,7 +227,9 @@ def test_an_outline_ends_in_no_spike():
     xy, truth = points_in(shapely.box(0, 0, 14, 8), 8.0, angle=0.0)
     trail = np.column_stack([np.linspace(14, 20, 13), 8.0 + np.linspace(0.0, 0.4, 13)])
     outline = estimate_outline(np.concatenate([xy, trail]))
-    azimuth = lines_through(shapely.get_coordinates(shapely.geometry.polygon.orient(outline).exterior)[:-1])[:, 0]
+    azimuth = lines_through(
+        shapely.get_coordinates(shapely.geometry.polygon.orient(outline).exterior)[:-1]
+    )[:, 0]
     assert np.cos(azimuth - np.roll(azimuth, 1)).min() > BACK
     assert iou(outline, truth) > 0.95
     spike = np.array([(0, 0), (14, 0), (20, 8.2), (13.8, 7.7), (0, 8)], float)
@@ -218,10 +263,16 @@ def test_a_block_with_a_court_has_a_valid_solid_with_one():
 
 def test_courts_that_are_bays_already_or_would_cut_a_roof_in_two_are_left_out():
     outline = shapely.box(0, 0, 20, 10)
-    inside, bay, across = shapely.box(4, 4, 7, 7), shapely.box(9, 9, 12, 14), shapely.box(9, -1, 11, 11)
+    inside, bay, across = (
+        shapely.box(4, 4, 7, 7),
+        shapely.box(9, 9, 12, 14),
+        shapely.box(9, -1, 11, 11),
+    )
     assert with_courts(outline, [inside, bay]).equals(outline - inside)
     assert with_courts(outline, [across]).equals(outline)
-    assert with_courts(outline, [shapely.box(9, 1, 12, 10.2)]).area == pytest.approx(outline.area - 27)
+    assert with_courts(outline, [shapely.box(9, 1, 12, 10.2)]).area == pytest.approx(
+        outline.area - 27
+    )
 
 
 def test_levels_of_columns_are_the_cheapest_of_all():
@@ -247,7 +298,18 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
     rng = np.random.default_rng(3)
     x, y = rng.uniform(0, 10, (2, 300))
     border = Border(
-        x, np.sort(y), rng.random(300) < 0.3, 3.0, court, ANYWHERE, 0.15, costs_by_depth(0.02), 2.5, 3.0, 1.0, 6.0
+        x,
+        np.sort(y),
+        rng.random(300) < 0.3,
+        3.0,
+        court,
+        ANYWHERE,
+        0.15,
+        costs_by_depth(0.02),
+        2.5,
+        3.0,
+        1.0,
+        6.0,
     )
     ring = np.array([(0, 0), (9.8, 0.4), (9.5, 6), (4, 6.2), (4.1, 10), (0, 9.7)], float)
     lines = lines_through(ring[::-1] if court else ring)
@@ -261,12 +323,18 @@ def test_a_change_is_drawn_and_priced_as_if_all_were_drawn_anew(court):
         changes += [(dropped(lines, i), 1), (replaced_by(lines, i, 1, notch), 4)]
         for new, fresh in changes:
             found, anew = changed(new, drawing, i, 1, fresh, border), drawing_of(new, 0.0, border)
-            assert cost_of_change(new, drawing, i, 1, fresh, border, np.inf) == pytest.approx(found.cost)
+            assert cost_of_change(new, drawing, i, 1, fresh, border, np.inf) == pytest.approx(
+                found.cost
+            )
             if np.isfinite(anew.cost):
-                assert cost_of_change(new, drawing, i, 1, fresh, border, found.cost - 1e-6) == np.inf
+                assert (
+                    cost_of_change(new, drawing, i, 1, fresh, border, found.cost - 1e-6) == np.inf
+                )
                 assert cost_of_change(new, drawing, i, 1, fresh, border, found.cost + 1e-6) < np.inf
                 assert found.cost == pytest.approx(anew.cost) and found.structure == anew.structure
-                assert found.own == pytest.approx(anew.own) and found.corners == pytest.approx(anew.corners)
+                assert found.own == pytest.approx(anew.own) and found.corners == pytest.approx(
+                    anew.corners
+                )
                 priced += 1
     assert priced >= 12
 
@@ -280,10 +348,15 @@ def test_what_points_cost_is_looked_up_as_it_is_computed(wall):
 
 
 def test_lines_skew_ones_directions_and_sharp_corners_have_their_prices():
-    border = Border(*np.zeros((3, 0)), 3.0, False, ANYWHERE, 0.15, costs_by_depth(0.02), 3.0, 5.0, 1.0, 7.0)
+    border = Border(
+        *np.zeros((3, 0)), 3.0, False, ANYWHERE, 0.15, costs_by_depth(0.02), 3.0, 5.0, 1.0, 7.0
+    )
     rings = {"square": [(0, 0), (8, 0), (8, 6), (0, 6)], "wedge": [(0, 0), (12, 0), (0, 5)]}
     rings |= {"slant": [(0, 0), (9, 0), (7, 6), (-2, 6)]}
-    costs = {k: structure_cost(lines_through(np.array(ring, float)), 0.0, border) for k, ring in rings.items()}
+    costs = {
+        k: structure_cost(lines_through(np.array(ring, float)), 0.0, border)
+        for k, ring in rings.items()
+    }
     assert costs == {"square": 12.0, "wedge": 9.0 + 5.0 + 1.0 + 7.0, "slant": 12.0 + 5.0 + 2 * 1.0}
 
 
@@ -295,7 +368,9 @@ def test_the_given_direction_is_that_of_the_edges():
     assert length[off < 0.02].sum() > 0.8 * length.sum()
 
 
-@pytest.mark.parametrize("xy", [np.zeros((0, 2)), np.zeros((5, 2)), np.column_stack([np.arange(6.0), np.arange(6.0)])])
+@pytest.mark.parametrize(
+    "xy", [np.zeros((0, 2)), np.zeros((5, 2)), np.column_stack([np.arange(6.0), np.arange(6.0)])]
+)
 def test_points_that_span_no_area_are_an_error_with_a_sentence(xy):
     with pytest.raises(FitError, match="expected points that span an area"):
         estimate_outline(xy)
@@ -308,7 +383,12 @@ def test_kept_densities_say_of_a_side_what_its_points_do(seed):
     near = depth[depth < SHALLOW_M - OFFSETS_M[0]]
     for row, (blur, walls) in enumerate(product(BLURS_M, WALLS_M)):
         away = (near[:, None] + OFFSETS_M) / blur
-        density = np.where(np.abs(away) > SURE_BLURS, away > 0.0, norm.cdf(away) + walls * norm.pdf(away) / blur)
-        logs = np.log(a_metre * (density + STRAY)).sum(axis=0) - a_metre * (DEEP_M + OFFSETS_M + walls)
+        density = np.where(
+            np.abs(away) > SURE_BLURS, away > 0.0, norm.cdf(away) + walls * norm.pdf(away) / blur
+        )
+        logs = np.log(a_metre * (density + STRAY)).sum(axis=0) - a_metre * (
+            DEEP_M + OFFSETS_M + walls
+        )
         off = np.abs(log_likelihoods(depth, a_metre, log_densities())[row] - logs)
-        assert np.median(off) < 1e-3 * len(near) and off.max() < 0.6  # where it is cut off the density jumps by a third
+        # where it is cut off the density jumps by a third
+        assert np.median(off) < 1e-3 * len(near) and off.max() < 0.6

@@ -24,10 +24,14 @@ def test_plane_distances_equal_the_plane_equation():
     primitive = CATALOGUE["hip"]
     vertices = primitive.vertices({"width": 8, "length": 12, "height": 3, "ridge_length": 5})
     points = np.random.default_rng(0).normal(0, 3, (20, 3))
-    for face, found in zip(primitive.faces, plane_distances(points, vertices, primitive.faces), strict=True):
+    for face, found in zip(
+        primitive.faces, plane_distances(points, vertices, primitive.faces), strict=True
+    ):
         a, b, c = vertices[list(face[:3])]
         normal = np.cross(b - a, c - a)
-        np.testing.assert_allclose(np.abs(found), np.abs((points - a) @ normal) / np.linalg.norm(normal), atol=1e-9)
+        np.testing.assert_allclose(
+            np.abs(found), np.abs((points - a) @ normal) / np.linalg.norm(normal), atol=1e-9
+        )
 
 
 def test_outline_misfit_is_one_minus_iou():
@@ -41,8 +45,15 @@ def test_objective_is_j1_plus_beta_j2():
     xyz = LocalFrame.around(points).to_local(points)
     fitted = PaperFit(CATALOGUE["gable"], xyz, alpha_shape(xyz[:, :2]))
     vertices = fitted.vertices(fitted.theta)
-    j1 = np.mean([min(abs(d) for d in column) for column in plane_distances(xyz, vertices, CATALOGUE["gable"].faces).T])
-    assert fitted.objective(fitted.theta) == pytest.approx(j1 + BETA * outline_misfit(vertices, fitted.boundary))
+    j1 = np.mean(
+        [
+            min(abs(d) for d in column)
+            for column in plane_distances(xyz, vertices, CATALOGUE["gable"].faces).T
+        ]
+    )
+    assert fitted.objective(fitted.theta) == pytest.approx(
+        j1 + BETA * outline_misfit(vertices, fitted.boundary)
+    )
 
 
 @pytest.mark.parametrize("kind", ["gable", "hip", "pyramid"])
@@ -78,12 +89,20 @@ def test_every_primitive_starts_as_a_roof_with_a_finite_objective():
     for primitive in CATALOGUE.values():
         for variant in primitive.variants:
             fitted = PaperFit(variant, xyz, boundary)
-            assert math.isfinite(fitted.objective(fitted.theta)) and fitted.is_roof(fitted.theta), variant.name
+            assert math.isfinite(fitted.objective(fitted.theta)) and fitted.is_roof(fitted.theta), (
+                variant.name
+            )
 
 
 @pytest.mark.parametrize(
     "points",
-    [np.empty((0, 3)), np.ones((3, 3)), np.ones((20, 3)), np.arange(30.0).reshape(10, 3), np.full((9, 3), np.nan)],
+    [
+        np.empty((0, 3)),
+        np.ones((3, 3)),
+        np.ones((20, 3)),
+        np.arange(30.0).reshape(10, 3),
+        np.full((9, 3), np.nan),
+    ],
     ids=["none", "three", "coincident", "collinear", "nan"],
 )
 def test_points_without_area_are_refused(points):

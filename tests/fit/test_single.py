@@ -25,7 +25,9 @@ def gable_points():
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_generated_roof_is_recovered_with_its_type(name):
-    theta = typical_theta(name, height=1.5 if name == "shed" else 3.0, teeth=3 if name == "shed" else None)
+    theta = typical_theta(
+        name, height=1.5 if name == "shed" else 3.0, teeth=3 if name == "shed" else None
+    )
     fit = fit_roof(points_on(name, theta, density=6.0, teeth=3))
     assert fit.type == name
     truth = CATALOGUE[name].variant({"teeth": 3}) if name == "shed" else CATALOGUE[name]
@@ -43,13 +45,17 @@ def test_errors_are_a_few_standard_deviations():
     scores = []
     for seed in range(20):
         fit = fit_roof(points_on("hip", theta, seed=seed), settings=only("hip"))
-        scores.append([(fit.parameters[key] - value) / fit.sigma[key] for key, value in truth.items()])
+        scores.append(
+            [(fit.parameters[key] - value) / fit.sigma[key] for key, value in truth.items()]
+        )
     assert np.sqrt(np.mean(np.square(scores))) == pytest.approx(1.0, abs=0.5)
 
 
 @pytest.mark.parametrize(("name", "seed"), [("gable", 0), ("hip", 0), ("corner_mansard", 1)])
 def test_a_wide_steep_roof_among_outliers_keeps_its_type(name, seed):
-    """Starts were too large where outliers lie around, and too far apart in slope: other types won."""
+    """Starts were too large where outliers lie around, and too far apart in slope: other
+    types won.
+    """
     width, length, height = (10.6, 22.0, 5.4) if name == "corner_mansard" else (11.8, 25.0, 5.9)
     theta = typical_theta(name, width, length, height, kappa=0.97)
     points = points_on(name, theta, density=5.0, noise_m=0.08, outlier_share=0.05, seed=seed)
@@ -64,7 +70,9 @@ def test_a_gable_is_one_wherever_its_ridge_lies():
     uv = rng.uniform((-6.5, -4.5), (6.5, 4.5), (700, 2))
     c, s = np.cos(0.4), np.sin(0.4)
     xy = uv @ np.array([[c, s], [-s, c]]) + theta[:2]
-    fit = fit_roof(np.column_stack([xy, offset.height_at(theta, xy) + rng.normal(0, 0.05, len(xy))]))
+    fit = fit_roof(
+        np.column_stack([xy, offset.height_at(theta, xy) + rng.normal(0, 0.05, len(xy))])
+    )
     assert fit.type == "gable" and fit.parameters == pytest.approx(truth, abs=0.15)
 
 
@@ -153,7 +161,9 @@ def test_types_narrow_the_choice(gable_points):
 
 @pytest.mark.parametrize("count", [0, 1, 2, 3])
 def test_too_few_points_are_one_sentence(count):
-    with pytest.raises(FitError, match=f"expected at least 4 finite points .* got {count} of {count}"):
+    with pytest.raises(
+        FitError, match=f"expected at least 4 finite points .* got {count} of {count}"
+    ):
         fit_roof(np.arange(3.0 * count).reshape(-1, 3) ** 2)
 
 
@@ -199,7 +209,9 @@ def test_points_none_of_which_may_be_roof_are_refused(gable_points):
         fit_roof(gable_points, weights=np.zeros(len(gable_points)))
 
 
-@pytest.mark.parametrize("outline", [shapely.MultiPolygon([shapely.box(-6, -4, 6, 4)]), "POLYGON EMPTY"])
+@pytest.mark.parametrize(
+    "outline", [shapely.MultiPolygon([shapely.box(-6, -4, 6, 4)]), "POLYGON EMPTY"]
+)
 def test_an_outline_that_is_no_polygon_is_refused(gable_points, outline):
     with pytest.raises(FitError, match="expected a polygon of shapely as outline"):
         fit_roof(gable_points, outline)

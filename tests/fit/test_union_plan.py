@@ -17,7 +17,17 @@ from hiproof.fit.union.regions import Site, regions_of
 from hiproof.fit.union.scene import scene_of
 from hiproof.fit.union.sides import Side, corners_of, sides_of
 from hiproof.fit.union.unite import ends_of
-from hiproof.fit.union.volumes import LEVEL, OFFSET, REPLACES, SLOPE, U0, V0, V1, base_only, roof_heights
+from hiproof.fit.union.volumes import (
+    LEVEL,
+    OFFSET,
+    REPLACES,
+    SLOPE,
+    U0,
+    V0,
+    V1,
+    base_only,
+    roof_heights,
+)
 from hiproof.model import Part, Piece
 from hiproof.primitives import get
 from hiproof.primitives.family import Member

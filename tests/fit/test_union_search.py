@@ -23,7 +23,14 @@ from hiproof.fit.union.steps import (
     edge_cost,
     walls_of,
 )
-from hiproof.fit.union.trim import NEAR_EDGE_M, NEAR_VERTEX_M, SLACK_UNITS, drawn_in, drawn_out, trim
+from hiproof.fit.union.trim import (
+    NEAR_EDGE_M,
+    NEAR_VERTEX_M,
+    SLACK_UNITS,
+    drawn_in,
+    drawn_out,
+    trim,
+)
 from hiproof.fit.union.volumes import (
     BASE_COST,
     DIRECTION,

@@ -1,4 +1,6 @@
-"""Point files that lie or are damaged, each with what hiproof must say of it; all are made from one small town."""
+"""Point files that lie or are damaged, each with what hiproof must say of it; all are made from one
+small town.
+"""
 
 import re
 import struct
@@ -13,16 +15,33 @@ from tiny_town import make_town
 
 # where a field stands in the header of LAS, by the ASPRS specification
 FIELDS = {
-    **{"data start": ("<I", 96), "vlr count": ("<I", 100), "record length": ("<H", 105), "count 1.2": ("<I", 107)},
-    **{"x scale": ("<d", 131), "z scale": ("<d", 147), "x offset": ("<d", 155), "y offset": ("<d", 163)},
+    **{
+        "data start": ("<I", 96),
+        "vlr count": ("<I", 100),
+        "record length": ("<H", 105),
+        "count 1.2": ("<I", 107),
+    },
+    **{
+        "x scale": ("<d", 131),
+        "z scale": ("<d", 147),
+        "x offset": ("<d", 155),
+        "y offset": ("<d", 163),
+    },
     **{"x max": ("<d", 179), "x min": ("<d", 187), "y max": ("<d", 195), "z max": ("<d", 211)},
-    **{"evlr start": ("<Q", 235), "evlr count": ("<I", 243), "count": ("<Q", 247), "vlr length": ("<H", 375 + 20)},
+    **{
+        "evlr start": ("<Q", 235),
+        "evlr count": ("<I", 243),
+        "count": ("<Q", 247),
+        "vlr length": ("<H", 375 + 20),
+    },
 }
 
 
 @dataclass(frozen=True)
 class Damaged:
-    """A file at `path` of which hiproof must say something that `sentence` (a regular expression) finds."""
+    """A file at `path` of which hiproof must say something that `sentence` (a regular expression)
+    finds.
+    """
 
     name: str
     path: Path
@@ -35,7 +54,9 @@ def damaged_clouds(folder: Path, seed: int = 0) -> list[Damaged]:
     sound = sound_clouds(folder / "sound")
     cases = {}
     for name, (ending, raw) in sound.items():
-        cases |= {f"{what} in {name}": (ending, *rest) for what, rest in header_lies(name, raw).items()}
+        cases |= {
+            f"{what} in {name}": (ending, *rest) for what, rest in header_lies(name, raw).items()
+        }
     cases |= laz_lies(sound) | copc_lies(sound) | text_and_ply() | garbled(sound, seed)
     found = []
     for name, (ending, content, sentence) in cases.items():
@@ -114,7 +135,10 @@ def header_lies(name: str, raw: bytes) -> dict[str, tuple[bytes, str]]:
     if "1.2" not in name:
         lies["count of a million millions"] = (count, 10**12, "1000000000000 points")
         lies["evlr count"] = ("evlr count", 2**32 - 1, "4294967295 records")
-    changed = {what: (with_field(raw, field, value), sentence) for what, (field, value, sentence) in lies.items()}
+    changed = {
+        what: (with_field(raw, field, value), sentence)
+        for what, (field, value, sentence) in lies.items()
+    }
     if "laz" in name or name == "copc":
         place = 227 if "1.2" in name else 375  # COPC's own record, else LASzip's
         changed["record of 65535 bytes"] = (packed(raw, "<H", place + 20, 65535), "record")
@@ -150,7 +174,10 @@ def laz_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
 
 
 def copc_lies(sound: dict) -> dict[str, tuple[str, bytes, str]]:
-    """COPC's hierarchy of pages and nodes. The sound file has one page with one node, at its end."""
+    """COPC's hierarchy of pages and nodes.
+
+    The sound file has one page with one node, at its end.
+    """
     ending, raw = sound["copc"]
     page = struct.unpack_from("<Q", raw, 375 + 54 + 40)[0]
     itself = packed(raw, "<Qii", page + 16, page, 32, -1)
@@ -180,13 +207,37 @@ def text_and_ply() -> dict[str, tuple[str, bytes, str]]:
         "only a byte order mark": (".xyz", b"\xef\xbb\xbf", "x y z"),
         "utf-16": (".txt", rows.encode("utf-16"), "UTF-16"),
         "only blank lines": (".csv", b"\n" * 50, "x y z"),
-        "repeated property": (".ply", (ply.format(binary, 3, xyz + "property float x\n")).encode() + three, "twice"),
-        "superscript count": (".ply", ply.format("ascii", "²", xyz).encode() + b"1 2 3\n", "vertices"),
-        "count of a million millions in ply": (".ply", ply.format(binary, 10**12, xyz).encode() + three, "vertices"),
-        "the same in ascii": (".ply", ply.format("ascii", 10**12, xyz).encode() + b"1 2 3\n", "vertices"),
-        "count of 4000 digits": (".ply", ply.format(binary, "9" * 4000, xyz).encode() + three, "vertices"),
+        "repeated property": (
+            ".ply",
+            (ply.format(binary, 3, xyz + "property float x\n")).encode() + three,
+            "twice",
+        ),
+        "superscript count": (
+            ".ply",
+            ply.format("ascii", "²", xyz).encode() + b"1 2 3\n",
+            "vertices",
+        ),
+        "count of a million millions in ply": (
+            ".ply",
+            ply.format(binary, 10**12, xyz).encode() + three,
+            "vertices",
+        ),
+        "the same in ascii": (
+            ".ply",
+            ply.format("ascii", 10**12, xyz).encode() + b"1 2 3\n",
+            "vertices",
+        ),
+        "count of 4000 digits": (
+            ".ply",
+            ply.format(binary, "9" * 4000, xyz).encode() + three,
+            "vertices",
+        ),
         "negative count": (".ply", ply.format(binary, -3, xyz).encode() + three, "vertices"),
-        "coordinate 1e300 in ply": (".ply", ply.format("ascii", 1, xyz).encode() + b"1e300 2 3\n", r"1e\+300"),
+        "coordinate 1e300 in ply": (
+            ".ply",
+            ply.format("ascii", 1, xyz).encode() + b"1e300 2 3\n",
+            r"1e\+300",
+        ),
     }
 
 
@@ -199,5 +250,9 @@ def garbled(sound: dict, seed: int) -> dict[str, tuple[str, bytes, str]]:
         changed = bytearray(raw)
         for place in rng.integers(start, len(raw) - 300, 40):
             changed[place] ^= int(rng.integers(1, 256))
-        cases[f"garbled points in {name}"] = (ending, bytes(changed), "bounds|cannot be decoded|chunk")
+        cases[f"garbled points in {name}"] = (
+            ending,
+            bytes(changed),
+            "bounds|cannot be decoded|chunk",
+        )
     return cases

@@ -1,4 +1,6 @@
-"""Footprints as they should not be, each with the status that its building must come to; a sound one lies beside each."""
+"""Footprints as they should not be, each with the status that its building must come to; a sound
+one lies beside each.
+"""
 
 import json
 from pathlib import Path
@@ -8,14 +10,17 @@ import shapely
 
 from tiny_town import ORIGIN
 
-SOUND_IN_THE_WORLD = shapely.box(*ORIGIN[:2] + [38, 12], *ORIGIN[:2] + [51, 21])  # the tiny town's second house
+# the tiny town's second house
+SOUND_IN_THE_WORLD = shapely.box(*ORIGIN[:2] + [38, 12], *ORIGIN[:2] + [51, 21])
 CORNERS = [(8, 12), (20, 12), (20, 20), (8, 20), (8, 12)]  # its first
 
 
 def wavy(vertices: int, seed: int = 0) -> np.ndarray:
     """A valid ring (n, 2) about the first house, rough by two centimetres."""
     angle = np.linspace(0, 2 * np.pi, vertices, endpoint=False)
-    radius = 5 + 0.3 * np.sin(8 * angle) + np.random.default_rng(seed).uniform(-0.02, 0.02, vertices)
+    radius = (
+        5 + 0.3 * np.sin(8 * angle) + np.random.default_rng(seed).uniform(-0.02, 0.02, vertices)
+    )
     return np.array([14, 16]) + np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
 
 
@@ -33,7 +38,10 @@ def star(points: int) -> np.ndarray:
 
 def stretched(place: int, x: float) -> list:
     """The first house with one corner's x moved."""
-    return [(x, y) if number in (place, (place + 4) % 8) else (x0, y) for number, (x0, y) in enumerate(CORNERS)]
+    return [
+        (x, y) if number in (place, (place + 4) % 8) else (x0, y)
+        for number, (x0, y) in enumerate(CORNERS)
+    ]
 
 
 ODD = {
@@ -63,5 +71,8 @@ def write_beside_a_sound_one(path: Path, ring: np.ndarray | list) -> Path:
         for id, xy in rings.items()
     ]
     crs = {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
-    path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}), encoding="utf-8")
+    path.write_text(
+        json.dumps({"type": "FeatureCollection", "crs": crs, "features": features}),
+        encoding="utf-8",
+    )
     return path

@@ -1,4 +1,6 @@
-"""Damaged outputs of a run, as `check`, `convert` and `report` may find them; all are made from one sound run."""
+"""Damaged outputs of a run, as `check`, `convert` and `report` may find them; all are made from one
+sound run.
+"""
 
 import copy
 import json
@@ -11,13 +13,20 @@ HUGE, DEEP = 10**400, 1_000_000
 
 
 def sound_lines(folder: Path) -> list[dict]:
-    """The lines of a sound CityJSONSeq file: a header, a gable, a block with a courtyard, a building without model."""
+    """The lines of a sound CityJSONSeq file: a header, a gable, a block with a courtyard, a
+    building without model.
+    """
     write_sample_run(folder)
     return [json.loads(line) for line in (folder / "buildings.city.jsonl").read_text().splitlines()]
 
 
-def changed(lines: list[dict], *path: str | int, to: object = None, by: Callable | None = None) -> bytes:
-    """The file with the member at `path` (line, key, key, ...) replaced; `...` stands for the line's only city object."""
+def changed(
+    lines: list[dict], *path: str | int, to: object = None, by: Callable | None = None
+) -> bytes:
+    """The file with the member at `path` (line, key, key, ...) replaced;
+
+    `...` stands for the line's only city object.
+    """
     lines = copy.deepcopy(lines)
     place = lines
     for step in path[:-1]:
@@ -31,7 +40,9 @@ def as_text(lines: list[dict]) -> bytes:
 
 
 def damaged_files(folder: Path) -> dict[str, bytes]:
-    """Contents of `buildings.city.jsonl` by what is wrong with the file as a whole, or with its header."""
+    """Contents of `buildings.city.jsonl` by what is wrong with the file as a whole, or with its
+    header.
+    """
     lines = sound_lines(folder)
     sound = as_text(lines)
     return {
@@ -53,12 +64,16 @@ def damaged_files(folder: Path) -> dict[str, bytes]:
         "scale of two": changed(lines, 0, "transform", "scale", to=[1, 1]),
         "scale of words": changed(lines, 0, "transform", "scale", to=["a", "b", "c"]),
         "huge scale": changed(lines, 0, "transform", "scale", to=[HUGE, 1, 1]),
-        "infinite translation": changed(lines, 0, "transform", "translate", to=[float("inf"), 0, 0]),
+        "infinite translation": changed(
+            lines, 0, "transform", "translate", to=[float("inf"), 0, 0]
+        ),
     }
 
 
 def damaged_models(folder: Path) -> dict[str, bytes]:
-    """Contents of `buildings.city.jsonl` by what is wrong with its first building; the others are sound."""
+    """Contents of `buildings.city.jsonl` by what is wrong with its first building; the others are
+    sound.
+    """
     lines = sound_lines(folder)
     return damaged_members(lines) | damaged_geometries(lines)
 
@@ -73,7 +88,9 @@ def damaged_members(lines: list[dict]) -> dict[str, bytes]:
         "feature is a list": changed(lines, 1, to=[]),
         "feature is null": changed(lines, 1, to=None),
         "vertices of two": changed(lines, 1, "vertices", by=lambda v: [p[:2] for p in v]),
-        "vertices of words": changed(lines, 1, "vertices", by=lambda v: [["a", "b", "c"] for _ in v]),
+        "vertices of words": changed(
+            lines, 1, "vertices", by=lambda v: [["a", "b", "c"] for _ in v]
+        ),
         "vertices null": changed(lines, 1, "vertices"),
         "a huge vertex": changed(lines, 1, "vertices", 0, 0, to=HUGE),
         "a vertex that is no number": changed(lines, 1, "vertices", 0, 0, to=float("nan")),
@@ -81,7 +98,9 @@ def damaged_members(lines: list[dict]) -> dict[str, bytes]:
         "objects are null": changed(lines, 1, "CityObjects"),
         "an object is null": changed(lines, 1, "CityObjects", "house-1"),
         "an object is a text": changed(lines, 1, "CityObjects", "house-1", to="gable"),
-        "an attribute that is no number": changed(lines, *attributes, by=lambda a: a | {"height": float("nan")}),
+        "an attribute that is no number": changed(
+            lines, *attributes, by=lambda a: a | {"height": float("nan")}
+        ),
     }
 
 
@@ -113,7 +132,9 @@ def damaged_geometries(lines: list[dict]) -> dict[str, bytes]:
 
 
 def invalid_models(folder: Path) -> dict[str, bytes]:
-    """As `damaged_models`, for what may be read as CityJSON but is no solid: `check` has findings for it."""
+    """As `damaged_models`, for what may be read as CityJSON but is no solid: `check` has findings
+    for it.
+    """
     lines = sound_lines(folder)
     solid = (1, "CityObjects", ..., "geometry", 0)
     face = (*solid, "boundaries", 0, 0)
@@ -138,10 +159,18 @@ def odd_models(folder: Path) -> dict[str, bytes]:
     return {
         "attributes null": changed(lines, *attributes),
         "a huge attribute": changed(lines, *attributes, by=lambda a: a | {"height": HUGE}),
-        "attributes with objects": changed(lines, *attributes, by=lambda a: a | {"owner": {"names": [1, [2, None]]}}),
-        "roof type is a number": changed(lines, *attributes, by=lambda a: a | {"hiproof_roof_type": 7}),
-        "status is a list": changed(lines, *attributes, by=lambda a: a | {"hiproof_status": ["modelled"]}),
-        "roof type with markup": changed(lines, *attributes, by=lambda a: a | {"hiproof_roof_type": "[/red]"}),
+        "attributes with objects": changed(
+            lines, *attributes, by=lambda a: a | {"owner": {"names": [1, [2, None]]}}
+        ),
+        "roof type is a number": changed(
+            lines, *attributes, by=lambda a: a | {"hiproof_roof_type": 7}
+        ),
+        "status is a list": changed(
+            lines, *attributes, by=lambda a: a | {"hiproof_status": ["modelled"]}
+        ),
+        "roof type with markup": changed(
+            lines, *attributes, by=lambda a: a | {"hiproof_roof_type": "[/red]"}
+        ),
         "geometry null": changed(lines, 1, "CityObjects", ..., "geometry"),
         "no semantics": changed(lines, *solid, "semantics"),
         "lod is a word": changed(lines, *solid, "lod", to="two"),

@@ -41,16 +41,61 @@ from sample_parameters import write_parameters_of_each_kind
 
 FILES = ("buildings.city.jsonl", "parameters.jsonl", "run.json")
 OTHERS: tuple[Any, ...] = (
-    None, True, False, 0, 1, -1, 2, 7.5, -0.25, 1e-300, 1e9, 1e20, 1e300, -1e300, 10**15, 2**31, 2**63, 10**400,
-    "", "a", "²", "0", "\0", "\ud800", "a" * 5000, "../../x", "NaN", "gable", "EPSG:28992", "EPSG:4326", "foot",
-    [], [1], [None], ["a"], [[]], [[[]]], [0, 0, 0], [1e300, 0, 0], [[0, 0], [1, 1], [0, 1]], [[[0, 0], [1, 1], [0, 1]]],
-    {}, {"a": 1}, {"type": "Solid"}, float("nan"), float("inf"), float("-inf"),
-)  # fmt: skip
+    None,
+    True,
+    False,
+    0,
+    1,
+    -1,
+    2,
+    7.5,
+    -0.25,
+    1e-300,
+    1e9,
+    1e20,
+    1e300,
+    -1e300,
+    10**15,
+    2**31,
+    2**63,
+    10**400,
+    "",
+    "a",
+    "²",
+    "0",
+    "\0",
+    "\ud800",
+    "a" * 5000,
+    "../../x",
+    "NaN",
+    "gable",
+    "EPSG:28992",
+    "EPSG:4326",
+    "foot",
+    [],
+    [1],
+    [None],
+    ["a"],
+    [[]],
+    [[[]]],
+    [0, 0, 0],
+    [1e300, 0, 0],
+    [[0, 0], [1, 1], [0, 1]],
+    [[[0, 0], [1, 1], [0, 1]]],
+    {},
+    {"a": 1},
+    {"type": "Solid"},
+    float("nan"),
+    float("inf"),
+    float("-inf"),
+)
 """What takes the place of a value; infinities and NaN are written as Python's JSON writes them."""
 
 
 def places(value: Any, path: tuple = ()) -> Iterator[tuple]:
-    """Paths of all values in a JSON value, of its lists' first, last and two further items alone."""
+    """Paths of all values in a JSON value, of its lists' first, last and two further items
+    alone.
+    """
     yield path
     if isinstance(value, dict):
         for name, inner in value.items():
@@ -89,7 +134,11 @@ def damaged_text(text: str, rng: random.Random) -> bytes:
     """A file's text with a line damaged, or the text itself."""
     lines, action = text.splitlines(), rng.random()
     if action < 0.85:
-        number = rng.randrange(len(lines)) if len(lines) < 3 or rng.random() < 0.3 else rng.randrange(1, len(lines))
+        number = (
+            rng.randrange(len(lines))
+            if len(lines) < 3 or rng.random() < 0.3
+            else rng.randrange(1, len(lines))
+        )
         value = json.loads(text) if text.startswith("{\n") else json.loads(lines[number])
         for _ in range(rng.choice([1, 1, 1, 2])):
             value = damage(value, rng)
@@ -102,7 +151,9 @@ def damaged_text(text: str, rng: random.Random) -> bytes:
         return text.encode()[: rng.randrange(len(text))]
     elif action < 0.95:
         number = rng.randrange(len(lines))
-        lines = rng.choice([lines[:number] + lines[number + 1 :], [*lines, lines[number]], lines[::-1]])
+        lines = rng.choice(
+            [lines[:number] + lines[number + 1 :], [*lines, lines[number]], lines[::-1]]
+        )
     else:
         place = rng.randrange(len(text))
         return text.encode()[:place] + rng.randbytes(rng.randrange(1, 9)) + text.encode()[place:]
@@ -116,7 +167,9 @@ def edit(folder: Path) -> None:
         for ask in (
             desk.building,
             desk.cloud,
-            lambda id: desk.change(id, {"parts": desk.building(id)["parts"], "asked": {"action": "show"}}),
+            lambda id: desk.change(
+                id, {"parts": desk.building(id)["parts"], "asked": {"action": "show"}}
+            ),
             lambda id: desk.accept(id, {"parts": desk.building(id)["parts"], "version": "run"}),
         ):
             try:
@@ -140,10 +193,20 @@ def view(folder: Path) -> None:
 def load(folder: Path) -> None:
     """All that is read for a database, and the values it would be sent."""
 
-    def send(dsn: str, rows: Iterable[Row], parts: Iterable[list[tuple]], srid: int, prefix: str) -> int:
+    def send(
+        dsn: str, rows: Iterable[Row], parts: Iterable[list[tuple]], srid: int, prefix: str
+    ) -> int:
         for row in rows:
-            sent = [row.id, row.status or "", json.dumps(row.attributes, allow_nan=False), polyhedral_wkt(row) or ""]
-            assert "\0" not in "".join([*sent, *(str(roof) for roof in roof_rows(row))]).encode().decode()
+            sent = [
+                row.id,
+                row.status or "",
+                json.dumps(row.attributes, allow_nan=False),
+                polyhedral_wkt(row) or "",
+            ]
+            assert (
+                "\0"
+                not in "".join([*sent, *(str(roof) for roof in roof_rows(row))]).encode().decode()
+            )
         return sum(map(len, parts))
 
     with patch("hiproof.view.loading.load_rows", send):
@@ -156,7 +219,10 @@ READERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {
     "convert obj": (lambda folder: convert(folder, None, Made.obj), FILES),
     "view": (view, FILES),
     "report": (lambda folder: report(folder, None, None, None, None), FILES[::2]),
-    "evaluate": (lambda folder: evaluate(folder, [str(folder / "cloud.xyz")], None, None, None, None), FILES[::2]),
+    "evaluate": (
+        lambda folder: evaluate(folder, [str(folder / "cloud.xyz")], None, None, None, None),
+        FILES[::2],
+    ),
     "load": (load, FILES[::2]),
     "edit": (edit, FILES[1:]),
     "build": (build, FILES[1:]),
@@ -172,7 +238,9 @@ def sentence(error: HiproofError) -> None:
 
 
 def fault_of(read: Callable[[Path], Any], folder: Path) -> str:
-    """What goes wrong when a reader reads a run, other than that it says so; empty where nothing does."""
+    """What goes wrong when a reader reads a run, other than that it says so; empty where nothing
+    does.
+    """
     try:
         with redirect_stdout(StringIO()):
             read(folder)
@@ -189,17 +257,23 @@ def fault_of(read: Callable[[Path], Any], folder: Path) -> str:
 
 
 def write_sound_run(folder: Path) -> Path:
-    """Write a run of a few buildings of different roofs, made of their parameters, with a cloud to measure against."""
+    """Write a run of a few buildings of different roofs, made of their parameters, with a cloud to
+    measure against.
+    """
     write_parameters_of_each_kind(folder / "given" / "parameters.jsonl")
     build_file(folder / "given" / "parameters.jsonl", folder / "run")
-    (folder / "run" / "cloud.xyz").write_text("85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n85002.0 446001.0 5.0\n")
+    (folder / "run" / "cloud.xyz").write_text(
+        "85000.0 446000.0 5.0\n85001.0 446000.0 5.0\n85002.0 446001.0 5.0\n"
+    )
     return folder / "run"
 
 
 def faults(
     sound: Path, work: Path, count: int, seed: int, readers: int = len(READERS)
 ) -> Iterator[tuple[int, str, str]]:
-    """Yield (number, reader, what goes wrong) of `count` runs made of a sound one, each read by so many `readers`."""
+    """Yield (number, reader, what goes wrong) of `count` runs made of a sound one, each read by so
+    many `readers`.
+    """
     texts = {name: (sound / name).read_text() for name in FILES}
     LOGGER.setLevel(logging.ERROR + 1)
     for number in range(seed, seed + count):

@@ -100,14 +100,23 @@ def address(rng: random.Random) -> str:
     before, after = rng.choice(SHAPES).split("{}")
     if rng.random() < 0.2 and len(after) > 3:
         place = rng.randrange(1, len(after))
-        after = after[:place] + after[place:][rng.choice([0, 1]) :] + rng.choice(["", "", "@", ":", " "])
+        after = (
+            after[:place]
+            + after[place:][rng.choice([0, 1]) :]
+            + rng.choice(["", "", "@", ":", " "])
+        )
     return before + secret(rng) + after
 
 
 def called(*arguments: str) -> str:
     """What the command line says."""
     out = StringIO()
-    level, handlers, show, listener = LOGGER.level, LOGGER.handlers[:], warnings.showwarning, news.listener
+    level, handlers, show, listener = (
+        LOGGER.level,
+        LOGGER.handlers[:],
+        warnings.showwarning,
+        news.listener,
+    )
     try:
         asked = patch.object(sys, "argv", ["hiproof", *arguments])
         with asked, redirect_stdout(out), redirect_stderr(out), suppress(SystemExit):
@@ -121,14 +130,27 @@ def called(*arguments: str) -> str:
 def files_in(folder: Path) -> str:
     """The content of all files, as text."""
     return "\n".join(
-        f"{file.name}\n{file.read_bytes().decode('latin-1')}" for file in folder.rglob("*") if file.is_file()
+        f"{file.name}\n{file.read_bytes().decode('latin-1')}"
+        for file in folder.rglob("*")
+        if file.is_file()
     )
 
 
 def ways(folder: Path) -> dict[str, Callable[[str], str]]:
-    """All that may repeat an address, by what the address is given as; texts of screen, log and files."""
+    """All that may repeat an address, by what the address is given as; texts of screen, log and
+    files.
+    """
     run, cloud, log, out = folder / "run", str(folder / "cloud.xyz"), folder / "log", folder / "out"
-    asked = ("reconstruct", "--out", str(out), "--log-file", str(log), "--log-level", "debug", "--restart")
+    asked = (
+        "reconstruct",
+        "--out",
+        str(out),
+        "--log-file",
+        str(log),
+        "--log-level",
+        "debug",
+        "--restart",
+    )
 
     def api(told: str) -> str:
         try:
@@ -141,11 +163,15 @@ def ways(folder: Path) -> dict[str, Callable[[str], str]]:
     return {
         "load": lambda told: called("load", str(run), told),
         "load in pieces": lambda told: called("load", str(run), *told.split()),
-        "footprints": lambda told: called(*asked, cloud, "--footprints", told) + files_in(out) + files_in(log.parent),
+        "footprints": lambda told: (
+            called(*asked, cloud, "--footprints", told) + files_in(out) + files_in(log.parent)
+        ),
         "cloud": lambda told: called(*asked, cloud, told) + files_in(out) + files_in(log.parent),
         "terrain": lambda told: called(*asked, cloud, "--terrain", told) + files_in(out),
         "overrides": lambda told: called(*asked, cloud, f"--overrides={told}") + files_in(out),
-        "evaluate": lambda told: called("evaluate", str(run), told, "--out", str(out)) + files_in(out),
+        "evaluate": lambda told: (
+            called("evaluate", str(run), told, "--out", str(out)) + files_in(out)
+        ),
         "classify": lambda told: called("classify", told, str(out / "c.laz")),
         "check": lambda told: called("check", told),
         "wrong command": lambda told: called(told),
@@ -163,8 +189,12 @@ def leak(text: str) -> str:
     return ""
 
 
-def leaks(folder: Path, count: int, seed: int = 0, chosen: int = 100) -> Iterator[tuple[str, str, str]]:
-    """Yield (way, address, what was said) of those of `count` addresses whose secret is repeated by some `chosen` ways."""
+def leaks(
+    folder: Path, count: int, seed: int = 0, chosen: int = 100
+) -> Iterator[tuple[str, str, str]]:
+    """Yield (way, address, what was said) of those of `count` addresses whose secret is repeated by
+    some `chosen` ways.
+    """
     write_sample_run(folder / "run")
     (folder / "cloud.xyz").write_text("".join(f"{x} {y} 5.0\n" for x in range(8) for y in range(8)))
     known = ways(folder)

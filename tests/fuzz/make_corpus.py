@@ -21,20 +21,29 @@ NAMED = "expected .* got"  # what every sentence about a file that cannot be use
 
 
 def make_corpus(folder: Path, seed: int = 0) -> dict[str, str]:
-    """Write the corpus; by path in `folder`, what is said (a regular expression) or the status that must come of it."""
+    """Write the corpus; by path in `folder`, what is said (a regular expression) or the status that
+    must come of it.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     write_town(folder, make_town(2, 3.0))  # sound, to run the damaged ones beside
-    found = {str(case.path.relative_to(folder)): case.sentence for case in damaged_clouds(folder / "clouds", seed)}
+    found = {
+        str(case.path.relative_to(folder)): case.sentence
+        for case in damaged_clouds(folder / "clouds", seed)
+    }
     for kind, contents in (
         (
             "models",
-            damaged_files(folder / "sound") | damaged_models(folder / "sound") | invalid_models(folder / "sound"),
+            damaged_files(folder / "sound")
+            | damaged_models(folder / "sound")
+            | invalid_models(folder / "sound"),
         ),
         ("records", RECORDS),
     ):
         (folder / kind).mkdir(exist_ok=True)
         for name, content in contents.items():
-            path = folder / kind / (file_name(name) + (".city.jsonl" if kind == "models" else ".json"))
+            path = (
+                folder / kind / (file_name(name) + (".city.jsonl" if kind == "models" else ".json"))
+            )
             path.write_bytes(content)
             found[str(path.relative_to(folder))] = NAMED
     (folder / "footprints").mkdir(exist_ok=True)
@@ -50,4 +59,7 @@ def file_name(name: str) -> str:
 
 
 if __name__ == "__main__":
-    print(f"{len(make_corpus(Path(sys.argv[1]), int((*sys.argv, '0')[2])))} damaged inputs in {sys.argv[1]}")
+    print(
+        f"{len(make_corpus(Path(sys.argv[1]), int((*sys.argv, '0')[2])))} damaged inputs in "
+        f"{sys.argv[1]}"
+    )

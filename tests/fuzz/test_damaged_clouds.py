@@ -11,7 +11,9 @@ from fuzz.damaged_clouds import damaged_clouds, field_of, sound_clouds
 from hiproof.errors import InputError
 from hiproof.read.pointcloud import iter_points, read_header
 
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+QUICK = settings(
+    max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None
+)
 
 
 def read(path):
@@ -21,7 +23,9 @@ def read(path):
         clouds = list(iter_points(path))
     except InputError as error:
         return str(error)
-    return np.concatenate([cloud.xyz for cloud in clouds]), np.concatenate([cloud.classification for cloud in clouds])
+    return np.concatenate([cloud.xyz for cloud in clouds]), np.concatenate(
+        [cloud.classification for cloud in clouds]
+    )
 
 
 @pytest.fixture(scope="module")
@@ -45,7 +49,10 @@ class Sound:
 @pytest.fixture(scope="module")
 def sound(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sound")
-    return {name: Sound(folder / f"changed{ending}", raw) for name, (ending, raw) in sound_clouds(folder).items()}
+    return {
+        name: Sound(folder / f"changed{ending}", raw)
+        for name, (ending, raw) in sound_clouds(folder).items()
+    }
 
 
 def test_every_damaged_cloud_is_named_with_what_is_wrong(corpus):
@@ -55,7 +62,11 @@ def test_every_damaged_cloud_is_named_with_what_is_wrong(corpus):
     unclear = {
         name: answer
         for name, (case, answer) in answers.items()
-        if not (answer.startswith("expected") and str(case.path) in answer and re.search(case.sentence, answer))
+        if not (
+            answer.startswith("expected")
+            and str(case.path) in answer
+            and re.search(case.sentence, answer)
+        )
     }
     assert not unclear
 

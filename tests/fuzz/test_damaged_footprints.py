@@ -1,4 +1,6 @@
-"""A footprint that is no building's gets a status of its own, in little time, and harms no other."""
+"""A footprint that is no building's gets a status of its own, in little time, and harms
+no other.
+"""
 
 import time
 
@@ -19,16 +21,22 @@ from hiproof.settings import Settings
 from run_records import by_id
 from tiny_town import make_town, write_cloud, write_footprints
 
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+QUICK = settings(
+    max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None
+)
 NUMBERS = st.one_of(
-    st.floats(-30, 30), st.floats(allow_nan=True, allow_infinity=True), st.sampled_from([0.0, 1.0, 1e9])
+    st.floats(-30, 30),
+    st.floats(allow_nan=True, allow_infinity=True),
+    st.sampled_from([0.0, 1.0, 1e9]),
 )
 
 
 @pytest.fixture(scope="module")
 def cloud(tmp_path_factory):
     town = make_town(2, 3.0)
-    return str(write_cloud(tmp_path_factory.mktemp("town") / "cloud.laz", town.xyz, town.classification))
+    return str(
+        write_cloud(tmp_path_factory.mktemp("town") / "cloud.laz", town.xyz, town.classification)
+    )
 
 
 @pytest.fixture(scope="module")
@@ -85,7 +93,9 @@ def test_an_outline_of_hundreds_of_teeth_is_grown_fast_and_by_as_much():
     start = time.process_time()
     outline = grown(comb(450), 4.0, quad_segs=4)
     assert time.process_time() - start < 0.3
-    assert outline.area == pytest.approx(shapely.buffer(shapely.convex_hull(comb(450)), 4.0).area, rel=0.03)
+    assert outline.area == pytest.approx(
+        shapely.buffer(shapely.convex_hull(comb(450)), 4.0).area, rel=0.03
+    )
     square = shapely.box(0, 0, 9, 9)
     assert grown(square, 4.0, quad_segs=4).equals_exact(shapely.buffer(square, 4.0, quad_segs=4))
 
@@ -126,4 +136,6 @@ def test_any_ring_becomes_valid_polygons_of_a_buildings_size_or_none(rest):
     assert polygons
     for polygon in polygons:
         assert polygon.is_valid
-        assert polygon.is_empty or np.ptp(shapely.get_coordinates(polygon), axis=0).max() <= WIDEST_M
+        assert (
+            polygon.is_empty or np.ptp(shapely.get_coordinates(polygon), axis=0).max() <= WIDEST_M
+        )

@@ -1,4 +1,6 @@
-"""What `check`, `convert` and `report` answer to damaged files of a run: a sentence, never a traceback or a wrong file."""
+"""What `check`, `convert` and `report` answer to damaged files of a run: a sentence, never a
+traceback or a wrong file.
+"""
 
 import re
 
@@ -7,7 +9,14 @@ import typer
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from fuzz.damaged_models import RECORDS, damaged_files, damaged_models, invalid_models, odd_models, sound_lines
+from fuzz.damaged_models import (
+    RECORDS,
+    damaged_files,
+    damaged_models,
+    invalid_models,
+    odd_models,
+    sound_lines,
+)
 from hiproof.cli import check
 from hiproof.cli.convert import Made, convert
 from hiproof.cli.report import report
@@ -22,7 +31,11 @@ COMMANDS = {
     "convert to obj": lambda folder: convert(folder, None, Made.obj),
     "report": lambda folder: report(folder, None, None, None, None),
 }
-WRITTEN = {"convert to glb": "buildings.glb", "convert to obj": "buildings.obj", "report": "report.html"}
+WRITTEN = {
+    "convert to glb": "buildings.glb",
+    "convert to obj": "buildings.obj",
+    "report": "report.html",
+}
 
 
 def answer(command, *arguments):
@@ -50,13 +63,20 @@ def test_damaged_files_are_refused_with_a_sentence(command, run_folder, tmp_path
     for name, content in cases(damaged_files, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
         code, said = answer(COMMANDS[command], run_folder)
-        assert code == 2 and said.startswith("expected") and "got" in said and str(run_folder) in said, name
-    assert sorted(path.name for path in run_folder.iterdir() if path.suffix != ".mtl") == [MODELS, "run.json"]
+        assert (
+            code == 2 and said.startswith("expected") and "got" in said and str(run_folder) in said
+        ), name
+    assert sorted(path.name for path in run_folder.iterdir() if path.suffix != ".mtl") == [
+        MODELS,
+        "run.json",
+    ]
 
 
 @pytest.mark.parametrize("command", COMMANDS)
 @pytest.mark.parametrize("make", [damaged_models, invalid_models])
-def test_a_damaged_building_is_named_and_the_others_are_used(make, command, run_folder, tmp_path_factory, caplog):
+def test_a_damaged_building_is_named_and_the_others_are_used(
+    make, command, run_folder, tmp_path_factory, caplog
+):
     written = run_folder / WRITTEN[command]
     for name, content in cases(make, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
@@ -89,7 +109,9 @@ def test_damaged_buildings_count_as_invalid(run_folder, tmp_path_factory, capsys
     for name, content in cases(damaged_models, tmp_path_factory).items():
         (run_folder / MODELS).write_bytes(content)
         assert answer(check.count_invalid, [run_folder / MODELS], 0.01)[0] == 1, name
-        assert "1 solid, 1 valid, 0 invalid, 1 damaged building left out" in capsys.readouterr().out, name
+        assert (
+            "1 solid, 1 valid, 0 invalid, 1 damaged building left out" in capsys.readouterr().out
+        ), name
 
 
 def test_solids_that_are_none_are_found_invalid(run_folder, tmp_path_factory, capsys):
@@ -128,7 +150,9 @@ def test_any_change_of_the_text_is_read_or_answered(data, sound_text):
     folder, text = sound_text
     start = data.draw(st.integers(0, len(text) - 1))
     length = data.draw(st.integers(0, 20))
-    inserted = data.draw(st.sampled_from(["", "null", "-1", "1e999", "[]", "{}", '"', "9" * 400, "0.5", "[[", "NaN"]))
+    inserted = data.draw(
+        st.sampled_from(["", "null", "-1", "1e999", "[]", "{}", '"', "9" * 400, "0.5", "[[", "NaN"])
+    )
     (folder / MODELS).write_text(text[:start] + inserted + text[start + length :])
     for read in (read_models, read_solids):
         try:

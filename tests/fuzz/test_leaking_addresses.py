@@ -25,7 +25,11 @@ def test_pieces_that_a_library_may_quote_are_hidden():
 
 
 def test_sentences_keep_their_words():
-    remember("postgresql://postgres:postgres@localhost/db", "postgresql://me:a@h/db", "host=h password=12")
+    remember(
+        "postgresql://postgres:postgres@localhost/db",
+        "postgresql://me:a@h/db",
+        "host=h password=12",
+    )
     sentence = "expected a PostGIS database at postgresql://, got 12 buildings; pass a table"
     assert masked(sentence) == sentence
     assert masked("user postgres") == "user ..."

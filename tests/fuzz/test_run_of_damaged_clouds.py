@@ -1,4 +1,6 @@
-"""A run of sound and damaged clouds: the damaged are named, the buildings come out as if they had not been there."""
+"""A run of sound and damaged clouds: the damaged are named, the buildings come out as if they had
+not been there.
+"""
 
 import re
 

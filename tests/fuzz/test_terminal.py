@@ -1,4 +1,6 @@
-"""What reaches the terminal: a word at Ctrl-C, and names from outside as they are, whatever they look like."""
+"""What reaches the terminal: a word at Ctrl-C, and names from outside as they are, whatever they
+look like.
+"""
 
 import os
 import signal
@@ -40,7 +42,9 @@ def town(tmp_path):
     return write_town(tmp_path / "town", make_town(2, 3.0))
 
 
-def test_an_interrupted_run_says_what_is_kept_and_goes_on(hiproof, town, tmp_path, monkeypatch, capsys):
+def test_an_interrupted_run_says_what_is_kept_and_goes_on(
+    hiproof, town, tmp_path, monkeypatch, capsys
+):
     command = ("reconstruct", town[0], "--footprints", town[1], "--out", tmp_path / "out")
     with monkeypatch.context() as patch:
 
@@ -64,8 +68,12 @@ def interrupted_in_compiled_code(*_, **__):
     raise SystemError("returned a result with an exception set") from inner
 
 
-@pytest.mark.parametrize("place", ["sort.mask_at", "solve.Surroundings", "solve.fragments", "run.merge"])
-def test_an_interrupt_within_compiled_code_is_no_failure(hiproof, town, tmp_path, monkeypatch, capsys, place):
+@pytest.mark.parametrize(
+    "place", ["sort.mask_at", "solve.Surroundings", "solve.fragments", "run.merge"]
+)
+def test_an_interrupt_within_compiled_code_is_no_failure(
+    hiproof, town, tmp_path, monkeypatch, capsys, place
+):
     command = ("reconstruct", town[0], "--footprints", town[1], "--out", tmp_path / "out")
     with monkeypatch.context() as patch:
         patch.setattr(f"hiproof.city.{place}", interrupted_in_compiled_code)
@@ -84,7 +92,9 @@ def test_an_interrupt_ends_a_build_from_parameters(hiproof, town, tmp_path, monk
 @pytest.mark.parametrize("imported", ["hiproof.early", "numpy", "typer"])
 def test_an_interrupt_while_packages_are_imported_ends_without_a_traceback(imported):
     command = [sys.executable, "-X", "importtime", "-m", "hiproof", "settings"]
-    with subprocess.Popen(command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True) as process:
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, stdout=subprocess.DEVNULL, text=True
+    ) as process:
         next(line for line in process.stderr if line.rstrip().endswith(imported))
         time.sleep(0.01)
         process.send_signal(signal.SIGINT)
@@ -93,8 +103,14 @@ def test_an_interrupt_while_packages_are_imported_ends_without_a_traceback(impor
 
 
 def test_importing_the_package_leaves_interrupts_alone():
-    script = "import hiproof, signal; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
-    assert subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout == "True\n"
+    script = (
+        "import hiproof, signal; print(signal.getsignal(signal.SIGINT) is "
+        "signal.default_int_handler)"
+    )
+    assert (
+        subprocess.run([sys.executable, "-c", script], capture_output=True, text=True).stdout
+        == "True\n"
+    )
 
 
 def interrupted_worker():

@@ -1,4 +1,6 @@
-"""Whatever stands in a text or PLY file: its points are read, all of them possible, or one sentence says why not."""
+"""Whatever stands in a text or PLY file: its points are read, all of them possible, or one sentence
+says why not.
+"""
 
 import numpy as np
 import pytest
@@ -10,17 +12,38 @@ from hiproof.read.plausible import is_plausible
 from hiproof.read.pointcloud import iter_points, read_header
 from read.test_pointcloud import some_points, write_ply
 
-QUICK = settings(max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None)
+QUICK = settings(
+    max_examples=60, deadline=None, suppress_health_check=list(HealthCheck), database=None
+)
 FIELDS = st.one_of(
     st.floats(-1e4, 1e4).map(str),
     st.floats().map(str),
-    st.sampled_from(["x", "y", "z", "class", "#", "//", '"', "1,5", "0x1f", "1_000", "²", "9" * 400, "\ufeff", "-"]),
+    st.sampled_from(
+        [
+            "x",
+            "y",
+            "z",
+            "class",
+            "#",
+            "//",
+            '"',
+            "1,5",
+            "0x1f",
+            "1_000",
+            "²",
+            "9" * 400,
+            "\ufeff",
+            "-",
+        ]
+    ),
 )
 LINES = st.lists(st.lists(FIELDS, max_size=6), max_size=8)
 
 
 def check(path):
-    """Read the file through; nothing but an InputError may come of it, and no point that cannot be."""
+    """Read the file through; nothing but an InputError may come of it, and no point that
+    cannot be.
+    """
     try:
         read_header(path)
         clouds = list(iter_points(path))
@@ -34,7 +57,11 @@ def check(path):
 
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 @QUICK
-@given(lines=LINES, delimiter=st.sampled_from([" ", ",", ";", "\t"]), ending=st.sampled_from(["\n", "\r\n", "\r"]))
+@given(
+    lines=LINES,
+    delimiter=st.sampled_from([" ", ",", ";", "\t"]),
+    ending=st.sampled_from(["\n", "\r\n", "\r"]),
+)
 def test_any_table_is_read_or_answered(lines, delimiter, ending, tmp_path_factory):
     path = tmp_path_factory.getbasetemp() / "any.xyz"
     path.write_text(ending.join(delimiter.join(line) for line in lines), newline="")
@@ -53,7 +80,9 @@ def test_any_bytes_are_read_or_answered(content, tmp_path_factory):
 @pytest.fixture(scope="module", params=["ascii", "binary_little_endian"])
 def ply(request, tmp_path_factory):
     folder = tmp_path_factory.mktemp("ply")
-    return folder / "changed.ply", write_ply(folder / "sound.ply", *some_points(40), request.param).read_bytes()
+    return folder / "changed.ply", write_ply(
+        folder / "sound.ply", *some_points(40), request.param
+    ).read_bytes()
 
 
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
@@ -63,7 +92,9 @@ def test_any_change_of_a_ply_file_is_read_or_answered(data, ply):
     path, raw = ply
     start = data.draw(st.integers(0, len(raw) - 1))
     inserted = data.draw(
-        st.one_of(st.binary(max_size=8), st.sampled_from([b"99999999999", b"property float x\n", b"-1"]))
+        st.one_of(
+            st.binary(max_size=8), st.sampled_from([b"99999999999", b"property float x\n", b"-1"])
+        )
     )
     path.write_bytes(raw[:start] + inserted + raw[start + data.draw(st.integers(0, 12)) :])
     check(path)

@@ -9,7 +9,9 @@ from hiproof.geometry.alpha_shape import alpha_shape
 
 
 def slow_alpha_area(xy, radius):
-    """Area of the Delaunay triangles whose circumcircle, drawn through their corners, is smaller than `radius`."""
+    """Area of the Delaunay triangles whose circumcircle, drawn through their corners, is smaller
+    than `radius`.
+    """
     area = 0.0
     for triangle in shapely.get_parts(shapely.delaunay_triangles(shapely.MultiPoint(xy))):
         corners = np.array(triangle.exterior.coords)[:3]
@@ -46,7 +48,8 @@ def test_the_larger_of_two_houses():
 
 
 @pytest.mark.parametrize(
-    "xy", [np.zeros((1, 2)), np.zeros((5, 2)), np.ones((2, 1)) * [[1.0, 2]], np.full((4, 2), np.nan)]
+    "xy",
+    [np.zeros((1, 2)), np.zeros((5, 2)), np.ones((2, 1)) * [[1.0, 2]], np.full((4, 2), np.nan)],
 )
 def test_points_without_area_are_refused(xy):
     with pytest.raises(FitError, match="span an area"):
@@ -70,8 +73,11 @@ def test_the_shape_is_the_same_far_from_the_origin(seed):
 
 @pytest.mark.parametrize("holes", [True, False])
 def test_a_court_is_kept_or_filled(holes):
-    xy = np.stack(np.meshgrid(np.arange(0, 10.1, 0.5), np.arange(0, 10.1, 0.5)), axis=-1).reshape(-1, 2)
+    xy = np.stack(np.meshgrid(np.arange(0, 10.1, 0.5), np.arange(0, 10.1, 0.5)), axis=-1).reshape(
+        -1, 2
+    )
     xy = xy[np.abs(xy - 5.0).max(axis=1) > 2.4]
     shape = alpha_shape(xy, 1.0, holes=holes)
     assert len(shape.interiors) == holes
-    assert shape.area == pytest.approx(100 - 25 * holes, abs=2.5)  # corners of the court are rounded off
+    # corners of the court are rounded off
+    assert shape.area == pytest.approx(100 - 25 * holes, abs=2.5)

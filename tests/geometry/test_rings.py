@@ -10,18 +10,24 @@ from hiproof.geometry.rings import ring_normal, ring_normals
 
 @pytest.mark.parametrize("seed", range(20))
 def test_a_point_is_inside_where_an_odd_number_of_edges_flips(seed):
-    """Whatever the rings: also where they cross themselves, as shapely's repair by the even-odd rule sees them."""
+    """Whatever the rings: also where they cross themselves, as shapely's repair by the even-odd
+    rule sees them.
+    """
     rng = np.random.default_rng(seed)
     ring = rng.uniform(-5.0, 5.0, (7, 2))
     area = shapely.make_valid(shapely.Polygon(ring))
     for x, y in rng.uniform(-6.0, 6.0, (200, 2)):
-        flipped = sum(flips(*a, *b, x, y) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True))
+        flipped = sum(
+            flips(*a, *b, x, y) for a, b in zip(ring, np.roll(ring, -1, axis=0), strict=True)
+        )
         assert bool(flipped % 2) == shapely.contains_xy(area, x, y)
 
 
 def test_a_normal_is_as_long_as_its_ring_is_large_and_turns_with_it():
     rng = np.random.default_rng(0)
-    ring = np.column_stack([shapely.get_coordinates(shapely.box(3.0, 4.0, 8.0, 6.0))[:-1], np.full(4, 7.0)])
+    ring = np.column_stack(
+        [shapely.get_coordinates(shapely.box(3.0, 4.0, 8.0, 6.0))[:-1], np.full(4, 7.0)]
+    )
     turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
     turn *= np.sign(np.linalg.det(turn))
     assert ring_normal(ring[::-1]) == pytest.approx(-ring_normal(ring))
@@ -33,4 +39,6 @@ def test_a_normal_is_as_long_as_its_ring_is_large_and_turns_with_it():
 def test_many_normals_are_each_rings_own():
     rng = np.random.default_rng(1)
     rings = [rng.normal(size=(count, 3)) for count in (3, 4, 7, 3)]
-    np.testing.assert_allclose(ring_normals(rings), [ring_normal(ring) for ring in rings], atol=1e-12)
+    np.testing.assert_allclose(
+        ring_normals(rings), [ring_normal(ring) for ring in rings], atol=1e-12
+    )

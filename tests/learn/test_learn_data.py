@@ -1,4 +1,6 @@
-"""Training data: labels that mean what they say, splits that hold, and files that cannot be used."""
+"""Training data: labels that mean what they say, splits that hold, and files that
+cannot be used.
+"""
 
 import json
 from pathlib import Path
@@ -22,24 +24,41 @@ def box_city(count, code="1000"):
     vertices, objects = [], {}
     for i in range(count):
         base = len(vertices)
-        vertices += [[x + 20 * i, y, z] for z in (0, 4) for x, y in ((0, 0), (6, 0), (6, 8), (0, 8))]
+        vertices += [
+            [x + 20 * i, y, z] for z in (0, 4) for x, y in ((0, 0), (6, 0), (6, 8), (0, 8))
+        ]
         sides = [[k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k] for k in range(4)]
         faces = [[[base + v for v in ring]] for ring in ([3, 2, 1, 0], [4, 5, 6, 7], *sides)]
         semantics = {
-            "surfaces": [{"type": "GroundSurface"}, {"type": "RoofSurface"}, {"type": "WallSurface"}],
+            "surfaces": [
+                {"type": "GroundSurface"},
+                {"type": "RoofSurface"},
+                {"type": "WallSurface"},
+            ],
             "values": [[0, 1, 2, 2, 2, 2]],
         }
         geometry = [{"type": "Solid", "lod": "2", "boundaries": [faces], "semantics": semantics}]
-        objects[f"box-{i}"] = {"type": "Building", "attributes": {"roofType": code}, "geometry": geometry}
+        objects[f"box-{i}"] = {
+            "type": "Building",
+            "attributes": {"roofType": code},
+            "geometry": geometry,
+        }
     return {
-        "type": "CityJSON", "version": "2.0", "transform": {"scale": [1, 1, 1], "translate": [80000, 450000, 0]},
-        "CityObjects": objects, "vertices": vertices,
-    }  # fmt: skip
+        "type": "CityJSON",
+        "version": "2.0",
+        "transform": {"scale": [1, 1, 1], "translate": [80000, 450000, 0]},
+        "CityObjects": objects,
+        "vertices": vertices,
+    }
 
 
 def test_simulated_clouds_are_the_same_whenever_asked_for_and_differ_by_role():
     source = open_source("simulated")
-    first, again, other = source.sample(TRAINING, 5), source.sample(TRAINING, 5), source.sample(VALIDATION, 5)
+    first, again, other = (
+        source.sample(TRAINING, 5),
+        source.sample(TRAINING, 5),
+        source.sample(VALIDATION, 5),
+    )
     np.testing.assert_array_equal(first.xyz, again.xyz)
     assert first.xyz.shape != other.xyz.shape or not np.array_equal(first.xyz, other.xyz)
 
@@ -66,7 +85,9 @@ def test_an_annexed_house_keeps_its_type(type):
 def test_varied_houses_are_whole_and_keep_their_type(type):
     for seed in range(30):
         house = training_house(np.random.default_rng([3, seed]), type, annex_share=0.3)
-        assert house.type == type and house.outline.geom_type == "Polygon" and house.outline.area > 1.0
+        assert (
+            house.type == type and house.outline.geom_type == "Polygon" and house.outline.area > 1.0
+        )
 
 
 def test_a_cut_corner_leaves_a_convex_plan_under_the_same_planes():
@@ -89,7 +110,10 @@ def test_a_resized_part_keeps_its_shape_and_a_lengthened_one_its_ends():
     )
     smaller = resized(rng, hip).parameters
     ratios = {name: smaller[name] / hip.parameters[name] for name in smaller}
-    assert ratios["length"] == pytest.approx(ratios["width"]) and ratios["height"] <= ratios["width"] <= 1.0
+    assert (
+        ratios["length"] == pytest.approx(ratios["width"])
+        and ratios["height"] <= ratios["width"] <= 1.0
+    )
 
 
 def test_boxes_of_a_cityjson_are_scanned_and_split(tmp_path):

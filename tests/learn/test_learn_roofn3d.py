@@ -21,7 +21,10 @@ def multipoint(points):
 
 
 def write_roofn3d(folder, count=40, header_of_points="points"):
-    """Simulated clouds as RoofN3D; every roof is one surface. Returns the number of roof points by id."""
+    """Simulated clouds as RoofN3D; every roof is one surface.
+
+    Returns the number of roof points by id.
+    """
     buildings = [
         [
             "id",
@@ -33,7 +36,9 @@ def write_roofn3d(folder, count=40, header_of_points="points"):
             "brep",
         ]
     ]
-    surfaces = [["id", "points", "outline", "plane_a", "plane_b", "plane_c", "plane_d", "fk_buildings"]]
+    surfaces = [
+        ["id", "points", "outline", "plane_a", "plane_b", "plane_c", "plane_d", "fk_buildings"]
+    ]
     roof_points = {}
     for id in range(count):
         points, labels, type = training_sample(np.random.default_rng(id), TYPES, n_points=(80, 200))
@@ -74,7 +79,10 @@ def test_buildings_are_read_once_and_split_by_id(source):
 
 def test_points_of_surfaces_carry_the_type_and_the_rest_none(source, tmp_path):
     roof_points = sorted(write_roofn3d(tmp_path).values())
-    told = [int(source.on_surface[a:b].sum()) for a, b in zip(source.starts[:-1], source.starts[1:], strict=True)]
+    told = [
+        int(source.on_surface[a:b].sum())
+        for a, b in zip(source.starts[:-1], source.starts[1:], strict=True)
+    ]
     assert sorted(told) == roof_points
     for index in range(10):
         sample = source.sample(TRAINING, index)

@@ -35,7 +35,9 @@ def tiny_network(seed=0):
 
 
 def clouds(count, layout=TINY.layout, start=0):
-    return [arrange(training_sample(np.random.default_rng(start + i))[0], layout) for i in range(count)]
+    return [
+        arrange(training_sample(np.random.default_rng(start + i))[0], layout) for i in range(count)
+    ]
 
 
 def largest_difference(network, path, arrangements):
@@ -83,18 +85,28 @@ def test_gradient_reaches_every_weight():
     network = RoofNetwork(TINY).train()
     points, types = network(*network_inputs(clouds(4), TINY.layout))
     (points.square().sum() + types.square().sum()).backward()
-    assert all(parameter.grad is not None and parameter.grad.abs().sum() > 0 for parameter in network.parameters())
+    assert all(
+        parameter.grad is not None and parameter.grad.abs().sum() > 0
+        for parameter in network.parameters()
+    )
 
 
 def test_symmetric_mirrors_along_and_across_and_nothing_else():
     features, seen = clouds(1)[0].features, set()
     for seed in range(20):
-        signs = symmetric(features, np.random.default_rng(seed)) / np.where(features == 0, 1, features)
+        signs = symmetric(features, np.random.default_rng(seed)) / np.where(
+            features == 0, 1, features
+        )
         assert np.isin(signs[features != 0], (-1, 1)).all()
-        along, across = (np.sign(signs[features[:, columns[0]] != 0, columns[0]][0]) for columns in (ALONG, ACROSS))
+        along, across = (
+            np.sign(signs[features[:, columns[0]] != 0, columns[0]][0])
+            for columns in (ALONG, ACROSS)
+        )
         expected = np.ones(features.shape[1])
         expected[list(ALONG)], expected[list(ACROSS)] = along, across
-        np.testing.assert_array_equal(np.where(features == 0, expected, signs), np.tile(expected, (len(features), 1)))
+        np.testing.assert_array_equal(
+            np.where(features == 0, expected, signs), np.tile(expected, (len(features), 1))
+        )
         seen.add((along, across))
     assert len(seen) == 4
 

@@ -1,4 +1,6 @@
-"""Where parts show: areas that share nothing, are the outline together, and lie where no other part is higher."""
+"""Where parts show: areas that share nothing, are the outline together, and lie where no other part
+is higher.
+"""
 
 import json
 from dataclasses import replace
@@ -64,16 +66,26 @@ def test_where_a_part_shows_none_is_higher(kind, seed):
 
 
 def test_parts_in_one_plane_share_a_surface_by_their_outlines():
-    roof = Roof((flat(3.0, 0, 0, 6, 5), flat(3.0, 6, 0, 10, 5), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
+    roof = Roof(
+        (flat(3.0, 0, 0, 6, 5), flat(3.0, 6, 0, 10, 5), flat(2.0, 1, 1, 2, 2)),
+        shapely.box(0, 0, 10, 5),
+        FRAME,
+    )
     building = composed(roof)
     assert len(building.solid.of_kind("RoofSurface")) == 1
     assert [area.area for area in building.shown_areas()] == pytest.approx([30.0, 20.0, 0.0])
 
 
 def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
-    """The flat part is drawn over 60 m2, of which the gable hides 45; the gable is drawn over, and shows, 45."""
+    """The flat part is drawn over 60 m2, of which the gable hides 45; the gable is drawn over, and
+    shows, 45.
+    """
     slopes = np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])
-    gable = Part("gable", (Piece(shapely.box(0, 0, 9, 5), slopes),), {"width": 5.0, "length": 9.0, "height": 1.0})
+    gable = Part(
+        "gable",
+        (Piece(shapely.box(0, 0, 9, 5), slopes),),
+        {"width": 5.0, "length": 9.0, "height": 1.0},
+    )
     hidden = flat(3.0, 2, 1, 8, 4)
     roof = Roof((flat(2.5, 0, 0, 12, 5), gable, hidden), shapely.box(0, 0, 12, 5), FRAME)
     building = replace(composed(roof), z_ground=0.0)
@@ -90,7 +102,9 @@ def test_a_building_is_of_the_type_that_shows_most_in_every_output(tmp_path):
 
 
 def test_hidden_parts_do_not_make_a_roof_a_mixed_one(tmp_path):
-    gable = Part("gable", (Piece(shapely.box(0, 0, 9, 5), np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])),))
+    gable = Part(
+        "gable", (Piece(shapely.box(0, 0, 9, 5), np.array([[0.0, 0.4, 4.0], [0.0, -0.4, 6.0]])),)
+    )
     building = composed(Roof((flat(3.0, 2, 1, 8, 4), gable), shapely.box(0, 0, 9, 5), FRAME))
     write_all(tmp_path, [replace(building, z_ground=0.0)])
     assert "1030</bldg:roofType>" in (tmp_path / "buildings.gml").read_text()
@@ -100,7 +114,10 @@ def test_rows_hold_where_a_part_shows_and_its_size_and_nothing_of_a_hidden_one()
     roof = Roof((flat(3.0, -5, -5, 20, 20), flat(2.0, 1, 1, 2, 2)), shapely.box(0, 0, 10, 5), FRAME)
     (geometry, values), (hidden, of_hidden) = table_rows(composed(roof), None, {}).parts
     x, y, _ = RD_ORIGIN
-    assert shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5)) and values["area_m2"] == 50.0
+    assert (
+        shapely.from_wkb(geometry).equals(shapely.box(x, y, x + 10, y + 5))
+        and values["area_m2"] == 50.0
+    )
     assert hidden is None and of_hidden["area_m2"] == 0.0
 
 
@@ -112,7 +129,14 @@ def test_a_small_surface_stays_with_its_part_where_no_other_is_drawn():
 
 def test_what_shrinks_to_a_line_on_the_grid_is_no_area():
     area = shapely.Polygon(
-        [(-4.72, 0.253), (-2.038, 2), (-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)]
+        [
+            (-4.72, 0.253),
+            (-2.038, 2),
+            (-2.221, 1.864),
+            (-1.357, 0.634),
+            (-3.735, -1.053),
+            (-4.604, 0.098),
+        ]
     )
     own = shapely.Polygon([(-2.039, 1.999), (-4.604, 0.098), (-4.72, 0.253)])
     other = shapely.Polygon([(-2.221, 1.864), (-1.357, 0.634), (-3.735, -1.053), (-4.604, 0.098)])
@@ -128,7 +152,10 @@ def test_parts_in_one_plane_whose_outlines_miss_one_another_leave_no_slivers(see
         affinity.rotate(shapely.box(0, 0, 6, 5), 30),
         affinity.rotate(shapely.box(6, 0, 10, 5), 30, (3, 2.5)),
     )
-    boxes = [shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4) for box in (first, second)]
+    boxes = [
+        shapely.set_precision(affinity.rotate(box, rng.uniform(-0.02, 0.02)), 1e-4)
+        for box in (first, second)
+    ]
     parts = tuple(Part("flat", (Piece(box, np.array([[0.0, 0.0, 3.0]])),)) for box in boxes)
     building = composed(Roof(parts, affinity.rotate(shapely.box(0, 0, 10, 5), 30, (3, 2.5)), FRAME))
     areas = building.shown_areas()

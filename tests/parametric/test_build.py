@@ -1,4 +1,6 @@
-"""`hiproof build`: a run's own parameters give the run's own files; what a hand got wrong is one sentence about one building."""
+"""`hiproof build`: a run's own parameters give the run's own files; what a hand got wrong is one
+sentence about one building.
+"""
 
 import copy
 import json
@@ -24,7 +26,13 @@ from hiproof.primitives import CATALOGUE
 from hiproof.primitives.parameters import names_of
 from hiproof.simulate import demo_files
 
-FILES = ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg")
+FILES = (
+    "buildings.gml",
+    "buildings.citygml3.gml",
+    "buildings.city.jsonl",
+    "parameters.jsonl",
+    "buildings.gpkg",
+)
 PARQUET = ("buildings.parquet", "parts.parquet", "roof_surfaces.parquet")
 PUBLISHED = Path(__file__).parents[2] / "docs/parameters.schema.json"
 RING = [[-6.0, -4.0], [6.0, -4.0], [6.0, 4.0], [-6.0, 4.0], [-6.0, -4.0]]
@@ -40,7 +48,13 @@ def house(**changes):
         "rotation": 0.0,
     }
     part |= changes
-    return {"id": "a", "origin": [85000.0, 446000.0, 2.0], "outline": [RING], "z_ground": 2.0, "parts": [part]}
+    return {
+        "id": "a",
+        "origin": [85000.0, 446000.0, 2.0],
+        "outline": [RING],
+        "z_ground": 2.0,
+        "parts": [part],
+    }
 
 
 def write_lines(path, *records, head=HEAD):
@@ -50,13 +64,19 @@ def write_lines(path, *records, head=HEAD):
 
 @pytest.fixture(scope="module")
 def demo_run(tmp_path_factory):
-    """The bundled neighbourhood, without the network: its types are all in it, and a footprint without points."""
+    """The bundled neighbourhood, without the network: its types are all in it, and a footprint
+    without points.
+    """
     files, out = demo_files(), tmp_path_factory.mktemp("demo")
     pytest.importorskip("pyarrow", reason="GeoParquet needs pyarrow (extra `city`)")
     everything = {"parquet": True, "citygml": "both", "osm_tags": True}
     settings = hiproof.Settings.from_dict({"segment": {"enabled": False}, "write": everything})
     request = hiproof.Request(
-        (str(files["cloud"]),), out, str(files["footprints"]), str(files["terrain"]), settings=settings
+        (str(files["cloud"]),),
+        out,
+        str(files["footprints"]),
+        str(files["terrain"]),
+        settings=settings,
     )
     hiproof.reconstruct_area(request)
     return out
@@ -64,7 +84,9 @@ def demo_run(tmp_path_factory):
 
 def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
     built = build_file(demo_run / "parameters.jsonl", tmp_path)
-    assert built.exit_code == 0 and built.buildings == len(hiproof.read_parameters(demo_run / "parameters.jsonl"))
+    assert built.exit_code == 0 and built.buildings == len(
+        hiproof.read_parameters(demo_run / "parameters.jsonl")
+    )
     for name in (*FILES, *PARQUET):
         assert (tmp_path / name).read_bytes() == (demo_run / name).read_bytes(), name
 
@@ -72,9 +94,13 @@ def test_a_runs_own_parameters_give_its_own_files(demo_run, tmp_path):
 def test_a_file_that_an_editor_began_with_a_mark_of_its_encoding_is_read(demo_run, tmp_path):
     text = (demo_run / "parameters.jsonl").read_text(encoding="utf-8")
     (tmp_path / "saved.jsonl").write_text(text, encoding="utf-8-sig")
-    assert hiproof.read_parameters(tmp_path / "saved.jsonl") == hiproof.read_parameters(demo_run / "parameters.jsonl")
+    assert hiproof.read_parameters(tmp_path / "saved.jsonl") == hiproof.read_parameters(
+        demo_run / "parameters.jsonl"
+    )
     (tmp_path / "overrides.jsonl").write_text('{"id": "a", "type": "hip"}\n', encoding="utf-8-sig")
-    assert [record["id"] for _, record in override_records(str(tmp_path / "overrides.jsonl"))] == ["a"]
+    assert [record["id"] for _, record in override_records(str(tmp_path / "overrides.jsonl"))] == [
+        "a"
+    ]
 
 
 def test_all_lines_are_as_the_published_schema_says(demo_run):
@@ -92,7 +118,9 @@ def test_every_type_can_be_built_by_its_own_parameters():
             parameters = CATALOGUE[name].typical(8.0, 12.0, 3.0)
         else:
             parameters = {key: 30.0 if key.startswith("pitch") else 0.0 for key in names_of(name)}
-            parameters |= {"width": 8.0, "length": 12.0} | ({"height": 1.5} if "height" in parameters else {})
+            parameters |= {"width": 8.0, "length": 12.0} | (
+                {"height": 1.5} if "height" in parameters else {}
+            )
         building = hiproof.build(house(type=name, parameters=parameters))
         assert building.type == name and not check_solid(building.solid), name
         assert list(parameters) == [key for key in names_of(name) if key in parameters]
@@ -120,7 +148,10 @@ def spoilt(change):
 
 
 BAD = {
-    "negative width": (lambda r: r["parts"][0]["parameters"].update(width=-8.0), "positive width of part 0, got -8"),
+    "negative width": (
+        lambda r: r["parts"][0]["parameters"].update(width=-8.0),
+        "positive width of part 0, got -8",
+    ),
     "NaN": (
         lambda r: r["parts"][0]["parameters"].update(height=float("nan")),
         "number as height in .* part 0, got nan",
@@ -133,16 +164,21 @@ BAD = {
     "misspelt": (lambda r: r["parts"][0]["parameters"].update(ridge=3.0), "got also ridge"),
     "misspelt key": (lambda r: r["parts"][0].update(rotatoin=3.0), "got also rotatoin"),
     "outside": (lambda r: r["parts"][0].update(position=[50.0, 0, 5]), "outside it"),
-    "alike": (lambda r: r["parts"].append(copy.deepcopy(r["parts"][0])), "part 1 the same as part 0"),
+    "alike": (
+        lambda r: r["parts"].append(copy.deepcopy(r["parts"][0])),
+        "part 1 the same as part 0",
+    ),
     "ridge too long": (
         lambda r: r["parts"][0].update(
-            type="hip", parameters={"width": 8.0, "length": 12.0, "height": 3.0, "ridge_length": 13.0}
+            type="hip",
+            parameters={"width": 8.0, "length": 12.0, "height": 3.0, "ridge_length": 13.0},
         ),
         "planes that rise",
     ),
     "too steep": (
         lambda r: r["parts"][0].update(
-            type="monopitch", parameters={"width": 8.0, "length": 12.0, "pitch_front": 95.0, "eave_front": 0.0}
+            type="monopitch",
+            parameters={"width": 8.0, "length": 12.0, "pitch_front": 95.0, "eave_front": 0.0},
         ),
         "pitch_front between 0 and 89 degrees",
     ),
@@ -174,14 +210,22 @@ def test_a_roof_that_does_not_close_is_one_sentence():
 
 def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
     wrong = spoilt(lambda r: r["parts"][0]["parameters"].update(width=-8.0)) | {"id": "wrong"}
-    path = write_lines(tmp_path / "p.jsonl", house() | {"id": "one"}, wrong, house() | {"id": "two"})
+    path = write_lines(
+        tmp_path / "p.jsonl", house() | {"id": "one"}, wrong, house() | {"id": "two"}
+    )
     done = CliRunner().invoke(app, ["build", str(path), "--out", str(tmp_path / "out")])
     assert done.exit_code == 2
     assert "building wrong: expected a positive width" in done.output
     rows = {row["id"]: row for row in hiproof.read_parameters(tmp_path / "out/parameters.jsonl")}
-    assert [rows[id]["status"] for id in ("one", "wrong", "two")] == ["modelled", "not_built", "modelled"]
+    assert [rows[id]["status"] for id in ("one", "wrong", "two")] == [
+        "modelled",
+        "not_built",
+        "modelled",
+    ]
     assert rows["wrong"]["parts"] == wrong["parts"]
-    _, _, _, columns = pyogrio.raw.read(tmp_path / "out/buildings.gpkg", layer="buildings", columns=["hiproof_status"])
+    _, _, _, columns = pyogrio.raw.read(
+        tmp_path / "out/buildings.gpkg", layer="buildings", columns=["hiproof_status"]
+    )
     assert columns[0].tolist() == ["modelled", "not_built", "modelled"]
     mended = {**rows["wrong"], "parts": house()["parts"]}
     assert hiproof.build(mended).status.is_model
@@ -189,14 +233,19 @@ def test_one_wrong_building_keeps_its_parameters_and_stops_no_other(tmp_path):
 
 def test_a_first_building_whose_outline_crosses_itself_stops_no_other(tmp_path):
     wrong = house() | {"id": "wrong", "outline": [[[-6, -4], [6, 4], [6, -4], [-6, 4], [-6, -4]]]}
-    built = build_file(write_lines(tmp_path / "p.jsonl", wrong, house() | {"id": "two"}), tmp_path / "out")
+    built = build_file(
+        write_lines(tmp_path / "p.jsonl", wrong, house() | {"id": "two"}), tmp_path / "out"
+    )
     assert built.by_status == {"not_built": 1, "modelled": 1}
 
 
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ('{"hiproof_parameters": 1}\n\n{"id": "a", "parts": [}\n', r"line 3 of .* column 23 .*beside.*mend it there"),
+        (
+            '{"hiproof_parameters": 1}\n\n{"id": "a", "parts": [}\n',
+            r"line 3 of .* column 23 .*beside.*mend it there",
+        ),
         (
             '{"hiproof_parameters": 1}\n{"id": "a",\n "parts": []}\n',
             r"line 2 of .* column 12 .*an object stands on one line",
@@ -217,7 +266,9 @@ def test_a_file_that_cannot_be_read_is_refused_whole(text, message, tmp_path, ca
     with pytest.raises(HiproofError, match=message):
         build_file(tmp_path / "p.jsonl", tmp_path / "out")
     assert not list((tmp_path / "out").glob("*"))
-    monkeypatch.setattr("sys.argv", ["hiproof", "build", str(tmp_path / "p.jsonl"), "--out", str(tmp_path / "out")])
+    monkeypatch.setattr(
+        "sys.argv", ["hiproof", "build", str(tmp_path / "p.jsonl"), "--out", str(tmp_path / "out")]
+    )
     with pytest.raises(SystemExit) as end:
         main()
     assert end.value.code == 2
@@ -251,7 +302,9 @@ def test_buildings_may_be_fewer_and_in_another_order(demo_run, tmp_path):
 def test_shapes_and_schema_are_printed():
     shapes = CliRunner().invoke(app, ["build", "--shapes"]).output
     assert [line.split(":")[0] for line in shapes.splitlines()] == list(CATALOGUE)
-    assert json.loads(CliRunner().invoke(app, ["build", "--schema"]).output) == json.loads(PUBLISHED.read_text())
+    assert json.loads(CliRunner().invoke(app, ["build", "--schema"]).output) == json.loads(
+        PUBLISHED.read_text()
+    )
 
 
 def test_the_head_keeps_feet(tmp_path):
@@ -275,8 +328,12 @@ def test_the_head_keeps_feet(tmp_path):
     ids=["another CRS", "one without a code", "feet without a CRS"],
 )
 def test_what_is_built_of_a_file_alone_is_read_in_its_place(tmp_path, head, out_crs):
-    path = write_lines(tmp_path / "parameters.jsonl", house(), head={"hiproof_parameters": 1} | head)
+    path = write_lines(
+        tmp_path / "parameters.jsonl", house(), head={"hiproof_parameters": 1} | head
+    )
     build_file(path, tmp_path / "out", changes={"write": {"out_crs": out_crs}})
     model = evaluate_run(tmp_path / "out").models[0]
     solid = hiproof.build(house()).solid
-    np.testing.assert_allclose(model.solid.vertices.mean(axis=0), solid.vertices.mean(axis=0), atol=1e-3)
+    np.testing.assert_allclose(
+        model.solid.vertices.mean(axis=0), solid.vertices.mean(axis=0), atol=1e-3
+    )

@@ -1,4 +1,6 @@
-"""Editing a building: other types, ridges at a height, parts more or less, refits; every edit is a valid solid or one sentence."""
+"""Editing a building: other types, ridges at a height, parts more or less, refits; every edit is a
+valid solid or one sentence.
+"""
 
 import numpy as np
 import pytest
@@ -19,7 +21,17 @@ from parametric_house import gable_house
 
 EDITS, BUILDINGS = 150, 30
 RIDGED = [name for name in CATALOGUE if name not in ("flat", "shed")]
-RECOVERED = ("gable", "hip", "monopitch", "pyramid", "half_hip", "mansard", "asymmetric_gable", "gambrel", "shed")
+RECOVERED = (
+    "gable",
+    "hip",
+    "monopitch",
+    "pyramid",
+    "half_hip",
+    "mansard",
+    "asymmetric_gable",
+    "gambrel",
+    "shed",
+)
 
 
 def built(roof, id="house"):
@@ -37,10 +49,18 @@ def test_a_changed_building_is_composed_as_it_was(gable):
     x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(-4, 4, 20), np.linspace(-3, 3, 20)))
     points = np.column_stack([x, y, 9.0 - 0.5 * np.abs(y)]) + house.roof.frame.origin
     more = house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0])
-    for changed in (house.with_part(0, type="hip"), more, more.without_part(1), house.refit(points)):
+    for changed in (
+        house.with_part(0, type="hip"),
+        more,
+        more.without_part(1),
+        house.refit(points),
+    ):
         record = building_record(changed)
         assert np.array_equal(changed.solid.vertices, hiproof.build(record, deep).solid.vertices)
-        assert changed.solid.vertices[:, 2].min() < hiproof.build(record).solid.vertices[:, 2].min() - 1.0
+        assert (
+            changed.solid.vertices[:, 2].min()
+            < hiproof.build(record).solid.vertices[:, 2].min() - 1.0
+        )
 
 
 @pytest.mark.parametrize("kind", CATALOGUE)
@@ -66,14 +86,23 @@ def test_a_flat_roof_becomes_a_gable_and_its_volume_grows(gable):
 
 
 def test_a_level_gable_gets_a_ridge(gable):
-    for level in (gable.with_part(0, height=0.0), gable.with_part(0, pitch_front=0.0, pitch_back=0.0)):
-        assert level.with_part(0, ridge_height=9.0).solid.vertices[:, 2].max() == pytest.approx(9.0, abs=1e-3)
+    for level in (
+        gable.with_part(0, height=0.0),
+        gable.with_part(0, pitch_front=0.0, pitch_back=0.0),
+    ):
+        assert level.with_part(0, ridge_height=9.0).solid.vertices[:, 2].max() == pytest.approx(
+            9.0, abs=1e-3
+        )
 
 
 def test_sides_move_one_by_one(gable):
     other = gable.with_part(0, pitch_front=30.0)
-    assert other.parts[0].parameters["pitch_back"] == pytest.approx(np.degrees(np.arctan(0.75)), abs=1e-5)
-    slopes = sorted(round(s, 3) for s in hiproof.write.roof_figures(other.solid).face_slope_deg if s == s)
+    assert other.parts[0].parameters["pitch_back"] == pytest.approx(
+        np.degrees(np.arctan(0.75)), abs=1e-5
+    )
+    slopes = sorted(
+        round(s, 3) for s in hiproof.write.roof_figures(other.solid).face_slope_deg if s == s
+    )
     assert slopes == [30.0, 36.87]
 
 
@@ -101,7 +130,9 @@ def test_heights_count_from_the_lowest_eave_whichever_it_becomes(gable, eave):
 
 def test_a_moved_part_roofs_what_its_rectangle_covers(gable):
     two = gable.with_part(1, type="flat", position=[0, 0, 9.0], width=2.0, length=2.0)
-    assert two.parts[1].area == pytest.approx(4.0) and two.solid.vertices[:, 2].max() == pytest.approx(11.0)
+    assert two.parts[1].area == pytest.approx(4.0) and two.solid.vertices[
+        :, 2
+    ].max() == pytest.approx(11.0)
     aside = two.with_part(1, position=[6.0, 0.0, 9.0])
     assert aside.parts[1].area == pytest.approx(2.0)
     assert len(two.without_part(1).parts) == 1

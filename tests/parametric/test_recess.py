@@ -39,14 +39,18 @@ def test_a_recess_is_as_deep_as_it_says_and_changes_nothing_beside_it(house, sun
     assert not check_solid(sunk.solid)
 
 
-@pytest.mark.parametrize("change", [{"width": 4.0, "length": 1.5}, {"position": [2.0, 1.0, 5.0]}, {"rotation": 30.0}])
+@pytest.mark.parametrize(
+    "change", [{"width": 4.0, "length": 1.5}, {"position": [2.0, 1.0, 5.0]}, {"rotation": 30.0}]
+)
 def test_where_a_recess_goes_the_roof_comes_back(house, sunk, change):
     position = [float(v) for v in sunk.parts[1].translation]
     there = sunk.with_part(1, **change)
     back = there.with_part(1, position=position, rotation=0.0, width=SIDE_M, length=SIDE_M)
     assert not check_solid(there.solid)
     assert back.solid.volume == pytest.approx(sunk.solid.volume, abs=0.01)
-    direct = rebuilt(house, with_recess(building_record(house)["parts"], house.roof, 0)).with_part(1, **change)
+    direct = rebuilt(house, with_recess(building_record(house)["parts"], house.roof, 0)).with_part(
+        1, **change
+    )
     assert there.solid.volume == pytest.approx(direct.solid.volume, abs=0.01)
 
 
@@ -60,7 +64,9 @@ def test_a_recess_of_the_same_area_takes_the_same_volume_anywhere_on_a_level_roo
 
 
 def test_a_part_that_leaves_nothing_out_stays_as_it_is(house):
-    parts = building_record(house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0]))["parts"]
+    parts = building_record(
+        house.with_part(1, type="flat", width=2.0, length=2.0, position=[0.0, 0.0, 12.0])
+    )["parts"]
     moved = {**parts[1], "position": [2.0, 0.0, 12.0], "outlines": None}
     assert placed(parts, 1, moved)[0] == parts[0]
 

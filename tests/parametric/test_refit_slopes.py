@@ -1,4 +1,6 @@
-"""The roof under the points as a refit sees it, held against the roof itself and against differences of its heights."""
+"""The roof under the points as a refit sees it, held against the roof itself and against
+differences of its heights.
+"""
 
 import numpy as np
 import pytest
@@ -10,7 +12,9 @@ STEP = 1e-6
 
 
 def scene(seed):
-    """A compound with one pitch changed, so that parts meet anew, and points about its outline, some beside it."""
+    """A compound with one pitch changed, so that parts meet anew, and points about its outline,
+    some beside it.
+    """
     rng = np.random.default_rng(seed)
     roof = random_compound(rng).roof
     west, south, east, north = roof.outline.bounds
@@ -37,7 +41,9 @@ def test_slopes_are_differences_of_heights_away_from_creases(seed):
     slopes = heights.jacobian(x, surface)
     for column in range(len(x)):
         moved = [heights.at(x + sign * STEP * np.eye(len(x))[column]) for sign in (1.0, -1.0)]
-        same = np.logical_and.reduce([(m.part == surface.part) & (m.row == surface.row) for m in moved])
+        same = np.logical_and.reduce(
+            [(m.part == surface.part) & (m.row == surface.row) for m in moved]
+        )
         numeric = (moved[1].gaps - moved[0].gaps) / (2.0 * STEP)
         assert same.mean() > 0.9
         np.testing.assert_allclose(slopes[same, column], numeric[same], atol=1e-2, rtol=1e-3)

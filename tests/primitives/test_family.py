@@ -1,4 +1,6 @@
-"""Laws of the family of roof shapes: one surface, whichever way it is turned, named or written down."""
+"""Laws of the family of roof shapes: one surface, whichever way it is turned, named or written
+down.
+"""
 
 import math
 from dataclasses import replace
@@ -22,7 +24,9 @@ def str_of(shape):
 
 
 def members(shape, count=12):
-    """Members of that shape: irregular ones, regular ones (those of the catalogue), skewed ones and canted ones in turn."""
+    """Members of that shape: irregular ones, regular ones (those of the catalogue), skewed ones and
+    canted ones in turn.
+    """
     for seed in range(count):
         rng = np.random.default_rng([seed, SHAPE_NAMES.index(shape)])
         member = member_of_shape(rng, shape, regular=seed % 4 == 1, skewed=seed % 4 == 2)
@@ -36,7 +40,14 @@ def with_cants(rng, member, most=3):
     distance = np.hypot(*member.half) * rng.uniform(0.6, 0.9, count)
     return replace(
         member,
-        cants=np.array([facing, distance, member.base + rng.uniform(-0.5, 2, count), rng.uniform(0.3, 2, count)]),
+        cants=np.array(
+            [
+                facing,
+                distance,
+                member.base + rng.uniform(-0.5, 2, count),
+                rng.uniform(0.3, 2, count),
+            ]
+        ),
     )
 
 
@@ -81,19 +92,35 @@ def short_of_a_run():
     """Members with a slope that runs over nothing: its rectangle ends where it begins."""
     half, inf = np.array([6.0, 4.0]), np.inf
     up_to_the_top = Member(
-        0.4, np.zeros(2), half, np.array([inf, inf, 5.0, inf]), np.array([0, 0, 0.3, 0]), 5.0 + 1e-11
+        0.4,
+        np.zeros(2),
+        half,
+        np.array([inf, inf, 5.0, inf]),
+        np.array([0, 0, 0.3, 0]),
+        5.0 + 1e-11,
     )
     for gap in (0.0, 1e-9, 1e-7, 1e-5):
         yield replace(up_to_the_top, top=5.0 + gap)
         yield replace(
-            up_to_the_top, eaves=np.array([inf, inf, 5.0, 5.0]), slopes=np.array([0, 0, 0.3, 0.3]), top=5.0 + gap
+            up_to_the_top,
+            eaves=np.array([inf, inf, 5.0, 5.0]),
+            slopes=np.array([0, 0, 0.3, 0.3]),
+            top=5.0 + gap,
         )
         # the ridge lies on the eave in front, or just behind the other
         yield Member(
-            -1.0, np.ones(2), half, np.array([inf, inf, 5.0, 5.0 - 8.0 * 0.5 + gap]), np.array([0, 0, 2.0, 0.5])
+            -1.0,
+            np.ones(2),
+            half,
+            np.array([inf, inf, 5.0, 5.0 - 8.0 * 0.5 + gap]),
+            np.array([0, 0, 2.0, 0.5]),
         )
         yield Member(
-            -1.0, np.ones(2), half, np.array([inf, inf, 5.0 - 8.0 * 0.5 + gap, 5.0]), np.array([0, 0, 0.5, 2.0])
+            -1.0,
+            np.ones(2),
+            half,
+            np.array([inf, inf, 5.0 - 8.0 * 0.5 + gap, 5.0]),
+            np.array([0, 0, 0.5, 2.0]),
         )
 
 
@@ -105,7 +132,9 @@ def test_what_runs_over_nothing_is_written_so_that_it_can_be_read():
         refuse_no_shape(member.name, written, "part 0")
         planes = planes_of(member.name, written, kappa, place)
         at = np.column_stack([over_plan(member), np.ones(200)])
-        assert (at @ planes.T).min(axis=1) == pytest.approx((at @ member.planes().T).min(axis=1), abs=1e-3)
+        assert (at @ planes.T).min(axis=1) == pytest.approx(
+            (at @ member.planes().T).min(axis=1), abs=1e-3
+        )
 
 
 @each_shape
@@ -114,7 +143,9 @@ def test_turning_the_axes_keeps_surface_plan_and_name(shape):
         turned, xy = member, over_plan(member)
         for _ in range(4):
             turned = turned.turned()
-            assert lowest_of(turned.planes(), xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-9)
+            assert lowest_of(turned.planes(), xy) == pytest.approx(
+                lowest_of(member.planes(), xy), abs=1e-9
+            )
             assert shapely.equals_exact(plan_of(turned), plan_of(member), 1e-9, normalize=True)
             assert turned.name == member.name
         assert turned.kappa == pytest.approx(member.kappa)
@@ -139,26 +170,40 @@ def test_a_member_over_its_whole_plan_is_the_lowest_of_its_planes(shape):
         part = member.part([plan_of(member)])
         xy = over_plan(member)
         assert part.type == member.name
-        assert part.pieces[0].height_at(xy) == pytest.approx(lowest_of(member.planes(), xy), abs=1e-9)
+        assert part.pieces[0].height_at(xy) == pytest.approx(
+            lowest_of(member.planes(), xy), abs=1e-9
+        )
         assert part.translation[2] == pytest.approx(member.base)
 
 
 @each_shape
 def test_eaves_lie_where_the_parameters_say(shape):
-    """In the middle of a side its own plane is as high above T_L as its eave, and as steep as its pitch."""
+    """In the middle of a side its own plane is as high above T_L as its eave, and as steep as its
+    pitch.
+    """
     side_by_side = [member for member in members(shape) if any(member.has)]
     for member in side_by_side:
         parameters, kappa, translation = member.describe(as_catalogue=False)
         c, s = math.cos(kappa), math.sin(kappa)
         half = 0.5 * np.array([parameters["length"], parameters["width"]])
         planes = planes_of(member.name, parameters, kappa, translation)
-        for name, way in {"left": (-1, 0), "right": (1, 0), "front": (0, -1), "back": (0, 1)}.items():
+        for name, way in {
+            "left": (-1, 0),
+            "right": (1, 0),
+            "front": (0, -1),
+            "back": (0, 1),
+        }.items():
             if f"eave_{name}" not in parameters:
                 continue
             middle = translation[:2] + (half * way) @ np.array([[c, s], [-s, c]])
             inwards = -np.array(way) @ np.array([[c, s], [-s, c]])
-            eave, pitch = parameters[f"eave_{name}"], math.tan(math.radians(parameters[f"pitch_{name}"]))
-            own = np.abs(planes[:, :2] @ inwards - pitch) + np.abs(planes @ (*middle, 1.0) - translation[2] - eave)
+            eave, pitch = (
+                parameters[f"eave_{name}"],
+                math.tan(math.radians(parameters[f"pitch_{name}"])),
+            )
+            own = np.abs(planes[:, :2] @ inwards - pitch) + np.abs(
+                planes @ (*middle, 1.0) - translation[2] - eave
+            )
             assert own.min() < 1e-9
 
 
@@ -174,7 +219,9 @@ def test_names_are_told_from_planes_eaves_and_pitches():
 
 @pytest.mark.parametrize("name", [name for name, shape in CATALOGUE.items() if shape.is_of_family])
 def test_a_shape_of_the_catalogue_is_told_by_its_own_parameters(name):
-    """A regular member's description is that of the catalogue: the primitive of these parameters has the same planes."""
+    """A regular member's description is that of the catalogue: the primitive of these parameters
+    has the same planes.
+    """
     primitive = get(name)
     rng = np.random.default_rng(len(name))
     for _ in range(10):
@@ -186,12 +233,16 @@ def test_a_shape_of_the_catalogue_is_told_by_its_own_parameters(name):
         assert planes == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("shape", [v for p in CATALOGUE.values() if p.is_of_family for v in p.variants], ids=str_of)
+@pytest.mark.parametrize(
+    "shape", [v for p in CATALOGUE.values() if p.is_of_family for v in p.variants], ids=str_of
+)
 def test_a_member_like_a_shape_is_described_in_its_words(shape):
     """What `fit_roof` and the union call such a roof, and by which parameters, is one thing."""
     rng = np.random.default_rng(5)
     for _ in range(10):
-        theta = shape.to_theta(shape.drawn(rng, rng.uniform(6.0, 12.0)), rng.uniform(-1.5, 1.5), rng.normal(0, 20, 3))
+        theta = shape.to_theta(
+            shape.drawn(rng, rng.uniform(6.0, 12.0)), rng.uniform(-1.5, 1.5), rng.normal(0, 20, 3)
+        )
         theta_p, kappa, translation = shape.from_theta(shape.canonical_theta(theta))
         member = member_of(shape.name, theta_p, kappa, translation)
         if member.name == shape.name:  # an asymmetric gable whose slopes are drawn equal is a gable
@@ -204,10 +255,15 @@ def test_a_member_like_a_shape_is_described_in_its_words(shape):
 
 @pytest.mark.parametrize("lower", [0, 1])
 def test_an_asymmetric_gable_of_all_but_even_eaves_has_deviations_of_its_changes_alone(lower):
-    """Which eave is the lower decides from where it is described; a change of a millimetre must not."""
+    """Which eave is the lower decides from where it is described; a change of a millimetre must
+    not.
+    """
     member = planted_gable(eaves=(3.0, 3.0 + 1e-4 * (1 - 2 * lower)))
     changes = several(
-        [replace(member, eaves=member.eaves + change) for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])]
+        [
+            replace(member, eaves=member.eaves + change)
+            for change in ([0.0, 0.0, 1e-3, 0.0], [0.0, 0.0, 0.0, 1e-3])
+        ]
     )
     sigma = member.part([shapely.Polygon(rectangle_of(member))], None, changes).sigma
     assert 0.0 < max(sigma.values()) < 0.01
@@ -231,9 +287,16 @@ def test_several_members_are_measured_as_each_of_them(shape, regular):
         for change in (0.0, 1e-3, 0.02)
     ]
     looks_alike = member.turned(2).has == member.has  # else it is seen from one side alone
-    for kappa in [member.turned(quarters).kappa for quarters in (range(4) if looks_alike else (0,))]:
-        together, alone = several(each).measures_of(kind, kappa), [own.measures_of(kind, kappa) for own in each]
-        assert np.array([np.broadcast_to(of, 3) for of in together]) == pytest.approx(np.array(alone).T, abs=1e-12)
+    for kappa in [
+        member.turned(quarters).kappa for quarters in (range(4) if looks_alike else (0,))
+    ]:
+        together, alone = (
+            several(each).measures_of(kind, kappa),
+            [own.measures_of(kind, kappa) for own in each],
+        )
+        assert np.array([np.broadcast_to(of, 3) for of in together]) == pytest.approx(
+            np.array(alone).T, abs=1e-12
+        )
 
 
 def several(members):
@@ -243,13 +306,18 @@ def several(members):
         for of in ("centre", "half", "eaves", "slopes", "leans")
     )
     centre, half, eaves, slopes, leans = arrays
-    tops, cants = np.array([own.top for own in members]), np.stack([own.cants for own in members], axis=2)
+    tops, cants = (
+        np.array([own.top for own in members]),
+        np.stack([own.cants for own in members], axis=2),
+    )
     return Member(members[0].kappa, centre, half, eaves, slopes, tops, leans, cants)
 
 
 @each_shape
 def test_a_cant_rises_square_from_its_wall(shape):
-    """Where its parameters say that its wall is, a cant is as high as its eave, and along it all the way."""
+    """Where its parameters say that its wall is, a cant is as high as its eave, and along it all
+    the way.
+    """
     for seed in range(4):
         rng = np.random.default_rng(seed)
         member = member_of_shape(rng, shape)
@@ -257,9 +325,9 @@ def test_a_cant_rises_square_from_its_wall(shape):
             continue
         parameters, kappa, translation = with_cants(rng, member).describe()
         told = [name.split("_")[1] for name in parameters if name.startswith("facing_")]
-        planes = member_of(member.name, parameters, kappa, translation).planes()[-len(told) - member.has_top :][
-            : len(told)
-        ]
+        planes = member_of(member.name, parameters, kappa, translation).planes()[
+            -len(told) - member.has_top :
+        ][: len(told)]
         for cant, plane in zip(told, planes, strict=True):
             out = kappa + math.radians(parameters[f"facing_{cant}"])
             way = np.array([math.cos(out), math.sin(out)])
@@ -267,7 +335,9 @@ def test_a_cant_rises_square_from_its_wall(shape):
             places = wall + np.outer([-2.0, 0.0, 2.0], [-way[1], way[0]])
             eave = translation[2] + parameters[f"eave_{cant}"]
             assert places @ plane[:2] + plane[2] == pytest.approx(eave, abs=1e-9)
-            assert math.degrees(math.atan(-plane[:2] @ way)) == pytest.approx(parameters[f"pitch_{cant}"], abs=1e-9)
+            assert math.degrees(math.atan(-plane[:2] @ way)) == pytest.approx(
+                parameters[f"pitch_{cant}"], abs=1e-9
+            )
 
 
 def planted_gable(eaves):
@@ -280,8 +350,14 @@ def planted_gable(eaves):
 def test_every_shape_of_the_family_has_its_own_planes_or_is_kin():
     assert set(SHAPE_NAMES) <= set(CATALOGUE)
     kin = {name for names in KIN for name in names}
-    assert kin | set(SHAPE_NAMES) == {name for name, shape in CATALOGUE.items() if shape.is_of_family}
-    assert KIN == (("gable", "asymmetric_gable"), ("hip", "half_hip", "pyramid"), ("side_hip", "side_half_hip"))
+    assert kin | set(SHAPE_NAMES) == {
+        name for name, shape in CATALOGUE.items() if shape.is_of_family
+    }
+    assert KIN == (
+        ("gable", "asymmetric_gable"),
+        ("hip", "half_hip", "pyramid"),
+        ("side_hip", "side_half_hip"),
+    )
 
 
 @pytest.mark.parametrize("name", CATALOGUE)
@@ -295,7 +371,9 @@ def test_a_name_stands_for_itself_its_kin_or_nothing(name):
 def test_what_is_no_type_or_lacks_a_parameter_is_told_in_a_sentence():
     with pytest.raises(FitError, match=r"expected a roof type .* got 'onion'"):
         planes_of("onion", {"pitch_front": 30.0}, 0.0, np.zeros(3))
-    parameters, kappa, translation = member_of_shape(np.random.default_rng(0), "corner").side_by_side()
+    parameters, kappa, translation = member_of_shape(
+        np.random.default_rng(0), "corner"
+    ).side_by_side()
     del parameters["eave_front"]
     with pytest.raises(FitError, match="expected the parameter eave_front of a corner roof"):
         planes_of("corner", parameters, kappa, translation)

@@ -15,12 +15,16 @@ each_variant = pytest.mark.parametrize("primitive", VARIANTS, ids=IDS)
 
 
 def random_roofs(primitive, count=20, seed=3):
-    """(theta_p, kappa, T_L) of ordinary roofs: typical proportions, each length varied by a tenth."""
+    """(theta_p, kappa, T_L) of ordinary roofs: typical proportions, each length varied by a
+    tenth.
+    """
     rng = np.random.default_rng(seed)
     for _ in range(count):
         width = rng.uniform(6, 12)
         theta_p = primitive.typical(width, width * rng.uniform(1.2, 2.5), rng.uniform(1.5, 4))
-        theta_p = {k: v if k == "teeth" else v * rng.uniform(0.95, 1.05) for k, v in theta_p.items()}
+        theta_p = {
+            k: v if k == "teeth" else v * rng.uniform(0.95, 1.05) for k, v in theta_p.items()
+        }
         yield theta_p, rng.uniform(-1.5, 1.5), rng.normal(0, 20, 3)
 
 
@@ -61,9 +65,13 @@ def test_faces_tile_the_plan_counter_clockwise_with_eave_at_zero(primitive):
         assert all(ring.is_ccw for ring in rings)
         areas = sum(shapely.Polygon(ring).area for ring in rings)
         assert areas == pytest.approx(theta_p["width"] * theta_p["length"])
-        assert shapely.union_all([shapely.Polygon(ring) for ring in rings]).area == pytest.approx(areas)
+        assert shapely.union_all([shapely.Polygon(ring) for ring in rings]).area == pytest.approx(
+            areas
+        )
         assert vertices[:, 2].min() == 0
-        np.testing.assert_allclose((vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)) / 2, 0, atol=1e-12)
+        np.testing.assert_allclose(
+            (vertices[:, :2].min(axis=0) + vertices[:, :2].max(axis=0)) / 2, 0, atol=1e-12
+        )
 
 
 @each_variant
@@ -73,12 +81,18 @@ def test_vertices_lie_on_the_surface_and_on_the_part(primitive):
         vertices = primitive.vertices(theta_p)
         inside = [np.mean(vertices[list(face)], axis=0) for face in primitive.faces]
         centroids = placed(np.array(inside), kappa, translation)
-        np.testing.assert_allclose(primitive.height_at(theta, centroids[:, :2]), centroids[:, 2], atol=1e-9)
+        np.testing.assert_allclose(
+            primitive.height_at(theta, centroids[:, :2]), centroids[:, 2], atol=1e-9
+        )
         part = primitive.part(theta)
         assert part.type == primitive.name
         assert part.area == pytest.approx(theta_p["width"] * theta_p["length"])
         for xy, z in zip(centroids[:, :2], centroids[:, 2], strict=True):
-            (piece,) = [piece for piece in part.pieces if piece.outline.buffer(1e-9).contains(shapely.Point(xy))]
+            (piece,) = [
+                piece
+                for piece in part.pieces
+                if piece.outline.buffer(1e-9).contains(shapely.Point(xy))
+            ]
             assert piece.height_at(xy[None])[0] == pytest.approx(z)
 
 
@@ -90,7 +104,9 @@ def test_canonical_theta_is_the_same_surface_and_idempotent(primitive):
         theta[HALF_WIDTH : HALF_WIDTH + 2] *= rng.uniform(0.7, 1.4, 2)
         canonical = primitive.canonical_theta(theta)
         xy = translation[:2] + rng.uniform(-3, 3, (40, 2))
-        np.testing.assert_allclose(primitive.height_at(canonical, xy), primitive.height_at(theta, xy), atol=1e-9)
+        np.testing.assert_allclose(
+            primitive.height_at(canonical, xy), primitive.height_at(theta, xy), atol=1e-9
+        )
         np.testing.assert_allclose(primitive.canonical_theta(canonical), canonical, atol=1e-9)
         assert primitive.part(canonical).pieces[0].outline.area == pytest.approx(
             primitive.part(theta).pieces[0].outline.area
@@ -140,7 +156,9 @@ def test_formula_cancels_and_divides_by_monomials_only():
 
 
 def test_unknown_type_is_named_with_the_known_ones():
-    with pytest.raises(SettingsError, match=r"expected a roof type \(flat, .*corner_mansard\), got 'onion'"):
+    with pytest.raises(
+        SettingsError, match=r"expected a roof type \(flat, .*corner_mansard\), got 'onion'"
+    ):
         get("onion")
 
 

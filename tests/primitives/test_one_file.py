@@ -1,4 +1,6 @@
-"""A primitive is one file: what `examples/new_primitive.py` registers, every stage knows, the network's labels left aside."""
+"""A primitive is one file: what `examples/new_primitive.py` registers, every stage knows, the
+network's labels left aside.
+"""
 
 import runpy
 from pathlib import Path
@@ -26,7 +28,9 @@ NAME = "curb_lean_to"
 
 @pytest.fixture(scope="module", autouse=True)
 def curb():
-    """The example's shape, which asserts that `fit_roof` finds it, in the catalogue while these tests run."""
+    """The example's shape, which asserts that `fit_roof` finds it, in the catalogue while these
+    tests run.
+    """
     runpy.run_path(str(EXAMPLE))
     yield CATALOGUE[NAME]
     del CATALOGUE[NAME]
@@ -48,7 +52,11 @@ def house(scanned):
 
 
 def test_it_obeys_the_laws_of_all_shapes(curb):
-    inherited = [law for law in vars(laws).values() if laws.each_variant.mark in getattr(law, "pytestmark", [])]
+    inherited = [
+        law
+        for law in vars(laws).values()
+        if laws.each_variant.mark in getattr(law, "pytestmark", [])
+    ]
     assert len(inherited) >= 6
     for law in inherited:
         law(curb)
@@ -82,15 +90,21 @@ def test_it_is_built_from_what_is_written(house):
     assert NAME in defs["properties"]["type"]["enum"]
     assert NAME in [rule["if"]["properties"]["type"]["const"] for rule in defs["allOf"]]
     del record["parts"][0]["parameters"]["break_height"]
-    with pytest.raises(InputError, match=r"expected the parameters .*break_height of the type curb_lean_to"):
+    with pytest.raises(
+        InputError, match=r"expected the parameters .*break_height of the type curb_lean_to"
+    ):
         hiproof.build(record)
 
 
 def test_it_is_edited_and_refitted(house, scanned):
     _, points = scanned
     gable = house.with_part(0, type="gable")
-    back = gable.with_part(0, type=NAME, ridge_height=house.parts[0].translation[2] + house.roof.frame.origin[2] + 3.0)
-    assert back.parts[0].type == NAME and back.parts[0].parameters["height"] == pytest.approx(3.0, abs=1e-6)
+    back = gable.with_part(
+        0, type=NAME, ridge_height=house.parts[0].translation[2] + house.roof.frame.origin[2] + 3.0
+    )
+    assert back.parts[0].type == NAME and back.parts[0].parameters["height"] == pytest.approx(
+        3.0, abs=1e-6
+    )
     fitted = house.with_part(0, height=house.parts[0].parameters["height"] + 0.4).refit(points)
     for name, value in house.parts[0].parameters.items():
         assert fitted.parts[0].parameters[name] == pytest.approx(value, abs=0.1), name
@@ -99,5 +113,10 @@ def test_it_is_edited_and_refitted(house, scanned):
 def test_it_is_drawn_written_and_weighed(curb):
     assert all(f">{name}" in primitive_svg(NAME) for name in curb.parameters)
     assert type_colour(NAME) == curb.colour and osm_shape(NAME) == curb.osm_shape
-    assert roof_type_code([NAME]) == curb.citygml_code and roof_type_code([NAME], "adv") == curb.adv_code
-    assert next(iter(combine({"monopitch": 0.9, "gable": 0.1}, {NAME: 100.0, "gable": 400.0}))) == NAME
+    assert (
+        roof_type_code([NAME]) == curb.citygml_code
+        and roof_type_code([NAME], "adv") == curb.adv_code
+    )
+    assert (
+        next(iter(combine({"monopitch": 0.9, "gable": 0.1}, {NAME: 100.0, "gable": 400.0}))) == NAME
+    )

@@ -13,19 +13,32 @@ from hiproof.read.assign import PointGrid, points_of_footprints
 
 def some_footprints(seed, count=12):
     rng = np.random.default_rng(seed)
-    hulls = [shapely.MultiPoint(rng.uniform(0, 9, (7, 2)) + rng.uniform(-10, 80, 2)).convex_hull for _ in range(count)]
+    hulls = [
+        shapely.MultiPoint(rng.uniform(0, 9, (7, 2)) + rng.uniform(-10, 80, 2)).convex_hull
+        for _ in range(count)
+    ]
     holed = shapely.difference(shapely.box(20, 20, 50, 45), shapely.box(30, 30, 40, 40))
-    return [Footprint(str(i), polygon) for i, polygon in enumerate([*hulls, holed, shapely.Polygon()])]
+    return [
+        Footprint(str(i), polygon) for i, polygon in enumerate([*hulls, holed, shapely.Polygon()])
+    ]
 
 
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize("offset", [0.0, 1e7])
 def test_the_grid_finds_what_a_plain_test_of_every_point_finds(seed, offset):
     footprints = some_footprints(seed)
-    xyz = np.random.default_rng(seed).uniform([0, 0, 0], [70, 60, 9], (3000, 3)) + [offset, offset, 0]
-    footprints = [Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints]
+    xyz = np.random.default_rng(seed).uniform([0, 0, 0], [70, 60, 9], (3000, 3)) + [
+        offset,
+        offset,
+        0,
+    ]
+    footprints = [
+        Footprint(f.id, shapely.transform(f.polygon, lambda xy: xy + offset)) for f in footprints
+    ]
     for footprint, found in zip(footprints, points_of_footprints(xyz, footprints), strict=True):
-        assert np.array_equal(found, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1])))
+        assert np.array_equal(
+            found, np.flatnonzero(shapely.intersects_xy(footprint.polygon, xyz[:, 0], xyz[:, 1]))
+        )
     grid = PointGrid(xyz)
     for footprint in footprints:
         found = grid.within(footprint.polygon, 3.0)
@@ -44,7 +57,10 @@ def test_neighbours_do_not_take_points_from_each_other():
 def test_no_points_and_no_polygon_find_nothing():
     footprints = [Footprint("a", shapely.box(0, 0, 1, 1)), Footprint("b", shapely.Polygon())]
     assert [len(found) for found in points_of_footprints(np.empty((0, 3)), footprints)] == [0, 0]
-    assert [len(found) for found in points_of_footprints(np.ones((4, 3)) * 0.5, footprints)] == [4, 0]
+    assert [len(found) for found in points_of_footprints(np.ones((4, 3)) * 0.5, footprints)] == [
+        4,
+        0,
+    ]
     assert len(PointGrid(np.ones((4, 2))).inside(shapely.box(1e6, 1e6, 1e6 + 1, 1e6 + 1))) == 0
 
 

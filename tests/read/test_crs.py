@@ -19,7 +19,13 @@ def test_examples_in_the_docstrings_run(module):
 
 @pytest.mark.parametrize(
     "first, second, same",
-    [(7415, 28992, True), (28992, 28992, True), (28992, 25832, False), (4326, 4979, True), (7415, None, False)],
+    [
+        (7415, 28992, True),
+        (28992, 28992, True),
+        (28992, 25832, False),
+        (4326, 4979, True),
+        (7415, None, False),
+    ],
 )
 def test_plan_decides_whether_two_are_the_same(first, second, same):
     assert same_horizontal(parse_crs(first), parse_crs(second)) is same
@@ -27,7 +33,9 @@ def test_plan_decides_whether_two_are_the_same(first, second, same):
 
 
 def test_wkt_without_a_code_is_recognised():
-    bare = CRS.from_wkt(CRS.from_epsg(28992).to_wkt("WKT1_GDAL").replace(',AUTHORITY["EPSG","28992"]', ""))
+    bare = CRS.from_wkt(
+        CRS.from_epsg(28992).to_wkt("WKT1_GDAL").replace(',AUTHORITY["EPSG","28992"]', "")
+    )
     assert same_horizontal(bare, parse_crs(7415))
 
 
@@ -66,7 +74,9 @@ def test_units_are_those_of_the_axes(crs, plan, height):
 
 
 def test_a_unit_that_contradicts_the_crs_is_refused():
-    assert units_of(None, named="foot").plan == units_of(CRS("EPSG:2222"), named="foot").plan == 0.3048
+    assert (
+        units_of(None, named="foot").plan == units_of(CRS("EPSG:2222"), named="foot").plan == 0.3048
+    )
     with pytest.raises(InputError, match="--unit"):
         units_of(CRS("EPSG:7415"), named="foot")
 

@@ -1,4 +1,6 @@
-"""Every feature of a footprint file comes back: split, repaired, renamed or empty, but never lost."""
+"""Every feature of a footprint file comes back: split, repaired, renamed or empty, but
+never lost.
+"""
 
 import doctest
 import json
@@ -18,14 +20,20 @@ from hiproof.read.overlap import check_overlap, doubtful_place, refuse_degrees
 from hiproof.read.polygons import simple_polygons
 from hiproof.settings import Settings
 
-pytestmark = pytest.mark.filterwarnings("ignore:'crs' was not provided", "ignore:invalid value encountered")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:'crs' was not provided", "ignore:invalid value encountered"
+)
 SQUARE = shapely.box(85000, 446000, 85010, 446010, ccw=False)
 RD, UTM31, UTM32, WGS84 = (CRS.from_epsg(code) for code in (28992, 25831, 25832, 4326))
-HOLED = shapely.Polygon(SQUARE.exterior, [[(85002, 446002), (85004, 446002), (85004, 446004), (85002, 446004)]])
+HOLED = shapely.Polygon(
+    SQUARE.exterior, [[(85002, 446002), (85004, 446002), (85004, 446004), (85002, 446004)]]
+)
 
 
 def write(path, geometries, crs="EPSG:28992", **fields):
-    wkb = np.array([None if g is None else shapely.to_wkb(g, output_dimension=3) for g in geometries], object)
+    wkb = np.array(
+        [None if g is None else shapely.to_wkb(g, output_dimension=3) for g in geometries], object
+    )
     pyogrio.raw.write(
         str(path),
         wkb,
@@ -57,21 +65,30 @@ def test_polygons_holes_and_attributes_come_back(tmp_path, ending):
         height=np.array([7.5, np.nan]),
         built=np.array(["1931-05-17", "2001-01-01"], "datetime64[D]"),
     )
-    first, second = sorted(read_footprints(path, id_attribute="name"), key=lambda f: f.id)  # FlatGeobuf reorders
+    # FlatGeobuf reorders
+    first, second = sorted(read_footprints(path, id_attribute="name"), key=lambda f: f.id)
     assert (first.id, second.id) == ("A", "B")
     assert first.polygon.equals(SQUARE) and second.polygon.equals(shifted(HOLED, 20))
     built = first.attributes.pop("built")
-    assert built.startswith("1931-05-17") and first.attributes == {"name": "A", "floors": 2, "height": 7.5}
+    assert built.startswith("1931-05-17") and first.attributes == {
+        "name": "A",
+        "floors": 2,
+        "height": 7.5,
+    }
     assert "height" not in second.attributes
     json.dumps(second.attributes)
 
 
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb", "shp"])
 def test_which_way_rings_go_round_depends_on_no_format(tmp_path, ending):
-    """A fit that begins at an edge sees a roof from the other side where its outline goes round the other way."""
+    """A fit that begins at an edge sees a roof from the other side where its outline goes round the
+    other way.
+    """
     path = write(tmp_path / f"a.{ending}", [SQUARE, shapely.reverse(SQUARE), shifted(HOLED, 20)])
     for footprint in read_footprints(path):
-        assert not footprint.polygon.exterior.is_ccw and all(hole.is_ccw for hole in footprint.polygon.interiors)
+        assert not footprint.polygon.exterior.is_ccw and all(
+            hole.is_ccw for hole in footprint.polygon.interiors
+        )
 
 
 def write_with_gaps(path, **fields):
@@ -94,7 +111,9 @@ def write_with_gaps(path, **fields):
 @pytest.mark.parametrize("ending", ["gpkg", "geojson", "fgb"])
 @pytest.mark.parametrize("where", [None, "name <> 'D' or name = 'E'"])
 def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, ending, where):
-    """They became decimals: a year 1931.0, a yes 1.0, and an id beyond 2^53 that of its neighbour."""
+    """They became decimals: a year 1931.0, a yes 1.0, and an id beyond 2^53 that of its
+    neighbour.
+    """
     path = write_with_gaps(
         tmp_path / f"a.{ending}",
         year=np.array([1931, 0, 2001], np.int32),
@@ -104,10 +123,25 @@ def test_whole_numbers_and_booleans_stay_so_where_a_feature_has_none(tmp_path, e
     )
     by_name = {f.id: f.attributes for f in read_footprints(path, id_attribute="name", where=where)}
     assert by_name["B"] == {"name": "B"}
-    assert [by_name["A"][k] for k in ("year", "listed", "number", "height")] == [1931, True, 2**53 + 1, 7.5]
-    assert [by_name["C"][k] for k in ("year", "listed", "number", "height")] == [2001, False, 2**53 + 3, 8.0]
+    assert [by_name["A"][k] for k in ("year", "listed", "number", "height")] == [
+        1931,
+        True,
+        2**53 + 1,
+        7.5,
+    ]
+    assert [by_name["C"][k] for k in ("year", "listed", "number", "height")] == [
+        2001,
+        False,
+        2**53 + 3,
+        8.0,
+    ]
     for attributes in (by_name["A"], by_name["C"]):
-        assert [type(attributes[k]) for k in ("year", "listed", "number", "height")] == [int, bool, int, float]
+        assert [type(attributes[k]) for k in ("year", "listed", "number", "height")] == [
+            int,
+            bool,
+            int,
+            float,
+        ]
 
 
 def test_ids_of_many_digits_stay_apart_where_a_feature_has_none(tmp_path):
@@ -121,7 +155,10 @@ def test_a_list_stays_a_list_however_long(tmp_path):
     ring = [[0, 0], [9, 0], [9, 9], [0, 0]]
     feature = {"type": "Feature", "properties": {"many": list(range(2000)), "names": ["a", "b"]}}
     feature["geometry"] = {"type": "Polygon", "coordinates": [ring]}
-    path, crs = tmp_path / "a.geojson", {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}}
+    path, crs = (
+        tmp_path / "a.geojson",
+        {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::28992"}},
+    )
     path.write_text(json.dumps({"type": "FeatureCollection", "crs": crs, "features": [feature]}))
     assert read_footprints(path)[0].attributes == feature["properties"]
 
@@ -136,7 +173,10 @@ def test_multipolygons_are_split_and_name_their_feature(tmp_path):
     path = write(tmp_path / "a.gpkg", [both, shifted(SQUARE, 60)], id=np.array(["M", "N"], object))
     footprints = read_footprints(path)
     assert [f.id for f in footprints] == ["M-1", "M-2", "N"]
-    assert footprints[1].attributes == {"id": "M", "part_of": "M"} and "part_of" not in footprints[2].attributes
+    assert (
+        footprints[1].attributes == {"id": "M", "part_of": "M"}
+        and "part_of" not in footprints[2].attributes
+    )
     assert sum(f.polygon.area for f in footprints[:2]) == pytest.approx(both.area)
 
 
@@ -168,44 +208,66 @@ def test_ids_come_from_a_usual_attribute_without_gaps_or_repeats(tmp_path):
     geometries = [SQUARE, shifted(SQUARE, 20)]
     path = write(tmp_path / "a.gpkg", geometries, id=twins, Identificatie=np.array([7.0, 9.0]))
     assert [f.id for f in read_footprints(path)] == ["7", "9"]
-    for name, ids in (("b", twins), ("c", np.array(["x", " "], object)), ("d", np.array([None, "x"], object))):
+    for name, ids in (
+        ("b", twins),
+        ("c", np.array(["x", " "], object)),
+        ("d", np.array([None, "x"], object)),
+    ):
         path = write(tmp_path / f"{name}.gpkg", geometries, id=ids)
-        with pytest.warns(InputWarning, match="id repeats or is missing, so buildings go by their number"):
+        with pytest.warns(
+            InputWarning, match="id repeats or is missing, so buildings go by their number"
+        ):
             assert [f.id for f in read_footprints(path)] == ["1", "2"]
 
 
 def test_repeated_ids_get_a_suffix_and_copies_name_their_original(tmp_path):
     path = write(
-        tmp_path / "a.gpkg", [SQUARE, SQUARE.reverse(), shifted(SQUARE, 20)], k=np.array(["x", "x", "x_2"], object)
+        tmp_path / "a.gpkg",
+        [SQUARE, SQUARE.reverse(), shifted(SQUARE, 20)],
+        k=np.array(["x", "x", "x_2"], object),
     )
     with pytest.warns(InputWarning) as caught:
         footprints = read_footprints(path, id_attribute="k")
     assert [f.id for f in footprints] == ["x", "x_3", "x_2"]
     assert footprints[1].attributes["copy_of"] == "x" and "copy_of" not in footprints[2].attributes
     assert {"id of an earlier", "polygon of another"} <= {
-        part for w in caught for part in ("id of an earlier", "polygon of another") if part in str(w.message)
+        part
+        for w in caught
+        for part in ("id of an earlier", "polygon of another")
+        if part in str(w.message)
     }
 
 
-def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_not(tmp_path, recwarn):
+def test_a_footprint_on_top_of_another_is_told_of_and_neighbours_and_courts_are_not(
+    tmp_path, recwarn
+):
     ring = shapely.Polygon(shifted(SQUARE, 50).buffer(5).exterior, [shifted(SQUARE, 50).exterior])
     apart = [SQUARE, shifted(SQUARE, np.ptp(SQUARE.bounds[::2])), ring, shifted(SQUARE, 50)]
     read_footprints(write(tmp_path / "a.gpkg", apart))
     assert not recwarn.list
     ids = np.array(["house", "annex", "block"], object)
     path = write(tmp_path / "b.gpkg", [SQUARE, SQUARE.buffer(-2), shifted(SQUARE, 20)], id=ids)
-    with pytest.warns(InputWarning, match=r"1 footprint on top of a larger one \(annex on house\): models of both"):
+    with pytest.warns(
+        InputWarning, match=r"1 footprint on top of a larger one \(annex on house\): models of both"
+    ):
         assert len(read_footprints(path)) == 3
 
 
 def test_features_without_area_stay_with_an_empty_polygon(tmp_path):
     line = shapely.Polygon([(0, 0), (5, 5), (2, 2), (0, 0)])
     path = write(
-        tmp_path / "a.gpkg", [SQUARE, line, None, shapely.Point(1, 1)], id=np.array(["a", "b", "c", "d"], object)
+        tmp_path / "a.gpkg",
+        [SQUARE, line, None, shapely.Point(1, 1)],
+        id=np.array(["a", "b", "c", "d"], object),
     )
     with pytest.warns(InputWarning, match="3 features with no area"):
         footprints = read_footprints(path)
-    assert [(f.id, f.polygon.is_empty) for f in footprints] == [("a", False), ("b", True), ("c", True), ("d", True)]
+    assert [(f.id, f.polygon.is_empty) for f in footprints] == [
+        ("a", False),
+        ("b", True),
+        ("c", True),
+        ("d", True),
+    ]
 
 
 def test_self_intersecting_footprints_are_repaired(tmp_path):
@@ -215,14 +277,18 @@ def test_self_intersecting_footprints_are_repaired(tmp_path):
     with pytest.warns(InputWarning, match="2 invalid footprints repaired"):
         footprints = read_footprints(path)
     assert [f.id for f in footprints] == ["tie-1", "tie-2", "spike"]
-    assert all(f.polygon.is_valid for f in footprints) and footprints[2].polygon.area == pytest.approx(100)
+    assert all(f.polygon.is_valid for f in footprints) and footprints[
+        2
+    ].polygon.area == pytest.approx(100)
 
 
 @pytest.mark.parametrize("seed", range(20))
 def test_any_tangle_of_edges_becomes_valid_polygons(seed):
     rng = np.random.default_rng(seed)
     for polygon in simple_polygons(shapely.Polygon(rng.uniform(0, 10, (rng.integers(3, 12), 2)))):
-        assert polygon.is_empty or (polygon.is_valid and polygon.geom_type == "Polygon" and polygon.area > 0)
+        assert polygon.is_empty or (
+            polygon.is_valid and polygon.geom_type == "Polygon" and polygon.area > 0
+        )
 
 
 def test_coordinates_that_are_no_numbers_enclose_no_area():
@@ -235,24 +301,46 @@ def test_a_file_of_several_layers_needs_a_name(tmp_path):
     more = [np.array(["B", "C"], object)]
     squares = shapely.to_wkb(np.array([shifted(SQUARE, 20), shifted(SQUARE, 40)], object))
     pyogrio.raw.write(
-        path, squares, more, ["name"], layer="sheds", geometry_type="Polygon", crs="EPSG:28992", append=True
+        path,
+        squares,
+        more,
+        ["name"],
+        layer="sheds",
+        geometry_type="Polygon",
+        crs="EPSG:28992",
+        append=True,
     )
     for read in (read_footprints, footprint_crs):
         with pytest.raises(InputError, match="2: buildings, sheds; name one with --layer"):
             read(path)
-    assert len(read_footprints(path, layer="sheds")) == 2 and footprint_crs(path, "buildings").to_epsg() == 28992
+    assert (
+        len(read_footprints(path, layer="sheds")) == 2
+        and footprint_crs(path, "buildings").to_epsg() == 28992
+    )
 
 
 def test_a_table_without_geometry_is_no_layer_to_choose_from(tmp_path):
     path = write(tmp_path / "a.gpkg", [SQUARE], name=np.array(["A"], object))
-    pyogrio.raw.write(path, None, [np.array(["x"], object)], ["note"], layer="notes", geometry_type=None, append=True)
+    pyogrio.raw.write(
+        path,
+        None,
+        [np.array(["x"], object)],
+        ["note"],
+        layer="notes",
+        geometry_type=None,
+        append=True,
+    )
     assert len(pyogrio.list_layers(path)) == 2 and len(read_footprints(path)) == 1
 
 
 def test_features_of_several_polygons_are_said_once(tmp_path):
     both = shapely.MultiPolygon([SQUARE, shifted(SQUARE, 20)])
-    with pytest.warns(InputWarning, match="2 features of several polygons became 4 buildings") as told:
-        read_footprints(write(tmp_path / "a.gpkg", [both, shifted(both, 60)], id=np.array(["M", "N"], object)))
+    with pytest.warns(
+        InputWarning, match="2 features of several polygons became 4 buildings"
+    ) as told:
+        read_footprints(
+            write(tmp_path / "a.gpkg", [both, shifted(both, 60)], id=np.array(["M", "N"], object))
+        )
     assert len(told) == 1
 
 
@@ -266,8 +354,20 @@ SLIPS = {
     "swapped axes": (HERE[:, ::-1], RD, HERE, RD, "x and y look swapped"),
     "swapped axes of an unknown CRS": (HERE[:, ::-1], None, HERE, None, "x and y look swapped"),
     "degrees": (moved(HERE, RD, WGS84), None, HERE, RD, "longitude and latitude in degrees"),
-    "degrees, latitude first": (moved(HERE, RD, WGS84)[:, ::-1], None, HERE, RD, "latitude and longitude in degrees"),
-    "a cloud in degrees": (HERE, RD, moved(HERE, RD, WGS84), None, "the cloud looks like longitude and latitude"),
+    "degrees, latitude first": (
+        moved(HERE, RD, WGS84)[:, ::-1],
+        None,
+        HERE,
+        RD,
+        "latitude and longitude in degrees",
+    ),
+    "a cloud in degrees": (
+        HERE,
+        RD,
+        moved(HERE, RD, WGS84),
+        None,
+        "the cloud looks like longitude and latitude",
+    ),
     "the wrong label": (HERE, UTM31, HERE, RD, "look like the cloud's EPSG:28992"),
     "a neighbouring zone": (IN_UTM, UTM32, IN_UTM, UTM31, "look like the cloud's EPSG:25831"),
     "two zones off": (
@@ -277,7 +377,13 @@ SLIPS = {
         UTM31,
         r"they look like EPSG:25832 \(ETRS89 / UTM zone 32N\)",
     ),
-    "a cloud in the next zone": (IN_UTM, UTM31, moved(IN_UTM, UTM31, UTM32), None, "the cloud looks like EPSG:25832"),
+    "a cloud in the next zone": (
+        IN_UTM,
+        UTM31,
+        moved(IN_UTM, UTM31, UTM32),
+        None,
+        "the cloud looks like EPSG:25832",
+    ),
     "a cloud in the UTM zone": (HERE, RD, IN_UTM, None, "the cloud looks like EPSG:25831"),
     "feet": (HERE / 0.3048, None, HERE, None, "they look like feet"),
     "a cloud in feet": (HERE, None, HERE / 0.3048, None, "the cloud like feet"),
@@ -289,7 +395,9 @@ SLIPS = {
 def test_footprints_elsewhere_are_refused_with_what_they_look_like(slip):
     xy, named, cloud_xy, cloud, expected = SLIPS[slip]
     in_use = xy if named is None or cloud is None else moved(xy, named, cloud)
-    footprints = [Footprint(str(i), shapely.Point(point).buffer(1e-3)) for i, point in enumerate(in_use)]
+    footprints = [
+        Footprint(str(i), shapely.Point(point).buffer(1e-3)) for i, point in enumerate(in_use)
+    ]
     reach = 1e-5 if np.abs(cloud_xy).max() < 180 else 20.0
     bounds = (*(cloud_xy.min(axis=0) - reach), *(cloud_xy.max(axis=0) + reach))
     with pytest.raises(InputError, match=expected) as caught:
@@ -317,14 +425,18 @@ def test_coordinates_far_from_where_their_crs_is_used_are_told(code, xy, expecte
 def test_footprints_in_degrees_that_name_another_crs_are_refused(crs, tmp_path):
     path = write(tmp_path / "a.gpkg", [shapely.box(4.36, 51.99, 4.3602, 51.9901)], crs)
     with pytest.raises(
-        InputError, match=r"a\.gpkg, which names .*, in metres, got .* look like degrees; name their CRS"
+        InputError,
+        match=r"a\.gpkg, which names .*, in metres, got .* look like degrees; name their CRS",
     ):
         read_footprints(path, target_crs=RD)
 
 
 def test_what_names_no_crs_and_counts_in_degrees_is_refused():
     low = np.array([[4.36, 52.0], [4.37, 52.01]])
-    with pytest.raises(InputError, match=r"got coordinates in x 4\.36000 to 4\.38000.* look like degrees; reproject"):
+    with pytest.raises(
+        InputError,
+        match=r"got coordinates in x 4\.36000 to 4\.38000.* look like degrees; reproject",
+    ):
         refuse_degrees(np.hstack([low, low + 0.01]), "the point clouds", "reproject")
     refuse_degrees(np.hstack([low, low + 12.0]), "the point clouds", "reproject")
     refuse_degrees(np.hstack([HERE, HERE + 0.01]), "the point clouds", "reproject")
@@ -332,10 +444,14 @@ def test_what_names_no_crs_and_counts_in_degrees_is_refused():
 
 
 @pytest.mark.parametrize("target", [None, "EPSG:7415"])
-def test_footprints_in_degrees_that_name_no_crs_are_refused_although_none_has_an_area(tmp_path, target):
+def test_footprints_in_degrees_that_name_no_crs_are_refused_although_none_has_an_area(
+    tmp_path, target
+):
     in_degrees = shapely.transform(SQUARE, lambda xy: moved(xy, RD, WGS84))
     path = write(tmp_path / "a.gpkg", [in_degrees, None], crs=None)
-    with pytest.raises(InputError, match=r"names no CRS, in metres, got .* look like degrees; name their CRS"):
+    with pytest.raises(
+        InputError, match=r"names no CRS, in metres, got .* look like degrees; name their CRS"
+    ):
         read_footprints(path, target_crs=target)
 
 
@@ -344,7 +460,9 @@ def test_overlap_is_checked_and_both_boxes_are_named():
     check_overlap(footprints, (84990, 445990, 85001, 446001))
     check_overlap(footprints, [(0, 0, 0, 1, 1, 9), (84990, 445990, -3, 85001, 446001, 9)])
     check_overlap(footprints[1:], (0, 0, 1, 1))
-    with pytest.raises(InputError, match=r"x 4\.0.* to 5\.0.*RD New.*x 85005\.0 to 85005\.0.*no CRS"):
+    with pytest.raises(
+        InputError, match=r"x 4\.0.* to 5\.0.*RD New.*x 85005\.0 to 85005\.0.*no CRS"
+    ):
         check_overlap(footprints, (4.0, 51.0, 5.0, 52.0), None, CRS.from_epsg(28992))
 
 
@@ -369,8 +487,16 @@ def bad_file(tmp_path, kind):
 
 
 BAD = {
-    **{"missing": "no such file", "empty file": "an empty file", "not a vector file": "that GDAL reads"},
-    **{"truncated": "that GDAL reads|layer", "no features": "without features", "no polygons": "got LineString"},
+    **{
+        "missing": "no such file",
+        "empty file": "an empty file",
+        "not a vector file": "that GDAL reads",
+    },
+    **{
+        "truncated": "that GDAL reads|layer",
+        "no features": "without features",
+        "no polygons": "got LineString",
+    },
     **{"no geometry": "without geometry", "metres called degrees": "outside that system"},
 }
 
@@ -392,12 +518,19 @@ def test_unknown_layers_and_attributes_are_answered_with_the_known_ones(tmp_path
 
 def test_degrees_without_a_cloud_crs_are_refused(tmp_path):
     with pytest.raises(InputError, match="in a projected CRS"):
-        read_footprints(write(tmp_path / "a.gpkg", [shapely.box(4, 52, 4.001, 52.001)], crs="EPSG:4326"))
+        read_footprints(
+            write(tmp_path / "a.gpkg", [shapely.box(4, 52, 4.001, 52.001)], crs="EPSG:4326")
+        )
 
 
 def test_a_geojson_in_a_national_grid_that_names_no_crs_is_told_how_to_name_it(tmp_path):
     geometry = shapely.geometry.mapping(SQUARE)
     feature = {"type": "Feature", "properties": {}, "geometry": geometry}
-    (tmp_path / "a.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}))
-    with pytest.raises(InputError, match=r"they are no degrees: name their CRS in the file, .* \(`ogr2ogr -a_srs`\)"):
+    (tmp_path / "a.geojson").write_text(
+        json.dumps({"type": "FeatureCollection", "features": [feature]})
+    )
+    with pytest.raises(
+        InputError,
+        match=r"they are no degrees: name their CRS in the file, .* \(`ogr2ogr -a_srs`\)",
+    ):
         read_footprints(tmp_path / "a.geojson", target_crs="EPSG:28992")

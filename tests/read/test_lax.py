@@ -1,4 +1,6 @@
-"""The index beside a LAS file, written here by its documented layout: no point near a building is missed, little else read."""
+"""The index beside a LAS file, written here by its documented layout: no point near a building is
+missed, little else read.
+"""
 
 import struct
 from itertools import pairwise
@@ -27,12 +29,16 @@ def cell_of(x, y, root, level):
 
 
 def write_lax(path, xyz, level=4, coarse_west=True, gap=3):
-    """A quadtree of `level` levels; its western half is coarser; runs that are less than `gap` apart are one."""
+    """A quadtree of `level` levels; its western half is coarser; runs that are less than `gap`
+    apart are one.
+    """
     root = (*np.floor(xyz[:, :2].min(axis=0)), *np.ceil(xyz[:, :2].max(axis=0)))
     middle = (root[0] + root[2]) / 2
     cells = {}
     for i, (x, y, _) in enumerate(xyz):
-        cells.setdefault(cell_of(x, y, root, level - 2 if coarse_west and x < middle else level), []).append(i)
+        cells.setdefault(
+            cell_of(x, y, root, level - 2 if coarse_west and x < middle else level), []
+        ).append(i)
     words = [
         struct.pack(
             "<4sI4sI4sIIII4f4sII",
@@ -57,7 +63,9 @@ def write_lax(path, xyz, level=4, coarse_west=True, gap=3):
     for cell, members in cells.items():
         starts = [0, *(np.flatnonzero(np.diff(members) > gap) + 1), len(members)]
         runs = [(members[a], members[b - 1]) for a, b in pairwise(starts)]
-        words.append(struct.pack(f"<iII{2 * len(runs)}I", cell, len(runs), len(members), *np.ravel(runs)))
+        words.append(
+            struct.pack(f"<iII{2 * len(runs)}I", cell, len(runs), len(members), *np.ravel(runs))
+        )
     path.write_bytes(b"".join(words))
 
 
@@ -85,7 +93,9 @@ def test_the_runs_hold_every_point_of_any_boxes(indexed, seed, monkeypatch):
     boxes = np.hstack([low, low + rng.uniform(1, 60, (3, 2))])
     runs = read_lax(path).runs_meeting(boxes)
     read = np.concatenate([cloud.xyz for cloud in iter_points(path, 100, runs=runs)])
-    wanted = np.array([p for p in xyz if any((p[:2] >= b[:2]).all() and (p[:2] <= b[2:]).all() for b in boxes)])
+    wanted = np.array(
+        [p for p in xyz if any((p[:2] >= b[:2]).all() and (p[:2] <= b[2:]).all() for b in boxes)]
+    )
     assert {tuple(p) for p in wanted.round(2)} <= {tuple(p) for p in read.round(2)}
     assert len(read) == (runs[:, 1] - runs[:, 0]).sum() < POINTS
 
@@ -107,7 +117,9 @@ def test_a_file_without_index_has_none(tmp_path):
     assert read_lax("https://example.org/a.laz") is None
 
 
-@pytest.mark.parametrize("harm", ["cut off", "of another file", "something else", "empty", "64 bits"])
+@pytest.mark.parametrize(
+    "harm", ["cut off", "of another file", "something else", "empty", "64 bits"]
+)
 def test_an_index_that_cannot_be_used_is_left_aside(indexed, harm):
     path, xyz = indexed
     if harm == "of another file":
@@ -117,9 +129,11 @@ def test_an_index_that_cannot_be_used_is_left_aside(indexed, harm):
     if harm == "64 bits":
         data[56] = 1
     beside.write_bytes(
-        {"cut off": data[: len(data) // 2 // 4 * 4], "something else": b"not an index" * 20, "empty": b""}.get(
-            harm, data
-        )
+        {
+            "cut off": data[: len(data) // 2 // 4 * 4],
+            "something else": b"not an index" * 20,
+            "empty": b"",
+        }.get(harm, data)
     )
     with pytest.warns(InputWarning, match=r"a\.lax: is left aside"):
         assert read_lax(path) is None

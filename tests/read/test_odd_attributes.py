@@ -21,7 +21,9 @@ SQUARES = [shapely.box(500000 + 20 * i, 4649776, 500010 + 20 * i, 4649786) for i
 
 def write_geojson(path, **columns):
     """Four squares with an id h0, h1, ... and these attributes."""
-    rows = [{"id": f"h{i}", **{name: values[i] for name, values in columns.items()}} for i in range(4)]
+    rows = [
+        {"id": f"h{i}", **{name: values[i] for name, values in columns.items()}} for i in range(4)
+    ]
     features = [
         {"type": "Feature", "properties": row, "geometry": shapely.geometry.mapping(square)}
         for row, square in zip(rows, SQUARES, strict=True)
@@ -35,7 +37,9 @@ def values_of(path, name, **options):
     """The attribute of each footprint, and the remarks that reading them made."""
     with pytest.warns(InputWarning) as told:
         footprints = read_footprints(path, **options)
-    return [footprint.attributes.get(name) for footprint in footprints], [str(remark.message) for remark in told]
+    return [footprint.attributes.get(name) for footprint in footprints], [
+        str(remark.message) for remark in told
+    ]
 
 
 def test_examples_in_the_docstrings_run():
@@ -61,7 +65,9 @@ def test_one_impossible_date_refuses_no_file(tmp_path, kind):
 
 @pytest.mark.filterwarnings("ignore::hiproof.errors.InputWarning")
 def test_an_impossible_date_goes_with_conditions_and_boxes(tmp_path):
-    path = write_geojson(tmp_path / "a.geojson", built=ODD["the 30th of February"], year=[1999, 2024, 2001, 1998])
+    path = write_geojson(
+        tmp_path / "a.geojson", built=ODD["the 30th of February"], year=[1999, 2024, 2001, 1998]
+    )
     chosen = read_footprints(
         path, where="year < 2010", target_crs="EPSG:32633", bbox=(500025, 4649776, 500080, 4649786)
     )
@@ -77,7 +83,9 @@ def test_a_date_of_a_shapefile_that_is_none_is_text(tmp_path):
     path = tmp_path / "a.shp"
     wkb = shapely.to_wkb(SQUARES).astype(object)
     fields = [np.arange(4), np.array(["1999-12-31"] * 4, "datetime64[D]")]
-    pyogrio.raw.write(str(path), wkb, fields, ["id", "built"], geometry_type="Polygon", crs="EPSG:32633")
+    pyogrio.raw.write(
+        str(path), wkb, fields, ["id", "built"], geometry_type="Polygon", crs="EPSG:32633"
+    )
     table = (tmp_path / "a.dbf").read_bytes()
     (tmp_path / "a.dbf").write_bytes(table.replace(b"19991231", b"19500000", 1))
     assert values_of(path, "built")[0] == ["1950-00-00", "1999-12-31", "1999-12-31", "1999-12-31"]
@@ -87,9 +95,19 @@ def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
     path = tmp_path / "a.gpkg"
     wkb = shapely.to_wkb(SQUARES).astype(object)
     names = np.array(["Straße", "b", "c", "d"], object)
-    pyogrio.raw.write(str(path), wkb, [names], ["name"], geometry_type="Polygon", crs="EPSG:32633", SPATIAL_INDEX="NO")
+    pyogrio.raw.write(
+        str(path),
+        wkb,
+        [names],
+        ["name"],
+        geometry_type="Polygon",
+        crs="EPSG:32633",
+        SPATIAL_INDEX="NO",
+    )
     with sqlite3.connect(path) as base:
-        for (trigger,) in base.execute("select name from sqlite_master where type = 'trigger'").fetchall():
+        for (trigger,) in base.execute(
+            "select name from sqlite_master where type = 'trigger'"
+        ).fetchall():
             base.execute(f'drop trigger "{trigger}"')
         base.execute("update a set name = cast(x'41ff42' as text) where name = 'b'")
     found, remarks = values_of(path, "name")
@@ -98,7 +116,9 @@ def test_text_in_no_encoding_keeps_what_can_be_read(tmp_path):
 
 def test_several_odd_attributes_are_named_in_one_remark(tmp_path):
     lists = [[True, False], [True], [], None]
-    path = write_geojson(tmp_path / "a.geojson", built=ODD["the year nought"], flags=lists, name=list("abcd"))
+    path = write_geojson(
+        tmp_path / "a.geojson", built=ODD["the year nought"], flags=lists, name=list("abcd")
+    )
     found, remarks = values_of(path, "name")
     assert found == list("abcd") and len(remarks) == 1 and remarks[0].endswith(": built, flags")
 
@@ -111,5 +131,7 @@ def test_more_attributes_than_a_geopackage_has_columns_are_told_before_work(recw
     assert 1900 < room < 1998
     say_if_columns_run_out("f.gpkg", with_attributes(room))
     assert not recwarn
-    with pytest.warns(InputWarning, match=f"has 2,500 attributes; buildings.gpkg holds the first {room:,}"):
+    with pytest.warns(
+        InputWarning, match=f"has 2,500 attributes; buildings.gpkg holds the first {room:,}"
+    ):
         say_if_columns_run_out("f.gpkg", with_attributes(2500))

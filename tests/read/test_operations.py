@@ -1,4 +1,6 @@
-"""Which operation PROJ uses, how accurate it is, and which grid is missing: said where it may cost a metre."""
+"""Which operation PROJ uses, how accurate it is, and which grid is missing: said where it may cost
+a metre.
+"""
 
 import json
 import warnings
@@ -32,7 +34,9 @@ def test_a_missing_grid_is_named_with_what_to_do():
     found = find("EPSG:27700", "EPSG:32630", LONDON)
     assert found.accuracy_m == 2.0 and "OSGB36 to WGS 84 (6)" in found.name
     assert found.missing_grids == (OSTN15,) and found.missing_accuracy_m == 1.0
-    assert found.remark.startswith("footprints.gpkg: transformed from EPSG:27700 (OSGB36 / British National Grid)")
+    assert found.remark.startswith(
+        "footprints.gpkg: transformed from EPSG:27700 (OSGB36 / British National Grid)"
+    )
     assert f"projsync --file {OSTN15}" in found.remark and "PROJ_NETWORK=ON" in found.remark
 
 
@@ -59,6 +63,8 @@ def test_footprints_that_come_by_a_coarse_operation_are_remarked(tmp_path):
     import shapely
 
     x, y = LONDON
-    path = write_footprints(tmp_path / "f.gpkg", {"a": shapely.box(x, y, x + 9, y + 8)}, crs="EPSG:27700")
+    path = write_footprints(
+        tmp_path / "f.gpkg", {"a": shapely.box(x, y, x + 9, y + 8)}, crs="EPSG:27700"
+    )
     with pytest.warns(InputWarning, match=OSTN15):
         read_footprints(path, target_crs="EPSG:32630")

@@ -1,4 +1,6 @@
-"""Point clouds come back as they were written, in every format; what cannot be read gets one sentence."""
+"""Point clouds come back as they were written, in every format; what cannot be read gets one
+sentence.
+"""
 
 import struct
 from dataclasses import replace
@@ -11,7 +13,13 @@ from hiproof.errors import InputError, InputWarning
 from hiproof.frames import METRES
 from hiproof.read.columns import find_columns
 from hiproof.read.las import is_copc
-from hiproof.read.pointcloud import expand_paths, iter_points, read_header, read_points, say_how_coarse
+from hiproof.read.pointcloud import (
+    expand_paths,
+    iter_points,
+    read_header,
+    read_points,
+    say_how_coarse,
+)
 from hiproof.settings import Settings
 
 
@@ -23,7 +31,10 @@ def some_points(count=500, seed=0):
 
 def write_las(path, xyz, classes=None, epsg=None, version="1.4", point_format=6):
     header = laspy.LasHeader(version=version, point_format=point_format)
-    header.offsets, header.scales = np.floor(xyz.min(axis=0)) if len(xyz) else np.zeros(3), np.full(3, 0.001)
+    header.offsets, header.scales = (
+        np.floor(xyz.min(axis=0)) if len(xyz) else np.zeros(3),
+        np.full(3, 0.001),
+    )
     if epsg is not None:
         from pyproj import CRS
 
@@ -37,7 +48,9 @@ def write_las(path, xyz, classes=None, epsg=None, version="1.4", point_format=6)
 
 
 def write_copc(path, xyz, classes):
-    """A COPC file of one octree node: a LAZ file whose first VLR is COPC's and whose last EVLR is the hierarchy."""
+    """A COPC file of one octree node: a LAZ file whose first VLR is COPC's and whose last EVLR is
+    the hierarchy.
+    """
     header = laspy.LasHeader(version="1.4", point_format=6)
     header.offsets, header.scales = np.floor(xyz.min(axis=0)), np.full(3, 0.001)
     centre, half = (xyz.min(axis=0) + xyz.max(axis=0)) / 2, float(np.ptp(xyz, axis=0).max())
@@ -52,22 +65,36 @@ def write_copc(path, xyz, classes):
     table = struct.unpack_from("<q", raw, data_start)[0]
     entry = struct.pack("<4iQ2i", 0, 0, 0, 0, data_start + 8, table - data_start - 8, len(xyz))
     struct.pack_into("<QI", raw, 235, len(raw), 1)
-    struct.pack_into("<Q", raw, 375 + 54 + 40, len(raw) + 60)  # where the root hierarchy page starts
+    # where the root hierarchy page starts
+    struct.pack_into("<Q", raw, 375 + 54 + 40, len(raw) + 60)
     raw += struct.pack("<H16sHQ32s", 0, b"copc", 1000, len(entry), b"") + entry
     path.write_bytes(raw)
     return path
 
 
 def write_ply(path, xyz, classes, form):
-    head = f"ply\nformat {form} 1.0\ncomment a test\nelement vertex {len(xyz)}\nproperty uchar red\n"
-    head += "property double x\nproperty double y\nproperty double z\nproperty uchar scalar_Classification\n"
+    head = (
+        f"ply\nformat {form} 1.0\ncomment a test\nelement vertex {len(xyz)}\nproperty uchar red\n"
+    )
+    head += (
+        "property double x\nproperty double y\nproperty double z\nproperty uchar "
+        "scalar_Classification\n"
+    )
     head += "element face 0\nproperty list uchar int vertex_indices\nend_header\n"
     if form == "ascii":
-        rows = "".join(f"7 {x:.3f} {y:.3f} {z:.3f} {c}\n" for (x, y, z), c in zip(xyz, classes, strict=True))
+        rows = "".join(
+            f"7 {x:.3f} {y:.3f} {z:.3f} {c}\n" for (x, y, z), c in zip(xyz, classes, strict=True)
+        )
         path.write_bytes(head.encode() + rows.encode())
         return path
     order = "<" if "little" in form else ">"
-    kinds = [("red", "u1"), ("x", order + "f8"), ("y", order + "f8"), ("z", order + "f8"), ("c", "u1")]
+    kinds = [
+        ("red", "u1"),
+        ("x", order + "f8"),
+        ("y", order + "f8"),
+        ("z", order + "f8"),
+        ("c", "u1"),
+    ]
     records = np.zeros(len(xyz), np.dtype(kinds))
     records["x"], records["y"], records["z"], records["c"] = *xyz.T, classes
     path.write_bytes(head.encode() + records.tobytes())
@@ -75,7 +102,10 @@ def write_ply(path, xyz, classes, form):
 
 
 def write_text(path, xyz, classes, delimiter=",", header="x,y,z,classification"):
-    rows = [delimiter.join([*(f"{v:.3f}" for v in p), str(c)]) for p, c in zip(xyz, classes, strict=True)]
+    rows = [
+        delimiter.join([*(f"{v:.3f}" for v in p), str(c)])
+        for p, c in zip(xyz, classes, strict=True)
+    ]
     path.write_text("\n".join(([header] if header else []) + rows) + "\n")
     return path
 
@@ -90,7 +120,9 @@ FORMATS = {
     "ply big": lambda p, xyz, c: write_ply(p / "a.ply", xyz, c, "binary_big_endian"),
     "csv": lambda p, xyz, c: write_text(p / "a.csv", xyz, c),
     "semicolons": lambda p, xyz, c: write_text(p / "a.txt", xyz, c, ";", "X;Y;Z;Class"),
-    "commented header": lambda p, xyz, c: write_text(p / "a.xyz", xyz, c, " ", "//X Y Z Classification"),
+    "commented header": lambda p, xyz, c: write_text(
+        p / "a.xyz", xyz, c, " ", "//X Y Z Classification"
+    ),
 }
 
 
@@ -114,7 +146,9 @@ def test_chunks_and_boxes_agree_with_the_whole(tmp_path, name):
     assert max(map(len, chunks)) <= 64
     assert np.allclose(np.concatenate([c.xyz for c in chunks]), xyz, atol=1e-6)
     box = (85010.0, 446005.0, 85030.0, 446030.0)
-    inside = (xyz[:, 0] >= 85010) & (xyz[:, 0] <= 85030) & (xyz[:, 1] >= 446005) & (xyz[:, 1] <= 446030)
+    inside = (
+        (xyz[:, 0] >= 85010) & (xyz[:, 0] <= 85030) & (xyz[:, 1] >= 446005) & (xyz[:, 1] <= 446030)
+    )
     assert np.allclose(read_points(path, box=box).xyz, xyz[inside], atol=1e-6)
 
 
@@ -140,7 +174,10 @@ def test_crs_comes_from_the_header_and_the_setting_overrules_it(tmp_path):
     path = write_las(tmp_path / "a.laz", xyz, epsg=28992)
     assert read_points(path).crs.to_epsg() == 28992
     assert read_header(path).crs.to_epsg() == 28992
-    assert read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:7415"}})).crs.to_epsg() == 7415
+    assert (
+        read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:7415"}})).crs.to_epsg()
+        == 7415
+    )
     assert read_points(write_las(tmp_path / "b.las", xyz)).crs is None
 
 
@@ -159,7 +196,9 @@ def test_notes_and_lists_of_a_delivery_are_left_aside_and_said(tmp_path):
     cloud, points = write_las(tmp_path / "a.laz", xyz), write_text(tmp_path / "b.csv", xyz, classes)
     (tmp_path / "notes.txt").write_text("The delivery\nof 2023")
     (tmp_path / "tiles.csv").write_text("name,area\na,1\n")
-    with pytest.warns(InputWarning, match=r"text without points is left aside: notes\.txt, tiles\.csv"):
+    with pytest.warns(
+        InputWarning, match=r"text without points is left aside: notes\.txt, tiles\.csv"
+    ):
         assert expand_paths((tmp_path,)) == [cloud, points]
     cloud.unlink()
     points.unlink()
@@ -219,14 +258,19 @@ def write_rounded_text(path, xyz, plan, height):
     return write_text(path, np.rint(xyz / steps) * steps, np.zeros(len(xyz), int))
 
 
-@pytest.mark.parametrize(("write", "name"), [(write_coarse_las, "a.las"), (write_rounded_text, "a.csv")])
 @pytest.mark.parametrize(
-    ("plan", "height", "told"), [(1.0, 0.1, "1 m in plan and 0.1 m in height"), (0.001, 0.1, "0.1 m in height")]
+    ("write", "name"), [(write_coarse_las, "a.las"), (write_rounded_text, "a.csv")]
+)
+@pytest.mark.parametrize(
+    ("plan", "height", "told"),
+    [(1.0, 0.1, "1 m in plan and 0.1 m in height"), (0.001, 0.1, "0.1 m in height")],
 )
 def test_coordinates_in_coarse_steps_are_told_of_once(tmp_path, write, name, plan, height, told):
     header = read_header(write(tmp_path / name, some_points()[0], plan, height))
     others = [replace(header, path=other) for other in ("b", "c")]
-    with pytest.warns(InputWarning, match=f"{name} and 2 more: coordinates come in steps of {told}, and") as caught:
+    with pytest.warns(
+        InputWarning, match=f"{name} and 2 more: coordinates come in steps of {told}, and"
+    ) as caught:
         say_how_coarse([header, *others], METRES)
     assert len(caught) == 1
 
@@ -248,7 +292,10 @@ def test_steps_in_feet_are_told_in_metres(tmp_path):
 AS_TOLD = {
     "text as laz": ("bad.laz", b"1 2 3\n4 5 6\n"),
     "empty": ("bad.laz", b""),
-    "ply of faces": ("bad.ply", b"ply\nformat ascii 1.0\nelement face 2\nproperty int a\nend_header\n1\n2\n"),
+    "ply of faces": (
+        "bad.ply",
+        b"ply\nformat ascii 1.0\nelement face 2\nproperty int a\nend_header\n1\n2\n",
+    ),
     "ply without end": ("bad.ply", b"ply\nformat ascii 1.0\nelement vertex 2\n"),
     "prose": ("bad.txt", b"Dear reader, this is\nno point cloud at all\n"),
     "word among numbers": ("bad.xyz", b"1 2 3\n4 five 6\n"),
@@ -306,10 +353,22 @@ def damaged_points(tmp_path, kind):
 
 BAD = {
     **dict.fromkeys(("truncated laz", "truncated las", "header only", "garbled laz"), "truncated"),
-    **{"missing records": "4000000000 records", "text as laz": "rename it to .xyz", "empty": "an empty file"},
-    **{"missing": "no such file", "empty folder": "point files in the folder", "zero points": "got none"},
+    **{
+        "missing records": "4000000000 records",
+        "text as laz": "rename it to .xyz",
+        "empty": "an empty file",
+    },
+    **{
+        "missing": "no such file",
+        "empty folder": "point files in the folder",
+        "zero points": "got none",
+    },
     **{"truncated ply": "the file is truncated", "ply of faces": "'face' before the vertices"},
-    **{"ply without end": "does not end", "prose": "Dear reader", "word among numbers": "after 0 points"},
+    **{
+        "ply without end": "does not end",
+        "prose": "Dear reader",
+        "word among numbers": "after 0 points",
+    },
     **{"two columns": "nothing like a point", "binary text": "binary data"},
     **{
         "degrees": "in degrees",
@@ -331,8 +390,13 @@ def test_what_cannot_be_read_gets_one_full_sentence(tmp_path, kind):
 
 def test_files_in_different_crs_are_refused(tmp_path):
     xyz, _ = some_points(20)
-    files = write_las(tmp_path / "a.laz", xyz, epsg=28992), write_las(tmp_path / "b.laz", xyz, epsg=25832)
-    with pytest.raises(InputError, match=r"in one CRS, got EPSG:28992 .*a\.laz and EPSG:25832 .*b\.laz"):
+    files = (
+        write_las(tmp_path / "a.laz", xyz, epsg=28992),
+        write_las(tmp_path / "b.laz", xyz, epsg=25832),
+    )
+    with pytest.raises(
+        InputError, match=r"in one CRS, got EPSG:28992 .*a\.laz and EPSG:25832 .*b\.laz"
+    ):
         read_points(*files)
 
 

@@ -1,4 +1,6 @@
-"""Rasters of all kinds give true heights in metres, or are refused in one sentence before any height is read."""
+"""Rasters of all kinds give true heights in metres, or are refused in one sentence before any
+height is read.
+"""
 
 import doctest
 
@@ -21,16 +23,38 @@ def height(xy):
     return 12.0 + 0.1 * (xy[:, 0] - WEST) + 0.05 * (xy[:, 1] - NORTH)
 
 
-def write(path, heights=None, transform=None, crs="EPSG:28992", dtype="float64", bands=1, setup=None, **options):
-    """A raster of 40 by 40 pixels of a metre that holds `heights` of its pixel centres, by default of a plane."""
+def write(
+    path,
+    heights=None,
+    transform=None,
+    crs="EPSG:28992",
+    dtype="float64",
+    bands=1,
+    setup=None,
+    **options,
+):
+    """A raster of 40 by 40 pixels of a metre that holds `heights` of its pixel centres, by default
+    of a plane.
+    """
     transform = transform or from_origin(WEST, NORTH, 1, 1)
     rows, columns = np.mgrid[:SIDE, :SIDE] + 0.5
     x, y = (
         transform.a * columns + transform.b * rows + transform.c,
         transform.d * columns + transform.e * rows + transform.f,
     )
-    values = height(np.column_stack([x.ravel(), y.ravel()])).reshape(SIDE, SIDE) if heights is None else heights
-    options = {"driver": "GTiff", "width": SIDE, "height": SIDE, "count": bands, "dtype": dtype, **options}
+    values = (
+        height(np.column_stack([x.ravel(), y.ravel()])).reshape(SIDE, SIDE)
+        if heights is None
+        else heights
+    )
+    options = {
+        "driver": "GTiff",
+        "width": SIDE,
+        "height": SIDE,
+        "count": bands,
+        "dtype": dtype,
+        **options,
+    }
     with rasterio.open(path, "w", crs=crs, transform=transform, **options) as file:
         file.write(np.broadcast_to(values, (bands, SIDE, SIDE)).astype(dtype))
         if setup:
@@ -49,12 +73,26 @@ def test_examples_in_the_docstrings_run():
 @pytest.mark.parametrize(
     "name, metres",
     [
-        ("m", 1.0), ("Metres above NAP", 1.0), ("m+NAP", 1.0), ("[m]", 1.0), ("", 1.0), ("unknown", 1.0),
-        ("decimetre", 0.1), ("dm", 0.1), ("cm", 0.01), ("millimeters", 0.001),
-        ("ft", 0.3048), ("Feet", 0.3048), ("foot (international)", 0.3048), ("feet above sea level", 0.3048),
-        ("US survey foot", 1200 / 3937), ("ftUS", 1200 / 3937), ("us-ft", 1200 / 3937), ("Foot_US", 1200 / 3937),
+        ("m", 1.0),
+        ("Metres above NAP", 1.0),
+        ("m+NAP", 1.0),
+        ("[m]", 1.0),
+        ("", 1.0),
+        ("unknown", 1.0),
+        ("decimetre", 0.1),
+        ("dm", 0.1),
+        ("cm", 0.01),
+        ("millimeters", 0.001),
+        ("ft", 0.3048),
+        ("Feet", 0.3048),
+        ("foot (international)", 0.3048),
+        ("feet above sea level", 0.3048),
+        ("US survey foot", 1200 / 3937),
+        ("ftUS", 1200 / 3937),
+        ("us-ft", 1200 / 3937),
+        ("Foot_US", 1200 / 3937),
     ],
-)  # fmt: skip
+)
 def test_the_unit_of_the_band_counts(tmp_path, name, metres):
     path = write(tmp_path / "dtm.tif", setup=lambda file: setattr(file, "units", (name,)))
     assert found(path) == pytest.approx(metres * height(PLACE)[0], abs=1e-9)
@@ -63,16 +101,22 @@ def test_the_unit_of_the_band_counts(tmp_path, name, metres):
 @pytest.mark.parametrize("name", ["degree", "K", "counts", "percent"])
 def test_a_unit_that_is_no_length_is_refused(tmp_path, name):
     path = write(tmp_path / "dtm.tif", setup=lambda file: setattr(file, "units", (name,)))
-    with pytest.raises(InputError, match=f"expected heights in metres or feet .* got a band in '{name}'"):
+    with pytest.raises(
+        InputError, match=f"expected heights in metres or feet .* got a band in '{name}'"
+    ):
         read_terrain(path)
 
 
-@pytest.mark.parametrize("scale, offset, unit", [(0.1, 0.0, ""), (1.0, 10.0, ""), (0.01, -5.0, "m"), (0.5, 2.0, "ft")])
+@pytest.mark.parametrize(
+    "scale, offset, unit", [(0.1, 0.0, ""), (1.0, 10.0, ""), (0.01, -5.0, "m"), (0.5, 2.0, "ft")]
+)
 def test_scale_and_offset_of_the_band_count(tmp_path, scale, offset, unit):
     def scaled(file):
         file.scales, file.offsets, file.units = (scale,), (offset,), (unit,)
 
-    path = write(tmp_path / "dtm.tif", np.full((SIDE, SIDE), -20), dtype="int16", nodata=-32768, setup=scaled)
+    path = write(
+        tmp_path / "dtm.tif", np.full((SIDE, SIDE), -20), dtype="int16", nodata=-32768, setup=scaled
+    )
     assert found(path) == pytest.approx((-20 * scale + offset) * (0.3048 if unit == "ft" else 1.0))
 
 
@@ -92,10 +136,19 @@ def test_a_scale_of_0_is_refused(tmp_path):
     ],
 )
 def test_a_raster_lies_where_its_geotransform_says(tmp_path, transform):
-    assert found(write(tmp_path / "dtm.tif", transform=transform)) == pytest.approx(height(PLACE)[0], abs=1e-6)
+    assert found(write(tmp_path / "dtm.tif", transform=transform)) == pytest.approx(
+        height(PLACE)[0], abs=1e-6
+    )
 
 
-@pytest.mark.parametrize("transform", [Affine(0, 0, WEST, 0, 0, NORTH), Affine(1, 1, WEST, 1, 1, NORTH), Affine(1, 0, WEST, 0, np.nan, NORTH)])  # fmt: skip
+@pytest.mark.parametrize(
+    "transform",
+    [
+        Affine(0, 0, WEST, 0, 0, NORTH),
+        Affine(1, 1, WEST, 1, 1, NORTH),
+        Affine(1, 0, WEST, 0, np.nan, NORTH),
+    ],
+)
 def test_a_singular_geotransform_is_refused(tmp_path, transform):
     with pytest.raises(InputError, match="pixels have an area"):
         read_terrain(write(tmp_path / "dtm.tif", transform=transform))
@@ -107,7 +160,10 @@ def test_a_crs_alone_is_no_position(tmp_path):
         read_terrain(write(tmp_path / "dtm.tif", transform=Affine.identity()))
 
 
-@pytest.mark.parametrize("nodata, dtype", [(-32768, "int16"), (65535, "uint16"), (0, "uint8"), (np.nan, "float32"), (-9999, "int32")])  # fmt: skip
+@pytest.mark.parametrize(
+    "nodata, dtype",
+    [(-32768, "int16"), (65535, "uint16"), (0, "uint8"), (np.nan, "float32"), (-9999, "int32")],
+)
 def test_declared_nodata_of_any_type_is_no_height(tmp_path, nodata, dtype):
     heights = np.full((SIDE, SIDE), 7.0)
     heights[:, :20] = nodata
@@ -129,7 +185,9 @@ def half_transparent(file):
     file.write(alpha.astype("float64"), 2)
 
 
-@pytest.mark.parametrize("options", [{"setup": half_masked}, {"bands": 2, "alpha": "yes", "setup": half_transparent}])
+@pytest.mark.parametrize(
+    "options", [{"setup": half_masked}, {"bands": 2, "alpha": "yes", "setup": half_transparent}]
+)
 @pytest.mark.filterwarnings("error::hiproof.errors.InputWarning")
 def test_masked_and_transparent_pixels_are_no_heights(tmp_path, options):
     model = read_terrain(write(tmp_path / "dtm.tif", **options))
@@ -138,7 +196,9 @@ def test_masked_and_transparent_pixels_are_no_heights(tmp_path, options):
 
 
 def test_of_several_bands_the_first_is_taken_and_named(tmp_path):
-    path = write(tmp_path / "dtm.tif", bands=3, setup=lambda file: file.write(np.zeros((SIDE, SIDE)), 2))
+    path = write(
+        tmp_path / "dtm.tif", bands=3, setup=lambda file: file.write(np.zeros((SIDE, SIDE)), 2)
+    )
     with pytest.warns(InputWarning, match="has 3 bands; the heights are taken from band 1"):
         assert found(path) == pytest.approx(height(PLACE)[0])
 
@@ -202,8 +262,10 @@ def test_heights_that_others_come_near_stay(tmp_path):
 def test_a_virtual_raster_whose_source_is_missing_says_so_when_it_is_asked(tmp_path):
     source = write(tmp_path / "tile.tif")
     text = f"""<VRTDataset rasterXSize="{SIDE}" rasterYSize="{SIDE}"><SRS>EPSG:28992</SRS>
-    <GeoTransform>{WEST}, 1, 0, {NORTH}, 0, -1</GeoTransform><VRTRasterBand dataType="Float64" band="1"><SimpleSource>
-    <SourceFilename relativeToVRT="1">tile.tif</SourceFilename><SourceBand>1</SourceBand></SimpleSource></VRTRasterBand>
+    <GeoTransform>{WEST}, 1, 0, {NORTH}, 0, -1</GeoTransform>
+    <VRTRasterBand dataType="Float64" band="1"><SimpleSource>
+    <SourceFilename relativeToVRT="1">tile.tif</SourceFilename><SourceBand>1</SourceBand>
+    </SimpleSource></VRTRasterBand>
     </VRTDataset>"""
     (tmp_path / "all.vrt").write_text(text)
     assert found(tmp_path / "all.vrt") == pytest.approx(height(PLACE)[0])

@@ -1,4 +1,6 @@
-"""Solids come back from CityJSON, CityJSONSeq and CityGML as they were, and broken files say what is wrong."""
+"""Solids come back from CityJSON, CityJSONSeq and CityGML as they were, and broken files say what
+is wrong.
+"""
 
 import json
 from pathlib import Path
@@ -18,7 +20,9 @@ OTHER_SURFACES = [{"type": "RoofSurface"}, {"type": "WallSurface"}, {"type": "Gr
 
 
 def city_object(kind="Solid"):
-    """A building whose geometry is SOLID in the given kind of boundary, two of them where the kind holds several."""
+    """A building whose geometry is SOLID in the given kind of boundary, two of them where the kind
+    holds several.
+    """
     shell = [[list(ring) for ring in face.rings] for face in SOLID.faces]
     kinds = [surface["type"] for surface in OTHER_SURFACES]
     values = [kinds.index(face.kind) for face in SOLID.faces]
@@ -27,7 +31,9 @@ def city_object(kind="Solid"):
     semantics = {"surfaces": OTHER_SURFACES, "values": values}
     return {
         "type": "Building",
-        "geometry": [{"type": kind, "lod": "2.2", "boundaries": boundaries, "semantics": semantics}],
+        "geometry": [
+            {"type": kind, "lod": "2.2", "boundaries": boundaries, "semantics": semantics}
+        ],
     }
 
 
@@ -56,14 +62,20 @@ def gml(xlinked=True, points="posList"):
     def polygon(k, face):
         rings = [f"<gml:LinearRing>{ring_text(ring)}</gml:LinearRing>" for ring in face.rings]
         holes = "".join(f"<gml:interior>{ring}</gml:interior>" for ring in rings[1:])
-        return f'<gml:Polygon gml:id="p{k}"><gml:exterior>{rings[0]}</gml:exterior>{holes}</gml:Polygon>'
+        return (
+            "<gml:Polygon "
+            f'gml:id="p{k}"><gml:exterior>{rings[0]}</gml:exterior>{holes}</gml:Polygon>'
+        )
 
     surfaces, members = "", ""
     for k, face in enumerate(SOLID.faces):
         if xlinked:
             members += f'<gml:surfaceMember xlink:href="#p{k}"/>'
-            surface = f"<gml:MultiSurface><gml:surfaceMember>{polygon(k, face)}</gml:surfaceMember></gml:MultiSurface>"
-            surface = f"<bldg:{face.kind}><bldg:lod2MultiSurface>{surface}</bldg:lod2MultiSurface></bldg:{face.kind}>"
+            surface = polygon(k, face)
+            surface = f"<gml:surfaceMember>{surface}</gml:surfaceMember>"
+            surface = f"<gml:MultiSurface>{surface}</gml:MultiSurface>"
+            surface = f"<bldg:lod2MultiSurface>{surface}</bldg:lod2MultiSurface>"
+            surface = f"<bldg:{face.kind}>{surface}</bldg:{face.kind}>"
             surfaces += f"<bldg:boundedBy>{surface}</bldg:boundedBy>"
         else:
             members += f"<gml:surfaceMember>{polygon(k, face)}</gml:surfaceMember>"
@@ -71,7 +83,8 @@ def gml(xlinked=True, points="posList"):
     building = f"<bldg:lod2Solid><gml:Solid>{shell}</gml:Solid></bldg:lod2Solid>{surfaces}"
     building = f'<bldg:Building gml:id="house">{building}</bldg:Building>'
     names = (
-        'xmlns="http://www.opengis.net/citygml/2.0" xmlns:bldg="http://www.opengis.net/citygml/building/2.0"'
+        'xmlns="http://www.opengis.net/citygml/2.0" '
+        'xmlns:bldg="http://www.opengis.net/citygml/building/2.0"'
         ' xmlns:gml="http://www.opengis.net/gml" xmlns:xlink="http://www.w3.org/1999/xlink"'
     )
     return f"<CityModel {names}><cityObjectMember>{building}</cityObjectMember></CityModel>"
@@ -111,10 +124,14 @@ def test_solid_comes_back(tmp_path, name):
     assert solid.volume == pytest.approx(SOLID.volume)
     if name != "by_value.gml":
         kinds = ("RoofSurface", "WallSurface", "GroundSurface")
-        assert [len(solid.of_kind(kind)) for kind in kinds] == [len(SOLID.of_kind(kind)) for kind in kinds]
+        assert [len(solid.of_kind(kind)) for kind in kinds] == [
+            len(SOLID.of_kind(kind)) for kind in kinds
+        ]
 
 
-@pytest.mark.parametrize(("kind", "ids"), [("MultiSurface", 1), ("CompositeSolid", 2), ("MultiSolid", 2)])
+@pytest.mark.parametrize(
+    ("kind", "ids"), [("MultiSurface", 1), ("CompositeSolid", 2), ("MultiSolid", 2)]
+)
 def test_other_geometries_come_out_shell_by_shell(tmp_path, kind, ids):
     found = list(read_solids(written(tmp_path, "a.city.json", json.dumps(city(kind)))))
     assert [name for name, _ in found] == ["house", "house#2"][:ids]
@@ -176,7 +193,9 @@ def test_broken_file_raises_a_sentence(tmp_path, name):
 
 
 def test_missing_and_binary_files_raise_a_sentence(tmp_path):
-    with pytest.raises(InputError, match=r"got the folder .*; name one in it, such as buildings\.city\.jsonl"):
+    with pytest.raises(
+        InputError, match=r"got the folder .*; name one in it, such as buildings\.city\.jsonl"
+    ):
         list(read_solids(tmp_path))
     with pytest.raises(InputError, match="got none"):
         list(read_solids(tmp_path / "none.json"))
@@ -185,10 +204,15 @@ def test_missing_and_binary_files_raise_a_sentence(tmp_path):
         list(read_solids(tmp_path / "binary.json"))
 
 
-@pytest.mark.skipif(not DEN_HAAG.exists(), reason="needs The Hague's city model in ../shared/data/denhaag")
+@pytest.mark.skipif(
+    not DEN_HAAG.exists(), reason="needs The Hague's city model in ../shared/data/denhaag"
+)
 def test_the_hague_reads_whole_and_most_of_it_is_valid():
     solids = dict(read_solids(DEN_HAAG))
     assert len(solids) == 1990
-    codes = [tuple(sorted({f.code for f in check_solid(solid, planarity_m=0.01)})) for solid in solids.values()]
+    codes = [
+        tuple(sorted({f.code for f in check_solid(solid, planarity_m=0.01)}))
+        for solid in solids.values()
+    ]
     assert codes.count(()) > 1800
     assert set(codes) <= {(), (102,), (104,), (203,)}

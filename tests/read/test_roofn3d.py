@@ -10,7 +10,10 @@ import hiproof.read.roofn3d
 from hiproof.errors import InputError, InputWarning
 from hiproof.read.roofn3d import read_roofn3d, read_roofn3d_labels
 
-HEADER = "id,class,points,outline,unassignedsurfacegrowingpoints,unassignedsubsurfacegrowingpoints,brep\n"
+HEADER = (
+    "id,class,points,outline,unassignedsurfacegrowingpoints,"
+    "unassignedsubsurfacegrowingpoints,brep\n"
+)
 SURFACES = "id,points,outline,plane_a,plane_b,plane_c,plane_d,fk_buildings\n"
 OUTLINE = "MULTIPOLYGON(((0 0,9 0,9 6,0 6,0 0)))"
 BREP = "MULTIPOLYGON Z (((0 0 3,9 0 3,9 3 5,0 3 5,0 0 3)))"
@@ -21,28 +24,50 @@ def multipoint(points):
 
 
 def roof(seed, count=40):
-    return np.round(np.random.default_rng(seed).uniform([586000, 4500000, 10], [586009, 4500006, 15], (count, 3)), 3)
+    return np.round(
+        np.random.default_rng(seed).uniform(
+            [586000, 4500000, 10], [586009, 4500006, 15], (count, 3)
+        ),
+        3,
+    )
 
 
 def row(id, class_name, points):
-    return f'{id},{class_name},"{multipoint(points)}","{OUTLINE}",,"{multipoint(points[:2])}","{BREP}"\n'
+    few = multipoint(points[:2])
+    return f'{id},{class_name},"{multipoint(points)}","{OUTLINE}",,"{few}","{BREP}"\n'
 
 
 @pytest.fixture
 def buildings(tmp_path):
     path = tmp_path / "roofn3d_buildings.csv"
-    classes = ["Saddleback roof", "Two-sided hip roof", "Pyramid roof", "Saddleback roof", "Onion dome"]
+    classes = [
+        "Saddleback roof",
+        "Two-sided hip roof",
+        "Pyramid roof",
+        "Saddleback roof",
+        "Onion dome",
+    ]
     ids = [7, 8, 9, 7, 10]
-    path.write_text(HEADER + "".join(row(i, c, roof(k)) for k, (i, c) in enumerate(zip(ids, classes, strict=True))))
+    path.write_text(
+        HEADER
+        + "".join(row(i, c, roof(k)) for k, (i, c) in enumerate(zip(ids, classes, strict=True)))
+    )
     return path
 
 
 def test_buildings_come_back_once_with_our_names_of_their_types(buildings):
     with pytest.warns(InputWarning, match="1 row with the id"):
         records = list(read_roofn3d(buildings))
-    assert [(r.id, r.type) for r in records] == [("7", "gable"), ("8", "hip"), ("9", "pyramid"), ("10", None)]
+    assert [(r.id, r.type) for r in records] == [
+        ("7", "gable"),
+        ("8", "hip"),
+        ("9", "pyramid"),
+        ("10", None),
+    ]
     assert records[3].class_name == "Onion dome"
-    assert np.array_equal(records[0].points, roof(0)) and records[0].outline.equals(shapely.box(0, 0, 9, 6))
+    assert np.array_equal(records[0].points, roof(0)) and records[0].outline.equals(
+        shapely.box(0, 0, 9, 6)
+    )
 
 
 def test_labels_are_found_by_coordinates(buildings, tmp_path):
@@ -51,7 +76,10 @@ def test_labels_are_found_by_coordinates(buildings, tmp_path):
     rows = [f'{k},"{multipoint(p)}","{BREP}",0,0.5,1,-3,{b}\n' for k, (b, p) in enumerate(pieces)]
     path.write_text(SURFACES + "".join(rows))
     with pytest.warns(InputWarning):
-        labels = {record.id: label.tolist() for record, label in read_roofn3d_labels(path, read_roofn3d(buildings))}
+        labels = {
+            record.id: label.tolist()
+            for record, label in read_roofn3d_labels(path, read_roofn3d(buildings))
+        }
     assert labels["7"] == [-1] * 5 + [0] * 15 + [1] * 12 + [-1] * 8
     assert labels["8"] == [0] * 10 + [-1] * 20 + [1] * 10
     assert set(labels["9"]) == {-1}
@@ -59,7 +87,9 @@ def test_labels_are_found_by_coordinates(buildings, tmp_path):
 
 def test_a_field_of_megabytes_and_empty_fields_are_read(tmp_path):
     path = tmp_path / "big.csv"
-    path.write_text(HEADER + row(1, "Pyramid roof", roof(0, 50_000)) + "2,Pyramid roof,,,,,\n3,Pyramid roof\n")
+    path.write_text(
+        HEADER + row(1, "Pyramid roof", roof(0, 50_000)) + "2,Pyramid roof,,,,,\n3,Pyramid roof\n"
+    )
     records = list(read_roofn3d(path))
     assert [len(r.points) for r in records] == [50_000, 0, 0] and records[1].outline.is_empty
 

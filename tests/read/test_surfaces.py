@@ -1,4 +1,6 @@
-"""Bodies and surfaces in space given as footprints: the outline is the area that they cover from above."""
+"""Bodies and surfaces in space given as footprints: the outline is the area that they cover from
+above.
+"""
 
 import doctest
 import itertools
@@ -26,7 +28,10 @@ POLYHEDRON, TIN, TRIANGLE = 15, 16, 17
 def body(ring, low=100.0, high=106.0):
     """Faces of a block on `ring`, top and bottom first."""
     ring = [(x + X, y + Y) for x, y in ring]
-    walls = [[(*a, low), (*b, low), (*b, high), (*a, high), (*a, low)] for a, b in itertools.pairwise(ring)]
+    walls = [
+        [(*a, low), (*b, low), (*b, high), (*a, high), (*a, low)]
+        for a, b in itertools.pairwise(ring)
+    ]
     return [[(x, y, z) for x, y in ring] for z in (low, high)] + walls
 
 
@@ -38,7 +43,8 @@ def triangles(faces):
 def surface(kind, member, rings, order="<", add=1000):
     start = struct.pack(f"{order}BII", order == "<", kind + add, len(rings))
     parts = [
-        struct.pack(f"{order}BIII", order == "<", member + add, 1, len(ring)) + np.array(ring, f"{order}f8").tobytes()
+        struct.pack(f"{order}BIII", order == "<", member + add, 1, len(ring))
+        + np.array(ring, f"{order}f8").tobytes()
         for ring in rings
     ]
     return start + b"".join(parts)
@@ -60,16 +66,26 @@ KINDS = {
     "polyhedral surface": (surface(POLYHEDRON, 3, body(ELL)), [90.0]),
     "multipolygon": (surface(6, 3, body(ELL)), [90.0]),
     "collection": (collection(surface(TIN, TRIANGLE, triangles(body(SQUARE)))), [108.0]),
-    "collection in a collection": (collection(collection(surface(POLYHEDRON, 3, body(ELL)))), [90.0]),
-    "collection of two bodies": (collection(*[surface(POLYHEDRON, 3, body(r)) for r in (SQUARE, AWAY)]), [108.0] * 2),
+    "collection in a collection": (
+        collection(collection(surface(POLYHEDRON, 3, body(ELL)))),
+        [90.0],
+    ),
+    "collection of two bodies": (
+        collection(*[surface(POLYHEDRON, 3, body(r)) for r in (SQUARE, AWAY)]),
+        [108.0] * 2,
+    ),
     "tower on a house": (
         collection(
-            surface(POLYHEDRON, 3, body(SQUARE)), surface(6, 3, body([(x / 3, y / 3) for x, y in SQUARE], 106, 120))
+            surface(POLYHEDRON, 3, body(SQUARE)),
+            surface(6, 3, body([(x / 3, y / 3) for x, y in SQUARE], 106, 120)),
         ),
         [108.0],
     ),
     "roofs alone": (surface(6, 3, ROOFS), [108.0]),
-    "roofs a hair apart": (surface(6, 3, [ROOFS[0], [(x, y + 4e-4, z) for x, y, z in ROOFS[1]]]), [108.0]),
+    "roofs a hair apart": (
+        surface(6, 3, [ROOFS[0], [(x, y + 4e-4, z) for x, y, z in ROOFS[1]]]),
+        [108.0],
+    ),
     "a triangle": (
         surface(6, 3, [])[:0]
         + struct.pack("<BIII", 1, 1017, 1, 4)
@@ -88,9 +104,13 @@ def write(path, declared, *geometries):
     """A GeoPackage of a layer that is declared so, whatever its geometries are."""
     box = shapely.to_wkb([shapely.box(X, Y, X + 1, Y + 1)] * len(geometries)).astype(object)
     ids = np.array([f"h{i}" for i in range(len(geometries))], object)
-    pyogrio.raw.write(str(path), box, [ids], ["id"], geometry_type="Polygon", crs="EPSG:32633", SPATIAL_INDEX="NO")
+    pyogrio.raw.write(
+        str(path), box, [ids], ["id"], geometry_type="Polygon", crs="EPSG:32633", SPATIAL_INDEX="NO"
+    )
     with sqlite3.connect(path) as base:
-        for (trigger,) in base.execute("select name from sqlite_master where type = 'trigger'").fetchall():
+        for (trigger,) in base.execute(
+            "select name from sqlite_master where type = 'trigger'"
+        ).fetchall():
             base.execute(f'drop trigger "{trigger}"')
         head = b"GP\0\1" + struct.pack("<i", 32633)
         rows = [(head + geometry, id) for geometry, id in zip(geometries, ids, strict=True)]
@@ -105,8 +125,12 @@ def test_each_body_has_the_outline_of_its_faces_from_above(tmp_path, kind):
     path = write(tmp_path / "a.gpkg", "GEOMETRY", geometry)
     footprints = read_footprints(path)
     assert [footprint.polygon.area for footprint in footprints] == pytest.approx(areas, abs=0.02)
-    assert [footprint.id for footprint in footprints] == (["h0"] if len(areas) == 1 else ["h0-1", "h0-2"])
-    assert all(footprint.polygon.is_valid and not footprint.polygon.interiors for footprint in footprints)
+    assert [footprint.id for footprint in footprints] == (
+        ["h0"] if len(areas) == 1 else ["h0-1", "h0-2"]
+    )
+    assert all(
+        footprint.polygon.is_valid and not footprint.polygon.interiors for footprint in footprints
+    )
 
 
 @pytest.mark.parametrize("declared", ["TIN", "POLYHEDRALSURFACE", "GEOMETRY"])
@@ -119,7 +143,9 @@ def test_layers_that_pyogrio_refuses_are_read(tmp_path, declared):
         assert [footprint.id for footprint in read_footprints(path)] == ["h0", "h1", "h2"]
     for layer in ("a", 0):
         assert len(read_footprints(path, layer=layer)) == 3
-    (chosen,) = read_footprints(path, where="id = 'h1'", target_crs="EPSG:32633", bbox=(X + 21, Y, X + 22, Y + 1))
+    (chosen,) = read_footprints(
+        path, where="id = 'h1'", target_crs="EPSG:32633", bbox=(X + 21, Y, X + 22, Y + 1)
+    )
     assert chosen.id == "h1" and chosen.polygon.area == pytest.approx(108.0)
     with pytest.raises(InputError, match="it has a"):
         read_footprints(path, layer="b")
@@ -128,31 +154,51 @@ def test_layers_that_pyogrio_refuses_are_read(tmp_path, declared):
 def test_one_refused_layer_among_others_is_listed(tmp_path):
     path = write(tmp_path / "a.gpkg", "TIN", surface(TIN, TRIANGLE, triangles(body(SQUARE))))
     wkb = shapely.to_wkb([shapely.box(0, 0, 5, 5)]).astype(object)
-    pyogrio.raw.write(str(path), wkb, [], [], layer="sheds", geometry_type="Polygon", crs="EPSG:32633", append=True)
+    pyogrio.raw.write(
+        str(path),
+        wkb,
+        [],
+        [],
+        layer="sheds",
+        geometry_type="Polygon",
+        crs="EPSG:32633",
+        append=True,
+    )
     with pytest.raises(InputError, match="got 2: a, sheds; name one with --layer"):
         read_footprints(path)
     assert [len(read_footprints(path, layer=layer)) for layer in ("a", "sheds")] == [1, 1]
 
 
 def test_polygons_of_one_feature_that_overlap_are_one_and_those_beside_each_other_several():
-    house, annex, other = shapely.box(0, 0, 10, 10), shapely.box(8, 0, 14, 6), shapely.box(10, 0, 15, 10)
+    house, annex, other = (
+        shapely.box(0, 0, 10, 10),
+        shapely.box(8, 0, 14, 6),
+        shapely.box(10, 0, 15, 10),
+    )
     (whole,) = simple_polygons(shapely.MultiPolygon([house, annex]))
     assert whole.area == pytest.approx(124.0)
-    assert [polygon.area for polygon in simple_polygons(shapely.MultiPolygon([house, other]))] == [100.0, 50.0]
+    assert [polygon.area for polygon in simple_polygons(shapely.MultiPolygon([house, other]))] == [
+        100.0,
+        50.0,
+    ]
     level = shapely.force_3d(shapely.MultiPolygon([house, other]), 4.0)
     assert not is_surface(level) and not is_surface(house) and not is_surface(None)
 
 
 def test_a_wall_alone_has_no_outline(tmp_path):
     wall = body(SQUARE)[2]
-    (footprint,) = read_footprints(write(tmp_path / "a.gpkg", "GEOMETRY", surface(6, 3, [wall, wall])))
+    (footprint,) = read_footprints(
+        write(tmp_path / "a.gpkg", "GEOMETRY", surface(6, 3, [wall, wall]))
+    )
     assert footprint.polygon.is_empty
 
 
 def test_closed_lines_are_refused_in_one_sentence(tmp_path):
     line = {"type": "LineString", "coordinates": [[x / 1e4, y / 1e4] for x, y in SQUARE]}
     features = [{"type": "Feature", "properties": {}, "geometry": line}]
-    (tmp_path / "a.geojson").write_text(json.dumps({"type": "FeatureCollection", "features": features}))
+    (tmp_path / "a.geojson").write_text(
+        json.dumps({"type": "FeatureCollection", "features": features})
+    )
     with pytest.raises(InputError, match=r"expected polygons in .* got LineString"):
         read_footprints(tmp_path / "a.geojson")
 
@@ -160,9 +206,15 @@ def test_closed_lines_are_refused_in_one_sentence(tmp_path):
 def test_wkb_of_postgis_is_renamed_too_and_damaged_wkb_left_alone():
     flags = 0x80000000 | 0x20000000
     faces = surface(TIN, TRIANGLE, triangles(body(SQUARE)), add=0x80000000)
-    ewkb = faces[:1] + struct.pack("<IiI", TIN | flags, 32633, struct.unpack_from("<I", faces, 5)[0]) + faces[9:]
+    ewkb = (
+        faces[:1]
+        + struct.pack("<IiI", TIN | flags, 32633, struct.unpack_from("<I", faces, 5)[0])
+        + faces[9:]
+    )
     (geometry,) = geometries_of(np.array([ewkb], object))
     assert geometry.geom_type == "MultiPolygon" and shapely.get_srid(geometry) == 32633
     assert as_polygons(ewkb[:100]) == ewkb[:100]
-    cut, curve, none = geometries_of(np.array([ewkb[:100], struct.pack("<BII", 1, 10, 0), None], object))
+    cut, curve, none = geometries_of(
+        np.array([ewkb[:100], struct.pack("<BII", 1, 10, 0), None], object)
+    )
     assert cut is None and curve is None and none is None

@@ -1,4 +1,6 @@
-"""Every terrain gives back the plane it was made from, says NaN where it does not know, and names its source."""
+"""Every terrain gives back the plane it was made from, says NaN where it does not know, and names
+its source.
+"""
 
 import doctest
 import pickle
@@ -29,7 +31,14 @@ def write_raster(path, width=120, height=80, step=0.5, crs="EPSG:28992", hole=No
     z = plane(np.column_stack([x, y])).reshape(height, width) if heights is None else heights
     if hole is not None:
         z[hole] = -9999
-    options = {"driver": "GTiff", "width": width, "height": height, "count": 1, "dtype": "float64", "nodata": -9999}
+    options = {
+        "driver": "GTiff",
+        "width": width,
+        "height": height,
+        "count": 1,
+        "dtype": "float64",
+        "nodata": -9999,
+    }
     with rasterio.open(path, "w", crs=crs, transform=transform, **options) as file:
         file.write(z, 1)
     return path
@@ -69,19 +78,30 @@ def test_tiles_change_nothing(tmp_path, monkeypatch):
 def test_a_raster_in_another_crs_is_asked_there(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif"), crs="EPSG:25831")
     there = Transformer.from_crs(28992, 25831, always_xy=True)
-    assert np.allclose(model.height_at(np.column_stack(there.transform(*inside().T))), plane(inside()), atol=1e-4)
+    assert np.allclose(
+        model.height_at(np.column_stack(there.transform(*inside().T))), plane(inside()), atol=1e-4
+    )
     assert read_terrain(tmp_path / "dtm.tif", crs="EPSG:7415").transformer is None
 
 
 def test_a_raster_survives_the_way_to_another_process(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif"), crs="EPSG:25831")
-    there = np.column_stack(Transformer.from_crs(28992, 25831, always_xy=True).transform(*inside().T))
-    assert np.array_equal(pickle.loads(pickle.dumps(model)).height_at(there), model.height_at(there))
+    there = np.column_stack(
+        Transformer.from_crs(28992, 25831, always_xy=True).transform(*inside().T)
+    )
+    assert np.array_equal(
+        pickle.loads(pickle.dumps(model)).height_at(there), model.height_at(there)
+    )
 
 
 def test_outside_and_without_data_is_unknown(tmp_path):
     model = read_terrain(write_raster(tmp_path / "dtm.tif", hole=(slice(20, 40), slice(20, 40))))
-    outside = [[WEST - 1, NORTH - 5], [WEST + 61, NORTH - 5], [WEST + 5, NORTH + 1], [WEST + 5, NORTH - 41]]
+    outside = [
+        [WEST - 1, NORTH - 5],
+        [WEST + 61, NORTH - 5],
+        [WEST + 5, NORTH + 1],
+        [WEST + 5, NORTH - 41],
+    ]
     assert np.isnan(model.height_at(np.array(outside))).all()
     assert np.isnan(model.height_at(np.array([[WEST + 15, NORTH - 15]]))).all()
     edge = np.array([[WEST + 9.9, NORTH - 15.0], [WEST, NORTH], [WEST + 60, NORTH - 40]])
@@ -89,11 +109,15 @@ def test_outside_and_without_data_is_unknown(tmp_path):
 
 
 @pytest.mark.parametrize("nothing", [3.4028234663852886e38, -3.4e38, np.inf, np.nan])
-def test_heights_that_no_ground_has_are_unknown_although_the_raster_does_not_say_so(tmp_path, nothing):
+def test_heights_that_no_ground_has_are_unknown_although_the_raster_does_not_say_so(
+    tmp_path, nothing
+):
     heights = np.full((80, 120), 2.0)
     heights[:, :60] = nothing
     model = read_terrain(write_raster(tmp_path / "dtm.tif", heights=heights))
-    found = model.height_at(np.array([[WEST + 10, NORTH - 20], [WEST + 29.8, NORTH - 20], [WEST + 50, NORTH - 20]]))
+    found = model.height_at(
+        np.array([[WEST + 10, NORTH - 20], [WEST + 29.8, NORTH - 20], [WEST + 50, NORTH - 20]])
+    )
     assert np.isnan(found[0]) and found[1:].tolist() == [2.0, 2.0]
 
 
@@ -156,14 +180,18 @@ def test_what_is_no_terrain_model_gets_one_full_sentence(tmp_path, kind, words):
     elif kind == "empty":
         path.write_bytes(b"")
     elif kind == "unplaced":
-        with rasterio.open(path, "w", driver="GTiff", width=4, height=4, count=1, dtype="float32") as file:
+        with rasterio.open(
+            path, "w", driver="GTiff", width=4, height=4, count=1, dtype="float32"
+        ) as file:
             file.write(np.zeros((4, 4), "float32"), 1)
     with pytest.raises(InputError, match=words):
         read_terrain(path)
 
 
 def test_a_truncated_raster_says_so_when_it_is_read(tmp_path):
-    path = write_raster(tmp_path / "dtm.tif", heights=np.random.default_rng(0).normal(size=(80, 120)))
+    path = write_raster(
+        tmp_path / "dtm.tif", heights=np.random.default_rng(0).normal(size=(80, 120))
+    )
     path.write_bytes(path.read_bytes()[:30000])
     with pytest.raises(InputError, match="raster"):
         read_terrain(path).height_at(inside())

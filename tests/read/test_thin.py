@@ -26,7 +26,9 @@ def test_a_thousand_equal_points_are_one():
 def test_occupied_cells_are_those_of_numpy(cells):
     keys = np.random.default_rng(0).integers(0, 50, 200)
     for mine, plain in zip(
-        occupied_cells(keys, cells), np.unique(keys, return_inverse=True, return_counts=True), strict=True
+        occupied_cells(keys, cells),
+        np.unique(keys, return_inverse=True, return_counts=True),
+        strict=True,
     ):
         assert np.array_equal(mine, plain)
 
@@ -37,12 +39,16 @@ def test_one_point_a_cell_equals_the_plain_loop(spread, cell_m):
     xyz = np.round(np.random.default_rng(3).uniform(-spread, spread, (400, 3)), 2)
     slow = {}
     for point in xyz:
-        slow.setdefault((np.floor(point[1] / cell_m), np.floor(point[0] / cell_m)), []).append(point)
+        slow.setdefault((np.floor(point[1] / cell_m), np.floor(point[0] / cell_m)), []).append(
+            point
+        )
     expected = [
         [*np.mean(own, axis=0)[:2], np.sort([p[2] for p in own])[(len(own) - 1) // 2]]
         for _, own in sorted(slow.items())
     ]
-    assert np.allclose(rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2), expected, atol=1e-9)
+    assert np.allclose(
+        rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2), expected, atol=1e-9
+    )
 
 
 def test_the_range_of_cells_holds_all_points():

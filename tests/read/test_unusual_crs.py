@@ -25,16 +25,22 @@ from hiproof.read.pointcloud import read_header, read_points
 from hiproof.read.terrain import read_terrain
 from hiproof.settings import Settings
 
-pytestmark = pytest.mark.filterwarnings("ignore:You will likely lose important projection information")
+pytestmark = pytest.mark.filterwarnings(
+    "ignore:You will likely lose important projection information"
+)
 FOOT, US_FOOT = 0.3048, 1200 / 3937
 UTM = CRS("EPSG:32633").to_wkt("WKT1_GDAL")
 TEXAS = CRS("EPSG:2277").to_wkt("WKT1_ESRI")
-VERTCS = 'VERTCS["NAVD88",VDATUM["North_American_Vertical_Datum_1988"],PARAMETER["Vertical_Shift",0.0],'
+VERTCS = (
+    'VERTCS["NAVD88",VDATUM["North_American_Vertical_Datum_1988"],PARAMETER["Vertical_Shift",0.0],'
+)
 
 
 def local(unit, axes="east,north"):
     first, second = axes.split(",")
-    return f'ENGCRS["site",EDATUM["peg"],CS[Cartesian,2],AXIS["x",{first}],AXIS["y",{second}],{unit}]'
+    return (
+        f'ENGCRS["site",EDATUM["peg"],CS[Cartesian,2],AXIS["x",{first}],AXIS["y",{second}],{unit}]'
+    )
 
 
 def with_unit(wkt, unit):
@@ -43,7 +49,8 @@ def with_unit(wkt, unit):
 
 
 def with_heights(plan, unit, direction="UP"):
-    return f'COMPD_CS["both",{plan},VERT_CS["h",VERT_DATUM["x",2005],UNIT[{unit}],AXIS["H",{direction}]]]'
+    vertical = f'VERT_CS["h",VERT_DATUM["x",2005],UNIT[{unit}],AXIS["H",{direction}]]'
+    return f'COMPD_CS["both",{plan},{vertical}]'
 
 
 UNDERSTOOD = {
@@ -57,9 +64,21 @@ UNDERSTOOD = {
     "metres, heights in US feet": ("EPSG:32614+6360", 1.0, US_FOOT),
     "kilometres": ("+proj=utm +zone=33 +datum=WGS84 +units=km", 1000.0, 1000.0),
     "a unit of its own": ("+proj=utm +zone=33 +datum=WGS84 +to_meter=0.9144", 0.9144, 0.9144),
-    "bound, with heights": ("+proj=utm +zone=33 +ellps=bessel +towgs84=1,2,3 +units=us-ft +vunits=m", US_FOOT, 1.0),
-    "bound compound": ("+proj=utm +zone=33 +datum=WGS84 +geoidgrids=egm96_15.gtx +vunits=us-ft", 1.0, US_FOOT),
-    "Esri's pair": (f'{TEXAS},{VERTCS}PARAMETER["Direction",1.0],UNIT["Foot_US",{US_FOOT}]]', US_FOOT, US_FOOT),
+    "bound, with heights": (
+        "+proj=utm +zone=33 +ellps=bessel +towgs84=1,2,3 +units=us-ft +vunits=m",
+        US_FOOT,
+        1.0,
+    ),
+    "bound compound": (
+        "+proj=utm +zone=33 +datum=WGS84 +geoidgrids=egm96_15.gtx +vunits=us-ft",
+        1.0,
+        US_FOOT,
+    ),
+    "Esri's pair": (
+        f'{TEXAS},{VERTCS}PARAMETER["Direction",1.0],UNIT["Foot_US",{US_FOOT}]]',
+        US_FOOT,
+        US_FOOT,
+    ),
     "a projection without a unit": (UTM.partition(',UNIT["metre"')[0] + "]", 1.0, 1.0),
     "with time": (
         f'COMPOUNDCRS["t",{CRS("EPSG:2277").to_wkt()},TIMECRS["GPS",TDATUM["t",TIMEORIGIN[1980-01-01]],'
@@ -67,16 +86,28 @@ UNDERSTOOD = {
         US_FOOT,
         US_FOOT,
     ),
-    "a projection nobody knows": (with_unit(UTM, f'"foot",{FOOT}').replace("Transverse_Mercator", "Mine"), FOOT, FOOT),
+    "a projection nobody knows": (
+        with_unit(UTM, f'"foot",{FOOT}').replace("Transverse_Mercator", "Mine"),
+        FOOT,
+        FOOT,
+    ),
 }
 """(definition, metres in a unit of plan and of height) of what has a place on the Earth."""
 
 LOCAL = {
-    "LOCAL_CS": ('LOCAL_CS["site",LOCAL_DATUM["d",0],UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]', 1.0, 1.0),
+    "LOCAL_CS": (
+        'LOCAL_CS["site",LOCAL_DATUM["d",0],UNIT["metre",1],AXIS["X",EAST],AXIS["Y",NORTH]]',
+        1.0,
+        1.0,
+    ),
     "MapInfo's Nonearth": ('LOCAL_CS["Nonearth",UNIT["Meter",1]]', 1.0, 1.0),
     "a name alone": ('LOCAL_CS["site"]', 1.0, 1.0),
     "US feet": ('LOCAL_CS["Nonearth",UNIT["US survey foot",0.304800609601219]]', US_FOOT, US_FOOT),
-    "ENGCRS in centimetres": (local('LENGTHUNIT["centimetre",0.01]', "unspecified,unspecified"), 0.01, 0.01),
+    "ENGCRS in centimetres": (
+        local('LENGTHUNIT["centimetre",0.01]', "unspecified,unspecified"),
+        0.01,
+        0.01,
+    ),
     "turned axes": (local('LENGTHUNIT["metre",1]', "southWest,southEast"), 1.0, 1.0),
     "of a ship": (local('LENGTHUNIT["metre",1]', "starboard,forward"), 1.0, 1.0),
     "three axes": (
@@ -98,7 +129,10 @@ REFUSED = {
     "degrees": ("EPSG:4326", "in degrees"),
     "degrees in space": ("EPSG:4979", "in degrees"),
     "degrees with heights": ("EPSG:4326+5773", "in degrees"),
-    "turned degrees": ("+proj=ob_tran +o_proj=longlat +o_lon_p=0 +o_lat_p=39.25 +lon_0=18", "in degrees"),
+    "turned degrees": (
+        "+proj=ob_tran +o_proj=longlat +o_lon_p=0 +o_lat_p=39.25 +lon_0=18",
+        "in degrees",
+    ),
     "geocentric": ("EPSG:4978", "geocentric"),
     "heights alone in feet": ("EPSG:6360", "heights alone"),
     "south and west": ("EPSG:5513", "south and west"),
@@ -106,7 +140,10 @@ REFUSED = {
     "west and south": ("EPSG:2048", "west and south"),
     "a mirrored site": (local('LENGTHUNIT["metre",1]', "west,north"), "west and north"),
     "depths": ("EPSG:32633+5715", "depths"),
-    "Esri's depths": (f'{TEXAS},{VERTCS}PARAMETER["Direction",-1.0],UNIT["Foot_US",{US_FOOT}]]', "depths"),
+    "Esri's depths": (
+        f'{TEXAS},{VERTCS}PARAMETER["Direction",-1.0],UNIT["Foot_US",{US_FOOT}]]',
+        "depths",
+    ),
     "units of 1e-300 m": ("+proj=utm +zone=33 +datum=WGS84 +to_meter=1e-300", "1e-300"),
     "units of nothing": (with_unit(UTM, '"unknown",0'), "unit of length"),
     "units below nothing": (with_unit(UTM, '"metre",-1'), "unit of length"),
@@ -124,13 +161,17 @@ REFUSED = {
         "two axes",
     ),
     "pressure": (
-        'PARAMETRICCRS["air",PDATUM["sea",ANCHOR["1013 hPa"]],CS[parametric,1],AXIS["p",up],PARAMETRICUNIT["hPa",100]]',
+        'PARAMETRICCRS["air",PDATUM["sea",ANCHOR["1013 '
+        'hPa"]],CS[parametric,1],AXIS["p",up],PARAMETRICUNIT["hPa",100]]',
         "two axes",
     ),
     "a unit by its name alone": ('LOCAL_CS["Nonearth",UNIT["Meter"]]', "UNIT"),
     "a unit that is no number": ('LOCAL_CS["Nonearth",UNIT["Meter",many]]', "non double"),
     "a unit of to_meter=-1": ("+proj=utm +zone=33 +datum=WGS84 +to_meter=-1", "to_meter"),
-    "heights before the plan": (f'COMPD_CS["x",VERT_CS["h",VERT_DATUM["x",2005],UNIT["metre",1]],{UTM}]', "COMPD"),
+    "heights before the plan": (
+        f'COMPD_CS["x",VERT_CS["h",VERT_DATUM["x",2005],UNIT["metre",1]],{UTM}]',
+        "COMPD",
+    ),
 }
 """(definition, what the sentence must name)."""
 
@@ -166,8 +207,13 @@ def test_a_derived_projected_crs_is_understood():
         "base_crs": {key: value for key, value in base.items() if key not in ("$schema", "id")},
         "conversion": {
             "name": "Affine",
-            "method": {"name": "Affine parametric transformation", "id": {"authority": "EPSG", "code": 9624}},
-            "parameters": [{"name": key, "value": value, "unit": "metre"} for key, value in parameters.items()],
+            "method": {
+                "name": "Affine parametric transformation",
+                "id": {"authority": "EPSG", "code": 9624},
+            },
+            "parameters": [
+                {"name": key, "value": value, "unit": "metre"} for key, value in parameters.items()
+            ],
         },
         "coordinate_system": base["coordinate_system"],
     }
@@ -176,7 +222,9 @@ def test_a_derived_projected_crs_is_understood():
 
 
 def directory(*keys):
-    return struct.pack("<4H", 1, 1, 0, len(keys)) + b"".join(struct.pack("<4H", *key) for key in keys)
+    return struct.pack("<4H", 1, 1, 0, len(keys)) + b"".join(
+        struct.pack("<4H", *key) for key in keys
+    )
 
 
 def short(**values):
@@ -207,7 +255,12 @@ KEYS = {
     "its own projection in US feet": ([*OWN, (3076, 0, 1, 9003)], US_FOOT, US_FOOT, None),
     "its own projection in feet": ([*OWN, (3076, 0, 1, 9002)], FOOT, FOOT, None),
     "its own projection in kilometres": ([*OWN, (3076, 0, 1, 9036)], 1000.0, 1000.0, None),
-    "its own projection and unit": ([*OWN, (3076, 0, 1, 32767), (3077, 34736, 1, 1)], 0.9144, 0.9144, None),
+    "its own projection and unit": (
+        [*OWN, (3076, 0, 1, 32767), (3077, 34736, 1, 1)],
+        0.9144,
+        0.9144,
+        None,
+    ),
     "with a base in degrees": ([*OWN, *short(k2048=4269, k3076=9003)], US_FOOT, US_FOOT, None),
     "no code, but a unit": (short(k1024=32767, k3076=9002), FOOT, FOOT, None),
     "NAVD88 by GeoTIFF, US feet": (short(k3072=26914, k4096=5103, k4099=9003), 1.0, US_FOOT, 26914),
@@ -216,7 +269,12 @@ KEYS = {
     "NGVD29 by GeoTIFF": (short(k3072=26914, k4096=5102), 1.0, US_FOOT, 26914),
     "above an ellipsoid": (short(k3072=26914, k4096=5001, k4099=9001), 1.0, 1.0, 26914),
     "above an ellipsoid, feet": (short(k3072=26914, k4096=5030, k4099=9002), 1.0, FOOT, 26914),
-    "Baltic heights, not a zone of Norway": (short(k3072=32636, k4096=5105, k4099=9001), 1.0, 1.0, 32636),
+    "Baltic heights, not a zone of Norway": (
+        short(k3072=32636, k4096=5105, k4099=9001),
+        1.0,
+        1.0,
+        32636,
+    ),
     "heights of its own": (short(k3072=26914, k4096=32767, k4099=9003), 1.0, US_FOOT, 26914),
     "NAVD88 by EPSG, US feet": (short(k3072=2277, k4096=5703, k4099=9003), US_FOOT, US_FOOT, 2277),
 }
@@ -227,7 +285,9 @@ KEYS = {
 def test_geotiff_keys_are_understood(tmp_path, kind):
     entries, plan, height, code = KEYS[kind]
     doubles = struct.pack("<2d", 0.0, 0.9144)
-    crs = crs_through_a_file(tmp_path, (34735, directory(*entries)), (34736, doubles), (34737, CITATION))
+    crs = crs_through_a_file(
+        tmp_path, (34735, directory(*entries)), (34736, doubles), (34737, CITATION)
+    )
     units = units_of(crs)
     assert (units.plan, units.height) == pytest.approx((plan, height), rel=1e-12)
     plan_crs = crs.sub_crs_list[0] if crs.is_compound else crs
@@ -244,7 +304,10 @@ def test_a_projection_in_another_unit_than_its_code_stays_where_it_is():
 FAULTY = {
     "no unit": (34735, directory(*OWN)),
     "a unit nobody knows": (34735, directory(*OWN, (3076, 0, 1, 12345))),
-    "a unit of its own without a size": (34735, directory(*OWN, (3076, 0, 1, 32767), (3077, 34736, 1, 7))),
+    "a unit of its own without a size": (
+        34735,
+        directory(*OWN, (3076, 0, 1, 32767), (3077, 34736, 1, 7)),
+    ),
     "an angle as the unit": (34735, directory(*OWN, (3076, 0, 1, 9102))),
     "a code nobody knows": (34735, directory(*short(k3072=1025))),
     "a projected CRS as heights": (34735, directory(*short(k3072=26914, k4096=26914))),
@@ -262,10 +325,18 @@ def test_a_header_that_cannot_be_understood_is_refused_unless_something_stands_i
     """It was taken as unknown, and feet as metres."""
     assert isinstance(crs_through_a_file(tmp_path, FAULTY[kind]), UnknownCRS)
     path = tmp_path / "a.las"
-    with pytest.raises(InputError, match="name the right one with --crs, or its unit alone with --unit"):
+    with pytest.raises(
+        InputError, match="name the right one with --crs, or its unit alone with --unit"
+    ):
         read_points(path)
-    assert read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:2222"}})).units.plan == FOOT
-    assert read_points(path, settings=Settings.from_dict({"read": {"unit": "foot"}})).units.plan == FOOT
+    assert (
+        read_points(path, settings=Settings.from_dict({"read": {"crs": "EPSG:2222"}})).units.plan
+        == FOOT
+    )
+    assert (
+        read_points(path, settings=Settings.from_dict({"read": {"unit": "foot"}})).units.plan
+        == FOOT
+    )
 
 
 def test_wkt_in_latin_1_and_beside_keys_is_read(tmp_path):
@@ -280,7 +351,10 @@ BOX = shapely.box(500000, 4649776, 500010, 4649786)
 
 
 def write_footprints(path, crs, units=1.0):
-    """One square in `units` of a metre; `crs` as GDAL's text, or the number of a GeoPackage that has no CRS."""
+    """One square in `units` of a metre;
+
+    `crs` as GDAL's text, or the number of a GeoPackage that has no CRS.
+    """
     polygon = shapely.to_wkb([shapely.transform(BOX, lambda xy: xy / units)])
     pyogrio.raw.write(str(path), polygon.astype(object), [], [], geometry_type="Polygon", crs=crs)
     return path
@@ -288,7 +362,8 @@ def write_footprints(path, crs, units=1.0):
 
 UNPLACED = {
     "undefined Cartesian": (
-        'ENGCRS["Undefined Cartesian SRS",EDATUM["?"],CS[Cartesian,2],AXIS["E",east],AXIS["N",north],LENGTHUNIT["metre",1]]',
+        'ENGCRS["Undefined Cartesian '
+        'SRS",EDATUM["?"],CS[Cartesian,2],AXIS["E",east],AXIS["N",north],LENGTHUNIT["metre",1]]',
         1.0,
     ),
     "Nonearth": (LOCAL["MapInfo's Nonearth"][0], 1.0),
@@ -316,7 +391,9 @@ def test_footprints_of_no_place_are_taken_to_be_in_the_clouds_crs(tmp_path, kind
 def test_footprints_that_run_south_and_west_are_moved_to_a_cloud_that_does_not(tmp_path):
     krovak = shapely.box(1040000, 740000, 1040010, 740020)
     wkb = shapely.to_wkb([krovak]).astype(object)
-    pyogrio.raw.write(str(tmp_path / "f.gpkg"), wkb, [], [], geometry_type="Polygon", crs="EPSG:5513")
+    pyogrio.raw.write(
+        str(tmp_path / "f.gpkg"), wkb, [], [], geometry_type="Polygon", crs="EPSG:5513"
+    )
     (footprint,) = read_footprints(tmp_path / "f.gpkg", target_crs="EPSG:5514")
     assert np.allclose(footprint.polygon.bounds, (-740020, -1040010, -740000, -1040000), atol=1e-3)
 
@@ -332,7 +409,9 @@ def frame_of(folder, record, footprints=None, **read):
     crs_through_a_file(folder, record, (34737, CITATION))
     cloud, footprints = str(folder / "a.las"), footprints and str(footprints)
     settings = Settings.from_dict({"read": read})
-    return settle_frame(Request((cloud,), folder / "out", footprints, settings=settings), read_headers((cloud,)))
+    return settle_frame(
+        Request((cloud,), folder / "out", footprints, settings=settings), read_headers((cloud,))
+    )
 
 
 OWN_FEET = (34735, directory(*OWN, *short(k3076=9003, k4096=5703)))
@@ -343,7 +422,9 @@ OWN_METRES = (34735, directory(*OWN, *short(k3076=9001, k4096=5703)))
 def test_a_local_cloud_takes_its_place_from_the_footprints_and_keeps_its_heights(tmp_path):
     path = write_footprints(tmp_path / "f.gpkg", "EPSG:32633")
     frame = frame_of(tmp_path, OWN_METRES, path)
-    assert frame.crs.sub_crs_list[0].to_epsg() == 32633 and vertical_crs(frame.crs).to_epsg() == 5703
+    assert (
+        frame.crs.sub_crs_list[0].to_epsg() == 32633 and vertical_crs(frame.crs).to_epsg() == 5703
+    )
     alone = frame_of(tmp_path, OWN_FEET)
     assert (alone.units.plan, alone.units.height) == pytest.approx((US_FOOT, 1.0))
     heights = frame_of(tmp_path, (34735, directory(*short(k4099=9003))), path)
@@ -367,9 +448,13 @@ def test_what_is_local_is_said(tmp_path):
 @pytest.mark.parametrize(
     ("cloud", "raster"), [("US feet", "EPSG:32614"), ("LOCAL_CS", "EPSG:32633"), (None, "LOCAL_CS")]
 )
-def test_a_terrain_model_beside_a_local_cloud_is_asked_in_its_own_coordinates(tmp_path, cloud, raster):
+def test_a_terrain_model_beside_a_local_cloud_is_asked_in_its_own_coordinates(
+    tmp_path, cloud, raster
+):
     rasterio = pytest.importorskip("rasterio")
-    crs = rasterio.crs.CRS.from_wkt(CRS(LOCAL[raster][0] if raster in LOCAL else raster).to_wkt("WKT1_GDAL"))
+    crs = rasterio.crs.CRS.from_wkt(
+        CRS(LOCAL[raster][0] if raster in LOCAL else raster).to_wkt("WKT1_GDAL")
+    )
     place = rasterio.transform.from_origin(500000, 4649800, 1, 1)
     profile = {
         "driver": "GTiff",

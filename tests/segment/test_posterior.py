@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from hiproof.segment import combine, most_probable
-from hiproof.segment.posterior import EVIDENCE_EXPONENT, OUTLIER_DISTANCE_M, SMALLEST_PRIOR, expected_distance
+from hiproof.segment.posterior import (
+    EVIDENCE_EXPONENT,
+    OUTLIER_DISTANCE_M,
+    SMALLEST_PRIOR,
+    expected_distance,
+)
 
 TYPES = {"gable": 0.6, "hip": 0.3, "flat": 0.1}
 
@@ -50,7 +55,10 @@ def test_a_type_the_fit_gave_up_is_behind_the_best_but_its_evidence_says_little(
     bics = {"gable": 0.0, "hip": 4.0}
     even = dict.fromkeys(TYPES, 1 / 3)
     assert list(combine(even, bics, points=200)) == ["gable", "hip", "flat"]
-    assert next(iter(combine({"flat": 0.99, "gable": 0.005, "hip": 0.005}, bics, points=200))) == "flat"
+    assert (
+        next(iter(combine({"flat": 0.99, "gable": 0.005, "hip": 0.005}, bics, points=200)))
+        == "flat"
+    )
     more, fewer = combine(even, bics, points=2000)["flat"], combine(even, bics, points=20)["flat"]
     assert more < fewer
 
@@ -61,7 +69,9 @@ class FakeFit:
     points_used = 100
 
     def __init__(self, names, noise_m=0.05, outlier_share=0.0, objective="likelihood"):
-        self.type, self.bics = (names[0], {names[0]: 50.0}) if names else ("gable", {"gable": 0.0, "hip": 8.0})
+        self.type, self.bics = (
+            (names[0], {names[0]: 50.0}) if names else ("gable", {"gable": 0.0, "hip": 8.0})
+        )
         self.noise_m, self.outlier_share, self.objective = noise_m, outlier_share, objective
 
 

@@ -1,10 +1,18 @@
-"""Sampling and arrangement: the compiled path equals plain NumPy, and the input follows the points."""
+"""Sampling and arrangement: the compiled path equals plain NumPy, and the input follows
+the points.
+"""
 
 import numpy as np
 import pytest
 
 from hiproof.segment.arrange import Layout, arrange
-from hiproof.segment.sampling import BALL_FACTOR, FEATURES, SURFACE_NEIGHBOURS, arranged, thin_to_grid
+from hiproof.segment.sampling import (
+    BALL_FACTOR,
+    FEATURES,
+    SURFACE_NEIGHBOURS,
+    arranged,
+    thin_to_grid,
+)
 from hiproof.simulate import training_sample
 
 COUNT, LEVELS, GROUP = 64, (32, 16, 8), 8
@@ -36,13 +44,20 @@ def slow_farthest_points(xyz, count):
 
 
 def slow_surface(xyz, i):
-    """Normal, roughness, convexity and offset over reach of point `i`, by the eigenvectors of its neighbours."""
+    """Normal, roughness, convexity and offset over reach of point `i`, by the eigenvectors of its
+    neighbours.
+    """
     away = distances(xyz[i : i + 1], xyz)[0]
     nearest = np.argsort(away)[:SURFACE_NEIGHBOURS]
     mean = xyz[nearest].mean(axis=0)
     values, vectors = np.linalg.eigh(np.cov(xyz[nearest].T, bias=True))
     normal = vectors[:, 0] * (-1 if vectors[2, 0] < 0 else 1)
-    return normal, np.sqrt(max(values[0], 0)), (xyz[i] - mean) @ normal, (mean - xyz[i])[:2] / away[nearest[-1]]
+    return (
+        normal,
+        np.sqrt(max(values[0], 0)),
+        (xyz[i] - mean) @ normal,
+        (mean - xyz[i])[:2] / away[nearest[-1]],
+    )
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -57,11 +72,15 @@ def test_choice_and_surfaces_equal_the_slow_oracle(seed):
         assert told["roughness"] == pytest.approx(min(roughness / 0.2, 5), abs=1e-4)
         if normal[2] > 1e-6:
             assert told["convexity"] == pytest.approx(np.clip(convexity / 0.2, -5, 5), abs=1e-4)
-        assert np.hypot(told["offset_x"], told["offset_y"]) == pytest.approx(np.hypot(*offset), abs=1e-5)
+        assert np.hypot(told["offset_x"], told["offset_y"]) == pytest.approx(
+            np.hypot(*offset), abs=1e-5
+        )
 
 
 def slow_groups(xyz, centres, sources, count, radius):
-    """Sorted distances of the nearest `count` within `radius`, the nearest repeated where there are fewer."""
+    """Sorted distances of the nearest `count` within `radius`, the nearest repeated where there are
+    fewer.
+    """
     away = np.sort(distances(xyz[np.arange(centres) % len(xyz)], xyz[:sources]), axis=1)[:, :count]
     away = np.pad(away, ((0, 0), (0, count - away.shape[1])), constant_values=np.inf)
     return np.where(away <= radius, away, away[:, :1])
@@ -77,14 +96,18 @@ def test_neighbourhoods_equal_the_slow_oracle(count):
         assert radius == pytest.approx(BALL_FACTOR * max(cover, 1e-3), rel=1e-5)
         centres = chosen[np.arange(level) % found]
         told = np.sqrt(((chosen[index] - centres[:, None]) ** 2).sum(axis=2))
-        expected = slow_groups(chosen, level, min(above, found), GROUP, BALL_FACTOR * max(cover, 1e-3))
+        expected = slow_groups(
+            chosen, level, min(above, found), GROUP, BALL_FACTOR * max(cover, 1e-3)
+        )
         np.testing.assert_allclose(told, expected, atol=1e-9)
     for target, source, index, weight in (
         (LEVELS[0], LEVELS[2], ups[0], weights[0]),
         (COUNT, LEVELS[0], *ups[1:], weights[1]),
     ):
         away = slow_groups(chosen, target, min(source, found), 3, np.inf)
-        np.testing.assert_allclose(weight, (1 / (away + 1e-3)) / (1 / (away + 1e-3)).sum(axis=1)[:, None], rtol=1e-4)
+        np.testing.assert_allclose(
+            weight, (1 / (away + 1e-3)) / (1 / (away + 1e-3)).sum(axis=1)[:, None], rtol=1e-4
+        )
         assert index.max() < source
 
 
@@ -114,7 +137,9 @@ def test_arrangement_has_the_layouts_shapes(shape):
     arranged = arrange(np.random.default_rng(2).uniform(0, 10, shape), LAYOUT)
     assert arranged.features.shape == (64, 11) and np.isfinite(arranged.features).all()
     assert [group.shape for group in arranged.groups] == [(32, 8), (16, 8), (8, 8)]
-    assert [group.max() < size for group, size in zip(arranged.groups, (64, 32, 16), strict=True)] == [True] * 3
+    assert [
+        group.max() < size for group, size in zip(arranged.groups, (64, 32, 16), strict=True)
+    ] == [True] * 3
     assert [index.shape for index in arranged.up_indices] == [(32, 3), (64, 3)]
     np.testing.assert_allclose(arranged.up_weights[0].sum(axis=1), 1.0, rtol=1e-5)
 

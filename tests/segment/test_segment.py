@@ -25,7 +25,9 @@ def turned(xyz, angle):
 
 def cloud(seed, types=ROOF_TYPES):
     """Points (n, 3), labels (n,) with -1 for not-roof, and the type's name."""
-    points, labels, type = training_sample(np.random.default_rng([77, seed]), types, density=(4.0, 8.0))
+    points, labels, type = training_sample(
+        np.random.default_rng([77, seed]), types, density=(4.0, 8.0)
+    )
     return points, np.where(labels == len(types), NOT_ROOF, labels), types[type]
 
 
@@ -59,7 +61,9 @@ def test_turning_about_z_changes_nothing(angle):
     for seed in range(3):
         points, _, _ = cloud(seed)
         before, after = segment(points), segment(turned(points, angle))
-        np.testing.assert_allclose(list(after.types.values()), list(before.types.values()), atol=1e-3)
+        np.testing.assert_allclose(
+            list(after.types.values()), list(before.types.values()), atol=1e-3
+        )
         assert (before.labels == after.labels).mean() > 0.995
 
 
@@ -101,7 +105,8 @@ def test_labelled_real_roofs_with_the_fits_evidence():
         found = segment(points)
         fit = partial(fit_roof, points, weights=found.weights)
         _, posterior = most_probable(
-            lambda types, fit=fit: fit(settings=Settings.from_dict({"fit": {"types": types}})), found.types
+            lambda types, fit=fit: fit(settings=Settings.from_dict({"fit": {"types": types}})),
+            found.types,
         )
         named = next(iter(posterior))
         right += AS_GABLE.get(named, named) == path.parent.name
@@ -128,7 +133,9 @@ def test_points_weigh_nothing_only_where_they_are_surely_no_roof():
 
 def test_points_are_labelled_only_when_asked_for(monkeypatch):
     points, _, _ = cloud(0)
-    monkeypatch.setattr(inference, "carried_back", lambda *_: pytest.fail("nobody asked for the labels"))
+    monkeypatch.setattr(
+        inference, "carried_back", lambda *_: pytest.fail("nobody asked for the labels")
+    )
     assert segment(points).type
 
 
@@ -150,7 +157,11 @@ def test_a_large_cloud_takes_bounded_memory():
     [
         (np.zeros((9, 3)), FitError, "at least 10 points"),
         (np.ones((50, 3)), FitError, "all in one place"),
-        (np.r_[np.random.default_rng(0).random((20, 3)), [[np.nan, 0, 0]]], FitError, "finite coordinates"),
+        (
+            np.r_[np.random.default_rng(0).random((20, 3)), [[np.nan, 0, 0]]],
+            FitError,
+            "finite coordinates",
+        ),
         (np.zeros((20, 2)), InputError, r"\(n, 3\) array"),
         (np.zeros(30), InputError, r"\(n, 3\) array"),
         (np.array([["a", "b", "c"]] * 20), InputError, "array of numbers"),
@@ -188,9 +199,15 @@ def test_a_gpu_that_is_absent_is_refused():
     if "CUDAExecutionProvider" in onnxruntime.get_available_providers():
         pytest.skip("ONNX Runtime has CUDA here")
     with pytest.raises(SettingsError, match="CUDA"):
-        segment(np.random.default_rng(0).random((20, 3)), Settings().replace({"segment": {"device": "cuda"}}))
+        segment(
+            np.random.default_rng(0).random((20, 3)),
+            Settings().replace({"segment": {"device": "cuda"}}),
+        )
 
 
 def test_types_the_network_does_not_know_are_refused():
     with pytest.raises(SettingsError, match="onion"):
-        segment(np.random.default_rng(0).random((20, 3)), Settings().replace({"fit": {"types": ("onion",)}}))
+        segment(
+            np.random.default_rng(0).random((20, 3)),
+            Settings().replace({"fit": {"types": ("onion",)}}),
+        )

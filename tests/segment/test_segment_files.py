@@ -42,7 +42,12 @@ def test_one_bad_file_does_not_stop_the_others_and_the_exit_code_tells(tmp_path)
     np.savetxt(tmp_path / "few.xyz", np.random.default_rng(0).random((5, 3)))
     app = typer.Typer()
     app.command()(command)
-    arguments = [str(tmp_path / "few.xyz"), str(tmp_path / "good.xyz"), "--out", str(tmp_path / "out.laz")]
+    arguments = [
+        str(tmp_path / "few.xyz"),
+        str(tmp_path / "good.xyz"),
+        "--out",
+        str(tmp_path / "out.laz"),
+    ]
     result = CliRunner().invoke(app, arguments)
     assert result.exit_code == 1
     assert "at least 10 points" in result.output

@@ -1,4 +1,6 @@
-"""A simulated city: every building once, tiles that do not depend on each other, files that agree with the truth."""
+"""A simulated city: every building once, tiles that do not depend on each other, files that agree
+with the truth.
+"""
 
 import json
 
@@ -12,7 +14,15 @@ from typer.testing import CliRunner
 from hiproof.errors import InputError, OutputError
 from hiproof.simulate import ROOF_TYPES
 from hiproof.simulate.__main__ import app
-from hiproof.simulate.city import HOUSES, WORKS, City, Stock, block_buildings, drawn_names, write_city
+from hiproof.simulate.city import (
+    HOUSES,
+    WORKS,
+    City,
+    Stock,
+    block_buildings,
+    drawn_names,
+    write_city,
+)
 from hiproof.simulate.compounds import COMPOUND_KINDS
 from hiproof.simulate.scanner import ScanSettings
 from hiproof.simulate.survey import survey
@@ -46,7 +56,12 @@ def test_tiles_hold_their_own_points_at_the_density_asked(folder):
         x, y = map(float, count.tile.split("_"))
         assert len(las.points) == count.points
         # Coordinates are stored to the centimetre, so a point may be rounded onto the upper border.
-        assert las.x.min() >= x and las.x.max() <= x + 100 and las.y.min() >= y and las.y.max() <= y + 100
+        assert (
+            las.x.min() >= x
+            and las.x.max() <= x + 100
+            and las.y.min() >= y
+            and las.y.max() <= y + 100
+        )
         assert set(np.unique(las.classification)) <= {2, 5, 6}
     total = sum(count.points for count in counts)
     assert total / (len(counts) * 100.0**2) == pytest.approx(SMALL.density, rel=0.35)
@@ -57,7 +72,9 @@ def test_a_tile_is_the_same_without_the_others(folder):
     stock = Stock(SMALL)
     bounds = list(stock.tiles())[-1]
     settings = ScanSettings(density=SMALL.density)
-    clouds = survey(stock.patches(bounds), stock.near(bounds), stock.terrain, SMALL.flight, SMALL.seed, settings)
+    clouds = survey(
+        stock.patches(bounds), stock.near(bounds), stock.terrain, SMALL.flight, SMALL.seed, settings
+    )
     points = np.concatenate([cloud.points for cloud in clouds])
     las = laspy.read(path / "tiles" / f"{bounds[0]:.0f}_{bounds[1]:.0f}.laz")
     assert len(points) == len(las.points) and np.abs(points[:, 2] - las.z).max() < 0.0051
@@ -66,10 +83,14 @@ def test_a_tile_is_the_same_without_the_others(folder):
 def test_a_building_over_a_tile_border_has_its_points_in_both(folder):
     path, counts = folder
     points = [laspy.read(path / "tiles" / f"{count.tile}.laz") for count in counts]
-    xyz = np.concatenate([np.column_stack([las.x, las.y, las.z])[las.classification == 6] for las in points])
+    xyz = np.concatenate(
+        [np.column_stack([las.x, las.y, las.z])[las.classification == 6] for las in points]
+    )
     tiles = np.repeat(np.arange(len(points)), [(las.classification == 6).sum() for las in points])
     crossing = 0
-    for lot in (lot for block in range(len(Stock(SMALL).blocks)) for lot in Stock(SMALL).lots(block)):
+    for lot in (
+        lot for block in range(len(Stock(SMALL).blocks)) for lot in Stock(SMALL).lots(block)
+    ):
         inner = lot.building.footprint.buffer(-0.7)
         inside = shapely.contains_xy(inner, xyz[:, 0], xyz[:, 1])
         assert inside.sum() > 0.4 * inner.area * SMALL.density
@@ -97,14 +118,20 @@ def test_streets_offer_every_type():
 
 
 def test_the_command_reports_and_refuses(tmp_path):
-    done = CliRunner().invoke(app, ["city", str(tmp_path), "--buildings", "3", "--density", "0.5", "--tile", "200"])
+    done = CliRunner().invoke(
+        app, ["city", str(tmp_path), "--buildings", "3", "--density", "0.5", "--tile", "200"]
+    )
     assert done.exit_code == 0 and "3 buildings" in done.output
     again = CliRunner().invoke(app, ["city", str(tmp_path), "--buildings", "3"])
     assert again.exit_code == 2 and "without a city" in again.output
 
 
 def test_impossible_cities_are_refused_in_a_sentence(tmp_path):
-    for wrong in ({"buildings": 0}, {"buildings": 5, "tile_m": 1.0}, {"buildings": 5, "density": -2.0}):
+    for wrong in (
+        {"buildings": 0},
+        {"buildings": 5, "tile_m": 1.0},
+        {"buildings": 5, "density": -2.0},
+    ):
         with pytest.raises(InputError, match="expected"):
             City(**wrong)
     blocked = tmp_path / "file"

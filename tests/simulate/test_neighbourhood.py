@@ -31,7 +31,10 @@ def test_every_type_and_the_compounds_stand_there():
     truth = json.loads(demo_files()["truth"].read_text())
     types = {part["type"] for building in truth["buildings"] for part in building["parts"]}
     kinds = {building["kind"] for building in truth["buildings"]}
-    assert types == set(ROOF_TYPES) and {"L", "T", "U", "cross", "extension", "two_level", "saw_tooth_hall"} <= kinds
+    assert (
+        types == set(ROOF_TYPES)
+        and {"L", "T", "U", "cross", "extension", "two_level", "saw_tooth_hall"} <= kinds
+    )
 
 
 def test_bundled_files_are_what_the_command_makes(tmp_path):

@@ -1,4 +1,6 @@
-"""Generated roofs have the plan and the heights of their type; compounds have the parts they claim."""
+"""Generated roofs have the plan and the heights of their type; compounds have the parts
+they claim.
+"""
 
 import json
 import math
@@ -9,11 +11,25 @@ import shapely
 
 from hiproof.errors import InputError
 from hiproof.primitives import CATALOGUE
-from hiproof.simulate import COMPOUND_KINDS, ROOF_TYPES, building_of, random_building, random_compound
+from hiproof.simulate import (
+    COMPOUND_KINDS,
+    ROOF_TYPES,
+    building_of,
+    random_building,
+    random_compound,
+)
 from hiproof.simulate.shapes import box
 
 SEEDS = range(12)
-PARTS = {"L": {2}, "T": {2}, "U": {3}, "cross": {2}, "extension": {2}, "two_level": {2}, "saw_tooth_hall": {2}}
+PARTS = {
+    "L": {2},
+    "T": {2},
+    "U": {3},
+    "cross": {2},
+    "extension": {2},
+    "two_level": {2},
+    "saw_tooth_hall": {2},
+}
 PARTS |= {"dormered": {2, 3, 4, 5}, "winged_hip": {3}, "L_of_hips": {2}, "row": {3, 4, 5, 6}}
 
 
@@ -43,10 +59,14 @@ def test_each_type_has_its_heights(seed):
         elif type in ("monopitch", "shed"):
             assert max(corners) == pytest.approx(h, abs=1e-6)
         elif type == "asymmetric_gable":
-            assert profile(building, near, p["ridge_offset"] * 2 / p["width"]) == pytest.approx(h, abs=1e-6)
+            assert profile(building, near, p["ridge_offset"] * 2 / p["width"]) == pytest.approx(
+                h, abs=1e-6
+            )
             assert max(corners) == pytest.approx(p["eave_step"], abs=1e-6)
         else:
-            low_end = {"gable": h, "gambrel": h, "half_hip": h - p.get("hip_height", 0.0)}.get(type, 0.0)
+            low_end = {"gable": h, "gambrel": h, "half_hip": h - p.get("hip_height", 0.0)}.get(
+                type, 0.0
+            )
             assert middle == pytest.approx(h, abs=1e-6) and end == pytest.approx(low_end, abs=1e-6)
             assert max(corners) == pytest.approx(0.0, abs=1e-6)
 
@@ -57,10 +77,17 @@ def test_plan_and_slopes_are_those_of_houses(seed):
     for type in ROOF_TYPES:
         building = random_building(rng, type, origin=(10.0, 20.0, 3.0))
         p = building.parameters
-        slopes = np.concatenate([np.hypot(*piece.planes[:, :2].T) for piece in building.roof.pieces])
+        slopes = np.concatenate(
+            [np.hypot(*piece.planes[:, :2].T) for piece in building.roof.pieces]
+        )
         assert slopes.max() < math.tan(math.radians(70.0))
-        assert 20 < building.outline.area < 3000 and building.outline.area == pytest.approx(p["length"] * p["width"])
-        assert building.z_ground == 3.0 and building.footprint.centroid.distance(shapely.Point(10, 20)) < 1e-6
+        assert 20 < building.outline.area < 3000 and building.outline.area == pytest.approx(
+            p["length"] * p["width"]
+        )
+        assert (
+            building.z_ground == 3.0
+            and building.footprint.centroid.distance(shapely.Point(10, 20)) < 1e-6
+        )
         assert CATALOGUE[type].variant(p).vertices(p)[:, 2].min() == pytest.approx(0.0)
 
 
@@ -69,7 +96,11 @@ def test_compounds_have_their_parts_in_one_outline(kind):
     for seed in SEEDS:
         building = random_compound(np.random.default_rng(seed), kind)
         assert len(building.roof.parts) in PARTS[kind]
-        assert building.kind == kind and building.outline.geom_type == "Polygon" and building.outline.is_valid
+        assert (
+            building.kind == kind
+            and building.outline.geom_type == "Polygon"
+            and building.outline.is_valid
+        )
         covered = shapely.union_all([piece.outline for piece in building.roof.pieces])
         assert covered.symmetric_difference(building.outline).area < 1e-3
         assert len(building.truth()["parts"]) == len(building.roof.parts)
@@ -101,7 +132,9 @@ def test_dormers_come_out_of_one_slope_and_end_under_it():
             below -= house.pieces[0].height_at(np.column_stack([x, np.full(7, back)]))
             assert above.min() > 0.6 and below.max() < -0.05 and back * side > 0
         outlines = [dormer.pieces[0].outline for dormer in dormers]
-        assert shapely.union_all(outlines).area == pytest.approx(sum(outline.area for outline in outlines))
+        assert shapely.union_all(outlines).area == pytest.approx(
+            sum(outline.area for outline in outlines)
+        )
 
 
 def test_two_hips_of_an_l_have_one_ridge_height():
@@ -127,7 +160,9 @@ def test_kappa_turns_the_building_and_nothing_else():
     first = random_building(np.random.default_rng(4), "hip", kappa=0.2)
     turned = random_building(np.random.default_rng(4), "hip", kappa=1.2)
     assert turned.parameters == pytest.approx(first.parameters)
-    assert math.remainder(turned.kappa - first.kappa - 1.0, math.pi) == pytest.approx(0.0, abs=1e-12)
+    assert math.remainder(turned.kappa - first.kappa - 1.0, math.pi) == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 @pytest.mark.parametrize("kind", COMPOUND_KINDS)

@@ -1,4 +1,6 @@
-"""The simulated scanner: points lie on the truth, in the number asked for, with the right labels."""
+"""The simulated scanner: points lie on the truth, in the number asked for, with the
+right labels.
+"""
 
 import dataclasses
 
@@ -27,7 +29,11 @@ from hiproof.simulate.scene import Body, scene_of
 
 ROOF, WALL, GROUND = (SOURCES.index(name) for name in ("roof", "wall", "ground"))
 EXACT = ScanSettings(
-    range_noise_m=0.0, horizontal_noise_m=0.0, beam_radius_m=0.0, registration_m=0.0, defects=Defects.none()
+    range_noise_m=0.0,
+    horizontal_noise_m=0.0,
+    beam_radius_m=0.0,
+    registration_m=0.0,
+    defects=Defects.none(),
 )
 
 
@@ -51,7 +57,10 @@ def test_roof_points_lie_on_the_truth(type):
     local = building.roof.frame.to_local(cloud.points)
     # The roof's height jumps at a shed's teeth, where a plan position has two right answers.
     highest = building.roof.height_at(local[roof, :2])
-    on_a_piece = np.min([np.abs(p.height_at(local[roof, :2]) - local[roof, 2]) for p in building.roof.pieces], axis=0)
+    on_a_piece = np.min(
+        [np.abs(p.height_at(local[roof, :2]) - local[roof, 2]) for p in building.roof.pieces],
+        axis=0,
+    )
     assert on_a_piece.max() < 1e-9
     assert np.nanmax(local[roof, 2] - highest) < 1e-9
     assert set(cloud.label[roof]) == {ROOF_TYPES.index(type)}
@@ -90,16 +99,26 @@ def test_compiled_beams_equal_a_slow_walk(type):
 
 
 def test_heading_changes_no_label():
-    """Turning flight and building together gives the same labels; a nadir beam has no walls whatever the heading."""
+    """Turning flight and building together gives the same labels; a nadir beam has no walls
+    whatever the heading.
+    """
     for heading in (0.0, 1.0, 2.5):
         building = random_building(np.random.default_rng(2), "hip", kappa=0.3 + heading)
-        beams = beams_of(np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.2), np.zeros(2), 12.0, 0.0)
+        beams = beams_of(
+            np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.2), np.zeros(2), 12.0, 0.0
+        )
         cloud = returns(bare_scene(building), beams, np.random.default_rng(4), EXACT)
         if heading == 0.0:
             first = cloud
-        assert np.array_equal(cloud.label, first.label) and np.array_equal(cloud.source, first.source)
-        nadir = beams_of(np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.0), np.zeros(2), 12.0, 0.0)
-        assert WALL not in returns(bare_scene(building), nadir, np.random.default_rng(4), EXACT).source
+        assert np.array_equal(cloud.label, first.label) and np.array_equal(
+            cloud.source, first.source
+        )
+        nadir = beams_of(
+            np.random.default_rng(4), Swath(heading, 0.5, 0.4, 0.0), np.zeros(2), 12.0, 0.0
+        )
+        assert (
+            WALL not in returns(bare_scene(building), nadir, np.random.default_rng(4), EXACT).source
+        )
 
 
 def test_walls_show_only_at_an_angle_and_lie_on_the_outline():
@@ -117,7 +136,9 @@ def test_seeds_reproduce(seed):
     for _ in range(2):
         rng = np.random.default_rng(seed)
         clouds.append(scan(random_building(rng), rng))
-    assert np.array_equal(clouds[0].points, clouds[1].points) and np.array_equal(clouds[0].label, clouds[1].label)
+    assert np.array_equal(clouds[0].points, clouds[1].points) and np.array_equal(
+        clouds[0].label, clouds[1].label
+    )
 
 
 def test_defects_all_happen_and_none_happens_without_them():
@@ -125,7 +146,11 @@ def test_defects_all_happen_and_none_happens_without_them():
     everything = Defects(*(1.0,) * 8, outliers=0.02)
     seen = set()
     for _ in range(6):
-        seen |= set(scan(random_building(rng, "gable"), rng, ScanSettings(margin_m=2.0, defects=everything)).source)
+        seen |= set(
+            scan(
+                random_building(rng, "gable"), rng, ScanSettings(margin_m=2.0, defects=everything)
+            ).source
+        )
     assert seen == set(range(len(SOURCES)))
     bare = scan(random_building(rng, "gable"), rng, ScanSettings(defects=Defects.none()))
     assert set(bare.source) <= {ROOF, WALL, GROUND}
@@ -137,9 +162,15 @@ def cube(size=10.0, height=6.0):
     from hiproof.model import ROOF as ROOF_SURFACE
 
     base = np.array([(0, 0), (size, 0), (size, size), (0, size)])
-    vertices = np.concatenate([np.column_stack([base, np.full(4, z)]) for z in (0.0, height)]) + (500.0, 900.0, 3.0)
+    vertices = np.concatenate([np.column_stack([base, np.full(4, z)]) for z in (0.0, height)]) + (
+        500.0,
+        900.0,
+        3.0,
+    )
     sides = tuple(Face(((k, (k + 1) % 4, 4 + (k + 1) % 4, 4 + k),), WALL) for k in range(4))
-    return Solid(vertices, (Face(((3, 2, 1, 0),), GROUND), *sides, Face(((4, 5, 6, 7),), ROOF_SURFACE)))
+    return Solid(
+        vertices, (Face(((3, 2, 1, 0),), GROUND), *sides, Face(((4, 5, 6, 7),), ROOF_SURFACE))
+    )
 
 
 def test_solids_are_scanned_like_buildings():

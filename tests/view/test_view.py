@@ -26,8 +26,12 @@ from hiproof.write.meshes.tiles import write_models
 from hiproof.write.meshes.viewed import ViewedModel
 from sample_models import ORIGIN, SOLIDS, two_parts, write_sample_run
 
-BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-needs_browser = pytest.mark.skipif(BROWSER is None, reason="no Chromium here; apt-get install chromium")
+BROWSER = next(
+    filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
+)
+needs_browser = pytest.mark.skipif(
+    BROWSER is None, reason="no Chromium here; apt-get install chromium"
+)
 
 WAIT = """<script>
 // Painting by hand: a page that nobody looks at is asked for no frame while the machine is busy.
@@ -46,22 +50,26 @@ HTMLCanvasElement.prototype.setPointerCapture = () => {};  // knows no pointers 
 function click([x, y]) {
   const box = scene.canvas.getBoundingClientRect();
   for (const kind of ["pointerdown", "pointerup"]) scene.canvas.dispatchEvent(
-    new PointerEvent(kind, { clientX: box.left + x, clientY: box.top + y, button: 0, buttons: 1, pointerId: 1 }));
+    new PointerEvent(kind,
+      { clientX: box.left + x, clientY: box.top + y, button: 0, buttons: 1, pointerId: 1 }));
 }
 (async () => {
   await ready; await settled();
   say.webgl = Boolean(scene.gl); say.tiles = scene.layers.length;
   say.legend = document.getElementById("legend").innerText;
   const { corners, owner } = scene.layers[0].tile, row = owner.length - 1;
-  const top = [0, 1, 2].map(k => (corners[k] + corners[3 + k] + corners[6 + k]) / 3);  // of the first building's roof
+  // of the first building's roof
+  const top = [0, 1, 2].map(k => (corners[k] + corners[3 + k] + corners[6 + k]) / 3);
   click(scene.project(top)); say.clicked = told();
   click([2, scene.canvas.clientHeight - 2]); say.kept = told();
   document.dispatchEvent(new KeyboardEvent("keydown", { key: "Escape" })); say.cleared = told();
-  scene.target[0] += 1e6; scene.paint(); say.away = scene.layers.filter(layer => layer.visible).length;
+  scene.target[0] += 1e6; scene.paint();
+  say.away = scene.layers.filter(layer => layer.visible).length;
   document.dispatchEvent(new KeyboardEvent("keydown", { key: "Home" })); scene.paint();
   say.home = scene.layers.filter(layer => layer.visible).length;
   say.faults = faults;
-  document.body.append(Object.assign(document.createElement("pre"), { id: "said", textContent: JSON.stringify(say) }));
+  document.body.append(Object.assign(document.createElement("pre"),
+    { id: "said", textContent: JSON.stringify(say) }));
 })();
 </script>"""
 )
@@ -76,12 +84,20 @@ def parameters(*kinds):
 def tiles(tmp_path_factory):
     folder = tmp_path_factory.mktemp("view") / "a.3dtiles"
     models = [
-        ViewedModel(id, kind, solid, {"parameters": parameters(kind), "rf_slope": 36.87, "unknown": None}, {0: kind})
+        ViewedModel(
+            id,
+            kind,
+            solid,
+            {"parameters": parameters(kind), "rf_slope": 36.87, "unknown": None},
+            {0: kind},
+        )
         for id, (kind, solid) in SOLIDS.items()
     ]
     pair = two_parts()
     beside = pair.solid.moved(np.array([0, 20, 0]) - ORIGIN)
-    models.append(pair._replace(solid=beside, attributes={"parameters": parameters("gable", "hip")}))
+    models.append(
+        pair._replace(solid=beside, attributes={"parameters": parameters("gable", "hip")})
+    )
     with pytest.warns(UserWarning, match="no CRS"):
         write_models(folder, models)
     return folder
@@ -113,9 +129,20 @@ def answer(port, path, host=None):
 def document_of(page, folder, serving, profile):
     """The page over the tiles in `folder` after its scripts ran, as text."""
     port = serving(LoopbackServer(partial(Handler, directory=str(folder), page=page)))
-    command = [BROWSER, "--headless", "--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+    command = [
+        BROWSER,
+        "--headless",
+        "--no-sandbox",
+        "--disable-gpu",
+        "--disable-background-networking",
+    ]
     command += ["--enable-unsafe-swiftshader", "--no-proxy-server", f"--user-data-dir={profile}"]
-    command += ["--window-size=900,700", "--virtual-time-budget=60000", "--dump-dom", f"http://{LOOPBACK}:{port}/"]
+    command += [
+        "--window-size=900,700",
+        "--virtual-time-budget=60000",
+        "--dump-dom",
+        f"http://{LOOPBACK}:{port}/",
+    ]
     return subprocess.run(command, capture_output=True, text=True, timeout=120).stdout
 
 
@@ -127,10 +154,16 @@ def test_the_page_shows_the_tiles_and_tells_of_a_building_clicked(tiles, serving
     assert said, f"the page's scripts did not run to their end: {text[-2000:]}"
     say = json.loads(said[1].replace("&lt;", "<").replace("&gt;", ">").replace("&amp;", "&"))
     assert say["faults"] == [] and say["webgl"] and say["tiles"] == 1
-    assert say["legend"].split() == ["gable", "flat", "hip"]  # of all parts, the most frequent first
-    assert re.search(r"id\s+house-1", say["clicked"]) and re.search(r"rf_slope\s+36.87", say["clicked"])
-    assert re.search(r"part 0\s+gable: width 8.12", say["clicked"]) and "unknown" not in say["clicked"]
-    assert say["kept"] == say["clicked"] and say["cleared"] == ""  # a click beside the buildings changes nothing
+    # of all parts, the most frequent first
+    assert say["legend"].split() == ["gable", "flat", "hip"]
+    assert re.search(r"id\s+house-1", say["clicked"]) and re.search(
+        r"rf_slope\s+36.87", say["clicked"]
+    )
+    assert (
+        re.search(r"part 0\s+gable: width 8.12", say["clicked"]) and "unknown" not in say["clicked"]
+    )
+    # a click beside the buildings changes nothing
+    assert say["kept"] == say["clicked"] and say["cleared"] == ""
     assert say["away"] == 0 and say["home"] == 1
 
 
@@ -142,13 +175,19 @@ def test_tiles_that_cannot_be_read_are_said(tiles, serving, tmp_path):
     text = document_of(page, folder, serving, tmp_path / "first")
     assert "Some tiles cannot be read (tiles/r.glb: 404)" in text
     (folder / "tileset.json").unlink()
-    assert "is hiproof view still running" in document_of(page, folder, serving, tmp_path / "second")
+    assert "is hiproof view still running" in document_of(
+        page, folder, serving, tmp_path / "second"
+    )
 
 
 def test_page_and_tiles_are_served(tiles, serving):
     port = serving(server_of(tiles, "a <run>"))
     status, page = answer(port, "/")
-    assert status == 200 and b"a &lt;run&gt;" in page and b"http" not in page.replace(b"http://www.w3.org", b"")
+    assert (
+        status == 200
+        and b"a &lt;run&gt;" in page
+        and b"http" not in page.replace(b"http://www.w3.org", b"")
+    )
     assert json.loads(answer(port, "/tileset.json")[1])["asset"]["version"] == "1.1"
     assert answer(port, "/tiles/r.glb")[1][:4] == b"glTF"
 
@@ -201,7 +240,9 @@ def refuse_writing_below(folder, monkeypatch):
         monkeypatch.setattr(Path, name, refusing(getattr(Path, name)))
     opened = files.OutputFile.__init__
     monkeypatch.setattr(
-        files.OutputFile, "__init__", lambda file, hidden, path: refusing(opened_at)(hidden, file, path)
+        files.OutputFile,
+        "__init__",
+        lambda file, hidden, path: refusing(opened_at)(hidden, file, path),
     )
 
     def opened_at(hidden, file, path):

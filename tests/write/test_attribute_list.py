@@ -1,4 +1,6 @@
-"""Every attribute that is written is declared, with unit and meaning, and the documents list them."""
+"""Every attribute that is written is declared, with unit and meaning, and the documents
+list them.
+"""
 
 import json
 import re
@@ -57,7 +59,9 @@ def test_buildings_have_the_attributes_declared():
         found = building_attributes(building, figures_of(building), units=feet)
         own = set(found) - set(building.attributes)
         assert own == {*names(ROOFER, PREFIX), *names(HIPROOF, OWN)}
-        for attribute, prefix in ((a, p) for table, p in ((ROOFER, PREFIX), (HIPROOF, OWN)) for a in table):
+        for attribute, prefix in (
+            (a, p) for table, p in ((ROOFER, PREFIX), (HIPROOF, OWN)) for a in table
+        ):
             value = found[prefix + attribute.name]
             assert value is None or isinstance(value, KINDS[attribute.kind]), attribute.name
     assert OWN + "units" not in building_attributes(unmodelled(), None, units=METRES)
@@ -74,7 +78,12 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
     write_all(tmp_path, [modelled(gable_house())])
     feature = json.loads((tmp_path / "buildings.city.jsonl").read_text().splitlines()[1])
     (city_object,) = feature["CityObjects"].values()
-    surfaces = [s for g in city_object["geometry"] if g["type"] == "Solid" for s in g["semantics"]["surfaces"]]
+    surfaces = [
+        s
+        for g in city_object["geometry"]
+        if g["type"] == "Solid"
+        for s in g["semantics"]["surfaces"]
+    ]
     assert {key for s in surfaces for key in s} - {"type"} == set(names(ROOF_SURFACE))
     record = building_record(modelled(gable_house()))
     assert list(record) == names(PARAMETERS)
@@ -86,14 +95,20 @@ def test_roof_surfaces_parameters_and_tables_are_as_declared(tmp_path):
 
 def test_tables_of_the_database_are_as_declared():
     tables = re.findall(r"create table if not exists \{(\w+)\} \((.*?)\);", SCHEMA, re.DOTALL)
-    for (name, body), attributes in zip(tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS, POSTGIS_PARTS), strict=True):
+    for (name, body), attributes in zip(
+        tables, (POSTGIS_BUILDINGS, POSTGIS_ROOFS, POSTGIS_PARTS), strict=True
+    ):
         body = body.replace("{measures}", MEASURES)
         columns = re.findall(r"(?:^|,)\s*(\w+) (?=text|integer|double|jsonb|geometry)", body)
         assert columns == names(attributes), name
 
 
 def test_the_table_of_parts_has_a_column_for_every_parameter():
-    parameters = {parameter for kind in CATALOGUE for parameter in (*names_of(kind), *side_by_side_or_none(kind))}
+    parameters = {
+        parameter
+        for kind in CATALOGUE
+        for parameter in (*names_of(kind), *side_by_side_or_none(kind))
+    }
     assert parameters <= set(names(PARTS_LAYER))
 
 

@@ -15,12 +15,17 @@ from hiproof.write.meshes.triangles import face_triangles, faces_triangles
 from hiproof.write.meshes.viewed import ViewedModel
 from sample_models import SOLIDS, courtyard_solid, gable_solid, two_parts, write_sample_run
 
-BUILDINGS = [ViewedModel(id, kind, solid, {"height": 3.5}, {0: kind}) for id, (kind, solid) in SOLIDS.items()]
+BUILDINGS = [
+    ViewedModel(id, kind, solid, {"height": 3.5}, {0: kind}) for id, (kind, solid) in SOLIDS.items()
+]
 
 
 def glb_positions(document, binary, mesh):
     primitives = document["meshes"][mesh]["primitives"]
-    parts = [accessor_values(document, binary, primitive["attributes"]["POSITION"]) for primitive in primitives]
+    parts = [
+        accessor_values(document, binary, primitive["attributes"]["POSITION"])
+        for primitive in primitives
+    ]
     return np.concatenate(parts).reshape(-1, 3, 3)
 
 
@@ -30,7 +35,9 @@ def volume(triangles):
 
 @pytest.mark.parametrize("solid", [gable_solid(), courtyard_solid()], ids=["gable", "courtyard"])
 def test_triangles_tile_every_face_and_keep_its_side(solid):
-    for face, triangles in zip(solid.faces, faces_triangles(solid.vertices, solid.faces), strict=True):
+    for face, triangles in zip(
+        solid.faces, faces_triangles(solid.vertices, solid.faces), strict=True
+    ):
         assert (triangles == face_triangles(solid.vertices, face)).all()
         expected = sum(ring_normal(solid.vertices[list(ring)]) for ring in face.rings)
         found = sum(ring_normal(solid.vertices[t]) for t in triangles)
@@ -56,18 +63,29 @@ def test_attributes_of_the_input_do_not_take_the_place_of_id_and_type(tmp_path):
     told = {"id": "a", "roof_type": "thatch", "type": "church"}
     write_glb(tmp_path / "a.glb", [ViewedModel("a", "gable", gable_solid(), told, {0: "gable"})])
     (node,) = parse_glb(tmp_path / "a.glb")[0]["nodes"]
-    assert node["extras"] == {"id": "a", "roof_type": "gable", "roof_type_input": "thatch", "type": "church"}
+    assert node["extras"] == {
+        "id": "a",
+        "roof_type": "gable",
+        "roof_type_input": "thatch",
+        "type": "church",
+    }
 
 
 def test_obj_holds_every_building_closed(tmp_path):
     assert write_obj(tmp_path / "a.obj", BUILDINGS) == 2
     lines = (tmp_path / "a.obj").read_text().splitlines()
     assert [line for line in lines if line.startswith("o ")] == ["o house-1", "o block_2"]
-    materials = {line[7:] for line in (tmp_path / "a.mtl").read_text().splitlines() if line.startswith("newmtl")}
+    materials = {
+        line[7:]
+        for line in (tmp_path / "a.mtl").read_text().splitlines()
+        if line.startswith("newmtl")
+    }
     assert {line[7:] for line in lines if line.startswith("usemtl")} <= materials
     vertices = np.array([line.split()[1:] for line in lines if line.startswith("v ")], float)
     faces = [[int(i) - 1 for i in line.split()[1:]] for line in lines if line.startswith("f ")]
-    fans = np.array([(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)])
+    fans = np.array(
+        [(face[0], face[i], face[i + 1]) for face in faces for i in range(1, len(face) - 1)]
+    )
     assert volume(vertices[fans]) == pytest.approx(8 * 12 * 5.5 + (400 - 64) * 9.0)
 
 
@@ -86,7 +104,11 @@ def test_a_roof_face_has_the_colour_of_its_part(tmp_path):
         list(linear_rgb(type_colour(kind))) for kind in ("gable", "hip")
     ]
     write_obj(tmp_path / "a.obj", [two_parts()])
-    used = [line[7:] for line in (tmp_path / "a.obj").read_text().splitlines() if line.startswith("usemtl")]
+    used = [
+        line[7:]
+        for line in (tmp_path / "a.obj").read_text().splitlines()
+        if line.startswith("usemtl")
+    ]
     assert used == ["roof_gable", "roof_hip", "WallSurface", "GroundSurface"]
 
 

@@ -22,7 +22,14 @@ from hiproof.read.solids import read_solids
 from hiproof.settings import WriteSettings
 from hiproof.status import Status
 from hiproof.view.loading import database_rows
-from hiproof.write import FileHead, roof_figures, write_attributes, write_citygml, write_cityjson, write_parameters
+from hiproof.write import (
+    FileHead,
+    roof_figures,
+    write_attributes,
+    write_citygml,
+    write_cityjson,
+    write_parameters,
+)
 from hiproof.write.citygml.roof_codes import CODE_SPACES
 from hiproof.write.citygml.version2 import NAMESPACES, CityGMLWriter
 from hiproof.write.citygml.version3 import CityGML3Writer
@@ -42,11 +49,26 @@ def terrace(id="terrace"):
         *("gable", (Piece(shapely.box(0, 0, 6, 8), planes),)),
         *({"width": 8.0, "length": 6.0, "height": 2.0}, 0.0, np.array([3.0, 4.0, 4.0])),
     )
-    flat = Part("flat", (Piece(shapely.box(6, 0, 10, 8), np.array([[0.0, 0.0, 3.0]])),), {}, 0.0, np.array([8, 4, 3.0]))
+    flat = Part(
+        "flat",
+        (Piece(shapely.box(6, 0, 10, 8), np.array([[0.0, 0.0, 3.0]])),),
+        {},
+        0.0,
+        np.array([8, 4, 3.0]),
+    )
     roof = Roof((gable, flat), shapely.box(0, 0, 10, 8), LocalFrame(RD_ORIGIN))
     line = np.array([[0, 0, 0.2], [10, 0, 0.0], [10, 8, 0.1], [0, 0, 0.2]]) + RD_ORIGIN
     solid = compose(roof, 0.0).moved(RD_ORIGIN)
-    return Building(id, Status.MODELLED, "", Model(roof, solid), Quality(points=99), 0.0, "ground class", (line,))
+    return Building(
+        id,
+        Status.MODELLED,
+        "",
+        Model(roof, solid),
+        Quality(points=99),
+        0.0,
+        "ground class",
+        (line,),
+    )
 
 
 def gml(tmp_path, buildings, write):
@@ -69,7 +91,9 @@ def lods(city_object):
     return [geometry["lod"] for geometry in city_object.get("geometry", [])]
 
 
-@pytest.mark.parametrize("write", [WriteSettings(), WHOLE, IN_PARTS], ids=["default", "whole", "parts"])
+@pytest.mark.parametrize(
+    "write", [WriteSettings(), WHOLE, IN_PARTS], ids=["default", "whole", "parts"]
+)
 def test_all_that_is_written_is_valid(tmp_path, write):
     buildings = [terrace(), modelled(gable_house(), "house"), unmodelled()]
     gml(tmp_path, buildings, write)
@@ -80,7 +104,9 @@ def test_all_that_is_written_is_valid(tmp_path, write):
         assert len(solids) >= 2 and all(check_solid(solid, 0.01) == () for _, solid in solids)
 
 
-@pytest.mark.parametrize(("shift", "low", "high"), [((0, 0), (0, 0), (10, 8)), ((1.5, -0.5), (-1.5, 0), (10, 8.5))])
+@pytest.mark.parametrize(
+    ("shift", "low", "high"), [((0, 0), (0, 0), (10, 8)), ((1.5, -0.5), (-1.5, 0), (10, 8.5))]
+)
 def test_the_envelope_holds_a_footprint_that_was_moved(tmp_path, shift, low, high):
     root = gml(tmp_path, [replace(terrace(), shift=shift)], WHOLE)
     corners = [np.array(text.split(), float)[:2] for text in found(root, "//gml:Envelope/*/text()")]
@@ -97,13 +123,19 @@ def test_citygml_stays_within_its_schema(tmp_path, write):
 
 def test_levels_of_detail_have_the_heights_that_the_rule_says(tmp_path):
     building = terrace()
-    figures, city_object = roof_figures(building.solid), objects(tmp_path, [building], WHOLE)["terrace"]
+    figures, city_object = (
+        roof_figures(building.solid),
+        objects(tmp_path, [building], WHOLE)["terrace"],
+    )
     assert lods(city_object) == ["0", "0", "1.2", "1.3", "2.2"]
-    kinds = [geometry["semantics"]["surfaces"][0]["type"] for geometry in city_object["geometry"][:2]]
+    kinds = [
+        geometry["semantics"]["surfaces"][0]["type"] for geometry in city_object["geometry"][:2]
+    ]
     assert kinds == ["GroundSurface", "RoofSurface"]
     block, steps, roof = (solid for _, solid in read_solids(tmp_path / "a.city.jsonl"))
     assert block.volume == pytest.approx(80 * figures.h_70p, rel=1e-4)
-    gable_70p = 6.0 - 2.0 * 0.3  # of a gable's heights over the plan, which are spread evenly from eave to ridge
+    # of a gable's heights over the plan, which are spread evenly from eave to ridge
+    gable_70p = 6.0 - 2.0 * 0.3
     assert steps.volume == pytest.approx(48 * gable_70p + 32 * 3.0, rel=1e-3)
     assert roof.volume == pytest.approx(48 * 5.0 + 32 * 3.0, rel=1e-4)
 
@@ -113,11 +145,19 @@ def test_citygml_has_each_level_in_its_property(tmp_path):
     for name in ("lod0FootPrint", "lod0RoofEdge", "lod1Solid", "lod2Solid"):
         assert len(found(root, f"//bldg:Building/bldg:{name}")) == 1
     heights = [
-        found(root, f"//bldg:{name}//gml:posList/text()")[0].split()[2::3] for name in ("lod0FootPrint", "lod0RoofEdge")
+        found(root, f"//bldg:{name}//gml:posList/text()")[0].split()[2::3]
+        for name in ("lod0FootPrint", "lod0RoofEdge")
     ]
-    assert set(heights[0]) == {"0.0000"} and set(heights[1]) == {f"{roof_figures(terrace().solid).h_eave:.4f}"}
-    z = [float(z) for text in found(root, "//bldg:lod1Solid//gml:posList/text()") for z in text.split()[2::3]]
-    assert sorted(set(z)) == pytest.approx([0.0, 3.0, 5.4], abs=0.01)  # the finer LoD1: the two blocks' tops
+    assert set(heights[0]) == {"0.0000"} and set(heights[1]) == {
+        f"{roof_figures(terrace().solid).h_eave:.4f}"
+    }
+    z = [
+        float(z)
+        for text in found(root, "//bldg:lod1Solid//gml:posList/text()")
+        for z in text.split()[2::3]
+    ]
+    # the finer LoD1: the two blocks' tops
+    assert sorted(set(z)) == pytest.approx([0.0, 3.0, 5.4], abs=0.01)
 
 
 def test_eaves_are_where_roofs_end():
@@ -131,22 +171,35 @@ def test_eaves_are_where_roofs_end():
 def test_building_parts_have_solids_types_heights_and_parameters(tmp_path):
     by_id = objects(tmp_path, [terrace()], IN_PARTS)
     whole, gable, flat = by_id["terrace"], by_id["terrace-part1"], by_id["terrace-part2"]
-    assert whole["children"] == ["terrace-part1", "terrace-part2"] and gable["parents"] == flat["parents"] == [
-        "terrace"
-    ]
+    assert whole["children"] == ["terrace-part1", "terrace-part2"] and gable["parents"] == flat[
+        "parents"
+    ] == ["terrace"]
     assert lods(whole) == ["0", "0", "1.2"] and lods(gable) == lods(flat) == ["1.3", "2.2"]
-    assert gable["attributes"]["rf_volume_lod22"] == pytest.approx(240.0) and flat["attributes"]["rf_h_roof_max"] == 3.0
+    assert (
+        gable["attributes"]["rf_volume_lod22"] == pytest.approx(240.0)
+        and flat["attributes"]["rf_h_roof_max"] == 3.0
+    )
     (primitive,) = gable["attributes"]["hiproof_primitives"]
-    assert (primitive["type"], primitive["width"], primitive["height"], primitive["z_eave"]) == ("gable", 8.0, 2.0, 4.0)
+    assert (primitive["type"], primitive["width"], primitive["height"], primitive["z_eave"]) == (
+        "gable",
+        8.0,
+        2.0,
+        4.0,
+    )
     root = gml(tmp_path, [terrace()], IN_PARTS)
     parts = found(root, "//bldg:consistsOfBuildingPart/bldg:BuildingPart")
-    assert [part.xpath("bldg:roofType/text()", namespaces=NAMESPACES) for part in parts] == [["3100"], ["1000"]]
+    assert [part.xpath("bldg:roofType/text()", namespaces=NAMESPACES) for part in parts] == [
+        ["3100"],
+        ["1000"],
+    ]
     assert [part.xpath("bldg:measuredHeight/text()", namespaces=NAMESPACES) for part in parts] == [
         ["6.0000"],
         ["3.0000"],
     ]
     assert set(found(root, "//bldg:roofType/@codeSpace")) == {CODE_SPACES["adv"]}
-    assert found(parts[0], "gen:genericAttributeSet/gen:doubleAttribute[@name='width']/gen:value/text()") == ["8.0"]
+    assert found(
+        parts[0], "gen:genericAttributeSet/gen:doubleAttribute[@name='width']/gen:value/text()"
+    ) == ["8.0"]
     ids = found(root, "//@gml:id")
     assert len(set(ids)) == len(ids)
 
@@ -157,7 +210,9 @@ def test_whoever_reads_models_gets_the_whole_building_at_its_finest(tmp_path, wr
     objects(tmp_path, [building, modelled(gable_house(), "house")], write)
     model, house = read_models(tmp_path / "a.city.jsonl")
     assert (model.id, house.id) == ("terrace", "house")
-    assert check_solid(model.solid, 0.01) == () and model.solid.volume == pytest.approx(building.solid.volume, rel=1e-4)
+    assert check_solid(model.solid, 0.01) == () and model.solid.volume == pytest.approx(
+        building.solid.volume, rel=1e-4
+    )
     for face in model.solid.of_kind(ROOF):
         x, y, z = ring_normal(model.solid.vertices[list(face.rings[0])])
         assert model.part_types[face.part] == ("gable" if np.hypot(x, y) > 0.1 * z else "flat")
@@ -168,9 +223,15 @@ def test_a_files_head_says_how_it_is_drawn_and_a_build_obeys_it_or_options(tmp_p
     build_file(tmp_path / "p.jsonl", tmp_path / "one")
     build_file(tmp_path / "one/parameters.jsonl", tmp_path / "two")
     for name in ("buildings.gml", "buildings.city.jsonl", "parameters.jsonl", "buildings.gpkg"):
-        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), name
+        assert (tmp_path / "one" / name).read_bytes() == (tmp_path / "two" / name).read_bytes(), (
+            name
+        )
     assert b"BuildingPart" in (tmp_path / "two/buildings.city.jsonl").read_bytes()
-    build_file(tmp_path / "p.jsonl", tmp_path / "three", changes={"write": {"parts_as": "one", "lods": ["1.2"]}})
+    build_file(
+        tmp_path / "p.jsonl",
+        tmp_path / "three",
+        changes={"write": {"parts_as": "one", "lods": ["1.2"]}},
+    )
     (feature,) = (tmp_path / "three/buildings.city.jsonl").read_text().splitlines()[1:]
     (city_object,) = json.loads(feature)["CityObjects"].values()
     assert lods(city_object) == ["0", "1.2"]
@@ -185,13 +246,18 @@ def test_gdal_reads_a_building_as_its_surfaces(tmp_path, write):
     _, _, shapes, _ = pyogrio.raw.read(tmp_path / "a.gml")
     faces = shapely.get_parts(shapely.from_wkb(shapes[0]))
     assert len(faces) == len(building.solid.faces)
-    assert max(shapely.get_coordinates(faces, include_z=True)[:, 2]) == building.solid.vertices[:, 2].max()
+    assert (
+        max(shapely.get_coordinates(faces, include_z=True)[:, 2])
+        == building.solid.vertices[:, 2].max()
+    )
 
 
 def test_without_surfaces_by_value_the_line_is_that_of_the_solids_level(tmp_path):
     root = gml(tmp_path, [terrace()], WriteSettings(gml_surfaces=False))
     assert len(found(root, "//bldg:lod2TerrainIntersection")) == 1
-    assert found(root, "//bldg:Building/bldg:lod2MultiSurface | //bldg:lod1TerrainIntersection") == []
+    assert (
+        found(root, "//bldg:Building/bldg:lod2MultiSurface | //bldg:lod1TerrainIntersection") == []
+    )
     bare = gml(tmp_path, [terrace()], WriteSettings(terrain_intersection=False))
     assert found(bare, "//bldg:lod1TerrainIntersection | //bldg:lod2TerrainIntersection") == []
 
@@ -200,9 +266,17 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
     write_attributes(tmp_path / "a.gpkg", [terrace(), unmodelled()], "EPSG:7415")
     with sqlite3.connect(tmp_path / "a.gpkg") as file:
         assert file.execute("pragma user_version").fetchone() == (10200,)
-        styles = file.execute(f"select f_table_name, f_geometry_column, useAsDefault, styleQML from {TABLE}").fetchall()
-    layers = {name: geometry for name, geometry in pyogrio.list_layers(tmp_path / "a.gpkg") if name != TABLE}
-    assert [row[:3] for row in styles] == [(style.layer, "geom", int(style.is_default)) for style in STYLES]
+        styles = file.execute(
+            f"select f_table_name, f_geometry_column, useAsDefault, styleQML from {TABLE}"
+        ).fetchall()
+    layers = {
+        name: geometry
+        for name, geometry in pyogrio.list_layers(tmp_path / "a.gpkg")
+        if name != TABLE
+    }
+    assert [row[:3] for row in styles] == [
+        (style.layer, "geom", int(style.is_default)) for style in STYLES
+    ]
     assert [style.layer for style in STYLES if style.is_default] == list(layers)
     for (name, _, _, qml), style in zip(styles, STYLES, strict=True):
         renderer = etree.fromstring(qml.encode()).find("renderer-v2")
@@ -210,9 +284,16 @@ def test_a_geopackage_is_of_an_old_version_and_brings_a_style_for_each_layer(tmp
         assert len(renderer.findall("symbols/symbol")) == len(style.colours)
 
 
-@pytest.mark.parametrize(("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)])
+@pytest.mark.parametrize(
+    ("lods", "grounds"), [(("0",), 0), (("0", "1.2"), 1), (("1.3",), 1), (("2.2",), 1)]
+)
 def test_a_database_gets_one_shell_of_a_building_in_parts_at_every_level(tmp_path, lods, grounds):
-    write_cityjson(tmp_path / "buildings.city.jsonl", [terrace()], "EPSG:7415", write=replace(IN_PARTS, lods=lods))
+    write_cityjson(
+        tmp_path / "buildings.city.jsonl",
+        [terrace()],
+        "EPSG:7415",
+        write=replace(IN_PARTS, lods=lods),
+    )
     (row,) = database_rows(tmp_path)
     assert sum(face.kind == GROUND for face in (row.solid.faces if row.solid else ())) == grounds
     assert (polyhedral_wkt(row) is not None) == bool(grounds)

@@ -1,4 +1,6 @@
-"""What is written of a building is the building: roof and solid follow from the written object to the last digit."""
+"""What is written of a building is the building: roof and solid follow from the written object to
+the last digit.
+"""
 
 import json
 from dataclasses import replace
@@ -69,7 +71,9 @@ def test_simulated_buildings_of_all_kinds_follow_from_what_is_written(density, w
 
 
 @pytest.mark.parametrize("wrong", [{"width": -131.0}, {"pitch_front": -12.0}, {"length": 0.0}])
-def test_a_part_that_no_file_can_hold_is_given_up_alone_and_the_building_says_so(wrong, monkeypatch):
+def test_a_part_that_no_file_can_hold_is_given_up_alone_and_the_building_says_so(
+    wrong, monkeypatch
+):
     """Whatever a fit comes to, what is written can be read."""
     x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 7, 0.4)))
     points = np.column_stack([x, y, np.where(x < 8, 8 - 0.9 * abs(y - 3.5), 3.0)])

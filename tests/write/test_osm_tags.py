@@ -1,4 +1,6 @@
-"""Simple 3D tags against roofs whose angles and heights are known, whichever way they are turned."""
+"""Simple 3D tags against roofs whose angles and heights are known, whichever way they
+are turned.
+"""
 
 import math
 
@@ -16,8 +18,25 @@ from hiproof.write.roof_figures import roof_figures
 
 # The values that OpenStreetMap's page of roof:shape documents for roofs of planes.
 DOCUMENTED = {
-    *("flat", "skillion", "gabled", "gabled_height_moved", "hipped", "half-hipped", "side_hipped", "side_half-hipped"),
-    *("pyramidal", "mansard", "gambrel", "sawtooth", "saltbox", "double_saltbox", "quadruple_saltbox"),
+    *(
+        "flat",
+        "skillion",
+        "gabled",
+        "gabled_height_moved",
+        "hipped",
+        "half-hipped",
+        "side_hipped",
+        "side_half-hipped",
+    ),
+    *(
+        "pyramidal",
+        "mansard",
+        "gambrel",
+        "sawtooth",
+        "saltbox",
+        "double_saltbox",
+        "quadruple_saltbox",
+    ),
 }
 NO_TAGS = dict.fromkeys((tag.name for tag in OSM), None)
 
@@ -29,8 +48,16 @@ def tags_of(building):
 def turned_house(degrees, type="gable"):
     """A house of 12 by 8 m whose length lies `degrees` from east."""
     ring = shapely.affinity.rotate(shapely.box(-6, -4, 6, 4), degrees, origin=(0, 0)).exterior
-    part = {"type": "gable", "parameters": {"width": 8, "length": 12, "height": 3}, "position": [0, 0, 5]}
-    place = {"origin": [85000, 446000, 2], "outline": [shapely.get_coordinates(ring).tolist()], "z_ground": 2}
+    part = {
+        "type": "gable",
+        "parameters": {"width": 8, "length": 12, "height": 3},
+        "position": [0, 0, 5],
+    }
+    place = {
+        "origin": [85000, 446000, 2],
+        "outline": [shapely.get_coordinates(ring).tolist()],
+        "z_ground": 2,
+    }
     house = hiproof.build({"id": "a", **place, "parts": [{**part, "rotation": degrees}]})
     return house if type == "gable" else house.with_part(0, type=type)
 
@@ -51,9 +78,14 @@ def test_a_gable_is_told_in_degrees_and_metres(degrees):
     assert tags["roof:shape"] == "gabled" and tags["roof:angle"] == pytest.approx(
         math.degrees(math.atan(0.75)), abs=0.01
     )
-    assert tags["roof:height"] == pytest.approx(3, abs=0.01) and tags["height"] == pytest.approx(8, abs=0.01)
+    assert tags["roof:height"] == pytest.approx(3, abs=0.01) and tags["height"] == pytest.approx(
+        8, abs=0.01
+    )
     across = 0 - degrees  # the compass direction across a ridge that lies `degrees` from east
-    assert min(apart(tags["roof:direction"], across), apart(tags["roof:direction"], across + 180)) < 0.01
+    assert (
+        min(apart(tags["roof:direction"], across), apart(tags["roof:direction"], across + 180))
+        < 0.01
+    )
 
 
 @pytest.mark.parametrize("name", ONE_ENDED)
@@ -68,7 +100,13 @@ def test_a_roof_with_one_hipped_end_looks_that_way(name, degrees):
 
 def test_a_flat_roof_looks_nowhere():
     tags = tags_of(modelled(box(), kinds=("flat",)))
-    assert tags == {"roof:shape": "flat", "roof:height": 0.0, "roof:direction": None, "roof:angle": 0.0, "height": 3.0}
+    assert tags == {
+        "roof:shape": "flat",
+        "roof:height": 0.0,
+        "roof:direction": None,
+        "roof:angle": 0.0,
+        "height": 3.0,
+    }
 
 
 def test_of_several_parts_the_largest_counts():

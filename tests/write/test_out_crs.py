@@ -1,4 +1,6 @@
-"""Laws of `--out-crs`: coordinates come back, walls stay upright, solids valid, and all files agree on where a building stands."""
+"""Laws of `--out-crs`: coordinates come back, walls stay upright, solids valid, and all files agree
+on where a building stands.
+"""
 
 import json
 import warnings
@@ -30,7 +32,11 @@ from hiproof.write.naming import FileUnits
 from hiproof.write.reprojected import crs_of_files
 from tiny_town import make_town, write_cloud, write_footprints
 
-DELFT, NEW_YORK, PARIS = (85000.0, 446000.0, 2.0), (300000.0, 60000.0, 12.0), (652000.0, 6862000.0, 35.0)
+DELFT, NEW_YORK, PARIS = (
+    (85000.0, 446000.0, 2.0),
+    (300000.0, 60000.0, 12.0),
+    (652000.0, 6862000.0, 35.0),
+)
 WAYS = {
     "national grid to UTM": ("EPSG:7415", "EPSG:25831", DELFT),
     "to the next UTM zone": ("EPSG:7415", "EPSG:25832", DELFT),
@@ -51,15 +57,18 @@ def buildings_at(origin):
 @pytest.mark.parametrize("way", WAYS)
 def test_coordinates_come_back_within_a_millimetre(way):
     crs, out, origin = WAYS[way]
-    places = np.array(origin) + np.random.default_rng(0).uniform((-5e3, -5e3, -3), (5e3, 5e3, 90), (500, 3))
+    places = np.array(origin) + np.random.default_rng(0).uniform(
+        (-5e3, -5e3, -3), (5e3, 5e3, 90), (500, 3)
+    )
     for units in (FileUnits.of(crs, out_crs=out).gml, FileUnits.of(crs, out_crs=out).cityjson):
         there = units.from_metres(places)
         assert np.abs(units.to_metres(there) - places).max() < 1e-3
         assert np.abs(there[:, :2] - places[:, :2]).max() > 100.0
-        assert np.array_equal(units.from_metres(places[:, :2]), there[:, :2])  # a plan goes as a place does
-        assert units.from_metres(places[0]) == pytest.approx(there[0]) and units.height * there[:, 2] == pytest.approx(
-            places[:, 2], abs=1e-3
-        )
+        # a plan goes as a place does
+        assert np.array_equal(units.from_metres(places[:, :2]), there[:, :2])
+        assert units.from_metres(places[0]) == pytest.approx(there[0]) and units.height * there[
+            :, 2
+        ] == pytest.approx(places[:, 2], abs=1e-3)
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -67,11 +76,15 @@ def test_solids_stay_valid_and_their_walls_upright(way):
     crs, out, origin = WAYS[way]
     units = FileUnits.of(crs, out_crs=out).gml
     for building in buildings_at(origin):
-        assert building_attributes(building, units=units)["hiproof_iso19107_lod22"] == "[]", building.id
+        assert building_attributes(building, units=units)["hiproof_iso19107_lod22"] == "[]", (
+            building.id
+        )
         before, after = building.solid.vertices, units.from_metres(building.solid.vertices)
         for face in building.solid.of_kind(WALL):
             ring = list(face.rings[0])
-            assert len(np.unique(after[ring, :2], axis=0)) == len(np.unique(before[ring, :2], axis=0))
+            assert len(np.unique(after[ring, :2], axis=0)) == len(
+                np.unique(before[ring, :2], axis=0)
+            )
 
 
 def test_a_solid_that_breaks_on_the_way_says_so():
@@ -93,15 +106,24 @@ def town(tmp_path_factory):
     cloud = str(write_cloud(folder / "cloud.laz", town.xyz, town.classification, "EPSG:7415"))
     footprints = str(write_footprints(folder / "footprints.gpkg", town.footprints, "EPSG:28992"))
     for name, out_crs in (("here", ""), ("there", "EPSG:25831")):
-        settings = Settings.from_dict({"write": {"out_crs": out_crs, "lods": ["0", "2.2"], "citygml": "both"}})
-        assert reconstruct_area(Request((cloud,), folder / name, footprints, settings=settings)).exit_code == 0
+        settings = Settings.from_dict(
+            {"write": {"out_crs": out_crs, "lods": ["0", "2.2"], "citygml": "both"}}
+        )
+        assert (
+            reconstruct_area(
+                Request((cloud,), folder / name, footprints, settings=settings)
+            ).exit_code
+            == 0
+        )
     return folder
 
 
 def gml_places(path):
     """All places (n, 3) of a GML file, and the CRS it names."""
     root = etree.parse(path)
-    numbers = np.array(" ".join(node.text for node in root.iter("{*}posList")).split(), float).reshape(-1, 3)
+    numbers = np.array(
+        " ".join(node.text for node in root.iter("{*}posList")).split(), float
+    ).reshape(-1, 3)
     return numbers, next(root.iter("{*}Envelope")).get("srsName")
 
 
@@ -113,13 +135,20 @@ def test_all_files_stand_in_the_same_place(town):
         assert there[1] == "urn:ogc:def:crs,crs:EPSG::25831,crs:EPSG::5709"
     runs = [list(read_models(town / run / "buildings.city.jsonl")) for run in ("here", "there")]
     for one, other in zip(*runs, strict=True):
-        assert np.abs(units.cityjson.to_metres(other.solid.vertices) - one.solid.vertices).max() < 1e-3
+        assert (
+            np.abs(units.cityjson.to_metres(other.solid.vertices) - one.solid.vertices).max() < 1e-3
+        )
         assert one.solid.faces == other.solid.faces
     for layer in ("buildings", "parts", "roof_surfaces"):
-        metas, shapes = zip(*(table(town / run / "buildings.gpkg", layer) for run in ("here", "there")), strict=True)
+        metas, shapes = zip(
+            *(table(town / run / "buildings.gpkg", layer) for run in ("here", "there")), strict=True
+        )
         moved = shapely.get_coordinates(shapes[1], include_z=layer == "roof_surfaces")
         assert (
-            np.abs(units.gml.to_metres(moved) - shapely.get_coordinates(shapes[0], include_z=moved.shape[1] == 3)).max()
+            np.abs(
+                units.gml.to_metres(moved)
+                - shapely.get_coordinates(shapes[0], include_z=moved.shape[1] == 3)
+            ).max()
             < 1e-3
         )
         assert metas[1]["crs"] == "EPSG:25831"
@@ -131,21 +160,43 @@ def table(path, layer):
 
 
 def test_parameters_stay_in_the_clouds_crs_and_build_the_same_bytes(town, tmp_path):
-    here, there = ((town / run / "parameters.jsonl").read_bytes().split(b"\n") for run in ("here", "there"))
+    here, there = (
+        (town / run / "parameters.jsonl").read_bytes().split(b"\n") for run in ("here", "there")
+    )
     assert here[1:] == there[1:]
     build_file(town / "there/parameters.jsonl", tmp_path / "again")
-    for name in ("buildings.gml", "buildings.citygml3.gml", "buildings.city.jsonl", "parameters.jsonl"):
-        assert (tmp_path / "again" / name).read_bytes() == (town / "there" / name).read_bytes(), name
-    build_file(town / "here/parameters.jsonl", tmp_path / "moved", changes={"write": {"out_crs": "EPSG:25831"}})
+    for name in (
+        "buildings.gml",
+        "buildings.citygml3.gml",
+        "buildings.city.jsonl",
+        "parameters.jsonl",
+    ):
+        assert (tmp_path / "again" / name).read_bytes() == (town / "there" / name).read_bytes(), (
+            name
+        )
+    build_file(
+        town / "here/parameters.jsonl",
+        tmp_path / "moved",
+        changes={"write": {"out_crs": "EPSG:25831"}},
+    )
     for name in ("buildings.gml", "buildings.city.jsonl"):
-        assert (tmp_path / "moved" / name).read_bytes() == (town / "there" / name).read_bytes(), name
+        assert (tmp_path / "moved" / name).read_bytes() == (town / "there" / name).read_bytes(), (
+            name
+        )
 
 
 def test_models_elsewhere_are_judged_where_their_points_are(town):
     cloud = str(town / "cloud.laz")
-    for here, there in zip(*(evaluate_run(town / run, [cloud]).figures for run in ("here", "there")), strict=True):
-        assert there.quality.rmse == pytest.approx(here.quality.rmse, abs=1e-4) and here.quality.points > 50
-    assert run_crs_text(town / "there").startswith("COMPOUNDCRS") and "UTM zone 31N" in run_crs_text(town / "there")
+    for here, there in zip(
+        *(evaluate_run(town / run, [cloud]).figures for run in ("here", "there")), strict=True
+    ):
+        assert (
+            there.quality.rmse == pytest.approx(here.quality.rmse, abs=1e-4)
+            and here.quality.points > 50
+        )
+    assert run_crs_text(town / "there").startswith(
+        "COMPOUNDCRS"
+    ) and "UTM zone 31N" in run_crs_text(town / "there")
 
 
 def test_the_same_crs_is_no_other(tmp_path):

@@ -11,16 +11,28 @@ from hiproof.write.roof_figures import roof_figures
 
 def hip_house():
     """10 x 16 m, eaves at 4, ridge at 8 m from y = 5 to 11."""
-    xyz = [(x, y, z) for z in (0, 4) for x, y in ((0, 0), (10, 0), (10, 16), (0, 16))] + [(5, 5, 8), (5, 11, 8)]
+    xyz = [(x, y, z) for z in (0, 4) for x, y in ((0, 0), (10, 0), (10, 16), (0, 16))] + [
+        (5, 5, 8),
+        (5, 11, 8),
+    ]
     roof = [(4, 5, 8), (5, 6, 9, 8), (6, 7, 9), (7, 4, 8, 9)]
     walls = [(i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4) for i in range(4)]
-    faces = [Face(((3, 2, 1, 0),), GROUND), *(Face((r,), ROOF) for r in roof), *(Face((w,), WALL) for w in walls)]
+    faces = [
+        Face(((3, 2, 1, 0),), GROUND),
+        *(Face((r,), ROOF) for r in roof),
+        *(Face((w,), WALL) for w in walls),
+    ]
     return Solid(np.array(xyz, float), tuple(faces))
 
 
 def two_levels():
-    """A quarter of the roof at 3 m, three quarters at 6 m (only the faces that the figures of a roof need)."""
-    low, high = prism([[(0, 0), (1, 0), (1, 4), (0, 4)]], 0, 3), prism([[(1, 0), (4, 0), (4, 4), (1, 4)]], 0, 6)
+    """A quarter of the roof at 3 m, three quarters at 6 m (only the faces that the figures of a
+    roof need).
+    """
+    low, high = (
+        prism([[(0, 0), (1, 0), (1, 4), (0, 4)]], 0, 3),
+        prism([[(1, 0), (4, 0), (4, 4), (1, 4)]], 0, 6),
+    )
     shifted = [Face(tuple(tuple(i + 8 for i in r) for r in f.rings), f.kind) for f in high.faces]
     return Solid(np.vstack([low.vertices, high.vertices]), low.faces + tuple(shifted))
 
@@ -93,7 +105,9 @@ def sampled_roof(solid, steps):
     heights, areas = [], []
     for face in solid.of_kind(ROOF):
         xyz = solid.vertices[list(face.rings[0])]
-        plane = np.linalg.lstsq(np.c_[xyz[:, :2] - xyz[0, :2], np.ones(len(xyz))], xyz[:, 2], rcond=None)[0]
+        plane = np.linalg.lstsq(
+            np.c_[xyz[:, :2] - xyz[0, :2], np.ones(len(xyz))], xyz[:, 2], rcond=None
+        )[0]
         polygon = shapely.Polygon(xyz[:, :2])
         x0, y0, x1, y1 = polygon.bounds
         x = x0 + (np.arange(steps) + 0.5) * (x1 - x0) / steps
@@ -109,7 +123,9 @@ def sampled_roof(solid, steps):
 def test_many_levels_are_searched_exactly():
     """A staircase of many levels: its percentiles are steps 350 and 490 of 700."""
     steps = 700
-    vertices = [(x + dx, y, x * 0.01) for x in range(steps) for dx, y in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    vertices = [
+        (x + dx, y, x * 0.01) for x in range(steps) for dx, y in ((0, 0), (1, 0), (1, 1), (0, 1))
+    ]
     faces = tuple(Face((tuple(range(4 * i, 4 * i + 4)),), ROOF) for i in range(steps))
     figures = roof_figures(Solid(np.array(vertices, float), faces))
     assert figures.h_50p == pytest.approx(3.49)
@@ -127,7 +143,9 @@ def test_figures_move_with_the_solid(shift):
 
 @pytest.mark.parametrize("top", [2.37151, 2.37155, 9.99996])
 def test_eaves_of_a_level_roof_are_at_its_height(top):
-    """The eave's height is rounded to choose it, about the middle of the solid: it stood a tenth of a millimetre above the roof."""
+    """The eave's height is rounded to choose it, about the middle of the solid: it stood a tenth of
+    a millimetre above the roof.
+    """
     for base in (0.0, 0.01234, -3.33335):
         figures = roof_figures(prism([[(0, 0), (4, 0), (4, 5), (0, 5)]], base, top))
         assert figures.h_min <= figures.h_eave <= figures.h_max

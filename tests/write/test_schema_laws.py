@@ -1,4 +1,6 @@
-"""The rules of CityGML 2.0 and CityJSON 2.0 that readers rely on most, asked without the schemas themselves."""
+"""The rules of CityGML 2.0 and CityJSON 2.0 that readers rely on most, asked without the schemas
+themselves.
+"""
 
 import json
 import re
@@ -16,14 +18,29 @@ GML = "{http://www.opengis.net/gml}"
 XLINK = "{http://www.w3.org/1999/xlink}"
 NAME = re.compile(r"[A-Za-z_][\w.-]*\Z")
 
-GENERIC = tuple(GEN + kind + "Attribute" for kind in ("string", "int", "double", "date", "uri", "measure"))
+GENERIC = tuple(
+    GEN + kind + "Attribute" for kind in ("string", "int", "double", "date", "uri", "measure")
+)
 BUILDING_ORDER = (
     (GML + "description", GML + "name", GML + "boundedBy"),
     (CORE + "creationDate", CORE + "terminationDate", CORE + "externalReference"),
     GENERIC,
-    *((BLDG + name,) for name in ("class", "function", "usage", "yearOfConstruction", "roofType", "measuredHeight")),
+    *(
+        (BLDG + name,)
+        for name in (
+            "class",
+            "function",
+            "usage",
+            "yearOfConstruction",
+            "roofType",
+            "measuredHeight",
+        )
+    ),
     *((BLDG + name,) for name in ("lod1Solid", "lod1TerrainIntersection")),
-    *((BLDG + name,) for name in ("lod2Solid", "lod2MultiSurface", "lod2MultiCurve", "lod2TerrainIntersection")),
+    *(
+        (BLDG + name,)
+        for name in ("lod2Solid", "lod2MultiSurface", "lod2MultiCurve", "lod2TerrainIntersection")
+    ),
     (BLDG + "boundedBy",),
 )
 SURFACE_ORDER = ((GML + "description", GML + "name"), GENERIC, (BLDG + "lod2MultiSurface",))
@@ -32,11 +49,15 @@ SURFACES = tuple(BLDG + kind for kind in ("RoofSurface", "WallSurface", "GroundS
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A run's files with a gable, a courtyard, two of one id, ids that XML forbids, and one without a model."""
+    """A run's files with a gable, a courtyard, two of one id, ids that XML forbids, and one without
+    a model.
+    """
     place = tmp_path_factory.mktemp("schema")
     solids = {"a": gable_house(), "yard": courtyard(), "1 b/<c>": box()}
     buildings = [modelled(solid, id) for id, solid in solids.items()]
-    write_all(place, [*buildings, modelled(box(), "yard"), unmodelled(), unmodelled("ü")], "EPSG:7415")
+    write_all(
+        place, [*buildings, modelled(box(), "yard"), unmodelled(), unmodelled("ü")], "EPSG:7415"
+    )
     return place
 
 
@@ -52,7 +73,9 @@ def sequence(folder):
 
 
 def in_order(element, order):
-    places = [next((k for k, group in enumerate(order) if child.tag in group), None) for child in element]
+    places = [
+        next((k for k, group in enumerate(order) if child.tag in group), None) for child in element
+    ]
     assert None not in places, [child.tag for child in element]
     assert places == sorted(places)
 
@@ -72,13 +95,21 @@ def test_citygml_ids_are_names_unique_and_all_references_lead_to_one(gml):
     ids = [element.get(GML + "id") for element in gml.iter() if element.get(GML + "id") is not None]
     assert len(set(ids)) == len(ids) and all(NAME.match(id) for id in ids)
     targets = [element.get(XLINK + "href") for element in gml.iter() if element.get(XLINK + "href")]
-    assert targets and {target[0] for target in targets} == {"#"} and {target[1:] for target in targets} <= set(ids)
-    assert all(element.get(GML + "id") for element in gml.iter(BLDG + "Building", GML + "Solid", *SURFACES))
+    assert (
+        targets
+        and {target[0] for target in targets} == {"#"}
+        and {target[1:] for target in targets} <= set(ids)
+    )
+    assert all(
+        element.get(GML + "id") for element in gml.iter(BLDG + "Building", GML + "Solid", *SURFACES)
+    )
 
 
 def test_citygml_has_its_required_members(gml):
     (envelope,) = gml[0]
-    assert envelope.get("srsDimension") == "3" and envelope.get("srsName").startswith("urn:ogc:def:crs")
+    assert envelope.get("srsDimension") == "3" and envelope.get("srsName").startswith(
+        "urn:ogc:def:crs"
+    )
     assert [child.tag for child in envelope] == [GML + "lowerCorner", GML + "upperCorner"]
     for attribute in gml.iter(*GENERIC):
         assert attribute.get("name") and [child.tag for child in attribute] == [GEN + "value"]
@@ -95,16 +126,28 @@ def test_citygml_rings_are_closed(gml):
         assert positions.tag == GML + "posList" and positions.get("srsDimension") == "3"
         assert len(numbers) >= 12 and len(numbers) % 3 == 0 and numbers[:3] == numbers[-3:]
     for polygon in gml.iter(GML + "Polygon"):
-        assert [child.tag for child in polygon] == [GML + "exterior"] + [GML + "interior"] * (len(polygon) - 1)
+        assert [child.tag for child in polygon] == [GML + "exterior"] + [GML + "interior"] * (
+            len(polygon) - 1
+        )
 
 
 def test_cityjson_header_has_its_required_members(sequence):
     header, _ = sequence
-    assert (header["type"], header["version"], header["CityObjects"], header["vertices"]) == ("CityJSON", "2.0", {}, [])
+    assert (header["type"], header["version"], header["CityObjects"], header["vertices"]) == (
+        "CityJSON",
+        "2.0",
+        {},
+        [],
+    )
     assert set(header["transform"]) == {"scale", "translate"}
-    assert all(len(values) == 3 for values in header["transform"].values()) and min(header["transform"]["scale"]) > 0
+    assert (
+        all(len(values) == 3 for values in header["transform"].values())
+        and min(header["transform"]["scale"]) > 0
+    )
     assert len(header["metadata"]["geographicalExtent"]) == 6
-    assert re.fullmatch(r"https://www\.opengis\.net/def/crs/\w+/\w+/\w+", header["metadata"]["referenceSystem"])
+    assert re.fullmatch(
+        r"https://www\.opengis\.net/def/crs/\w+/\w+/\w+", header["metadata"]["referenceSystem"]
+    )
 
 
 def test_cityjson_features_hold_their_object_and_its_vertices(sequence):
@@ -112,7 +155,12 @@ def test_cityjson_features_hold_their_object_and_its_vertices(sequence):
     ids = [feature["id"] for feature in features]
     assert len(set(ids)) == len(ids) == 6
     for feature in features:
-        assert feature["type"] == "CityJSONFeature" and set(feature) == {"type", "id", "CityObjects", "vertices"}
+        assert feature["type"] == "CityJSONFeature" and set(feature) == {
+            "type",
+            "id",
+            "CityObjects",
+            "vertices",
+        }
         assert list(feature["CityObjects"]) == [feature["id"]]
         (city_object,) = feature["CityObjects"].values()
         assert city_object["type"] == "Building" and isinstance(city_object["attributes"], dict)
@@ -128,15 +176,26 @@ def test_cityjson_geometries_have_type_lod_boundaries_and_matching_semantics(seq
         used = set()
         for geometry in city_object.get("geometry", []):
             assert isinstance(geometry["lod"], str)
-            shells = geometry["boundaries"] if geometry["type"] == "Solid" else [geometry["boundaries"]]
+            shells = (
+                geometry["boundaries"] if geometry["type"] == "Solid" else [geometry["boundaries"]]
+            )
             assert geometry["type"] in ("Solid", "MultiSurface")
             rings = [ring for shell in shells for surface in shell for ring in surface]
-            assert all(len(ring) >= 3 and len(set(ring)) == len(ring) for ring in rings)  # not closed, no repeats
+            # not closed, no repeats
+            assert all(len(ring) >= 3 and len(set(ring)) == len(ring) for ring in rings)
             used |= {index for ring in rings for index in ring}
             if "semantics" in geometry:
                 semantics = geometry["semantics"]
                 assert set(semantics) == {"surfaces", "values"}
-                assert {s["type"] for s in semantics["surfaces"]} <= {"RoofSurface", "WallSurface", "GroundSurface"}
-                assert [len(values) for values in semantics["values"]] == [len(shell) for shell in shells]
-                assert {v for values in semantics["values"] for v in values} == set(range(len(semantics["surfaces"])))
+                assert {s["type"] for s in semantics["surfaces"]} <= {
+                    "RoofSurface",
+                    "WallSurface",
+                    "GroundSurface",
+                }
+                assert [len(values) for values in semantics["values"]] == [
+                    len(shell) for shell in shells
+                ]
+                assert {v for values in semantics["values"] for v in values} == set(
+                    range(len(semantics["surfaces"]))
+                )
         assert used == set(range(len(feature["vertices"])))

@@ -1,4 +1,6 @@
-"""3D Tiles read back by lines of our own: each building once, in its place, under its own attributes."""
+"""3D Tiles read back by lines of our own: each building once, in its place, under its own
+attributes.
+"""
 
 import json
 import shutil
@@ -40,7 +42,12 @@ def town(count=60, seed=0):
         at = ORIGIN + [*np.round(rng.uniform(0, 500, 2), 2), np.round(rng.uniform(0, 5), 2)]
         width = float(rng.uniform(4, 30))
         solid = courtyard_solid(width, width / 3) if k % 5 == 0 else gable_solid(width, 1.5 * width)
-        told = {"k": k, "half known": None if k % 2 else k / 2, "name": None if k % 3 else f"Haus {k} ü", "flag": k > 3}
+        told = {
+            "k": k,
+            "half known": None if k % 2 else k / 2,
+            "name": None if k % 3 else f"Haus {k} ü",
+            "flag": k > 3,
+        }
         kind = "flat" if k % 5 == 0 else "gable"
         yield ViewedModel(f"house-{k}", kind, solid.moved(at), told, {0: kind})
 
@@ -98,7 +105,9 @@ def rows_of(document, binary):
         if told["type"] == "SCALAR":
             columns[told["name"]] = np.frombuffer(values, "<f8").tolist()
         else:
-            ends = np.frombuffer(view_bytes(document, binary, table["properties"][id]["stringOffsets"]), "<u4")
+            ends = np.frombuffer(
+                view_bytes(document, binary, table["properties"][id]["stringOffsets"]), "<u4"
+            )
             columns[told["name"]] = [values[a:b].decode() for a, b in pairwise(ends.tolist())]
     assert {len(column) for column in columns.values()} == {table["count"]}
     return [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
@@ -132,7 +141,8 @@ def boxes_on_earth(folder):
         places, ids, rows = content_of(folder, tile)
         earth = places @ transform[:3, :3].T + transform[:3, 3]
         found |= {
-            row["id"]: np.array([f(earth[ids == k], axis=0) for f in (np.min, np.max)]) for k, row in enumerate(rows)
+            row["id"]: np.array([f(earth[ids == k], axis=0) for f in (np.min, np.max)])
+            for k, row in enumerate(rows)
         }
     return found
 
@@ -141,7 +151,10 @@ def boxes_on_earth(folder):
 def test_models_stand_in_the_same_place_by_way_of_another_crs(tiled, tmp_path, out):
     """Whatever the frames of the tilesets, which may lie half a metre apart."""
     way = FileUnits.of("EPSG:7415", out_crs=out).gml
-    moved = (m._replace(solid=replace(m.solid, vertices=way.from_metres(m.solid.vertices))) for m in town())
+    moved = (
+        m._replace(solid=replace(m.solid, vertices=way.from_metres(m.solid.vertices)))
+        for m in town()
+    )
     write_models(tmp_path / "there.3dtiles", moved, f"{out}+5709", GEOID_M)
     here, there = boxes_on_earth(tiled[0]), boxes_on_earth(tmp_path / "there.3dtiles")
     assert here.keys() == there.keys()
@@ -155,7 +168,9 @@ def test_attributes_are_those_of_the_building(tiled):
         for row in content_of(folder, tile)[2]:
             roof_type, told = expected[row["id"]]
             assert row["type"] == roof_type and row["k"] == told["k"]
-            assert row["half known"] == (NO_NUMBER if told["half known"] is None else told["half known"])
+            assert row["half known"] == (
+                NO_NUMBER if told["half known"] is None else told["half known"]
+            )
             assert row["name"] == (told["name"] or "") and row["flag"] == str(told["flag"]).lower()
 
 
@@ -164,9 +179,15 @@ def test_a_roof_face_has_the_colour_of_its_part(tmp_path, globe):
     document, binary = parse_glb(tmp_path / "a.3dtiles/tiles/r.glb")
     names = document["meshes"][0]["primitives"][0]["attributes"]
     up = accessor_values(document, binary, names["NORMAL"])[:, 1]
-    painted = {tuple(c) for c in accessor_values(document, binary, names["COLOR_0"])[(up > 0.1) & (up < 0.9)].tolist()}
+    painted = {
+        tuple(c)
+        for c in accessor_values(document, binary, names["COLOR_0"])[
+            (up > 0.1) & (up < 0.9)
+        ].tolist()
+    }
     assert painted == {
-        (*(round(255 * part) for part in linear_rgb(type_colour(kind))), 255) for kind in ("gable", "hip")
+        (*(round(255 * part) for part in linear_rgb(type_colour(kind))), 255)
+        for kind in ("gable", "hip")
     }
 
 
@@ -224,7 +245,9 @@ def test_places_come_back_from_the_globe(name):
     earth = globe.to_earth(world)
     assert 6.3e6 < np.linalg.norm(earth, axis=1).min() < 6.4e6
     np.testing.assert_allclose(globe.from_earth(earth), world, atol=1e-3)
-    scale = np.linalg.norm(earth[1:] - earth[0], axis=1) / np.linalg.norm(world[1:] - world[0], axis=1)
+    scale = np.linalg.norm(earth[1:] - earth[0], axis=1) / np.linalg.norm(
+        world[1:] - world[0], axis=1
+    )
     assert abs(scale - 1).max() < 2e-3  # a projection's own, and metres that are metres
 
 
@@ -232,7 +255,9 @@ def test_a_geoid_height_raises_all_by_as_much():
     world = np.append(PLACES["EPSG:28992"], 3.0)[None]
     low, high = (Globe.of("EPSG:28992", height) for height in (0.0, 43.2))
     assert high.geographic(world)[0, 2] == pytest.approx(46.2)
-    assert np.linalg.norm(high.to_earth(world) - low.to_earth(world)) == pytest.approx(43.2, abs=1e-6)
+    assert np.linalg.norm(high.to_earth(world) - low.to_earth(world)) == pytest.approx(
+        43.2, abs=1e-6
+    )
     assert "43.2" in high.heights and high.is_known
 
 
@@ -316,9 +341,23 @@ def test_properties_have_ids_that_the_extension_allows():
 
 
 def write_sample_parameters(folder, ids=("house-1", "block 2", "bare")):
-    part = {"type": "gable", "parameters": {"width": 8.0}, "position": [0, 0, 0], "rotation": 0.0, "outlines": []}
-    head = {"hiproof_parameters": 1, "crs": "EPSG:7415", "unit": "auto", "cityjson_offset": None, "compose": {}}
-    records = [{"id": id, "origin": ORIGIN.tolist(), "parts": [part] if id != "bare" else []} for id in ids]
+    part = {
+        "type": "gable",
+        "parameters": {"width": 8.0},
+        "position": [0, 0, 0],
+        "rotation": 0.0,
+        "outlines": [],
+    }
+    head = {
+        "hiproof_parameters": 1,
+        "crs": "EPSG:7415",
+        "unit": "auto",
+        "cityjson_offset": None,
+        "compose": {},
+    }
+    records = [
+        {"id": id, "origin": ORIGIN.tolist(), "parts": [part] if id != "bare" else []} for id in ids
+    ]
     (folder / "parameters.jsonl").write_text("\n".join(map(json.dumps, [head, *records])) + "\n")
 
 
@@ -341,7 +380,13 @@ def test_attributes_of_the_input_do_not_take_the_place_of_id_type_and_parameters
     write_models(tmp_path / "a.3dtiles", [model], "EPSG:7415", GEOID_M)
     tileset = json.loads((tmp_path / "a.3dtiles" / "tileset.json").read_text())
     (row,) = content_of(tmp_path / "a.3dtiles", tileset["root"])[2]
-    assert row == {"id": "a", "type": "gable", "id_input": 7.0, "type_input": "church", "year": 1905.0}
+    assert row == {
+        "id": "a",
+        "type": "gable",
+        "id_input": 7.0,
+        "type_input": "church",
+        "year": 1905.0,
+    }
 
 
 def test_parameters_of_another_run_are_refused(tmp_path):
@@ -355,8 +400,12 @@ def node_has(package):
     """Whether Node.js finds `package`, and where packages for everyone lie."""
     if not shutil.which("node") or not shutil.which("npm"):
         return False, ""
-    root = subprocess.run(["npm", "root", "--global"], capture_output=True, text=True).stdout.strip()
-    done = subprocess.run(["node", "-e", f"require('{package}')"], capture_output=True, env=node_environment(root))
+    root = subprocess.run(
+        ["npm", "root", "--global"], capture_output=True, text=True
+    ).stdout.strip()
+    done = subprocess.run(
+        ["node", "-e", f"require('{package}')"], capture_output=True, env=node_environment(root)
+    )
     return done.returncode == 0, root
 
 
@@ -374,11 +423,16 @@ def test_the_gltf_validator_finds_no_fault(tiled):
     script = """
     const validator = require("gltf-validator"), fs = require("fs");
     validator.validateBytes(new Uint8Array(fs.readFileSync(process.argv[1]))).then(report =>
-      console.log(JSON.stringify([report.issues.numErrors, report.issues.numWarnings, report.info.drawCallCount])));
+      console.log(JSON.stringify(
+        [report.issues.numErrors, report.issues.numWarnings, report.info.drawCallCount])));
     """
     folder, _ = tiled
     for file in sorted((folder / "tiles").iterdir())[:3]:
         done = subprocess.run(
-            ["node", "-e", script, str(file)], capture_output=True, text=True, env=node_environment(root), timeout=120
+            ["node", "-e", script, str(file)],
+            capture_output=True,
+            text=True,
+            env=node_environment(root),
+            timeout=120,
         )
         assert json.loads(done.stdout) == [0, 0, 1], done.stderr

@@ -49,9 +49,13 @@ def schema():
 
 
 @pytest.mark.parametrize("crs", ["EPSG:7415", "EPSG:28992", None])
-@pytest.mark.parametrize("buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"])
+@pytest.mark.parametrize(
+    "buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"]
+)
 def test_valid_by_the_schema(tmp_path, schema, buildings, crs):
-    schema.assertValid(written(tmp_path, buildings, crs, creation_date=datetime.date(2020, 2, 3)).getroottree())
+    schema.assertValid(
+        written(tmp_path, buildings, crs, creation_date=datetime.date(2020, 2, 3)).getroottree()
+    )
 
 
 def test_strange_attributes_are_valid(tmp_path, schema):
@@ -78,7 +82,9 @@ def test_the_text_is_what_lxml_would_print(tmp_path):
 @given(st.text(max_size=12))
 def test_any_text_comes_back_from_xml(text):
     known = "".join(
-        c if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd" or c > "\uffff" else "\ufffd"
+        c
+        if c in "\t\n\r" or " " <= c <= "\ud7ff" or "\ue000" <= c <= "\ufffd" or c > "\uffff"
+        else "\ufffd"
         for c in text
     )
     element = etree.fromstring(f'<a b="{xml_attribute(text)}">{xml_text(text)}</a>')
@@ -97,18 +103,28 @@ def test_ids_are_unique_and_links_lead_somewhere(tmp_path):
     assert len(ids) == len(set(ids))
     links = {element.get(HREF)[1:] for element in root.iter() if element.get(HREF)}
     assert links == set(found(root, "//gml:Polygon/@gml:id"))
-    assert found(root, "//bldg:Building/@gml:id")[-3:] == ["bldg-same", "bldg-same..2", "bldg-same-1"]
+    assert found(root, "//bldg:Building/@gml:id")[-3:] == [
+        "bldg-same",
+        "bldg-same..2",
+        "bldg-same-1",
+    ]
 
 
 @pytest.mark.parametrize(
-    "kinds, code", [(("hip",), "1040"), (("hip", "hip"), "1040"), (("hip", "flat"), "1130"), (("free",), "1130")]
+    "kinds, code",
+    [(("hip",), "1040"), (("hip", "hip"), "1040"), (("hip", "flat"), "1130"), (("free",), "1130")],
 )
 def test_roof_type(tmp_path, kinds, code):
     """A slope of the house belongs to each part."""
     house = gable_house()
     roof = itertools.cycle(range(len(kinds)))
-    faces = tuple(replace(face, part=next(roof)) if face.kind == "RoofSurface" else face for face in house.faces)
-    (element,) = found(written(tmp_path, [modelled(replace(house, faces=faces), kinds=kinds)]), "//bldg:roofType")
+    faces = tuple(
+        replace(face, part=next(roof)) if face.kind == "RoofSurface" else face
+        for face in house.faces
+    )
+    (element,) = found(
+        written(tmp_path, [modelled(replace(house, faces=faces), kinds=kinds)]), "//bldg:roofType"
+    )
     assert element.text == code
     assert element.get("codeSpace").endswith("_AbstractBuilding_roofType.xml")
 
@@ -119,7 +135,9 @@ def test_heights_attributes_and_date(tmp_path):
     assert found(root, "//core:creationDate/text()") == ["2020-02-03"]
     assert found(root, "//gen:doubleAttribute[@name='rf_h_roof_ridge']/gen:value/text()") == ["7.0"]
     assert found(root, "//gen:stringAttribute[@name='naam']/gen:value/text()") == ["Café <&>"]
-    assert found(root, "//bldg:RoofSurface/gen:doubleAttribute[@name='azimuth']/gen:value/text()") == ["270.0", "90.0"]
+    assert found(
+        root, "//bldg:RoofSurface/gen:doubleAttribute[@name='azimuth']/gen:value/text()"
+    ) == ["270.0", "90.0"]
 
 
 def test_polygons_are_the_solid(tmp_path):
@@ -128,13 +146,20 @@ def test_polygons_are_the_solid(tmp_path):
     polygons = found(root, "//bldg:boundedBy//gml:Polygon")
     assert len(polygons) == len(solid.faces)
     for polygon, face in zip(polygons, solid.faces, strict=True):
-        rings = [np.array(text.split(), float).reshape(-1, 3) for text in found(polygon, ".//gml:posList/text()")]
+        rings = [
+            np.array(text.split(), float).reshape(-1, 3)
+            for text in found(polygon, ".//gml:posList/text()")
+        ]
         assert len(rings) == len(face.rings) == len(found(polygon, "gml:exterior|gml:interior"))
         for ring, indices in zip(rings, face.rings, strict=True):
-            np.testing.assert_allclose(ring, solid.vertices[[*indices, indices[0]]] + RD_ORIGIN, atol=1e-9)
+            np.testing.assert_allclose(
+                ring, solid.vertices[[*indices, indices[0]]] + RD_ORIGIN, atol=1e-9
+            )
 
 
-@pytest.mark.parametrize("crs", ["EPSG:2193+7839", "EPSG:2193", "EPSG:3035", "EPSG:2154+5720", "EPSG:25832"])
+@pytest.mark.parametrize(
+    "crs", ["EPSG:2193+7839", "EPSG:2193", "EPSG:3035", "EPSG:2154+5720", "EPSG:25832"]
+)
 def test_gdal_reads_the_place_also_where_the_crs_counts_north_first(tmp_path, crs):
     written(tmp_path, [modelled(box(), terrain_intersection=())], crs)
     west, south, east, north = pyogrio.read_info(tmp_path / "a.gml")["total_bounds"]
@@ -147,7 +172,9 @@ def test_envelope_holds_everything(tmp_path):
     assert box_.get("srsName") == "urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709"
     assert box_.get("srsDimension") == "3"
     low, high = (np.array(corner.text.split(), float) for corner in box_)
-    xyz = np.concatenate([np.array(t.split(), float).reshape(-1, 3) for t in found(root, "//gml:posList/text()")])
+    xyz = np.concatenate(
+        [np.array(t.split(), float).reshape(-1, 3) for t in found(root, "//gml:posList/text()")]
+    )
     np.testing.assert_allclose([low, high], [xyz.min(axis=0), xyz.max(axis=0)])
 
 
@@ -169,7 +196,10 @@ def test_incremental_equals_whole(tmp_path):
 @pytest.mark.parametrize("id", ["a", "ä", "1", " ", "", "<&>", "x" * 300, "a:b", "\n"])
 def test_any_id_becomes_a_name(id):
     name = "bldg-" + gml_name(id)
-    assert etree.fromstring(f"<a xmlns:xml='http://www.w3.org/XML/1998/namespace' xml:id='{name}'/>") is not None
+    assert (
+        etree.fromstring(f"<a xmlns:xml='http://www.w3.org/XML/1998/namespace' xml:id='{name}'/>")
+        is not None
+    )
     assert all(c.isascii() and (c.isalnum() or c in "_.-") for c in name)
 
 

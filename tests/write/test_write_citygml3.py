@@ -1,4 +1,6 @@
-"""CityGML 3.0 against what 2.0 tells of the same buildings, and against the order that OGC's schemas ask for."""
+"""CityGML 3.0 against what 2.0 tells of the same buildings, and against the order that OGC's
+schemas ask for.
+"""
 
 import datetime
 
@@ -15,22 +17,31 @@ from hiproof.write.fragments import Fragment
 
 HREF = f"{{{NAMESPACES['xlink']}}}href"
 
-# What may stand in a building, in its schemas' order: gml, core (feature, city object, space), construction, building.
+# What may stand in a building, in its schemas' order: gml, core (feature, city object, space),
+# construction, building.
 BUILDING = {
     "gml": "description descriptionReference identifier name boundedBy location",
-    "core": "creationDate terminationDate validFrom validTo externalReference generalizesTo relativeToTerrain relativeToWater "
-    "relatedTo appearance genericAttribute dynamizer spaceType volume area boundary lod0Point lod0MultiSurface lod0MultiCurve "
+    "core": "creationDate terminationDate validFrom validTo externalReference generalizesTo "
+    "relativeToTerrain relativeToWater "
+    "relatedTo appearance genericAttribute dynamizer spaceType volume area boundary lod0Point "
+    "lod0MultiSurface lod0MultiCurve "
     "lod1Solid lod2Solid lod2MultiSurface lod2MultiCurve lod3Solid lod3MultiSurface lod3MultiCurve "
-    "lod1TerrainIntersectionCurve lod2TerrainIntersectionCurve lod3TerrainIntersectionCurve pointCloud",
-    "con": "conditionOfConstruction dateOfConstruction dateOfDemolition constructionEvent elevation height occupancy",
-    "bldg": "class function usage roofType storeysAboveGround storeysBelowGround storeyHeightsAboveGround "
-    "storeyHeightsBelowGround buildingConstructiveElement buildingInstallation buildingRoom buildingFurniture "
+    "lod1TerrainIntersectionCurve lod2TerrainIntersectionCurve lod3TerrainIntersectionCurve "
+    "pointCloud",
+    "con": "conditionOfConstruction dateOfConstruction dateOfDemolition constructionEvent "
+    "elevation height occupancy",
+    "bldg": "class function usage roofType storeysAboveGround storeysBelowGround "
+    "storeyHeightsAboveGround "
+    "storeyHeightsBelowGround buildingConstructiveElement buildingInstallation buildingRoom "
+    "buildingFurniture "
     "buildingSubdivision address buildingPart",
 }
 SURFACE = {
     "gml": BUILDING["gml"],
-    "core": "creationDate terminationDate validFrom validTo externalReference generalizesTo relativeToTerrain relativeToWater "
-    "relatedTo appearance genericAttribute dynamizer area lod0MultiCurve lod0MultiSurface lod1MultiSurface "
+    "core": "creationDate terminationDate validFrom validTo externalReference generalizesTo "
+    "relativeToTerrain relativeToWater "
+    "relatedTo appearance genericAttribute dynamizer area lod0MultiCurve lod0MultiSurface "
+    "lod1MultiSurface "
     "lod2MultiSurface lod3MultiSurface pointCloud",
     "con": "fillingSurface",
 }
@@ -46,7 +57,7 @@ TWO_PARTS = """<core:cityObjectMember><bldg:Building gml:id="bldg-x"><gml:name>x
 <gen:intAttribute name="k"><gen:value>3</gen:value></gen:intAttribute><gen:genericAttributeSet name="s">
 <gen:doubleAttribute name="width"><gen:value>8.5</gen:value></gen:doubleAttribute></gen:genericAttributeSet><bldg:roofType>1030</bldg:roofType>
 <bldg:lod1Solid><gml:Solid><gml:exterior><gml:CompositeSurface/></gml:exterior></gml:Solid></bldg:lod1Solid>
-</bldg:BuildingPart></bldg:consistsOfBuildingPart></bldg:Building></core:cityObjectMember>"""
+</bldg:BuildingPart></bldg:consistsOfBuildingPart></bldg:Building></core:cityObjectMember>"""  # noqa: E501
 
 
 def street():
@@ -80,7 +91,11 @@ def new(root, path):
 
 def assert_in_order(element, sequence):
     """The children of `element` are of the sequence's names, in its order."""
-    known = [f"{{{NAMESPACES[prefix]}}}{name}" for prefix, names in sequence.items() for name in names.split()]
+    known = [
+        f"{{{NAMESPACES[prefix]}}}{name}"
+        for prefix, names in sequence.items()
+        for name in names.split()
+    ]
     places = [known.index(child.tag) for child in element]
     assert places == sorted(places)
 
@@ -97,7 +112,9 @@ def assert_told_as_the_schemas_ask(root):
         if etree.QName(element).localname in WITH_ID:
             assert element.get(ID), element
     assert {href.removeprefix("#") for href in new(root, "//@xlink:href")} <= set(ids)
-    assert {child.tag for child in new(root, "//gml:Solid/gml:exterior/*")} <= {f"{{{NAMESPACES['gml']}}}Shell"}
+    assert {child.tag for child in new(root, "//gml:Solid/gml:exterior/*")} <= {
+        f"{{{NAMESPACES['gml']}}}Shell"
+    }
 
 
 def test_order_names_and_ids_are_as_the_schemas_ask(roots):
@@ -127,37 +144,57 @@ def test_the_same_attributes_stand_in_both(roots):
     ]
     assert again == told and all(told)
     assert new(later, "//gen:IntAttribute[gen:name='n']/gen:value/text()") == ["3"]
-    for path in ("//bldg:roofType/text()", "//bldg:roofType/@codeSpace", "//gml:name/text()", "//gml:posList/text()"):
+    for path in (
+        "//bldg:roofType/text()",
+        "//bldg:roofType/@codeSpace",
+        "//gml:name/text()",
+        "//gml:posList/text()",
+    ):
         assert sorted(new(later, path)) == sorted(old.xpath(path, namespaces=OLD))
 
 
 def test_heights_dates_and_terrain_lines_are_told_in_the_newer_way(roots):
     old, later = roots
     heights = old.xpath("//bldg:measuredHeight/text()", namespaces=OLD)
-    assert new(later, "//con:height/con:Height[con:status='measured']/con:value[@uom='m']/text()") == heights
+    assert (
+        new(later, "//con:height/con:Height[con:status='measured']/con:value[@uom='m']/text()")
+        == heights
+    )
     assert set(new(later, "//core:creationDate/text()")) == {"2020-02-03T00:00:00"}
     for level in (1, 2):
-        lines = old.xpath(f"//bldg:lod{level}TerrainIntersection//gml:posList/text()", namespaces=OLD)
+        lines = old.xpath(
+            f"//bldg:lod{level}TerrainIntersection//gml:posList/text()", namespaces=OLD
+        )
         assert new(later, f"//core:lod{level}TerrainIntersectionCurve//gml:posList/text()") == lines
     assert new(later, "//gml:MultiCurve")
-    assert new(later, "/core:CityModel/gml:boundedBy/gml:Envelope/@srsName") == old.xpath("//@srsName")
+    assert new(later, "/core:CityModel/gml:boundedBy/gml:Envelope/@srsName") == old.xpath(
+        "//@srsName"
+    )
 
 
 def test_parts_and_level_0_are_told_in_the_newer_way():
     member = upgraded(Fragment(TWO_PARTS.replace("\n", "").encode(), (0.0,) * 6))
     declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in NAMESPACES.items())
-    root = etree.fromstring(f'<core:CityModel {declared} gml:id="c">'.encode() + member.text + b"</core:CityModel>")
+    root = etree.fromstring(
+        f'<core:CityModel {declared} gml:id="c">'.encode() + member.text + b"</core:CityModel>"
+    )
     assert b"xmlns" not in member.text and member.extent == (0.0,) * 6
     assert_told_as_the_schemas_ask(root)
     (part,) = new(root, "//bldg:Building/bldg:buildingPart/bldg:BuildingPart")
     assert new(part, "bldg:roofType/text()") == ["1030"] and new(part, "core:lod1Solid/gml:Solid")
     assert new(part, "core:genericAttribute/gen:IntAttribute/gen:value/text()") == ["3"]
-    one_set = "core:genericAttribute/gen:GenericAttributeSet[gen:name='s']/gen:genericAttribute/gen:DoubleAttribute"
+    one_set = (
+        "core:genericAttribute/gen:GenericAttributeSet[gen:name='s']"
+        "/gen:genericAttribute/gen:DoubleAttribute"
+    )
     assert new(part, f"{one_set}[gen:name='width']/gen:value/text()") == ["8.5"]
-    assert new(root, "//core:boundary/con:GroundSurface/core:lod0MultiSurface//gml:posList/text()") == [
-        "0 0 0 1 0 0 1 1 0 0 0 0"
-    ]
-    assert len(new(root, "//core:boundary/con:RoofSurface/core:lod0MultiSurface/gml:MultiSurface")) == 1
+    assert new(
+        root, "//core:boundary/con:GroundSurface/core:lod0MultiSurface//gml:posList/text()"
+    ) == ["0 0 0 1 0 0 1 1 0 0 0 0"]
+    assert (
+        len(new(root, "//core:boundary/con:RoofSurface/core:lod0MultiSurface/gml:MultiSurface"))
+        == 1
+    )
 
 
 def test_no_buildings_make_an_empty_model(tmp_path):

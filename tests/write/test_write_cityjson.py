@@ -1,4 +1,6 @@
-"""CityJSON against its own schema, read back, and through the eyes of a tool that measures models."""
+"""CityJSON against its own schema, read back, and through the eyes of a tool that
+measures models.
+"""
 
 import importlib.util
 import json
@@ -28,7 +30,9 @@ def street():
 
 def sequence(tmp_path, buildings, crs="EPSG:7415", **options):
     write_cityjson(tmp_path / "a.city.jsonl", buildings, crs, **options)
-    return [json.loads(line) for line in (tmp_path / "a.city.jsonl").read_text("utf-8").splitlines()]
+    return [
+        json.loads(line) for line in (tmp_path / "a.city.jsonl").read_text("utf-8").splitlines()
+    ]
 
 
 def document(tmp_path, buildings, crs="EPSG:7415", **options):
@@ -44,15 +48,22 @@ def validator(name):
     return jsonschema.Draft7Validator(json.loads(path.read_text()))
 
 
-@pytest.mark.parametrize("buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"])
+@pytest.mark.parametrize(
+    "buildings", [street(), [], [unmodelled()]], ids=["street", "none", "no model"]
+)
 @pytest.mark.parametrize("crs", ["EPSG:7415", None])
 def test_valid_by_the_schema(tmp_path, buildings, crs):
-    whole, feature = validator("cityjson.min.schema.json"), validator("cityjsonfeature.min.schema.json")
+    whole, feature = (
+        validator("cityjson.min.schema.json"),
+        validator("cityjsonfeature.min.schema.json"),
+    )
     head, *features = sequence(tmp_path, buildings, crs)
     assert len(features) == len(buildings)
     assert [error.message for one in features for error in feature.iter_errors(one)] == []
     assert [
-        error.message for one in (head, document(tmp_path, buildings, crs)) for error in whole.iter_errors(one)
+        error.message
+        for one in (head, document(tmp_path, buildings, crs))
+        for error in whole.iter_errors(one)
     ] == []
 
 
@@ -67,7 +78,9 @@ def test_the_solid_comes_back(tmp_path):
     assert len(np.unique(xyz, axis=0)) == len(xyz)
     want = courtyard().moved(RD_ORIGIN)
     geometry = solid_of(feature["CityObjects"]["a"])
-    kinds = [geometry["semantics"]["surfaces"][v]["type"] for v in geometry["semantics"]["values"][0]]
+    kinds = [
+        geometry["semantics"]["surfaces"][v]["type"] for v in geometry["semantics"]["values"][0]
+    ]
     assert kinds == [face.kind for face in want.faces]
     for rings, face in zip(geometry["boundaries"][0], want.faces, strict=True):
         for ring, indices in zip(rings, face.rings, strict=True):
@@ -86,11 +99,18 @@ def test_document_and_sequence_hold_the_same(tmp_path):
         assert other["attributes"] == one["attributes"]
         for here, there in zip(one.get("geometry", []), other.get("geometry", []), strict=True):
             own = np.array(feature["vertices"])
-            assert own[flat(here["boundaries"])].tolist() == vertices[flat(there["boundaries"])].tolist()
+            assert (
+                own[flat(here["boundaries"])].tolist()
+                == vertices[flat(there["boundaries"])].tolist()
+            )
 
 
 def flat(nested):
-    return [nested] if isinstance(nested, int) else [index for inner in nested for index in flat(inner)]
+    return (
+        [nested]
+        if isinstance(nested, int)
+        else [index for inner in nested for index in flat(inner)]
+    )
 
 
 def test_metadata(tmp_path):
@@ -155,7 +175,13 @@ def test_a_building_without_model_has_its_status(tmp_path):
 
 
 def test_not_a_number_never_reaches_the_file(tmp_path):
-    strange = {"a": float("nan"), "b": np.float64("inf"), "c": np.datetime64("NaT"), "d": {1: 2}, "e": b"\xff"}
+    strange = {
+        "a": float("nan"),
+        "b": np.float64("inf"),
+        "c": np.datetime64("NaT"),
+        "d": {1: 2},
+        "e": b"\xff",
+    }
     _, feature = sequence(tmp_path, [modelled(box(), attributes=strange, z_ground=float("nan"))])
     attributes = feature["CityObjects"]["a"]["attributes"]
     assert [attributes[name] for name in "abcde"] == [None, None, None, '{"1": 2}', "\ufffd"]
@@ -165,13 +191,17 @@ def test_not_a_number_never_reaches_the_file(tmp_path):
 @pytest.mark.parametrize("origin", [(1e7, 1e7, -430.0), (-12345678.9, 1e7, 8848.0)])
 def test_far_away_and_under_water(tmp_path, origin):
     head, feature = sequence(tmp_path, [modelled(box(), origin=np.array(origin))])
-    xyz = np.array(feature["vertices"]) * head["transform"]["scale"] + head["transform"]["translate"]
+    xyz = (
+        np.array(feature["vertices"]) * head["transform"]["scale"] + head["transform"]["translate"]
+    )
     np.testing.assert_allclose(xyz.min(axis=0), origin, atol=1e-4)
 
 
 def test_an_added_building_leaves_the_others_as_they_were(tmp_path):
     before = sequence(tmp_path, street()[2:])
-    after = sequence(tmp_path, [*street()[2:], modelled(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))])
+    after = sequence(
+        tmp_path, [*street()[2:], modelled(box(), "far", origin=np.array([88123.0, 449000.0, 0.0]))]
+    )
     assert after[1:-1] == before[1:]
 
 

@@ -106,7 +106,9 @@ def test_a_full_disk_leaves_nothing(tmp_path, name, file_size_limit):
 
 @pytest.fixture
 def file_size_limit():
-    """A function that limits how long any file of this process may become: the nearest to a full disk without one."""
+    """A function that limits how long any file of this process may become: the nearest to a full
+    disk without one.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     handler = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
 
@@ -119,7 +121,10 @@ def file_size_limit():
 
 
 def test_no_space_left_says_so(tmp_path):
-    with pytest.raises(OutputError, match="the disk is full; free some space"), atomic(tmp_path / "a") as beside:
+    with (
+        pytest.raises(OutputError, match="the disk is full; free some space"),
+        atomic(tmp_path / "a") as beside,
+    ):
         beside.write_text("half")
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     assert names_in(tmp_path) == []
@@ -163,7 +168,10 @@ def test_strange_ids_and_attributes_go_through(tmp_path, name):
         "geom": 1,
         "a:b": 1,
     }
-    buildings = [modelled(gable_house(), id, attributes=strange) for id in ("\0", "", "\ud800", "<&>", "x" * 300, "é")]
+    buildings = [
+        modelled(gable_house(), id, attributes=strange)
+        for id in ("\0", "", "\ud800", "<&>", "x" * 300, "é")
+    ]
     WRITERS[name](tmp_path / name, buildings)
     assert names_in(tmp_path) == [name]
 

@@ -1,4 +1,6 @@
-"""Generated roofs of every type through composing, writing and reading: what a user opens is what was modelled."""
+"""Generated roofs of every type through composing, writing and reading: what a user opens is what
+was modelled.
+"""
 
 import json
 
@@ -18,7 +20,9 @@ from hiproof.write.citygml.version2 import NAMESPACES
 
 
 def generated(seed):
-    """A building of each type and of each kind of compound, in world coordinates, as reconstruction would give them."""
+    """A building of each type and of each kind of compound, in world coordinates, as reconstruction
+    would give them.
+    """
     rng = np.random.default_rng(seed)
     made = {type: random_building(rng, type) for type in ROOF_TYPES}
     made |= {kind: random_compound(rng, kind) for kind in COMPOUND_KINDS}
@@ -26,7 +30,15 @@ def generated(seed):
         origin = sim.roof.frame.origin
         solid = compose(sim.roof, 0.0).moved(origin)
         quality = Quality(points=100 + number, density=4.0, rmse=0.05)
-        yield Building(name, Status.MODELLED, "", Model(sim.roof, solid), quality, float(origin[2]), "simulated")
+        yield Building(
+            name,
+            Status.MODELLED,
+            "",
+            Model(sim.roof, solid),
+            quality,
+            float(origin[2]),
+            "simulated",
+        )
 
 
 @pytest.fixture(scope="module")
@@ -39,12 +51,18 @@ def run(tmp_path_factory):
 
 def test_solids_read_back_are_valid_and_the_same(run):
     folder, buildings = run
-    for model, building in zip(read_models(folder / "buildings.city.jsonl"), buildings, strict=True):
+    for model, building in zip(
+        read_models(folder / "buildings.city.jsonl"), buildings, strict=True
+    ):
         assert model.id == building.id
         local = Solid(model.solid.vertices - building.roof.frame.origin, model.solid.faces)
         assert check_solid(local) == ()
-        assert [face.kind for face in model.solid.faces] == [face.kind for face in building.solid.faces]
-        assert local.volume == pytest.approx(model.attributes["rf_volume_lod22"], rel=1e-3, abs=0.01)
+        assert [face.kind for face in model.solid.faces] == [
+            face.kind for face in building.solid.faces
+        ]
+        assert local.volume == pytest.approx(
+            model.attributes["rf_volume_lod22"], rel=1e-3, abs=0.01
+        )
 
 
 def test_figures_agree_with_the_roof(run):
@@ -56,7 +74,8 @@ def test_figures_agree_with_the_roof(run):
         z = building.roof.height_at(rng.uniform((low_x, low_y), (high_x, high_y), (20000, 2)))
         z = z[np.isfinite(z)] + building.roof.frame.origin[2]
         got, want = [figures.h_50p, figures.h_70p], np.percentile(z, [50, 70])
-        # A step in the roof may lie just at the percentile, where a sample cannot tell on which side.
+        # A step in the roof may lie just at the percentile, where a sample cannot tell on which
+        # side.
         near = np.percentile(z, [[48, 68], [52, 72]])
         assert ((near[0] - 0.05 <= got) & (got <= near[1] + 0.05)).all(), (building.id, got, want)
         assert figures.h_max == pytest.approx(z.max(), abs=0.15)
@@ -66,12 +85,16 @@ def test_figures_agree_with_the_roof(run):
 def test_roof_type_and_parameters(run):
     folder, buildings = run
     root = etree.parse(folder / "buildings.gml")
-    for record, building in zip(read_parameters(folder / "parameters.jsonl"), buildings, strict=True):
+    for record, building in zip(
+        read_parameters(folder / "parameters.jsonl"), buildings, strict=True
+    ):
         assert record["type"] == building.type
         assert [part["type"] for part in record["parts"]] == [part.type for part in building.parts]
         for part, stored in zip(building.parts, record["parts"], strict=True):
             assert stored["parameters"] == pytest.approx(part.parameters, abs=1e-6)
-        (code,) = root.xpath(f"//bldg:Building[gml:name='{building.id}']/bldg:roofType/text()", namespaces=NAMESPACES)
+        (code,) = root.xpath(
+            f"//bldg:Building[gml:name='{building.id}']/bldg:roofType/text()", namespaces=NAMESPACES
+        )
         codes = {CATALOGUE[part.type].citygml_code for part in building.parts}
         assert code == (codes.pop() if len(codes) == 1 else "1130")
 
@@ -79,11 +102,14 @@ def test_roof_type_and_parameters(run):
 def test_both_formats_hold_the_same_corners(run):
     folder, _ = run
     root = etree.parse(folder / "buildings.gml")
-    lines = [json.loads(line) for line in (folder / "buildings.city.jsonl").read_text().splitlines()]
+    lines = [
+        json.loads(line) for line in (folder / "buildings.city.jsonl").read_text().splitlines()
+    ]
     transform = lines[0]["transform"]
     for building, feature in zip(root.iterfind(".//{*}Building"), lines[1:], strict=True):
         rings = [
-            np.array(p.text.split(), float).reshape(-1, 3) for p in building.iterfind(".//{*}LinearRing/{*}posList")
+            np.array(p.text.split(), float).reshape(-1, 3)
+            for p in building.iterfind(".//{*}LinearRing/{*}posList")
         ]
         here = {tuple(np.rint(corner * 1e4).astype(int)) for ring in rings for corner in ring}
         xyz = np.array(feature["vertices"]) * transform["scale"] + transform["translate"]

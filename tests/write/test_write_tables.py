@@ -1,4 +1,6 @@
-"""parameters.jsonl and buildings.gpkg: what goes in comes out, whatever the input's attributes are."""
+"""parameters.jsonl and buildings.gpkg: what goes in comes out, whatever the input's
+attributes are.
+"""
 
 import json
 import warnings
@@ -28,7 +30,12 @@ def test_parameters_come_back(tmp_path):
     building = modelled(gable_house(), kinds=("gable", "flat"), objective=-12.3456789)
     write_parameters(tmp_path / "p.jsonl", [unmodelled(), building])
     lost, record = read_parameters(tmp_path / "p.jsonl")
-    assert (lost["id"], lost["status"], lost["type"], lost["parts"]) == ("lost", "no_points", None, [])
+    assert (lost["id"], lost["status"], lost["type"], lost["parts"]) == (
+        "lost",
+        "no_points",
+        None,
+        [],
+    )
     part = record["parts"][0]
     assert part["parameters"] == {"width": 8.0, "height": 4.0}
     assert record["origin"] == RD_ORIGIN.tolist()
@@ -41,7 +48,9 @@ def test_parameters_come_back(tmp_path):
 
 
 def test_of_thousands_of_attributes_a_table_holds_the_first_and_all_of_our_own(tmp_path):
-    """SQLite has 2,000 columns at most: the table failed when all work was done, as if the disk were full."""
+    """SQLite has 2,000 columns at most: the table failed when all work was done, as if the disk
+    were full.
+    """
     building = modelled(box())
     many = {f"a{i}": i for i in range(2500)}
     few, _, _ = table(tmp_path, [building])
@@ -61,14 +70,20 @@ def test_outlines_come_back(tmp_path):
 
 def test_parameters_are_strict_json(tmp_path):
     part = replace(
-        modelled(box()).parts[0], parameters={"width": float("nan")}, translation=np.array([0, -0.0, np.inf])
+        modelled(box()).parts[0],
+        parameters={"width": float("nan")},
+        translation=np.array([0, -0.0, np.inf]),
     )
     building = modelled(box(), objective=float("nan"))
-    building = replace(building, built=replace(building.model, roof=replace(building.roof, parts=(part,))))
+    building = replace(
+        building, built=replace(building.model, roof=replace(building.roof, parts=(part,)))
+    )
     write_parameters(tmp_path / "p.jsonl", [building])
     text = (tmp_path / "p.jsonl").read_text()
     _, line = text.splitlines()
-    (part,) = json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))["parts"]
+    (part,) = json.loads(line, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))[
+        "parts"
+    ]
     assert part["parameters"] == {"width": None}
     assert part["position"] == [0.0, 0.0, None]
     assert "-0.0" not in text
@@ -88,7 +103,12 @@ def test_a_parameters_file_that_is_not_there(tmp_path):
 
 def test_the_table_has_every_building(tmp_path):
     square = shapely.box(85000, 446000, 85001, 446001)
-    buildings = [unmodelled(), unmodelled("asked", footprint=square), modelled(gable_house()), modelled(courtyard())]
+    buildings = [
+        unmodelled(),
+        unmodelled("asked", footprint=square),
+        modelled(gable_house()),
+        modelled(courtyard()),
+    ]
     columns, outlines, meta = table(tmp_path, buildings)
     assert columns["id"].tolist() == ["lost", "asked", "a", "a"]
     assert columns["hiproof_status"].tolist() == ["no_points", "no_points", "modelled", "modelled"]
@@ -130,9 +150,9 @@ def test_a_column_has_one_type(tmp_path, values, dtype, want):
 def test_unknown_figures_stay_numbers(tmp_path):
     _, _, meta = table(tmp_path, [unmodelled()])
     kinds = dict(zip(meta["fields"], meta["dtypes"], strict=True))
-    assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["hiproof_iso19107_lod22"]) == ("float64",) * 2 + (
-        "object",
-    )
+    assert (kinds["rf_h_ground"], kinds["hiproof_psd_mean"], kinds["hiproof_iso19107_lod22"]) == (
+        "float64",
+    ) * 2 + ("object",)
 
 
 def test_counts_are_counts_where_all_are_unknown(tmp_path):
@@ -152,7 +172,12 @@ def test_names_that_clash(tmp_path):
     columns, _, _ = table(tmp_path, [modelled(box(), attributes=clashing)])
     assert columns["id"].tolist() == ["a"]
     assert columns["hiproof_status"].tolist() == ["modelled"]
-    assert (columns["fid_2"][0], columns["geom_2"][0], columns["name_2"][0], columns["ID_input"][0]) == (7, "x", 2, 3)
+    assert (
+        columns["fid_2"][0],
+        columns["geom_2"][0],
+        columns["name_2"][0],
+        columns["ID_input"][0],
+    ) == (7, "x", 2, 3)
 
 
 def test_many_rows_are_written_in_batches(tmp_path, monkeypatch):

@@ -35,7 +35,7 @@ quarantine    a task that kills its process, found by trying it alone
 warm          what tasks call, compiled before they start
 warm_pieces   that, in pieces which processes compile side by side
 
-A building is owned by one tile and sees all points in and around its footprint from all files, in an order of its own:
-its answer does not depend on how the area was cut. Tasks are idempotent and write whole files or none, so a run that was
-killed goes on where it stopped.
+A building is owned by one tile and sees all points in and around its footprint from all files, in
+an order of its own: its answer does not depend on how the area was cut. Tasks are idempotent and
+write whole files or none, so a run that was killed goes on where it stopped.
 """

@@ -64,11 +64,15 @@ class RecordedTerrain:
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Heights (n,) at `xy_world` (n, 2), NaN where none was looked up."""
-        return np.array([self.known.get((x, y), (np.nan, False))[0] for x, y in xy_world.tolist()], float)
+        return np.array(
+            [self.known.get((x, y), (np.nan, False))[0] for x, y in xy_world.tolist()], float
+        )
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
         """Whether (n,) the raster held a code for "no data" at `xy_world` (n, 2)."""
-        return np.array([self.known.get((x, y), (np.nan, False))[1] for x, y in xy_world.tolist()], bool)
+        return np.array(
+            [self.known.get((x, y), (np.nan, False))[1] for x, y in xy_world.tolist()], bool
+        )
 
 
 class TerrainRecorder:
@@ -93,7 +97,12 @@ class TerrainRecorder:
 
 
 def keep_failure(
-    root: Path, tile: str, plan: WorkPlan, job: Job, trace: str, terrain: Callable[[], TerrainRecorder | None]
+    root: Path,
+    tile: str,
+    plan: WorkPlan,
+    job: Job,
+    trace: str,
+    terrain: Callable[[], TerrainRecorder | None],
 ) -> None:
     """Log the traceback of a failed building and keep its bundle; failing that, warn.
 
@@ -112,7 +121,9 @@ def keep_failure(
     except Exception as error:
         if is_interrupt(error):
             raise KeyboardInterrupt from error
-        LOGGER.warning("the input of building %s could not be kept in %s: %s", job.id, FOLDER, error)
+        LOGGER.warning(
+            "the input of building %s could not be kept in %s: %s", job.id, FOLDER, error
+        )
 
 
 def folder_name(id: str) -> str:
@@ -169,7 +180,9 @@ def save_bundle(
         if terrain is not None:
             rows = np.unique(np.concatenate(terrain.rows), axis=0)
             lines = [",".join(map(repr, row)) for row in rows.tolist()]
-            (beside / "terrain.csv").write_text("\n".join(["x,y,z,coded", *lines]) + "\n", encoding="utf-8")
+            (beside / "terrain.csv").write_text(
+                "\n".join(["x,y,z,coded", *lines]) + "\n", encoding="utf-8"
+            )
         facts = {
             "hiproof": __version__,
             "id": job.id,
@@ -181,7 +194,9 @@ def save_bundle(
             "override": override_record(root, job),
             "error": job.error,
         }
-        (beside / FACTS).write_text(json.dumps(masked_values(facts), indent=1) + "\n", encoding="utf-8")
+        (beside / FACTS).write_text(
+            json.dumps(masked_values(facts), indent=1) + "\n", encoding="utf-8"
+        )
 
 
 @contextmanager
@@ -228,7 +243,9 @@ def write_points(path: Path, points: dict[str, np.ndarray]) -> None:
     cloud.x, cloud.y, cloud.z = xyz.T
     for name, values in zip(EXACT, xyz.T, strict=True):
         cloud[name] = values
-    cloud.classification = np.concatenate([np.full(len(own), CLASSES[kind], np.uint8) for kind, own in points.items()])
+    cloud.classification = np.concatenate(
+        [np.full(len(own), CLASSES[kind], np.uint8) for kind, own in points.items()]
+    )
     cloud.write(path)
 
 
@@ -247,7 +264,9 @@ def write_outline(path: Path, job: Job) -> None:
     """Write the building's outline as GeoJSON, with its id alone."""
     geometry = None if job.area.is_empty else shapely.geometry.mapping(job.area)
     feature = {"type": "Feature", "properties": {"id": job.id}, "geometry": geometry}
-    path.write_text(json.dumps({"type": "FeatureCollection", "features": [feature]}) + "\n", encoding="utf-8")
+    path.write_text(
+        json.dumps({"type": "FeatureCollection", "features": [feature]}) + "\n", encoding="utf-8"
+    )
 
 
 def override_record(root: Path, job: Job) -> dict[str, Any] | None:
@@ -270,7 +289,9 @@ def load_bundle(
     folder = Path(folder)
     try:
         facts = json.loads((folder / FACTS).read_text(encoding="utf-8"))
-        (feature,) = json.loads((folder / "footprint.geojson").read_text(encoding="utf-8"))["features"]
+        (feature,) = json.loads((folder / "footprint.geojson").read_text(encoding="utf-8"))[
+            "features"
+        ]
         geometry = feature["geometry"]
         area = shapely.Polygon() if geometry is None else shapely.geometry.shape(geometry)
         footprint = Footprint(facts["id"], area, {}) if facts["has_footprint"] else None
@@ -284,12 +305,22 @@ def load_bundle(
         if facts["terrain"] is not None:
             rows = np.loadtxt(folder / "terrain.csv", delimiter=",", skiprows=1, ndmin=2)
             terrain = RecordedTerrain(str(facts["terrain"]), rows.reshape(-1, 4))
-    except (OSError, ValueError, KeyError, TypeError, IndexError, AttributeError, shapely.errors.ShapelyError) as error:
+    except (
+        OSError,
+        ValueError,
+        KeyError,
+        TypeError,
+        IndexError,
+        AttributeError,
+        shapely.errors.ShapelyError,
+    ) as error:
         raise InputError(
-            f"expected a folder that a run kept of a failed building at {folder}, got: {error}; it lies in the run's "
+            f"expected a folder that a run kept of a failed building at {folder}, got: {error}; it "
+            "lies in the run's "
             f"folder {FOLDER}"
         ) from error
     settings = Settings.from_toml(folder / "settings.toml")
-    settings = settings.replace({"reconstruct": {"align": "off"}})  # the outline lies where the run had moved it
+    # the outline lies where the run had moved it
+    settings = settings.replace({"reconstruct": {"align": "off"}})
     plan = WorkPlan((job,), {"0_0_0": (0,)}, facts["crs"], settings, {0: names}, translate)
     return plan, read_exact_points(folder / "points.laz"), terrain, override

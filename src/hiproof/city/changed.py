@@ -1,7 +1,8 @@
-"""A run whose footprints changed since: what became of a building stays where the building is the same, and the rest is done.
+"""A run whose footprints changed since: what became of a building stays where the building is the
+same, and the rest is done.
 
-A building's answer depends on the building alone, so its texts are those of a run from the start: they move with it to
-the work tile and the place that the new plan gives it.
+A building's answer depends on the building alone, so its texts are those of a run from the start:
+they move with it to the work tile and the place that the new plan gives it.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ from .plan import PLAN_FILE, WorkPlan
 
 
 class Place(NamedTuple):
-    """Where a building's texts stand: its position in the old plan, its tile, and how many stand before it there."""
+    """Where a building's texts stand: its position in the old plan, its tile, and how many stand
+    before it there.
+    """
 
     position: int
     tile: str
@@ -32,9 +35,11 @@ class Place(NamedTuple):
 
 
 def take_over(new: WorkPlan, old: WorkPlan, state: Path, ledger: Ledger) -> bool:
-    """Put the run in `state` on the plan `new`, with all that is known of buildings that `old` has too; whether that could be.
+    """Put the run in `state` on the plan `new`, with all that is known of buildings that `old` has
+    too; whether that could be.
 
-    It could not where the two plans tell buildings apart, read them or write them in different ways.
+    It could not where the two plans tell buildings apart, read them or write them in different
+    ways.
     """
     if common_of(new) != common_of(old):
         return False
@@ -96,16 +101,25 @@ def known_places(plan: WorkPlan, state: Path, ledger: Ledger) -> dict[str, Place
     return found
 
 
-def move_texts(plan: WorkPlan, state: Path, kept: dict[int, Place], redo: dict[str, list[int]]) -> None:
-    """Write the tiles' files anew from those that are there, and drop these; points are sorted again."""
+def move_texts(
+    plan: WorkPlan, state: Path, kept: dict[int, Place], redo: dict[str, list[int]]
+) -> None:
+    """Write the tiles' files anew from those that are there, and drop these; points are sorted
+    again.
+    """
     before, after = state / "tiles", state / "tiles.new"
     shutil.rmtree(after, ignore_errors=True)
     after.mkdir()
-    texts_of = functools.lru_cache(maxsize=8)(lambda tile: list(load_fragments(tile_parts(state, tile))))
+    texts_of = functools.lru_cache(maxsize=8)(
+        lambda tile: list(load_fragments(tile_parts(state, tile)))
+    )
     remove_tiles(state.parent)
     for tile, members in plan.tiles.items():
         if any(i in kept for i in members):
-            parts = [texts_of(kept[i].tile)[kept[i].number] if i in kept else to_do(plan) for i in members]
+            parts = [
+                texts_of(kept[i].tile)[kept[i].number] if i in kept else to_do(plan)
+                for i in members
+            ]
             with atomic_file(after / tile_parts(state, tile).name) as file:
                 save_fragments(file, parts)
             if tile not in redo:

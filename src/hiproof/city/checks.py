@@ -1,4 +1,6 @@
-"""What can be known to be wrong with a request before any file is read: one sentence then, and not after an hour."""
+"""What can be known to be wrong with a request before any file is read: one sentence then, and not
+after an hour.
+"""
 
 from __future__ import annotations
 
@@ -17,18 +19,23 @@ def refuse_unusable(request: Any) -> None:
     asked = request.processes
     if asked is not None and not (type(asked) is int and 1 <= asked <= MOST_PROCESSES):
         raise SettingsError(
-            f"expected --jobs between 1 and {MOST_PROCESSES}, got {shown(asked)}; a process a core is enough, as it is without this option"
+            f"expected --jobs between 1 and {MOST_PROCESSES}, got {shown(asked)}; a process a core "
+            "is enough, as it is without this option"
         )
     for name in ("layer", "where", "id_attribute"):
         if getattr(request, name) is not None and request.footprints is None:
             option = "--" + name.replace("_", "-")
-            raise SettingsError(f"expected footprints with {option}, got none; name them with --footprints")
+            raise SettingsError(
+                f"expected footprints with {option}, got none; name them with --footprints"
+            )
     refuse_settings(request.settings)
     refuse_missing_packages(request)
 
 
 def refuse_missing_packages(request: Any) -> None:
-    """Raise InputError where a package is not installed that this request needs, and most do not."""
+    """Raise InputError where a package is not installed that this request needs, and most
+    do not.
+    """
     from ..read.database import import_psycopg, is_database
     from ..read.remote import import_fsspec, is_url
 
@@ -51,7 +58,9 @@ def refuse_missing_packages(request: Any) -> None:
 
 
 def refuse_settings(settings: Settings) -> None:
-    """Raise SettingsError or InputError for values that are well formed, but that nothing here can be done with."""
+    """Raise SettingsError or InputError for values that are well formed, but that nothing here can
+    be done with.
+    """
     refuse_unknown_types(settings.fit)
     refuse_crs(settings.read)
     refuse_without_network(settings)
@@ -77,7 +86,9 @@ def refuse_unknown_types(fit: Any) -> None:
 
 
 def refuse_crs(read: Any) -> None:
-    """The CRS that settings give the clouds must be known, projected, and of the unit that they give."""
+    """The CRS that settings give the clouds must be known, projected, and of the unit that they
+    give.
+    """
     from ..read.crs import parse_crs, units_of
 
     try:

@@ -1,4 +1,6 @@
-"""Which of the clouds' classes may hold roofs, settled once for a run: those named, or all where none is a building's."""
+"""Which of the clouds' classes may hold roofs, settled once for a run: those named, or all where
+none is a building's.
+"""
 
 from __future__ import annotations
 
@@ -15,40 +17,51 @@ from ..read.pointcloud import iter_points
 from ..read.runs import RUN_POINTS
 from ..settings import ReadSettings, Settings
 
-PEEK_POINTS = RUN_POINTS  # looked at at once to learn the classes: one chunk of LAZ, which is decoded whole
+# looked at at once to learn the classes: one chunk of LAZ, which is decoded whole
+PEEK_POINTS = RUN_POINTS
 
 
 def settle_classes(clouds: tuple[str, ...], settings: Settings) -> Settings:
-    """`settings`, or where roofs are to be found by shape or stand alone those with that said, and the classes that may hold roofs.
+    """`settings`, or where roofs are to be found by shape or stand alone those with that said, and
+    the classes that may hold roofs.
 
-    Classes other than the default that were asked for are taken as they are. Otherwise all classes but ground, water, noise,
-    low vegetation and bridges may hold roofs where no point has the building class, and one line says so. Raises InputError
-    where no class of the clouds may.
+    Classes other than the default that were asked for are taken as they are. Otherwise all classes
+    but ground, water, noise, low vegetation and bridges may hold roofs where no point has the
+    building class, and one line says so. Raises InputError where no class of the clouds may.
     """
     read = settings.read
-    if read.roofs == "class" or (read.roofs == "auto" and read.building_classes != ReadSettings().building_classes):
+    if read.roofs == "class" or (
+        read.roofs == "auto" and read.building_classes != ReadSettings().building_classes
+    ):
         return settings
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", InputWarning)  # what is to be said of the points the step that sorts them says
+        # what is to be said of the points the step that sorts them says
+        warnings.simplefilter("ignore", InputWarning)
         counts = count_classes(clouds, read.building_classes if read.roofs == "auto" else ())
     if read.roofs == "auto" and (not counts or any(counts[c] for c in read.building_classes)):
         return settings
-    from ..classify.scene import NO_ROOFS  # with scipy.ndimage: not where the clouds have a building class
+    # with scipy.ndimage: not where the clouds have a building class
+    from ..classify.scene import NO_ROOFS
 
     others = tuple(sorted(c for c in counts if c not in NO_ROOFS and c not in read.ground_classes))
     present = ", ".join(f"{c} ({counted(n, 'point')})" for c, n in sorted(counts.items()))
     if not others:
         raise InputError(
-            f"expected points that may be roofs, got classes {present}, all of them ground, water, noise, low vegetation "
+            f"expected points that may be roofs, got classes {present}, all of them ground, water, "
+            "noise, low vegetation "
             "or bridges; say which class holds roofs with --building-class"
         )
     if read.roofs == "auto":
         warnings.warn(
-            f"the clouds have no building class ({', '.join(map(str, read.building_classes))}) but {present}: roofs are looked "
-            f"for among the points of class {', '.join(map(str, others))}; say otherwise with --building-class",
+            f"the clouds have no building class ({', '.join(map(str, read.building_classes))}) but "
+            f"{present}: roofs are looked "
+            f"for among the points of class {', '.join(map(str, others))}; say otherwise with "
+            "--building-class",
             InputWarning,
         )
-    return with_read(settings, roofs="shape" if read.roofs == "auto" else read.roofs, building_classes=others)
+    return with_read(
+        settings, roofs="shape" if read.roofs == "auto" else read.roofs, building_classes=others
+    )
 
 
 def with_read(settings: Settings, **changes: Any) -> Settings:
@@ -56,7 +69,9 @@ def with_read(settings: Settings, **changes: Any) -> Settings:
 
 
 def count_classes(clouds: tuple[str, ...], enough: tuple[int, ...]) -> Counter[int]:
-    """Points by class, 0 where a file has none, of all readable files; counted no further than a point of class `enough`."""
+    """Points by class, 0 where a file has none, of all readable files; counted no further than a
+    point of class `enough`.
+    """
     counts: Counter[int] = Counter()
     for name in clouds:
         try:

@@ -8,8 +8,9 @@ from contextlib import contextmanager
 from multiprocessing import get_context
 from pathlib import Path
 
-# A process takes a second to start, as long as 50 buildings with footprints or five of those that a cloud is split into, where blocks of
-# houses are one and outlines are drawn. Delft's 160 on two cores: 6.6 s by one process, 5.4 by two, which took 1.2 s of CPU more.
+# A process takes a second to start, as long as 50 buildings with footprints or five of those that a
+# cloud is split into, where blocks of houses are one and outlines are drawn. Delft's 160 on two
+# cores: 6.6 s by one process, 5.4 by two, which took 1.2 s of CPU more.
 BUILDINGS_A_PROCESS, SPLIT_A_PROCESS = 150, 20
 QUOTA = Path(
     "/sys/fs/cgroup/cpu.max"
@@ -28,17 +29,22 @@ def cores() -> int:
 
 
 def as_many_as_pay(buildings: int, tiles: int, footprints: bool = True) -> int:
-    """Processes for so many buildings in so many work tiles, with `footprints` or split from the cloud.
+    """Processes for so many buildings in so many work tiles, with `footprints` or split from the
+    cloud.
 
     >>> as_many_as_pay(40, 3)
     1
     """
-    count = min(cores(), tiles, buildings // (BUILDINGS_A_PROCESS if footprints else SPLIT_A_PROCESS))
+    count = min(
+        cores(), tiles, buildings // (BUILDINGS_A_PROCESS if footprints else SPLIT_A_PROCESS)
+    )
     return count if count > 1 and has_semaphores() else 1
 
 
 def has_semaphores() -> bool:
-    """Whether processes can be handed work here: sandboxes without shared memory have none of what that takes."""
+    """Whether processes can be handed work here: sandboxes without shared memory have none of what
+    that takes.
+    """
     try:
         get_context("spawn").Semaphore()
         return True
@@ -48,7 +54,9 @@ def has_semaphores() -> bool:
 
 @contextmanager
 def one_thread_each() -> Iterator[None]:
-    """Processes started in here do linear algebra in one thread, unless the user said otherwise: there are as many of them as cores."""
+    """Processes started in here do linear algebra in one thread, unless the user said otherwise:
+    there are as many of them as cores.
+    """
     ours = [name for name in THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(ours, "1"))
     try:

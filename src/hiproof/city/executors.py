@@ -1,9 +1,12 @@
-"""Where tasks run: in this process, in processes of this machine, or on a Dask cluster. One verb: `run`.
+"""Where tasks run: in this process, in processes of this machine, or on a Dask cluster.
 
-`prepare(pieces)` comes first: compiled code is made before the work starts, so that no two workers make the same.
-`run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A worker that dies does not end the
-run: its tasks come back with a `WorkerLost`, and the caller decides whether to try them again. `isolated()` is an
-executor whose worker's death harms nobody else. Tasks are taken from their iterable only when a worker is near.
+One verb: `run`.
+
+`prepare(pieces)` comes first: compiled code is made before the work starts, so that no two workers
+make the same. `run(function, tasks)` yields (task, result, error) as tasks finish, in any order. A
+worker that dies does not end the run: its tasks come back with a `WorkerLost`, and the caller
+decides whether to try them again. `isolated()` is an executor whose worker's death harms nobody
+else. Tasks are taken from their iterable only when a worker is near.
 """
 
 from __future__ import annotations
@@ -33,7 +36,8 @@ from .tasks import make_ready
 
 CONNECT_S = 20  # seconds for an answer of the scheduler
 MOST_ON_WINDOWS = 61  # processes that one can wait for there
-WORKERLESS_S, POLL_S = 300, 5  # seconds without a worker until a run gives up; seconds between looks at what is done
+# seconds without a worker until a run gives up; seconds between looks at what is done
+WORKERLESS_S, POLL_S = 300, 5
 
 
 class WorkerLost(Exception):
@@ -46,7 +50,9 @@ class InProcess:
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
 
-    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def run(
+        self, function: Callable, tasks: Iterable[tuple]
+    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
         for task in tasks:
             try:
                 yield task, function(*task), None
@@ -63,7 +69,10 @@ class InProcess:
 
 
 class Processes:
-    """`count` worker processes. They are spawned, not forked: a fork would copy locks of compiled code mid-flight."""
+    """`count` worker processes.
+
+    They are spawned, not forked: a fork would copy locks of compiled code mid-flight.
+    """
 
     def __init__(self, count: int):
         self.count = min(count, MOST_ON_WINDOWS) if sys.platform == "win32" else count
@@ -73,19 +82,25 @@ class Processes:
     def prepare(self, pieces: Sequence[str]) -> None:
         make_ready(pieces)
 
-    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def run(
+        self, function: Callable, tasks: Iterable[tuple]
+    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
         try:
             yield from self.outcomes(function, tasks)
-        except BaseException:  # Ctrl-C, most of all: nobody waits any more for what the workers are at
+        # Ctrl-C, most of all: nobody waits any more for what the workers are at
+        except BaseException:
             if self.word is not None:
                 self.word.close()
             raise
 
-    def outcomes(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def outcomes(
+        self, function: Callable, tasks: Iterable[tuple]
+    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
         waiting = iter(tasks)
         running: dict[Future, tuple] = {}
         while True:
-            # two tasks a worker in the queue: enough to keep it busy, few enough to lose little when one dies
+            # two tasks a worker in the queue: enough to keep it busy, few enough to lose little
+            # when one dies
             while len(running) < 2 * self.count and (task := next(waiting, None)) is not None:
                 running[self.submit(function, task)] = task
             if not running:
@@ -103,7 +118,9 @@ class Processes:
             context = get_context("spawn")
             heard, self.word = context.Pipe(duplex=False)
             given = (os.getpid(), heard, log.started())
-            self.pool = ProcessPoolExecutor(self.count, mp_context=context, initializer=begin_worker, initargs=given)
+            self.pool = ProcessPoolExecutor(
+                self.count, mp_context=context, initializer=begin_worker, initargs=given
+            )
         try:
             with one_thread_each():
                 return self.pool.submit(function, *task)
@@ -113,13 +130,19 @@ class Processes:
             return lost
 
     def bury(self, running: dict[Future, tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
-        """A worker died and the pool with it: hand back what finished, report the rest as lost, start a new pool."""
+        """A worker died and the pool with it: hand back what finished, report the rest as lost,
+        start a new pool.
+        """
         wait(running)
         self.close()
         for future, task in list(running.items()):
             error: Any = future.exception()
             lost = isinstance(error, BrokenProcessPool)
-            yield task, None if error else future.result(), WorkerLost("a worker process died") if lost else error
+            yield (
+                task,
+                None if error else future.result(),
+                WorkerLost("a worker process died") if lost else error,
+            )
         running.clear()
 
     def isolated(self) -> Processes:
@@ -142,7 +165,8 @@ def begin_worker(parent: int, heard: Connection, logging: tuple) -> None:
 
 
 def leave_with_parent(parent: int, heard: Connection) -> None:
-    """Make a worker end when its parent closes the pipe, or is gone: kill -9 of the main process leaves nothing running.
+    """Make a worker end when its parent closes the pipe, or is gone: kill -9 of the main process
+    leaves nothing running.
 
     Ctrl-C, which a terminal sends to all, is the parent's to answer.
     """
@@ -157,7 +181,9 @@ def leave_with_parent(parent: int, heard: Connection) -> None:
 
 
 class Dask:
-    """A Dask cluster at `address`; its workers must have hiproof installed and see the same files (a shared file system)."""
+    """A Dask cluster at `address`; its workers must have hiproof installed and see the same files
+    (a shared file system).
+    """
 
     def __init__(self, address: str):
         distributed = import_distributed()
@@ -165,14 +191,20 @@ class Dask:
         try:
             self.client = distributed.Client(address, timeout=CONNECT_S)
         except (OSError, ValueError) as error:
-            raise InputError(f"expected a Dask scheduler at {address}, got: {error}; check the address") from error
+            raise InputError(
+                f"expected a Dask scheduler at {address}, got: {error}; check the address"
+            ) from error
 
     def prepare(self, pieces: Sequence[str]) -> None:
-        """One worker of each host compiles, the others then load it; a host that joins later has to compile while it works."""
+        """One worker of each host compiles, the others then load it; a host that joins later has to
+        compile while it works.
+        """
         one_of_each = {urlsplit(address).hostname: address for address in self.client.nthreads()}
         ends: SimpleQueue = SimpleQueue()
         tasks = [
-            self.submit(ends, make_ready, (tuple(pieces),), workers=[address], allow_other_workers=True)
+            self.submit(
+                ends, make_ready, (tuple(pieces),), workers=[address], allow_other_workers=True
+            )
             for address in one_of_each.values()
         ]
         patience = threading.Timer(POLL_S, news.listener, (0, count_compiled()))
@@ -183,7 +215,9 @@ class Dask:
         finally:
             patience.cancel()
 
-    def run(self, function: Callable, tasks: Iterable[tuple]) -> Iterator[tuple[tuple, Any, Exception | None]]:
+    def run(
+        self, function: Callable, tasks: Iterable[tuple]
+    ) -> Iterator[tuple[tuple, Any, Exception | None]]:
         waiting = iter(tasks)
         running: dict[Any, tuple] = {}
         ends: SimpleQueue = SimpleQueue()
@@ -203,29 +237,42 @@ class Dask:
         return future
 
     def next_end(self, ends: SimpleQueue) -> Any:
-        """The next future that ends. Where all workers are gone and none comes, the run ends: Dask itself would wait for ever."""
+        """The next future that ends.
+
+        Where all workers are gone and none comes, the run ends: Dask itself would wait for ever.
+        """
         without = 0
         while without < WORKERLESS_S:
             with suppress(Empty):
                 return ends.get(timeout=POLL_S)
             without = 0 if self.client.nthreads() else without + POLL_S
         raise OutputError(
-            f"expected workers at the Dask scheduler {self.address}, got none for {WORKERLESS_S} s; start some, the same "
+            f"expected workers at the Dask scheduler {self.address}, got none for {WORKERLESS_S} "
+            "s; start some, the same "
             "command then goes on from here"
         )
 
     def outcome(self, future: Any) -> tuple[Any, Exception | None]:
-        """(result, error). Dask has tried a task whose worker died on other workers before it gives up with KilledWorker."""
+        """(result, error).
+
+        Dask has tried a task whose worker died on other workers before it gives up with
+        KilledWorker.
+        """
         from distributed.scheduler import KilledWorker
 
         if future.status == "cancelled":
-            raise OutputError(f"lost the Dask scheduler at {self.address}; the same command goes on from here")
+            raise OutputError(
+                f"lost the Dask scheduler at {self.address}; the same command goes on from here"
+            )
         if future.status == "error":
             error = future.exception()
-            return None, WorkerLost("a worker process died") if isinstance(error, KilledWorker) else error
+            return None, WorkerLost("a worker process died") if isinstance(
+                error, KilledWorker
+            ) else error
         try:
             return future.result(timeout=WORKERLESS_S), None
-        except (TimeoutError, CancelledError, KilledWorker):  # the worker died before its result was fetched
+        # the worker died before its result was fetched
+        except (TimeoutError, CancelledError, KilledWorker):
             return None, WorkerLost("a worker process died with its result")
 
     def isolated(self) -> Dask:

@@ -1,4 +1,6 @@
-"""The roof of one building among points that nobody has classified: what lies on no surface, or on the ground, is left out."""
+"""The roof of one building among points that nobody has classified: what lies on no surface, or on
+the ground, is left out.
+"""
 
 from __future__ import annotations
 
@@ -11,14 +13,18 @@ CLEAR_M = 0.5  # of a roof above the ground
 BESIDE_M = 1.0  # m from the outline beyond which points lie beside the building
 FEWEST_BESIDE = 10  # cells beside a building, without which nothing is known of the ground
 MOSTLY, HARDLY = 0.5, 0.15  # shares of the outline's points
-# log odds of a roof where a footprint says that there is a building: sparse points of small roofs tell little by themselves
+# log odds of a roof where a footprint says that there is a building: sparse points of small roofs
+# tell little by themselves
 FOOTPRINT_ODDS = 0.7
 
 
 @dataclass(frozen=True)
 class FoundRoof:
-    """`points` (n, 3) of the roof; `remark` says what hides it, `is_seen` whether enough of it is there to be modelled;
-    `ground` (m, 3) are points on the ground inside the outline."""
+    """`points` (n, 3) of the roof;
+
+    `remark` says what hides it, `is_seen` whether enough of it is there to be modelled; `ground`
+    (m, 3) are points on the ground inside the outline.
+    """
 
     points: np.ndarray
     remark: str = ""
@@ -31,11 +37,14 @@ class FoundRoof:
         return self.remark.endswith("ground")
 
 
-def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False) -> FoundRoof:
-    """The roof within `area`, from the points `near` (n, 3) it and their `height` (n,) above ground, NaN where unknown.
+def found_roof(
+    near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_asked_for: bool = False
+) -> FoundRoof:
+    """The roof within `area`, from the points `near` (n, 3) it and their `height` (n,) above
+    ground, NaN where unknown.
 
-    `is_asked_for`: the area is a footprint, not one that was found by these points. Shares are of points thinned to one a voxel, so
-    that a wall or a crown hit often does not count as more.
+    `is_asked_for`: the area is a footprint, not one that was found by these points. Shares are of
+    points thinned to one a voxel, so that a wall or a crown hit often does not count as more.
     """
     from ..classify import roof_points
     from ..classify.surfaces import one_a_voxel
@@ -54,12 +63,17 @@ def found_roof(near: np.ndarray, area: shapely.Geometry, height: np.ndarray, is_
     if roof < HARDLY:
         return FoundRoof(near[inside], f"no roof seen: its points are {what}", False, ground)
     if roof < MOSTLY:
-        remark = f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, the rest {what}"
+        remark = (
+            f"mostly not seen: only {100 * roof:.0f} % of what lies inside the outline is roof, "
+            f"the rest {what}"
+        )
         return FoundRoof(near[inside & is_roof], remark, ground=ground)
     return FoundRoof(near[inside & is_roof], ground=ground)
 
 
 def found_alone(near: np.ndarray, area: shapely.Geometry) -> FoundRoof:
-    """The roof within `area` of points (n, 3) that are roofs' or leaves': without these, unless hardly anything would be left."""
+    """The roof within `area` of points (n, 3) that are roofs' or leaves': without these, unless
+    hardly anything would be left.
+    """
     found = found_roof(near, area, np.full(len(near), np.nan))
     return found if found.is_seen else FoundRoof(found.points)

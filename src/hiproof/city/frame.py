@@ -1,4 +1,6 @@
-"""In which CRS and units an area is worked out: what its clouds and its footprints name, and what is assumed if they do not."""
+"""In which CRS and units an area is worked out: what its clouds and its footprints name, and what
+is assumed if they do not.
+"""
 
 from __future__ import annotations
 
@@ -10,18 +12,30 @@ import numpy as np
 
 from ..errors import InputError, InputWarning
 from ..frames import Units
-from ..read.crs import combine, described, names_heights_alone, names_place, parse_crs, units_of, vertical_crs
+from ..read.crs import (
+    combine,
+    described,
+    names_heights_alone,
+    names_place,
+    parse_crs,
+    units_of,
+    vertical_crs,
+)
 from ..read.footprints import footprint_crs
 from ..read.overlap import doubtful_place, refuse_degrees, stretch
 from ..read.pointcloud import PointFileHeader, common_crs, say_how_coarse
 
-SAME_UNIT = 1e-5  # of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
-MOST_STRETCH = 0.01  # of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
+# of a unit; files round the US survey foot, which is 2e-6 longer than the foot, to six digits or so
+SAME_UNIT = 1e-5
+# of a length; national grids and UTM zones stay below 0.005, at 0.01 a house of 10 m is 10 cm off
+MOST_STRETCH = 0.01
 
 
 @dataclass(frozen=True)
 class AreaFrame:
-    """The pyproj CRSs that the clouds and the footprints name, None where they name none, and the units of the area's."""
+    """The pyproj CRSs that the clouds and the footprints name, None where they name none, and the
+    units of the area's.
+    """
 
     cloud: Any
     footprints: Any
@@ -29,19 +43,23 @@ class AreaFrame:
 
     @property
     def crs(self) -> Any:
-        """The CRS of everything written: the clouds', else the footprints', None where neither names one."""
+        """The CRS of everything written: the clouds', else the footprints', None where neither
+        names one.
+        """
         return self.cloud or self.footprints
 
 
 def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
     """The frame of a `run.Request` whose point files have `headers`.
 
-    The CRS that the settings give the clouds goes before that of their headers, and clouds that name none are taken to be
-    in the footprints'; whatever is assumed is said by an InputWarning. Raises InputError for clouds of several CRSs and
-    for degrees.
+    The CRS that the settings give the clouds goes before that of their headers, and clouds that
+    name none are taken to be in the footprints'; whatever is assumed is said by an InputWarning.
+    Raises InputError for clouds of several CRSs and for degrees.
     """
     read = request.settings.read
-    cloud = common_crs({header.path: header.crs for header in headers}, parse_crs(read.crs), read.unit)
+    cloud = common_crs(
+        {header.path: header.crs for header in headers}, parse_crs(read.crs), read.unit
+    )
     footprints = footprint_crs(request.footprints, request.layer) if request.footprints else None
     if not names_place(cloud):
         refuse_degrees_of_either(request.footprints, footprints, headers)
@@ -56,9 +74,11 @@ def settle_frame(request: Any, headers: list[PointFileHeader]) -> AreaFrame:
 
 
 def placed(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
-    """The CRS of clouds that leave their place open: the footprints' with the clouds' heights, else the clouds' local one.
+    """The CRS of clouds that leave their place open: the footprints' with the clouds' heights, else
+    the clouds' local one.
 
-    None where they name no plan at all. Raises InputError where the units of clouds and footprints differ.
+    None where they name no plan at all. Raises InputError where the units of clouds and footprints
+    differ.
     """
     if cloud is None:
         return None
@@ -70,31 +90,42 @@ def placed(cloud: Any, footprints: Any, path: str, unit: str) -> Any:
         warnings.warn(f"{path}: names a local CRS, {described(cloud)}, {place}", InputWarning)
         return cloud
     there = units_of(footprints, "the footprints")
-    if not names_heights_alone(cloud) and abs(units_of(cloud, named=unit).plan / there.plan - 1) > SAME_UNIT:
+    if (
+        not names_heights_alone(cloud)
+        and abs(units_of(cloud, named=unit).plan / there.plan - 1) > SAME_UNIT
+    ):
         raise InputError(
-            f"expected clouds and footprints in one CRS, got {described(cloud)} in {units_of(cloud)} and "
+            f"expected clouds and footprints in one CRS, got {described(cloud)} in "
+            f"{units_of(cloud)} and "
             f"{described(footprints)} in {there}; say with --crs in which the clouds are"
         )
     heights = cloud if names_heights_alone(cloud) else vertical_crs(cloud)
     taken = f"taken to be in the footprints' {described(footprints)}; say otherwise with --crs"
-    warnings.warn(f"{path}: names {described(cloud)}, which is no place on the Earth; {taken}", InputWarning)
+    warnings.warn(
+        f"{path}: names {described(cloud)}, which is no place on the Earth; {taken}", InputWarning
+    )
     return combine(footprints, heights)
 
 
 def say_where_it_lies(headers: list[PointFileHeader], frame: AreaFrame) -> None:
-    """One line where the CRS puts the clouds far from the area it is made for, so that it is another or of another unit, or where
-    its lengths there are not those on the ground."""
+    """One line where the CRS puts the clouds far from the area it is made for, so that it is
+    another or of another unit, or where its lengths there are not those on the ground.
+    """
     bounds = plan_bounds(headers)
     if not len(bounds):
         return
     middles = (bounds[:, :2] + bounds[:, 2:]) / 2
     doubt = doubtful_place(frame.crs, middles)
     if doubt:
-        warnings.warn(f"{headers[0].path}: lies at {doubt}; check the CRS and its unit", InputWarning)
+        warnings.warn(
+            f"{headers[0].path}: lies at {doubt}; check the CRS and its unit", InputWarning
+        )
     elif abs((times := stretch(frame.crs, middles)) - 1.0) > MOST_STRETCH:
         warnings.warn(
-            f"{headers[0].path}: in {described(frame.crs)} a metre on the ground is {times:.2f} m long there, and so are "
-            "roofs, but not their heights; reproject clouds and footprints to the UTM zone or the national grid",
+            f"{headers[0].path}: in {described(frame.crs)} a metre on the ground is {times:.2f} m "
+            "long there, and so are "
+            "roofs, but not their heights; reproject clouds and footprints to the UTM zone or the "
+            "national grid",
             InputWarning,
         )
 
@@ -105,11 +136,16 @@ def plan_bounds(headers: list[PointFileHeader]) -> np.ndarray:
     return bounds[np.isfinite(bounds).all(axis=1)]
 
 
-def refuse_degrees_of_either(path: str | None, footprints: Any, headers: list[PointFileHeader]) -> None:
-    """Clouds that name no CRS may not count in degrees, nor can footprints in degrees stand in for their CRS."""
+def refuse_degrees_of_either(
+    path: str | None, footprints: Any, headers: list[PointFileHeader]
+) -> None:
+    """Clouds that name no CRS may not count in degrees, nor can footprints in degrees stand in for
+    their CRS.
+    """
     if footprints is not None and footprints.is_geographic:
         raise InputError(
-            f"expected footprints that tell the CRS of clouds that name none, got {path} in {described(footprints)}, which "
+            f"expected footprints that tell the CRS of clouds that name none, got {path} in "
+            f"{described(footprints)}, which "
             "is in degrees; name the clouds' CRS with --crs, or reproject the footprints"
         )
     advice = "reproject them to the UTM zone or the national grid of the place (`pdal translate`)"
@@ -118,9 +154,13 @@ def refuse_degrees_of_either(path: str | None, footprints: Any, headers: list[Po
 
 
 def say_what_is_assumed(path: str, frame: AreaFrame) -> None:
-    """One line where no cloud names a CRS: what is then taken for granted would else be taken in silence."""
+    """One line where no cloud names a CRS: what is then taken for granted would else be taken in
+    silence.
+    """
     if frame.footprints is None:
         taken = f"its unit is taken as {frame.units}"
     else:
         taken = f"taken to be in the footprints' {described(frame.footprints)}"
-    warnings.warn(f"{path}: names no CRS; {taken}; say otherwise with --crs or --unit", InputWarning)
+    warnings.warn(
+        f"{path}: names no CRS; {taken}; say otherwise with --crs or --unit", InputWarning
+    )

@@ -1,4 +1,6 @@
-"""The buildings of a run without footprints: what a cloud of roof points, whose class is known or found, falls into."""
+"""The buildings of a run without footprints: what a cloud of roof points, whose class is known or
+found, falls into.
+"""
 
 from __future__ import annotations
 
@@ -12,15 +14,22 @@ from .classes import with_read
 from .plan import Job
 
 
-def jobs_from_cloud(clouds: tuple[str, ...], settings: Settings) -> tuple[tuple[Job, ...], Settings]:
-    """A job a building found, and the settings by which its points are chosen: all of them in a cloud of roofs alone."""
+def jobs_from_cloud(
+    clouds: tuple[str, ...], settings: Settings
+) -> tuple[tuple[Job, ...], Settings]:
+    """A job a building found, and the settings by which its points are chosen: all of them in a
+    cloud of roofs alone.
+    """
     from ..classify.split import split_buildings
 
     cloud = readable_points(clouds, settings)
     found = split_buildings(cloud, settings)
     if settings.read.roofs == "shape" and found and found[0].is_cut_out:
         roofs = counted(len(found), "roof") if len(found) > 1 else "one roof"
-        said = f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks like ground"
+        said = (
+            f"{', '.join(cloud.sources)}: taken for the points of {roofs}, as nothing in it looks "
+            "like ground"
+        )
         warnings.warn(said, InputWarning)
         settings = with_read(settings, roofs="alone")
     return tuple(Job(i, one.id, one.area, None, one.error) for i, one in enumerate(found)), settings

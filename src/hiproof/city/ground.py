@@ -1,7 +1,9 @@
-"""The ground around the buildings of a work tile, from one grid of whole-metre cells for all of them.
+"""The ground around the buildings of a work tile, from one grid of whole-metre cells for all of
+them.
 
-A cell's height depends on the points in it alone, and a building asks only the cells of its own whole-metre box. So the
-answer is the same whatever tile the cells were gathered for, and costs a few table look-ups instead of a triangulation.
+A cell's height depends on the points in it alone, and a building asks only the cells of its own
+whole-metre box. So the answer is the same whatever tile the cells were gathered for, and costs a
+few table look-ups instead of a triangulation.
 """
 
 from __future__ import annotations
@@ -15,17 +17,22 @@ from ..compiled import compiled
 from ..read.terrain import Terrain
 from ..read.thin import rank_in_cells, thin_to_grid, without_repeats
 
-RINGS = (2, 5, 9)  # cells looked at around a position, the next where fewer than three are known; within the reach
+# cells looked at around a position, the next where fewer than three are known; within the reach
+RINGS = (2, 5, 9)
 SOFT_M2 = 0.25  # cells nearer than half a metre weigh about the same
 LEVELLING = 0.1  # m2: holds the slope back where cells lie on one side only
 
 
 class Cells:
-    """Known cells as dense tables `x`, `y`, `z` (rows, columns) in world metres, NaN where no point is."""
+    """Known cells as dense tables `x`, `y`, `z` (rows, columns) in world metres, NaN where no point
+    is.
+    """
 
     def __init__(self, xyz: np.ndarray):
         """`xyz` (n, 3): at most one point a cell."""
-        self.low = np.floor(xyz[:, :2].min(axis=0)).astype(np.int64) if len(xyz) else np.zeros(2, np.int64)
+        self.low = (
+            np.floor(xyz[:, :2].min(axis=0)).astype(np.int64) if len(xyz) else np.zeros(2, np.int64)
+        )
         cell = np.floor(xyz[:, :2]).astype(np.int64) - self.low
         size = cell.max(axis=0) + 1 if len(xyz) else (0, 0)
         tables = np.full((3, size[1], size[0]), np.nan)
@@ -33,16 +40,22 @@ class Cells:
         self.x, self.y, self.z = tables
 
     def inside(self, box: np.ndarray) -> np.ndarray:
-        """Points (m, 3) of the known cells inside the whole-metre `box` (xmin, ymin, xmax, ymax)."""
+        """Points (m, 3) of the known cells inside the whole-metre `box` (xmin, ymin, xmax,
+        ymax).
+        """
         left, low, right, high = (
-            max(int(side) - first, 0) for side, first in zip(box, self.low.tolist() * 2, strict=True)
+            max(int(side) - first, 0)
+            for side, first in zip(box, self.low.tolist() * 2, strict=True)
         )
         known = np.isfinite(self.z[low:high, left:right])
-        return np.column_stack([table[low:high, left:right][known] for table in (self.x, self.y, self.z)])
+        return np.column_stack(
+            [table[low:high, left:right][known] for table in (self.x, self.y, self.z)]
+        )
 
 
 class GroundAround:
-    """Terrain for one building: a plane through the known cells around each position, the near ones weighing most.
+    """Terrain for one building: a plane through the known cells around each position, the near ones
+    weighing most.
 
     Moving least squares (Lancaster and Salkauskas 1981) with weights 1 / (distance^2 + SOFT_M2).
     """
@@ -59,7 +72,9 @@ class GroundAround:
 
 
 class BareAround:
-    """Terrain for one building where no class says which points are the ground: the lowest cells, without what stands on it."""
+    """Terrain for one building where no class says which points are the ground: the lowest cells,
+    without what stands on it.
+    """
 
     source = "ground found by its shape"
 
@@ -69,7 +84,8 @@ class BareAround:
     @functools.cached_property
     def bare(self) -> GroundAround:
         """Found when first asked for, from the cells inside the box alone."""
-        from ..classify.ground import bare_points  # with scipy.ndimage: not where the clouds have a ground class
+        # with scipy.ndimage: not where the clouds have a ground class
+        from ..classify.ground import bare_points
 
         lowest = self.cells.inside(self.box)
         return GroundAround(Cells(bare_points(lowest) if len(lowest) else lowest), self.box)
@@ -80,9 +96,11 @@ class BareAround:
 
 
 class LowestAround:
-    """The last resort for one building: the lowest known cell around each position, whatever its points' class.
+    """The last resort for one building: the lowest known cell around each position, whatever its
+    points' class.
 
-    Where ten cells or more are known the second lowest is taken: one low point is noise, two are ground.
+    Where ten cells or more are known the second lowest is taken: one low point is noise, two are
+    ground.
     """
 
     source, is_guess = "lowest points around the building", True
@@ -97,7 +115,9 @@ class LowestAround:
 
 
 class WhereSeen:
-    """A terrain that knows nothing unless `is_seen`, which is asked only where all better ones do not know."""
+    """A terrain that knows nothing unless `is_seen`, which is asked only where all better ones do
+    not know.
+    """
 
     def __init__(self, terrain: Terrain, is_seen: Callable[[], bool]):
         self.terrain, self.is_seen, self.source = terrain, is_seen, terrain.source
@@ -105,28 +125,42 @@ class WhereSeen:
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
         """The terrain's height (n,) at `xy_world` (n, 2), NaN where it knows none."""
-        return self.terrain.height_at(xy_world) if self.is_seen() else np.full(len(xy_world), np.nan)
+        return (
+            self.terrain.height_at(xy_world) if self.is_seen() else np.full(len(xy_world), np.nan)
+        )
 
 
 @compiled
 def window(x, y, reach, low, shape, box):
-    """Rows and columns, [first, end), of a table whose corner is cell `low`: at most `reach` from (x, y), inside `box`."""
+    """Rows and columns, [first, end), of a table whose corner is cell `low`: at most `reach` from
+    (x, y), inside `box`.
+    """
     column, row = np.int64(np.floor(x)), np.int64(np.floor(y))
-    rows = max(row - reach, box[1], low[1]) - low[1], min(row + reach + 1, box[3], low[1] + shape[0]) - low[1]
-    columns = max(column - reach, box[0], low[0]) - low[0], min(column + reach + 1, box[2], low[0] + shape[1]) - low[0]
+    rows = (
+        max(row - reach, box[1], low[1]) - low[1],
+        min(row + reach + 1, box[3], low[1] + shape[0]) - low[1],
+    )
+    columns = (
+        max(column - reach, box[0], low[0]) - low[0],
+        min(column + reach + 1, box[2], low[0] + shape[1]) - low[0],
+    )
     return rows[0], rows[1], columns[0], columns[1]
 
 
 @compiled
 def plane_heights(xy, x, y, z, low, box):
-    """Heights (n,) at `xy` (n, 2) of the weighted planes through the known cells of the tables x, y, z inside `box`."""
+    """Heights (n,) at `xy` (n, 2) of the weighted planes through the known cells of the tables x,
+    y, z inside `box`.
+    """
     heights = np.full(len(xy), np.nan)
     for i in range(len(xy)):
         for reach in RINGS:
             bounds = window(xy[i, 0], xy[i, 1], reach, low, z.shape, box)
             known, total, mean_x, mean_y, mean_z = weighted_mean(xy[i], x, y, z, bounds)
             if known >= (3 if reach < RINGS[-1] else 1):
-                slope_x, slope_y = weighted_slope(xy[i], x, y, z, bounds, total, mean_x, mean_y, mean_z)
+                slope_x, slope_y = weighted_slope(
+                    xy[i], x, y, z, bounds, total, mean_x, mean_y, mean_z
+                )
                 heights[i] = mean_z - slope_x * mean_x - slope_y * mean_y
                 break
     return heights
@@ -134,7 +168,9 @@ def plane_heights(xy, x, y, z, low, box):
 
 @compiled
 def weighted_mean(at, x, y, z, bounds):
-    """Known cells within `bounds`, the sum of their weights, and their mean offset from `at` (2,) and height."""
+    """Known cells within `bounds`, the sum of their weights, and their mean offset from `at` (2,)
+    and height.
+    """
     known, total, sum_x, sum_y, sum_z = 0, 0.0, 0.0, 0.0, 0.0
     for row in range(bounds[0], bounds[1]):
         for column in range(bounds[2], bounds[3]):
@@ -142,7 +178,11 @@ def weighted_mean(at, x, y, z, bounds):
                 dx, dy = x[row, column] - at[0], y[row, column] - at[1]
                 weight = 1.0 / (dx * dx + dy * dy + SOFT_M2)
                 known, total = known + 1, total + weight
-                sum_x, sum_y, sum_z = sum_x + weight * dx, sum_y + weight * dy, sum_z + weight * z[row, column]
+                sum_x, sum_y, sum_z = (
+                    sum_x + weight * dx,
+                    sum_y + weight * dy,
+                    sum_z + weight * z[row, column],
+                )
     if known == 0:
         return 0, 0.0, 0.0, 0.0, 0.0
     return known, total, sum_x / total, sum_y / total, sum_z / total
@@ -150,7 +190,9 @@ def weighted_mean(at, x, y, z, bounds):
 
 @compiled
 def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
-    """Rise of the plane through the known cells within `bounds` along x and along y, held back by LEVELLING."""
+    """Rise of the plane through the known cells within `bounds` along x and along y, held back by
+    LEVELLING.
+    """
     xx, yy, xy, xz, yz = LEVELLING, LEVELLING, 0.0, 0.0, 0.0
     for row in range(bounds[0], bounds[1]):
         for column in range(bounds[2], bounds[3]):
@@ -166,7 +208,9 @@ def weighted_slope(at, x, y, z, bounds, total, mean_x, mean_y, mean_z):
 
 @compiled
 def lowest_heights(xy, z, low, box):
-    """Lowest known height (n,) of the table z around `xy` (n, 2) and inside `box`, the second lowest of ten or more."""
+    """Lowest known height (n,) of the table z around `xy` (n, 2) and inside `box`, the second
+    lowest of ten or more.
+    """
     heights = np.full(len(xy), np.nan)
     for i in range(len(xy)):
         bounds = window(xy[i, 0], xy[i, 1], RINGS[-1], low, z.shape, box)
@@ -183,11 +227,15 @@ def lowest_heights(xy, z, low, box):
 
 
 def ground_cells(xyz: np.ndarray) -> Cells:
-    """Cells of ground points (n, 3) from any number of files: mean position and lower median height a cell."""
+    """Cells of ground points (n, 3) from any number of files: mean position and lower median height
+    a cell.
+    """
     return Cells(thin_to_grid(without_repeats(xyz), 1.0))
 
 
 def lowest_in_cells(xyz: np.ndarray) -> np.ndarray:
-    """The lowest height of each whole-metre cell, at the cell's centre: the lowest of lowest is the same however cut."""
+    """The lowest height of each whole-metre cell, at the cell's centre: the lowest of lowest is the
+    same however cut.
+    """
     lowest = rank_in_cells(xyz, 1.0, np.zeros_like)
     return np.column_stack([np.floor(lowest[:, :2]) + 0.5, lowest[:, 2]])

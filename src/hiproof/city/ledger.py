@@ -1,7 +1,8 @@
 """What is done, what failed and why: SQLite in WAL mode, from the standard library.
 
-SQLite rather than DuckDB: it needs no further dependency, survives kill -9 at any moment, and `hiproof status` may read
-while the run writes. Only the main process writes; a row changes after its task's file stands whole on disk.
+SQLite rather than DuckDB: it needs no further dependency, survives kill -9 at any moment, and
+`hiproof status` may read while the run writes. Only the main process writes; a row changes after
+its task's file stands whole on disk.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ from ..status import Doubt
 SCHEMA = """
 create table if not exists run (key text primary key, value text);
 create table if not exists task (
-    name text primary key, kind text, position integer, buildings integer, state text default 'open',
+    name text primary key, kind text, position integer, buildings integer,
+    state text default 'open',
     losses integer default 0, message text default '', finished real);
 create table if not exists building (
-    position integer primary key, id text, task text, status text, quality text, type text, detail text, share real, psd real,
+    position integer primary key, id text, task text, status text, quality text, type text,
+    detail text, share real, psd real,
     seconds real);
 create table if not exists override (position integer primary key, digest text);
 create table if not exists output (name text primary key, bytes integer, digest text);
@@ -41,7 +44,9 @@ class Task(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """A row of the buildings: `position` in the plan, what came of it, how good it is, and what it took."""
+    """A row of the buildings: `position` in the plan, what came of it, how good it is, and what it
+    took.
+    """
 
     position: int
     id: str
@@ -62,7 +67,9 @@ class Failure(NamedTuple):
 
 
 class Claim(NamedTuple):
-    """A file that the run says it has written: its name within the run's folder, its size and its digest."""
+    """A file that the run says it has written: its name within the run's folder, its size and its
+    digest.
+    """
 
     name: str
     bytes: int
@@ -70,8 +77,11 @@ class Claim(NamedTuple):
 
 
 def how_to_look(path: Path) -> str:
-    """How SQLite is to open a ledger that is only read. It wants to make a file beside one in WAL mode: where another person's folder
-    allows none, and no run is at work, the ledger is read as it stands."""
+    """How SQLite is to open a ledger that is only read.
+
+    It wants to make a file beside one in WAL mode: where another person's folder allows none, and
+    no run is at work, the ledger is read as it stands.
+    """
     beside = path.with_name(path.name + "-wal")
     at_rest = not beside.exists() or beside.stat().st_size == 0
     return "?mode=ro&immutable=1" if at_rest and not os.access(path.parent, os.W_OK) else "?mode=ro"
@@ -81,9 +91,12 @@ TABLES = ("run", "task", "building", "override", "output")
 
 
 class Ledger:
-    """The run's memory at `path`. States of a task: open, running, done, failed (its input cannot be used).
+    """The run's memory at `path`.
 
-    `losses` counts how often the process died that worked on the task. sqlite3's errors pass through.
+    States of a task: open, running, done, failed (its input cannot be used).
+
+    `losses` counts how often the process died that worked on the task. sqlite3's errors pass
+    through.
     """
 
     def __init__(self, path: Path, read_only: bool = False):
@@ -112,7 +125,12 @@ class Ledger:
         self.database.execute("commit")
 
     def claims(self) -> list[Claim]:
-        return list(map(Claim._make, self.database.execute("select name, bytes, digest from output order by name")))
+        return list(
+            map(
+                Claim._make,
+                self.database.execute("select name, bytes, digest from output order by name"),
+            )
+        )
 
     def overrides(self) -> dict[int, str]:
         """Digests of the overrides that buildings were made with, by position."""
@@ -128,9 +146,13 @@ class Ledger:
         self.database.executemany("insert into override values (?, ?)", list(digests.items()))
 
     def open_again(self, solved: list[str], digests: dict[int, str]) -> None:
-        """Open the tasks `solved` and the reading of all point files, for buildings whose overrides are now of `digests`."""
+        """Open the tasks `solved` and the reading of all point files, for buildings whose overrides
+        are now of `digests`.
+        """
         self.database.execute("begin")
-        self.database.executemany("update task set state = 'open' where name = ?", [(name,) for name in solved])
+        self.database.executemany(
+            "update task set state = 'open' where name = ?", [(name,) for name in solved]
+        )
         self.database.execute("update task set state = 'open' where kind = 'sort'")
         self.put_overrides(digests)
         self.set(merged="no")
@@ -145,12 +167,19 @@ class Ledger:
         """Enter those open tasks of a kind, in the order of the plan, that are not there yet."""
         self.database.execute("begin")
         sql = "insert or ignore into task (name, kind, position, buildings) values (?, ?, ?, ?)"
-        self.database.executemany(sql, [(t.name, t.kind, i, t.buildings) for i, t in enumerate(tasks)])
+        self.database.executemany(
+            sql, [(t.name, t.kind, i, t.buildings) for i, t in enumerate(tasks)]
+        )
         self.database.execute("commit")
 
     def open_tasks(self, kind: str) -> list[str]:
-        """Names of the tasks still to do, the largest first, so that at the end no worker waits long for another."""
-        sql = "select name from task where kind = ? and state = 'open' order by buildings desc, position"
+        """Names of the tasks still to do, the largest first, so that at the end no worker waits
+        long for another.
+        """
+        sql = (
+            "select name from task where kind = ? and state = 'open' order by buildings desc, "
+            "position"
+        )
         return [name for (name,) in self.database.execute(sql, (kind,))]
 
     def start(self, name: str) -> None:
@@ -158,11 +187,15 @@ class Ledger:
 
     def lose(self, name: str) -> None:
         """The process that worked on the task died."""
-        self.database.execute("update task set state = 'open', losses = losses + 1 where name = ?", (name,))
+        self.database.execute(
+            "update task set state = 'open', losses = losses + 1 where name = ?", (name,)
+        )
 
     def reopen(self) -> None:
         """What was running when the main process ended was lost with it."""
-        self.database.execute("update task set state = 'open', losses = losses + 1 where state = 'running'")
+        self.database.execute(
+            "update task set state = 'open', losses = losses + 1 where state = 'running'"
+        )
 
     def interrupt(self) -> None:
         """The main process ends in order: what was running is open again, and no loss."""
@@ -170,12 +203,18 @@ class Ledger:
 
     def sort_again(self) -> None:
         """Open the reading of the point files that were read."""
-        self.database.execute("update task set state = 'open' where kind = 'sort' and state = 'done'")
+        self.database.execute(
+            "update task set state = 'open' where kind = 'sort' and state = 'done'"
+        )
 
     def losses(self, name: str) -> int:
-        return self.database.execute("select losses from task where name = ?", (name,)).fetchone()[0]
+        return self.database.execute("select losses from task where name = ?", (name,)).fetchone()[
+            0
+        ]
 
-    def finish(self, name: str, state: str, message: str = "", outcomes: Iterable[Outcome] = ()) -> None:
+    def finish(
+        self, name: str, state: str, message: str = "", outcomes: Iterable[Outcome] = ()
+    ) -> None:
         """Close a task together with the rows of its buildings."""
         self.database.execute("begin")
         sql = "update task set state = ?, message = ?, finished = ? where name = ?"
@@ -183,14 +222,20 @@ class Ledger:
         self.put_outcomes(name, outcomes)
         self.database.execute("commit")
 
-    def begin_again(self, tasks: list[Task], outcomes: dict[int, Outcome], overrides: dict[int, str]) -> None:
-        """Enter the tasks of another plan as far as they are, and what is known of its buildings, by position."""
+    def begin_again(
+        self, tasks: list[Task], outcomes: dict[int, Outcome], overrides: dict[int, str]
+    ) -> None:
+        """Enter the tasks of another plan as far as they are, and what is known of its buildings,
+        by position.
+        """
         self.database.execute("begin")
         sql = (
-            "insert into task (name, kind, position, buildings, state, message, finished) values (?, ?, ?, ?, ?, ?, ?)"
+            "insert into task (name, kind, position, buildings, state, message, finished) values "
+            "(?, ?, ?, ?, ?, ?, ?)"
         )
         positions = (
-            (t.name, t.kind, i, t.buildings, t.state, t.message, t.finished or time.time()) for i, t in enumerate(tasks)
+            (t.name, t.kind, i, t.buildings, t.state, t.message, t.finished or time.time())
+            for i, t in enumerate(tasks)
         )
         self.database.executemany(sql, positions)
         self.put_outcomes("", outcomes.values())
@@ -200,12 +245,16 @@ class Ledger:
 
     def put_outcomes(self, task: str, outcomes: Iterable[Outcome]) -> None:
         rows = [(position, id, task, *rest) for position, id, *rest in outcomes]
-        self.database.executemany("insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
+        self.database.executemany(
+            "insert or replace into building values (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows
+        )
 
     def outcomes(self) -> dict[int, Outcome]:
         """What came of the buildings that were solved, by position."""
         sql = f"select {', '.join(Outcome._fields)} from building"
-        return {outcome.position: outcome for outcome in map(Outcome._make, self.database.execute(sql))}
+        return {
+            outcome.position: outcome for outcome in map(Outcome._make, self.database.execute(sql))
+        }
 
     def tasks(self) -> list[Task]:
         sql = f"select {', '.join(Task._fields)} from task order by kind, position"
@@ -219,17 +268,30 @@ class Ledger:
     def doubts(self) -> dict[Doubt, int]:
         """Buildings whose detail tells of a doubt, of those doubts that any has."""
         sql = "select count(*) from building where instr(detail, ?)"
-        counts = {doubt: self.database.execute(sql, (doubt.value,)).fetchone()[0] for doubt in Doubt}
+        counts = {
+            doubt: self.database.execute(sql, (doubt.value,)).fetchone()[0] for doubt in Doubt
+        }
         return {doubt: count for doubt, count in counts.items() if count}
 
     def column(self, name: str) -> list:
-        return [value for (value,) in self.database.execute(f"select {name} from building order by position")]
+        return [
+            value
+            for (value,) in self.database.execute(f"select {name} from building order by position")
+        ]
 
     def failed_ids(self) -> list[str]:
         """Ids of all buildings that hit an internal error."""
-        return [id for (id,) in self.database.execute("select id from building where status = 'internal_error'")]
+        return [
+            id
+            for (id,) in self.database.execute(
+                "select id from building where status = 'internal_error'"
+            )
+        ]
 
     def failures(self, limit: int = 20) -> list[Failure]:
         """The first buildings that hit an internal error."""
-        sql = "select id, detail from building where status = 'internal_error' order by position limit ?"
+        sql = (
+            "select id, detail from building where status = 'internal_error' order by position "
+            "limit ?"
+        )
         return list(map(Failure._make, self.database.execute(sql, (limit,))))

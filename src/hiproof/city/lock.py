@@ -1,8 +1,9 @@
 """One run a folder: whoever works in it holds a lock that ends with its process, however that ends.
 
-SQLite does the locking, as it does for the ledger: the standard library's, one way on every system, across processes
-and over network drives that know locks; a library for nothing but this would be one dependency more. The lock has a
-file of its own, so that `hiproof status` still reads the ledger.
+SQLite does the locking, as it does for the ledger: the standard library's, one way on every system,
+across processes and over network drives that know locks; a library for nothing but this would be
+one dependency more. The lock has a file of its own, so that `hiproof status` still reads the
+ledger.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ from ..errors import OutputError
 
 @contextmanager
 def held(state: Path) -> Iterator[None]:
-    """Hold the run's folder `state` for the block. Raises OutputError at once where another run holds it."""
+    """Hold the run's folder `state` for the block.
+
+    Raises OutputError at once where another run holds it.
+    """
     with closing(locked(state)):
         yield
 
@@ -30,9 +34,11 @@ def locked(state: Path) -> sqlite3.Connection:
     except sqlite3.Error as error:
         if error.sqlite_errorcode == sqlite3.SQLITE_BUSY:
             raise OutputError(
-                f"expected {state.parent} for this run alone, got one that another run works in; wait for its end "
+                f"expected {state.parent} for this run alone, got one that another run works in; "
+                "wait for its end "
                 "(`hiproof status` shows how far it is), or choose another --out"
             ) from None
         raise OutputError(
-            f"expected to lock {state}, got: {error}; choose an --out that can be written, on a drive with locks"
+            f"expected to lock {state}, got: {error}; choose an --out that can be written, on a "
+            "drive with locks"
         ) from error

@@ -1,7 +1,8 @@
 """The mark by which an output folder knows whose run it holds.
 
-The mark is made of every field of the request, of what stands in the files that it names, and of the version. A field
-takes no part only where its declaration says what else it decides: one that is added later cannot be forgotten.
+The mark is made of every field of the request, of what stands in the files that it names, and of
+the version. A field takes no part only where its declaration says what else it decides: one that is
+added later cannot be forgotten.
 """
 
 from __future__ import annotations
@@ -24,7 +25,9 @@ SHOWN_FILES = 3  # of an input that differs: enough to know which delivery was r
 
 
 def inputs_of(request: Request) -> dict[str, Any]:
-    """Everything that decides the result of a building, by name: values, and size and time of the files they name."""
+    """Everything that decides the result of a building, by name: values, and size and time of the
+    files they name.
+    """
     return {"version": __version__} | dict(named_values("", request, "the result"))
 
 
@@ -34,18 +37,25 @@ def choice_of(request: Request) -> dict[str, Any]:
 
 
 def named_values(name: str, value: Any, decides: str) -> Iterator[tuple[str, Any]]:
-    """(name, JSON value) of each leaf of the dataclass `value` whose declaration says that it `decides` so; the names of fields in
-    fields are joined by dots.
+    """(name, JSON value) of each leaf of the dataclass `value` whose declaration says that it
+    `decides` so; the names of fields in fields are joined by dots.
 
-    What stands at a path counts of leaves that are declared to name files alone: any word may be the name of a folder, too.
+    What stands at a path counts of leaves that are declared to name files alone: any word may be
+    the name of a folder, too.
     """
     for declared in dataclasses.fields(value):
         if declared.metadata.get("decides", "the result") == decides:
-            inner, found = f"{name}.{declared.name}" if name else declared.name, getattr(value, declared.name)
+            inner, found = (
+                f"{name}.{declared.name}" if name else declared.name,
+                getattr(value, declared.name),
+            )
             if dataclasses.is_dataclass(found):
                 yield from named_values(inner, found, decides)
             else:
-                yield inner, with_files(found) if declared.metadata.get("names") == "files" else found
+                yield (
+                    inner,
+                    with_files(found) if declared.metadata.get("names") == "files" else found,
+                )
 
 
 def with_files(value: Any) -> Any:
@@ -57,7 +67,8 @@ def with_files(value: Any) -> Any:
 
 
 def file_stamps(path: Path) -> list[tuple[str, int, int]]:
-    """(name, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none if nothing is there.
+    """(name, bytes, time in ns) of the file at `path` and its companions, of a folder's files; none
+    if nothing is there.
 
     The names are those within its folder: what was moved whole is the same.
     """
@@ -65,17 +76,24 @@ def file_stamps(path: Path) -> list[tuple[str, int, int]]:
         if path.is_dir():
             folder, files = path, [file for file in path.rglob("*") if file.is_file()]
         else:
-            beside = [path.with_suffix(end) for end in BESIDE] + [Path(f"{path}{end}") for end in APPENDED]
-            folder, files = path.parent, [file for file in {path, *beside} if path.is_file() and file.is_file()]
+            beside = [path.with_suffix(end) for end in BESIDE] + [
+                Path(f"{path}{end}") for end in APPENDED
+            ]
+            folder, files = (
+                path.parent,
+                [file for file in {path, *beside} if path.is_file() and file.is_file()],
+            )
         stamps = [(file.relative_to(folder).as_posix(), file.stat()) for file in files]
         return sorted((name, stat.st_size, stat.st_mtime_ns) for name, stat in stamps)
     return []
 
 
 def changed_files(told: Any, known: Any) -> str:
-    """Which files of an input differ, in brackets, from the values of `with_files` as JSON gives them; empty where it names none.
+    """Which files of an input differ, in brackets, from the values of `with_files` as JSON gives
+    them; empty where it names none.
 
-    >>> changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20, 2]]])
+    >>> changed_files([[["a.laz", 10, 1], ["b.laz", 20, 1]]], [[["a.laz", 10, 1], ["b.laz", 20,
+    ...     2]]])
     ' (b.laz)'
     """
     names = sorted({name for name, *_ in stamps_in(told) ^ stamps_in(known)})
@@ -87,14 +105,23 @@ def stamps_in(value: Any) -> set[tuple[str, int, int]]:
     """All (name, bytes, time in ns) in nested lists."""
     if not isinstance(value, list):
         return set()
-    if len(value) == 3 and isinstance(value[0], str) and all(type(number) is int for number in value[1:]):
+    if (
+        len(value) == 3
+        and isinstance(value[0], str)
+        and all(type(number) is int for number in value[1:])
+    ):
         return {(value[0], value[1], value[2])}
     return set().union(*map(stamps_in, value))
 
 
 def mark_of(inputs: dict[str, Any], salt: str) -> str:
-    """The mark of a run. A slow digest with a salt where an address holds a password: nobody shall try them out on it."""
-    text, shown = (json.dumps(told, sort_keys=True, default=str) for told in (inputs, masked_values(inputs)))
+    """The mark of a run.
+
+    A slow digest with a salt where an address holds a password: nobody shall try them out on it.
+    """
+    text, shown = (
+        json.dumps(told, sort_keys=True, default=str) for told in (inputs, masked_values(inputs))
+    )
     if text == shown:
         return hashlib.sha256((salt + text).encode()).hexdigest()
     return hashlib.scrypt(text.encode(), salt=salt.encode(), n=1 << 14, r=8, p=1, dklen=32).hex()

@@ -1,4 +1,6 @@
-"""Join the texts that the workers made into the output files, in plan order, one tile in memory at a time."""
+"""Join the texts that the workers made into the output files, in plan order, one tile in memory at
+a time.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,12 @@ ENDINGS = "|".join(re.escape(format.tile_ending) for format in OF_TILES.values()
 TILE_FILE = re.compile(rf"\.?-?\d+_-?\d+_\d+({ENDINGS}).*")  # a dot before it: unfinished
 
 
-def merge(plan: WorkPlan, state: Path, out: Path, progress: Callable[[str, int, int], None]) -> None:
-    """Write the files of the run, each whole or not at all, and remove what a killed merge left unfinished."""
+def merge(
+    plan: WorkPlan, state: Path, out: Path, progress: Callable[[str, int, int], None]
+) -> None:
+    """Write the files of the run, each whole or not at all, and remove what a killed merge left
+    unfinished.
+    """
     for name in (format.file for format in FORMATS.values() if format.fragment):
         for leftover in out.glob(f".{name}-*"):
             leftover.unlink(missing_ok=True)
@@ -24,7 +30,9 @@ def merge(plan: WorkPlan, state: Path, out: Path, progress: Callable[[str, int, 
     join_fragments(whole_files(plan, out), parts_of(plan, state, progress), plan.head)
 
 
-def parts_of(plan: WorkPlan, state: Path, progress: Callable[[str, int, int], None]) -> Iterator[Fragments]:
+def parts_of(
+    plan: WorkPlan, state: Path, progress: Callable[[str, int, int], None]
+) -> Iterator[Fragments]:
     for number, tile in enumerate(plan.tiles):
         progress("merge", number, len(plan.tiles))
         yield from load_fragments(tile_parts(state, tile))

@@ -1,5 +1,7 @@
-"""Where the points of each file of a run lie, noted when it is read from end to end: whoever asks for those of some buildings
-later (a run with other overrides, the page of `hiproof edit`) decodes the runs near them alone."""
+"""Where the points of each file of a run lie, noted when it is read from end to end: whoever asks
+for those of some buildings later (a run with other overrides, the page of `hiproof edit`) decodes
+the runs near them alone.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,9 @@ def noted_file(state: Path, number: int) -> Path:
 
 
 def save_noted(path: Path, boxes: list[np.ndarray], points: int) -> None:
-    """Note of a file of so many `points` where its runs lie: `boxes`, arrays (k, 4) one after the other."""
+    """Note of a file of so many `points` where its runs lie: `boxes`, arrays (k, 4) one after the
+    other.
+    """
     with atomic_file(path) as file:
         np.savez(file, boxes=np.concatenate([np.zeros((0, 4)), *boxes]), points=np.int64(points))
 

@@ -1,7 +1,8 @@
-"""What the points that are not of the building's class say of a building: why it has none of that class, or whether it stood
-there whenever it was scanned.
+"""What the points that are not of the building's class say of a building: why it has none of that
+class, or whether it stood there whenever it was scanned.
 
-All is told in whole-metre cells, as the ground and the lowest of the other points are kept of a work tile.
+All is told in whole-metre cells, as the ground and the lowest of the other points are kept of a
+work tile.
 """
 
 from __future__ import annotations
@@ -21,24 +22,36 @@ MOSTLY = 0.5  # of the outline's cells, which say why it has no points of the cl
 HALF_CLASSIFIED = 0.2  # of the outline's cells, as for places without points (evaluate/layers.py)
 BESIDE_WALL_M = 1.0  # m inside the outline, where points of the ground beside a wall may lie
 FEWEST_CELLS = 10  # with roof points, below which chance decides
-UNDER_ROOF = 0.4  # of these, with ground points as well: of Delft's buildings none, of simulated ones pulled down between two flights all
+# of these, with ground points as well: of Delft's buildings none, of simulated ones pulled down
+# between two flights all
+UNDER_ROOF = 0.4
 ROWS = 2**32  # cells from north to south, more than a world has metres
 
 
 @dataclass(frozen=True)
 class OtherPoints:
-    """What lies inside a building's `area` beside the points of its class: of each cell the ground (m, 3) and, where they lie
-    high above it, the lowest of the other points (n, 3)."""
+    """What lies inside a building's `area` beside the points of its class: of each cell the ground
+    (m, 3) and, where they lie high above it, the lowest of the other points (n, 3).
+    """
 
     area: shapely.Geometry
     ground: np.ndarray
     high: np.ndarray
 
     @classmethod
-    def inside(cls, area: shapely.Geometry, ground: np.ndarray, other: np.ndarray, terrain: Terrain) -> OtherPoints:
-        """Those among the `ground` and the lowest `other` points (k, 3) around the building; `terrain` says how high they lie."""
+    def inside(
+        cls, area: shapely.Geometry, ground: np.ndarray, other: np.ndarray, terrain: Terrain
+    ) -> OtherPoints:
+        """Those among the `ground` and the lowest `other` points (k, 3) around the building;
+
+        `terrain` says how high they lie.
+        """
         ground, other = (points[within(area, points)] for points in (ground, other))
-        return cls(area, ground, other[other[:, 2] - terrain.height_at(other) >= HIGH_M] if len(other) else other)
+        return cls(
+            area,
+            ground,
+            other[other[:, 2] - terrain.height_at(other) >= HIGH_M] if len(other) else other,
+        )
 
     def share(self, cells: np.ndarray) -> float:
         """The share of the area that so many cells are."""
@@ -46,14 +59,18 @@ class OtherPoints:
 
 
 def bare_ground(points: OtherPoints) -> np.ndarray:
-    """The ground points (k, 3) in whose cells nothing of another class lies high: no leaves, no roof without a class."""
+    """The ground points (k, 3) in whose cells nothing of another class lies high: no leaves, no
+    roof without a class.
+    """
     if not len(points.high):
         return points.ground
     return points.ground[~np.isin(cell_numbers(points.ground), cells_of(points.high))]
 
 
 def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
-    """The detail of a building without points of the building `classes`, empty where nothing else was seen either."""
+    """The detail of a building without points of the building `classes`, empty where nothing else
+    was seen either.
+    """
     bare = cells_of(points.ground)
     share, share_bare = points.share(np.setdiff1d(cells_of(points.high), bare)), points.share(bare)
     none = f"no model: no points of class {' or '.join(map(str, classes))} inside the footprint"
@@ -61,31 +78,42 @@ def why_no_points(points: OtherPoints, classes: Sequence[int]) -> str:
         lie = f"over {100 * share:.0f} % of it {Doubt.POINTS_OF_OTHER_CLASSES.value}"
         return f"{none}, but {lie}; --roofs shape looks for roofs among them"
     if share_bare > MOSTLY:
-        return f"{none}, and over {100 * share_bare:.0f} % of it {Doubt.BARE_GROUND.value}: nothing stood there when it was scanned"
+        return (
+            f"{none}, and over {100 * share_bare:.0f} % of it {Doubt.BARE_GROUND.value}: nothing "
+            "stood there when it was scanned"
+        )
     return ""
 
 
 def roof_of_other_classes(points: OtherPoints, roof: np.ndarray) -> str:
-    """A remark where, over much of a building, only points of other classes lie high: in cells without `roof` points (n, 3)
-    and without ground. Empty otherwise."""
+    """A remark where, over much of a building, only points of other classes lie high: in cells
+    without `roof` points (n, 3) and without ground. Empty otherwise.
+    """
     if not is_much(points.high, points):  # a point a cell: most buildings need no further look
         return ""
     high = np.setdiff1d(cells_of(points.high), cells_of(np.concatenate([roof, points.ground])))
     if not is_much(high, points):
         return ""
-    lie = f"over {100 * points.share(high):.0f} % of its outline, without points of its class, {Doubt.POINTS_OF_OTHER_CLASSES.value}"
+    lie = (
+        f"over {100 * points.share(high):.0f} % of its outline, without points of its class, "
+        f"{Doubt.POINTS_OF_OTHER_CLASSES.value}"
+    )
     return f"{lie}: leaves, or a roof that --roofs shape finds"
 
 
 def is_much(cells: np.ndarray, points: OtherPoints) -> bool:
-    """Whether so many cells (n, ...) are more than chance, and more than a small share of the area."""
+    """Whether so many cells (n, ...) are more than chance, and more than a small share of
+    the area.
+    """
     return len(cells) >= FEWEST_CELLS and points.share(cells) > HALF_CLASSIFIED
 
 
 def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
-    """A remark where ground points lie under much of a building's `roof` points (n, 3), empty otherwise.
+    """A remark where ground points lie under much of a building's `roof` points (n, 3), empty
+    otherwise.
 
-    One flight sees no ground through a roof, but two do where a house was built or pulled down between them.
+    One flight sees no ground through a roof, but two do where a house was built or pulled down
+    between them.
     """
     fewest = UNDER_ROOF * FEWEST_CELLS
     if len(points.ground) < fewest:
@@ -99,7 +127,8 @@ def ground_under_roof(points: OtherPoints, roof: np.ndarray) -> str:
     if len(seen) < FEWEST_CELLS or share <= UNDER_ROOF:
         return ""
     return (
-        f"over {100 * share:.0f} % of its area {Doubt.GROUND_UNDER_ROOF.value}: two dates, or a roof open at its sides"
+        f"over {100 * share:.0f} % of its area {Doubt.GROUND_UNDER_ROOF.value}: two dates, or a "
+        "roof open at its sides"
     )
 
 

@@ -1,7 +1,7 @@
 """The outlines of all buildings around those of a run, and the rows that touching ones form.
 
-Outlines of neighbours are input, whether a run asks for these buildings or not. A row is all outlines that touch, one
-through the other: it is moved onto its roofs as a whole, or not at all.
+Outlines of neighbours are input, whether a run asks for these buildings or not. A row is all
+outlines that touch, one through the other: it is moved onto its roofs as a whole, or not at all.
 """
 
 from __future__ import annotations
@@ -12,15 +12,22 @@ import numpy as np
 import shapely
 
 TOUCH_M = 0.2
-"""Gap (m) up to which outlines touch: surveys leave slits of a decimetre between houses of a row."""
+"""Gap (m) up to which outlines touch: surveys leave slits of a decimetre between houses
+of a row.
+"""
 
 MOST_ROW_M = 120.0
-"""Longest row (m) that is moved by itself. It bounds the points around a building that a work tile has to hold; a
-longer row follows the common shift of all footprints alone."""
+"""Longest row (m) that is moved by itself.
+
+It bounds the points around a building that a work tile has to hold; a longer row follows the common
+shift of all footprints alone.
+"""
 
 
 class Outlines:
-    """Plan polygons in world metres: first those of a run's buildings by their number, then those of others around."""
+    """Plan polygons in world metres: first those of a run's buildings by their number, then those
+    of others around.
+    """
 
     def __init__(self, polygons: list[shapely.Polygon]):
         self.polygons = np.array(polygons, object)
@@ -34,13 +41,20 @@ class Outlines:
         tree = shapely.STRtree(self.polygons)
         pairs = tree.query(self.polygons, predicate="dwithin", distance=TOUCH_M)
         count = len(self.polygons)
-        return connected_components(coo_array((np.ones(pairs.shape[1]), pairs), shape=(count, count)))[1]
+        return connected_components(
+            coo_array((np.ones(pairs.shape[1]), pairs), shape=(count, count))
+        )[1]
 
     @functools.cached_property
     def boxes(self) -> np.ndarray:
-        """Boxes (n, 4) of what each outline is moved with: its row, or itself where that is too long."""
+        """Boxes (n, 4) of what each outline is moved with: its row, or itself where that is too
+        long.
+        """
         own, labels = shapely.bounds(self.polygons), self.labels
-        low, high = np.full((labels.max(initial=0) + 1, 2), np.inf), np.full((labels.max(initial=0) + 1, 2), -np.inf)
+        low, high = (
+            np.full((labels.max(initial=0) + 1, 2), np.inf),
+            np.full((labels.max(initial=0) + 1, 2), -np.inf),
+        )
         np.fmin.at(low, labels, own[:, :2])
         np.fmax.at(high, labels, own[:, 2:])
         is_short = ((high - low).max(axis=1) <= MOST_ROW_M)[labels]
@@ -53,7 +67,9 @@ class Outlines:
         return np.split(order, np.cumsum(np.bincount(self.labels))[:-1])
 
     def row(self, index: int) -> list[shapely.Polygon]:
-        """The outlines of the row of outline `index`, itself among them, in an order of their own; none of too long a row."""
+        """The outlines of the row of outline `index`, itself among them, in an order of their own;
+        none of too long a row.
+        """
         row = self.polygons[self.members[self.labels[index]]]
         bounds = shapely.total_bounds(row)
         if not (bounds[2:] - bounds[:2]).max() <= MOST_ROW_M:
@@ -67,4 +83,6 @@ def row_outline(row: list[shapely.Polygon]) -> shapely.Polygon:
         return row[0]
     grown = shapely.union_all(shapely.buffer(row, TOUCH_M / 2, join_style="mitre"))
     closed = shapely.buffer(grown, -TOUCH_M / 2, join_style="mitre")
-    return max(shapely.get_parts(closed), key=lambda polygon: polygon.area, default=shapely.Polygon())
+    return max(
+        shapely.get_parts(closed), key=lambda polygon: polygon.area, default=shapely.Polygon()
+    )

@@ -1,4 +1,6 @@
-"""What a run says that it has written, and whether it still stands: size and digest of each file, kept in the ledger."""
+"""What a run says that it has written, and whether it still stands: size and digest of each file,
+kept in the ledger.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +12,22 @@ from .ledger import Claim
 
 CHUNK_BYTES = 1 << 20  # bytes read at once: a file of any size is digested in little memory
 SQLITE = b"SQLite format 3\0"
-# bytes of an SQLite file's head that change when a viewer opens it: how it is locked, and counters of that
+# bytes of an SQLite file's head that change when a viewer opens it: how it is locked, and counters
+# of that
 RESTLESS = ((18, 20), (24, 28), (92, 100))
 
 
 def claims(files: Iterable[Path], out: Path) -> list[Claim]:
     """What a run in `out` says of each of `files`."""
-    return [Claim(file.relative_to(out).as_posix(), file.stat().st_size, digest(file)) for file in files]
+    return [
+        Claim(file.relative_to(out).as_posix(), file.stat().st_size, digest(file)) for file in files
+    ]
 
 
 def broken_claims(known: Iterable[Claim], out: Path) -> list[str]:
-    """Names of those files that are gone or not as they were written; sizes are asked before digests."""
+    """Names of those files that are gone or not as they were written; sizes are asked before
+    digests.
+    """
     return [claim.name for claim in known if not stands(out / claim.name, claim)]
 
 
@@ -32,7 +39,9 @@ def stands(file: Path, claim: Claim) -> bool:
 
 
 def digest(file: Path) -> str:
-    """SHA-256 of a file's content, without what changes in a GeoPackage that is merely looked at."""
+    """SHA-256 of a file's content, without what changes in a GeoPackage that is merely
+    looked at.
+    """
     sha = hashlib.sha256()
     with open(file, "rb") as content:
         head = bytearray(content.read(CHUNK_BYTES))

@@ -1,4 +1,6 @@
-"""What is to be done: the buildings asked for, the work tile that owns each, and the point files."""
+"""What is to be done: the buildings asked for, the work tile that owns each, and the
+point files.
+"""
 
 from __future__ import annotations
 
@@ -31,16 +33,20 @@ from .outlines import Outlines
 PLAN_FILE = "plan.jsonl"
 AROUND_M = 4.0  # of roof points around a footprint: as fit/align.py asks, without its compiler here
 SHIFT_M = 3.0  # that a row may be moved, as in fit/align.py
-# m around a building in which its ground is looked for: where points have the class, a street's width; where it is found by shape, twice that
+# m around a building in which its ground is looked for: where points have the class, a street's
+# width; where it is found by shape, twice that
 GROUND_REACH_M, FOUND_GROUND_REACH_M = 10.0, 20.0
 
 
 @dataclass(frozen=True)
 class Job:
-    """One building asked for. `area` is the plan polygon whose points belong to it (world); `footprint` None: estimate.
+    """One building asked for.
 
-    A footprint stays as the file has it. Its area is moved by its `shift`, and is simpler where it has thousands of vertices.
-    `error` is what ended the search for buildings there: it is an internal error without being solved.
+    `area` is the plan polygon whose points belong to it (world); `footprint` None: estimate.
+
+    A footprint stays as the file has it. Its area is moved by its `shift`, and is simpler where it
+    has thousands of vertices. `error` is what ended the search for buildings there: it is an
+    internal error without being solved.
     """
 
     index: int
@@ -52,13 +58,15 @@ class Job:
 
 @dataclass(frozen=True)
 class WorkPlan:
-    """Everything a worker needs to know, kept as JSON in the run's folder: a line for the whole, then a line a building.
+    """Everything a worker needs to know, kept as JSON in the run's folder: a line for the whole,
+    then a line a building.
 
-    What a task reads (its point file, the terrain model) comes with the task: an address may hold a password.
-    `names` are the CityJSON id and the gml:id of those buildings whose own id will not do; `translate` is the offset of
-    the CityJSON file. Both are settled here, so that a building's text does not depend on what is written before it.
-    `registration` is the common shift of the footprints, None where it was not looked for; `operations` are those by
-    which PROJ transforms what is read and written. `others` are outlines around the buildings that were not asked for,
+    What a task reads (its point file, the terrain model) comes with the task: an address may hold a
+    password. `names` are the CityJSON id and the gml:id of those buildings whose own id will not
+    do; `translate` is the offset of the CityJSON file. Both are settled here, so that a building's
+    text does not depend on what is written before it. `registration` is the common shift of the
+    footprints, None where it was not looked for; `operations` are those by which PROJ transforms
+    what is read and written. `others` are outlines around the buildings that were not asked for,
     moved as they are.
     """
 
@@ -77,12 +85,16 @@ class WorkPlan:
 
     @property
     def terrain_reach_m(self) -> float:
-        """How far around a building terrain matters: farther where the ground must be found first."""
+        """How far around a building terrain matters: farther where the ground must be found
+        first.
+        """
         return FOUND_GROUND_REACH_M if self.settings.read.roofs == "shape" else GROUND_REACH_M
 
     @functools.cached_property
     def around_m(self) -> float:
-        """How far beyond its area a building sees roof points: those of neighbours tell where its own roof ends."""
+        """How far beyond its area a building sees roof points: those of neighbours tell where its
+        own roof ends.
+        """
         sees = self.settings.read.by_class and any(job.footprint is not None for job in self.jobs)
         return AROUND_M if sees else 0.0
 
@@ -98,7 +110,9 @@ class WorkPlan:
 
     @functools.cached_property
     def roof_boxes(self) -> np.ndarray:
-        """Whole-metre boxes (n, 4) in which buildings see roof points, upper sides excluded; NaN where an area is empty.
+        """Whole-metre boxes (n, 4) in which buildings see roof points, upper sides excluded;
+
+        NaN where an area is empty.
 
         A border on a whole metre belongs to the area: one metre more on the upper sides.
         """
@@ -110,20 +124,29 @@ class WorkPlan:
 
     @functools.cached_property
     def units(self) -> Units:
-        """Units of the clouds' and the footprints' coordinates; everything in between counts in metres."""
+        """Units of the clouds' and the footprints' coordinates; everything in between counts in
+        metres.
+        """
         from ..read.crs import units_of
 
         return units_of(self.crs(), named=self.settings.read.unit)
 
     def crs(self) -> Any:
-        """The output's reference system, None where no input names one; by its code where that says all of it, so that
-        also its plan alone has one."""
+        """The output's reference system, None where no input names one; by its code where that says
+        all of it, so that also its plan alone has one.
+        """
         return parse_crs(crs_text(self.crs_wkt))
 
     @functools.cached_property
     def head(self) -> FileHead:
         """What the files written have in common."""
-        return FileHead(self.crs(), self.settings.read.unit, self.translate, self.settings.compose, self.settings.write)
+        return FileHead(
+            self.crs(),
+            self.settings.read.unit,
+            self.translate,
+            self.settings.compose,
+            self.settings.write,
+        )
 
     def save(self, path: Path) -> None:
         whole = {
@@ -136,7 +159,9 @@ class WorkPlan:
             "operations": [operation.to_dict() for operation in self.operations],
             "others": shapely.to_wkb(list(self.others), hex=True).tolist() if self.others else [],
         }
-        areas = shapely.to_wkb([job.footprint.polygon if job.footprint else job.area for job in self.jobs], hex=True)
+        areas = shapely.to_wkb(
+            [job.footprint.polygon if job.footprint else job.area for job in self.jobs], hex=True
+        )
         with path.open("w", encoding="utf-8") as file:
             file.write(json.dumps(whole) + "\n")
             for job, area in zip(self.jobs, areas, strict=True):
@@ -153,7 +178,10 @@ class WorkPlan:
             registration = whole["registration"] and Registration.from_dict(whole["registration"])
             shift = registration.shift if registration else (0.0, 0.0)
             return WorkPlan(
-                jobs=tuple(job_of_row(i, *row, shift) for i, row in enumerate(zip(rows, areas, strict=True))),
+                jobs=tuple(
+                    job_of_row(i, *row, shift)
+                    for i, row in enumerate(zip(rows, areas, strict=True))
+                ),
                 tiles={name: tuple(members) for name, members in whole["tiles"].items()},
                 crs_wkt=whole["crs"],
                 settings=Settings.from_dict(whole["settings"]),
@@ -170,7 +198,9 @@ class WorkPlan:
 
 
 def job_of_row(index: int, row: list, area: shapely.Polygon, shift: tuple[float, float]) -> Job:
-    """A building of the plan's file: [id, area, attributes, error]; no attributes without a footprint."""
+    """A building of the plan's file: [id, area, attributes, error]; no attributes without a
+    footprint.
+    """
     id, _, attributes, error = row
     if attributes is None:
         return Job(index, id, area, None, error and ErrorReport(*error))
@@ -196,7 +226,9 @@ def loaded_plan(path: Path, stamp: int) -> WorkPlan:
 
 
 def unusual_names(jobs: tuple[Job, ...]) -> dict[int, tuple[str, str]]:
-    """Names in CityJSON and CityGML of the jobs that cannot go by their own id there, or where two ids would meet."""
+    """Names in CityJSON and CityGML of the jobs that cannot go by their own id there, or where two
+    ids would meet.
+    """
     json_names, gml_names, unusual = UniqueNames(), UniqueNames(), {}
     for job in jobs:
         pair = json_names.take(plain_text(job.id)), gml_names.take(gml_name(job.id))
@@ -212,9 +244,11 @@ def offset_of_jobs(jobs: tuple[Job, ...], units: Units) -> np.ndarray:
 
 
 def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str, tuple[int, ...]]:
-    """Work tiles by name: the buildings whose area starts in the same square, at most `most` in a tile.
+    """Work tiles by name: the buildings whose area starts in the same square, at most `most` in a
+    tile.
 
-    A building belongs to the square of its lower left corner, so ownership needs no geometry and has no ties.
+    A building belongs to the square of its lower left corner, so ownership needs no geometry and
+    has no ties.
     """
     squares: dict[tuple[int, int], list[int]] = {}
     for job in jobs:
@@ -227,20 +261,31 @@ def cut_into_tiles(jobs: tuple[Job, ...], tile_m: float, most: int) -> dict[str,
     return tiles
 
 
-def jobs_of_footprints(footprints: tuple[Footprint, ...], shift: tuple[float, float] = (0.0, 0.0)) -> tuple[Job, ...]:
+def jobs_of_footprints(
+    footprints: tuple[Footprint, ...], shift: tuple[float, float] = (0.0, 0.0)
+) -> tuple[Job, ...]:
     """One job a footprint, in the order of the file; all lie `shift` beside their roofs."""
     if not footprints:
-        raise InputError("expected at least one polygon in the footprints, got none; check the file and its layer")
+        raise InputError(
+            "expected at least one polygon in the footprints, got none; check the file and its "
+            "layer"
+        )
     return tuple(job_of_footprint(i, f, shift) for i, f in enumerate(footprints))
 
 
 def neighbourhood(job: Job, reach_m: float) -> np.ndarray:
-    """Box (xmin, ymin, xmax, ymax) around a job's area in which terrain points matter, on whole metres of the world.
+    """Box (xmin, ymin, xmax, ymax) around a job's area in which terrain points matter, on whole
+    metres of the world.
 
     Whole metres keep the terrain cells of a building the same whatever tile it is computed in.
     """
     xmin, ymin, xmax, ymax = job.area.bounds
     return np.array(
-        [math.floor(xmin - reach_m), math.floor(ymin - reach_m), math.ceil(xmax + reach_m), math.ceil(ymax + reach_m)],
+        [
+            math.floor(xmin - reach_m),
+            math.floor(ymin - reach_m),
+            math.ceil(xmax + reach_m),
+            math.ceil(ymax + reach_m),
+        ],
         float,
     )

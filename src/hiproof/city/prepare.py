@@ -21,7 +21,15 @@ from ..write.tables.geopackage import attributes_with_a_column
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
 from .outlines import MOST_ROW_M
-from .plan import Job, WorkPlan, cut_into_tiles, job_of_footprint, jobs_of_footprints, offset_of_jobs, unusual_names
+from .plan import (
+    Job,
+    WorkPlan,
+    cut_into_tiles,
+    job_of_footprint,
+    jobs_of_footprints,
+    offset_of_jobs,
+    unusual_names,
+)
 from .request import Box, Request
 
 if TYPE_CHECKING:
@@ -84,36 +92,54 @@ def say_where_files_lie(jobs: tuple[Job, ...], crs: Any, units: FileUnits) -> No
     doubt = doubtful_place(crs, corners) if len(corners) else None
     if doubt:
         warnings.warn(
-            f"--out-crs: the buildings lie at {doubt}; name the UTM zone or the national grid there", InputWarning
+            f"--out-crs: the buildings lie at {doubt}; name the UTM zone or the national grid "
+            "there",
+            InputWarning,
         )
 
 
 def check_terrain(terrain: RasterTerrain, jobs: tuple[Job, ...]) -> None:
-    """Read what lies under the buildings, so that damage ends the run before work is spent, and warn in one line where no
-    building has a height there: the ground points that stand in for it would else be taken in silence."""
+    """Read what lies under the buildings, so that damage ends the run before work is spent, and
+    warn in one line where no building has a height there: the ground points that stand in for it
+    would else be taken in silence.
+    """
     corners = shapely.get_coordinates([job.area for job in jobs])
     if not len(corners) or terrain.knows_any(corners):
         return
-    lies = "has no height under any building" if terrain.pixels_at(corners)[2].any() else "no building stands on it"
+    lies = (
+        "has no height under any building"
+        if terrain.pixels_at(corners)[2].any()
+        else "no building stands on it"
+    )
     advice = "its values" if "height" in lies else "its CRS"
     warnings.warn(
-        f"{masked(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}", InputWarning
+        f"{masked(terrain.path)}: {lies}, so the ground is taken from the points; check {advice}",
+        InputWarning,
     )
 
 
 def places_over(corners: np.ndarray) -> np.ndarray:
-    """Places (k, 2), 8 by 8 of them over the box of `corners` (n, 2): where buildings are to be looked for first."""
-    x, y = (np.linspace(low, high, 8) for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True))
+    """Places (k, 2), 8 by 8 of them over the box of `corners` (n, 2): where buildings are to be
+    looked for first.
+    """
+    x, y = (
+        np.linspace(low, high, 8)
+        for low, high in zip(corners.min(axis=0), corners.max(axis=0), strict=True)
+    )
     return np.column_stack([grid.ravel() for grid in np.meshgrid(x, y)])
 
 
 def most_buildings_a_tile(settings: Settings) -> int:
-    """Progress is told by tiles, and the paper's objective takes seconds a building: there each is a tile of its own."""
+    """Progress is told by tiles, and the paper's objective takes seconds a building: there each is
+    a tile of its own.
+    """
     return 1 if settings.fit.objective == "paper" else MOST_BUILDINGS_A_TILE
 
 
 def read_headers(clouds: tuple[str, ...]) -> list:
-    """Headers of the point files that can be read and hold points; one that does not ends no run."""
+    """Headers of the point files that can be read and hold points; one that does not ends
+    no run.
+    """
     from ..read.pointcloud import and_others, as_input_error, read_header
 
     headers, errors = [], []
@@ -126,7 +152,11 @@ def read_headers(clouds: tuple[str, ...]) -> list:
             errors.append(as_input_error(error, name))
     empty = [header.path for header in headers if not header.count]
     if len(empty) == len(headers):
-        raise errors[0] if errors else InputError(f"expected points in {', '.join(empty)}, got none; check the files")
+        raise (
+            errors[0]
+            if errors
+            else InputError(f"expected points in {', '.join(empty)}, got none; check the files")
+        )
     if empty:
         warnings.warn(f"{empty[0]}{and_others(empty)}: holds no points", InputWarning)
     return [header for header in headers if header.count]
@@ -135,8 +165,9 @@ def read_headers(clouds: tuple[str, ...]) -> list:
 def jobs_from_footprints(
     request: Request, headers: list, frame: AreaFrame, settings: Settings
 ) -> tuple[tuple[Job, ...], tuple[shapely.Polygon, ...], Registration | None]:
-    """A job a footprint, the outlines around that were not asked for, and the common shift by which all are moved; None
-    where it is not looked for."""
+    """A job a footprint, the outlines around that were not asked for, and the common shift by which
+    all are moved; None where it is not looked for.
+    """
     from ..read.overlap import check_overlap
     from .frame import plan_bounds
     from .registration import find_registration, is_registered, warn_if_moved
@@ -150,12 +181,18 @@ def jobs_from_footprints(
         check_overlap(footprints, bounds.tolist(), frame.footprints, frame.cloud, frame.units)
     is_part = settings.read.by_class and (request.where or request.bbox)
     data_set = all_footprints(request, frame, headers) if is_part else footprints
-    registration = find_registration(data_set, headers, frame.units, settings) if is_registered(settings) else None
+    registration = (
+        find_registration(data_set, headers, frame.units, settings)
+        if is_registered(settings)
+        else None
+    )
     shift = (0.0, 0.0)
     if registration is not None:
         warn_if_moved(registration, str(request.footprints))
         shift = registration.shift
-    others = [job_of_footprint(0, footprint, shift).area for footprint in around(footprints, data_set)]
+    others = [
+        job_of_footprint(0, footprint, shift).area for footprint in around(footprints, data_set)
+    ]
     return jobs_of_footprints(footprints, shift), tuple(others), registration
 
 
@@ -174,7 +211,8 @@ def around(footprints: tuple[Footprint, ...], data_set: tuple[Footprint, ...]) -
 
 
 def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[Footprint, ...]:
-    """The footprints within the clouds, whichever are asked for; of a database those that its own condition lets through.
+    """The footprints within the clouds, whichever are asked for; of a database those that its own
+    condition lets through.
 
     What is odd about them has been said of those that are asked for.
     """
@@ -182,13 +220,21 @@ def all_footprints(request: Request, frame: AreaFrame, headers: list) -> tuple[F
     from .frame import plan_bounds
 
     bounds, path = plan_bounds(headers), str(request.footprints)
-    box = (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist()) if len(bounds) else None
+    box = (
+        (*bounds[:, :2].min(axis=0).tolist(), *bounds[:, 2:].max(axis=0).tolist())
+        if len(bounds)
+        else None
+    )
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InputWarning)
-        return footprints_of(request, frame, where=request.where if is_database(path) else None, bbox=box)
+        return footprints_of(
+            request, frame, where=request.where if is_database(path) else None, bbox=box
+        )
 
 
-def footprints_of(request: Request, frame: AreaFrame, where: str | None, bbox: Box | None) -> tuple[Footprint, ...]:
+def footprints_of(
+    request: Request, frame: AreaFrame, where: str | None, bbox: Box | None
+) -> tuple[Footprint, ...]:
     from ..read.footprints import read_footprints
 
     return read_footprints(
@@ -202,15 +248,25 @@ def footprints_of(request: Request, frame: AreaFrame, where: str | None, bbox: B
     )
 
 
-def footprint_operations(request: Request, frame: AreaFrame, jobs: tuple[Job, ...]) -> list[Operation]:
-    """The operation by which footprints came to the clouds' CRS; said by a warning when they were read."""
+def footprint_operations(
+    request: Request, frame: AreaFrame, jobs: tuple[Job, ...]
+) -> list[Operation]:
+    """The operation by which footprints came to the clouds' CRS; said by a warning when they were
+    read.
+    """
     if frame.cloud is None or frame.footprints is None:
         return []
-    return operations_between(masked(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs)
+    return operations_between(
+        masked(str(request.footprints)), frame.footprints, frame.cloud, frame, jobs
+    )
 
 
-def terrain_operations(terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job, ...]) -> list[Operation]:
-    """The operation by which places come to the terrain model's CRS, with a warning where it is coarse."""
+def terrain_operations(
+    terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job, ...]
+) -> list[Operation]:
+    """The operation by which places come to the terrain model's CRS, with a warning where it is
+    coarse.
+    """
     from ..read.operations import warn_if_coarse
 
     if frame.crs is None or terrain.own_crs is None:
@@ -222,7 +278,9 @@ def terrain_operations(terrain: RasterTerrain, frame: AreaFrame, jobs: tuple[Job
 
 
 def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> list[Operation]:
-    """The operation by which coordinates come to the CRS of the files, with a warning where it is coarse."""
+    """The operation by which coordinates come to the CRS of the files, with a warning where it is
+    coarse.
+    """
     from ..read.operations import warn_if_coarse
 
     found = operations_between("--out-crs", frame.crs, out_crs, frame, jobs)
@@ -234,33 +292,49 @@ def file_operations(frame: AreaFrame, out_crs: Any, jobs: tuple[Job, ...]) -> li
 def operations_between(
     subject: str, source: Any, target: Any, frame: AreaFrame, jobs: tuple[Job, ...]
 ) -> list[Operation]:
-    """The operation from `source` to `target` in plan where the buildings stand; none where both are the same."""
+    """The operation from `source` to `target` in plan where the buildings stand; none where both
+    are the same.
+    """
     from ..read.crs import horizontal_crs, names_place, same_horizontal
     from ..read.operations import find_operation
     from ..read.overlap import reprojected
 
     boxes = shapely.bounds([job.area for job in jobs])
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
-    if same_horizontal(source, target) or not len(boxes) or not (names_place(source) and names_place(target)):
+    if (
+        same_horizontal(source, target)
+        or not len(boxes)
+        or not (names_place(source) and names_place(target))
+    ):
         return []
     middle = frame.units.from_metres(np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0)[None])
     x, y = reprojected(middle, frame.crs, source)[0]
-    return [find_operation(subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y)))]
+    return [
+        find_operation(
+            subject, horizontal_crs(source), horizontal_crs(target), (float(x), float(y))
+        )
+    ]
 
 
 def say_if_columns_run_out(path: str | None, footprints: tuple[Footprint, ...]) -> None:
-    """One line, before any work, where footprints have more attributes than a GeoPackage has columns."""
+    """One line, before any work, where footprints have more attributes than a GeoPackage has
+    columns.
+    """
     count = len({name for footprint in footprints for name in footprint.attributes})
     if count > (room := attributes_with_a_column()):
         warnings.warn(
-            f"{masked(str(path))}: has {count:,} attributes; buildings.gpkg holds the first {room:,}, because its tables have at "
+            f"{masked(str(path))}: has {count:,} attributes; buildings.gpkg holds the first "
+            f"{room:,}, because its tables have at "
             "most 2,000 columns, and the other files hold all",
             InputWarning,
         )
 
 
 def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[Job, ...]:
-    """Those of the `jobs` that meet the box asked for, numbered again; all where none is. Raises InputError where none does."""
+    """Those of the `jobs` that meet the box asked for, numbered again; all where none is.
+
+    Raises InputError where none does.
+    """
     from ..read.footprints import meets
 
     if request.bbox is None:
@@ -272,14 +346,24 @@ def jobs_in_box(jobs: tuple[Job, ...], request: Request, units: Units) -> tuple[
 
 
 def refuse_box_elsewhere(bbox: Box | None, bounds: np.ndarray) -> None:
-    """A box that meets none of the clouds' boxes (n, 4), both in the clouds' own unit, is refused before anything is read."""
-    if bbox is None or not len(bounds) or shapely.intersects(shapely.box(*bbox), shapely.box(*bounds.T)).any():
+    """A box that meets none of the clouds' boxes (n, 4), both in the clouds' own unit, is refused
+    before anything is read.
+    """
+    if (
+        bbox is None
+        or not len(bounds)
+        or shapely.intersects(shapely.box(*bbox), shapely.box(*bounds.T)).any()
+    ):
         return
     extent = [*bounds[:, :2].min(axis=0), *bounds[:, 2:].max(axis=0)]
     raise InputError(
-        f"expected a --bbox that meets the clouds, which lie in {told_box(extent)}, got {told_box(bbox)}; give it in their coordinates"
+        f"expected a --bbox that meets the clouds, which lie in {told_box(extent)}, got "
+        f"{told_box(bbox)}; give it in their coordinates"
     )
 
 
 def nothing_in(bbox: Box) -> str:
-    return f"expected buildings in --bbox {told_box(bbox)}, got none; it is in the coordinates of the clouds"
+    return (
+        f"expected buildings in --bbox {told_box(bbox)}, got none; it is in the coordinates of the "
+        "clouds"
+    )

@@ -1,7 +1,7 @@
 """Work that keeps killing its process: run it alone, and find the building that does it.
 
-A process may also die of what others do (a kill from outside, memory taken by a neighbour). So nothing is blamed before
-it has died TRIES times with nothing beside it.
+A process may also die of what others do (a kill from outside, memory taken by a neighbour). So
+nothing is blamed before it has died TRIES times with nothing beside it.
 """
 
 from __future__ import annotations
@@ -13,11 +13,14 @@ from typing import Any
 from .executors import WorkerLost
 from .plan import load_plan
 
-TRIES = 3  # deaths of its process, alone, until a task is taken for their cause: memory may run out by chance
+# deaths of its process, alone, until a task is taken for their cause: memory may run out by chance
+TRIES = 3
 
 
 def run_alone(alone: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
-    """(result, error) of `function(*task)` in an isolated executor, tried again when its process dies."""
+    """(result, error) of `function(*task)` in an isolated executor, tried again when its process
+    dies.
+    """
     for _ in range(TRIES):
         ((_, result, error),) = alone.run(function, [task])
         if not is_loss(error):
@@ -30,8 +33,11 @@ def is_loss(error: Exception | None) -> bool:
     return isinstance(error, (WorkerLost, MemoryError))
 
 
-def solve_in_quarantine(alone: Any, function: Callable, task: tuple) -> tuple[Any, Exception | None]:
-    """The rows of `solve_tile` for its arguments `task` (folder, tile, terrain), without the buildings that kill their process: they become internal errors.
+def solve_in_quarantine(
+    alone: Any, function: Callable, task: tuple
+) -> tuple[Any, Exception | None]:
+    """The rows of `solve_tile` for its arguments `task` (folder, tile, terrain), without the
+    buildings that kill their process: they become internal errors.
 
     Where the tile as a whole kills its process even alone, its buildings are tried one by one.
     """

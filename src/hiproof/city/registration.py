@@ -1,8 +1,8 @@
 """The common shift of a run's footprints onto its roofs, estimated before there are work tiles.
 
-The data set is all footprints of the file within the clouds, whichever of them --where or --bbox choose, and the roof
-points in a sample of its squares of CELL_M. The sample follows from the places of the footprints alone. So a building is
-moved alike in every run on these files.
+The data set is all footprints of the file within the clouds, whichever of them --where or --bbox
+choose, and the roof points in a sample of its squares of CELL_M. The sample follows from the places
+of the footprints alone. So a building is moved alike in every run on these files.
 """
 
 from __future__ import annotations
@@ -29,7 +29,10 @@ CELL_M = 250.0
 """Side (m) of the squares of the world that are sampled: some dozens of houses."""
 
 ENOUGH_FOOTPRINTS, MOST_CELLS, MOST_FILES = 400, 16, 8
-"""The sample ends with so many footprints: their mean is known to 0.02 m. The others bound what is read for it."""
+"""The sample ends with so many footprints: their mean is known to 0.02 m.
+
+The others bound what is read for it.
+"""
 
 AROUND_M = FARTHEST_M + 1.0
 """How far (m) around a square footprints bear on its points."""
@@ -38,19 +41,28 @@ Cell = tuple[int, int]
 
 
 def is_registered(settings: Settings) -> bool:
-    """Whether footprints of a run with these settings are registered: where classes tell roof points."""
+    """Whether footprints of a run with these settings are registered: where classes tell roof
+    points.
+    """
     return settings.reconstruct.align != "off" and settings.read.by_class
 
 
 def find_registration(
-    footprints: tuple[Footprint, ...], headers: list[PointFileHeader], units: Units, settings: Settings
+    footprints: tuple[Footprint, ...],
+    headers: list[PointFileHeader],
+    units: Units,
+    settings: Settings,
 ) -> Registration:
-    """Estimate the common shift of `footprints` onto the roof points of the files with `headers`."""
+    """Estimate the common shift of `footprints` onto the roof points of the files with
+    `headers`.
+    """
     polygons = np.array([f.polygon for f in footprints if not f.polygon.is_empty])
     boxes = boxes_of(headers, units)
     number_of = footprints_by_cell(polygons)
     cells, files = sampled(number_of, boxes)
-    points = points_by_cell(cells, [headers[i].path for i in sorted(files)], units, settings.read.building_classes)
+    points = points_by_cell(
+        cells, [headers[i].path for i in sorted(files)], units, settings.read.building_classes
+    )
     tree = shapely.STRtree(polygons)
     seen = [cell for cell in cells if cell in points]
     found = register((points[cell], polygons_near(tree, cell)) for cell in seen)
@@ -62,8 +74,10 @@ def warn_if_moved(registration: Registration, path: str) -> None:
     if registration.is_clear:
         (x, y), sigma = registration.xy, max(registration.sigma)
         warnings.warn(
-            f"{masked(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, {y:.2f}) m, with a standard "
-            f"deviation of {sigma:.2f} m; check the CRS of footprints and clouds, or keep them in place with --align off",
+            f"{masked(path)}: all footprints lie beside their roofs and are moved by ({x:.2f}, "
+            f"{y:.2f}) m, with a standard "
+            f"deviation of {sigma:.2f} m; check the CRS of footprints and clouds, or keep them in "
+            "place with --align off",
             InputWarning,
         )
 
@@ -85,7 +99,8 @@ def footprints_by_cell(polygons: np.ndarray) -> dict[Cell, int]:
 
 
 def sampled(number_of: dict[Cell, int], boxes: np.ndarray) -> tuple[list[Cell], set[int]]:
-    """Squares to look at, drawn by a hash of their place, and the numbers of the files that hold them.
+    """Squares to look at, drawn by a hash of their place, and the numbers of the files that hold
+    them.
 
     `number_of` counts the footprints of each square, `boxes` (n, 4) are those of the files.
     """
@@ -128,7 +143,9 @@ def polygons_near(tree: shapely.STRtree, cell: Cell) -> list[shapely.Polygon]:
 def points_by_cell(
     cells: list[Cell], paths: list[str], units: Units, building_classes: tuple[int, ...]
 ) -> dict[Cell, np.ndarray]:
-    """Roof points (n, 2) of the `cells`, of all files that can be read: the step that sorts points names the others."""
+    """Roof points (n, 2) of the `cells`, of all files that can be read: the step that sorts points
+    names the others.
+    """
     found: dict[Cell, list[np.ndarray]] = {}
     wanted = set(cells)
     for path in paths:

@@ -28,14 +28,19 @@ def solve_bundle(folder: Path, out: Path) -> tuple[Building, str]:
     traces: list[str] = []
     surroundings = Surroundings(points, terrain, plan)
     building, texts = solve_one(
-        plan, plan.jobs[0], surroundings, override, keep=lambda job, trace, terrain: traces.append(trace)
+        plan,
+        plan.jobs[0],
+        surroundings,
+        override,
+        keep=lambda job, trace, terrain: traces.append(trace),
     )
     join_fragments(whole_files(plan, Path(out)), [texts], plan.head)
     return building, "\n".join(traces)
 
 
 def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
-    """Repeat the search for buildings in the area of the plan's building where it ended in an error.
+    """Repeat the search for buildings in the area of the plan's building where it ended in an
+    error.
 
     `points` (n, 3) by kind are those of the bundle.
     """
@@ -44,7 +49,9 @@ def search_again(plan: WorkPlan, points: dict[str, np.ndarray]) -> WorkPlan:
         return plan
     kinds = {"roof": read.building_classes[0], "ground": read.ground_classes[0]}
     xyz = np.concatenate([points[kind] for kind in kinds])
-    classes = np.concatenate([np.full(len(points[kind]), number, np.uint8) for kind, number in kinds.items()])
+    classes = np.concatenate(
+        [np.full(len(points[kind]), number, np.uint8) for kind, number in kinds.items()]
+    )
     inside = shapely.intersects_xy(job.area, xyz[:, 0], xyz[:, 1])
     found = split_buildings(PointCloud(xyz[inside], classes[inside]), plan.settings)
     error = next((building.error for building in found if building.error), None)

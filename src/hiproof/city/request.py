@@ -16,12 +16,15 @@ FILES = {"names": "files"}
 
 @dataclass(frozen=True)
 class Request:
-    """A run: the point clouds (files, addresses), the folder `out` for the results, and how the one becomes the other.
+    """A run: the point clouds (files, addresses), the folder `out` for the results, and how the one
+    becomes the other.
 
-    `footprints` (file, address or database) with their `layer`, the `id_attribute` that names them, an SQL condition
-    `where` and a `bbox` (xmin, ymin, xmax, ymax) in the coordinates of the clouds say which buildings there are; without
-    footprints the clouds are split. `terrain` is a raster, `overrides` a file of what is known better; `processes` work on
-    this machine (None: as many as pay, see cores.py), or those of the Dask `scheduler`; `restart` begins anew in a folder that holds another run.
+    `footprints` (file, address or database) with their `layer`, the `id_attribute` that names them,
+    an SQL condition `where` and a `bbox` (xmin, ymin, xmax, ymax) in the coordinates of the clouds
+    say which buildings there are; without footprints the clouds are split. `terrain` is a raster,
+    `overrides` a file of what is known better; `processes` work on this machine (None: as many as
+    pay, see cores.py), or those of the Dask `scheduler`; `restart` begins anew in a folder that
+    holds another run.
 
     >>> from pathlib import Path
     >>> Request(("tile.laz",), Path("models"), footprints="footprints.gpkg").settings.fit.objective
@@ -35,7 +38,8 @@ class Request:
     id_attribute: str | None = field(default=None, metadata=WHICH)
     layer: str | None = field(default=None, metadata=WHICH)
     settings: Settings = field(default_factory=Settings)
-    overrides: str | None = field(default=None, metadata=NO_MATTER)  # the ledger knows them building by building
+    # the ledger knows them building by building
+    overrides: str | None = field(default=None, metadata=NO_MATTER)
     processes: int | None = field(default=1, metadata=NO_MATTER)
     scheduler: str | None = field(default=None, metadata=NO_MATTER)
     restart: bool = field(default=False, metadata=NO_MATTER)

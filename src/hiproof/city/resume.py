@@ -46,7 +46,9 @@ def open_state(out: Path) -> Path:
 
 
 def open_ledger(state: Path, restart: bool) -> Ledger:
-    """The ledger of a run; one that is damaged or of another version is dropped where the run begins anew."""
+    """The ledger of a run; one that is damaged or of another version is dropped where the run
+    begins anew.
+    """
     path = state / "ledger.sqlite"
     try:
         ledger = Ledger(path)
@@ -59,21 +61,26 @@ def open_ledger(state: Path, restart: bool) -> Ledger:
             return open_ledger(state, False)
         if is_full:
             raise OutputError(
-                f"expected to write the ledger in {state}, got: {error}; free some space, the same command then goes on"
+                f"expected to write the ledger in {state}, got: {error}; free some space, the same "
+                "command then goes on"
             ) from error
         raise OutputError(
-            f"expected the ledger of a run of this version in {state}, got: {error}; begin anew with --restart, or "
+            f"expected the ledger of a run of this version in {state}, got: {error}; begin anew "
+            "with --restart, or "
             "choose another --out"
         ) from error
     return ledger
 
 
 def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
-    """The plan of an earlier run of the same request whose files stand as it left them, else a new one; where the
-    footprints changed since, a new one that takes over what is known of the others."""
+    """The plan of an earlier run of the same request whose files stand as it left them, else a new
+    one; where the footprints changed since, a new one that takes over what is known of the others.
+    """
     fresh = False
     plan = None if request.restart else plan_to_go_on(request, state, ledger)
-    if plan is None or ledger.get("choice") != mark_of(choice_of(request), ledger.get("salt") or ""):
+    if plan is None or ledger.get("choice") != mark_of(
+        choice_of(request), ledger.get("salt") or ""
+    ):
         old, plan = plan, make_plan(request)
         fresh = old is None or not take_over(plan, old, state, ledger)
         if fresh:
@@ -81,7 +88,9 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
         enter(request, ledger)
     settle_overrides(request.overrides, plan, state, ledger, fresh=fresh)
     if ledger.open_tasks("solve") and not any((state / "points").iterdir()):
-        ledger.sort_again()  # somebody made room: without points, the buildings that are left would come out as ones that have none
+        # somebody made room: without points, the buildings that are left would come out as ones
+        # that have none
+        ledger.sort_again()
     LOGGER.info(
         "version %s %s in %s: %s in %s",
         __version__,
@@ -94,7 +103,10 @@ def resume_or_plan(request: Request, state: Path, ledger: Ledger) -> WorkPlan:
 
 
 def plan_to_go_on(request: Request, state: Path, ledger: Ledger) -> WorkPlan | None:
-    """The plan of the run that the folder holds, None where it holds none to go on from. Raises OutputError for another's."""
+    """The plan of the run that the folder holds, None where it holds none to go on from.
+
+    Raises OutputError for another's.
+    """
     inputs = inputs_of(request)
     if ledger.get("mark") is None or not (is_of(inputs, ledger) or is_begun(ledger)):
         return None
@@ -113,7 +125,9 @@ def begin(plan: WorkPlan, request: Request, state: Path, ledger: Ledger) -> None
     with atomic(state / PLAN_FILE) as beside:
         plan.save(Path(beside))
     ledger.add_tasks([Task(f"sort:{i}", "sort", 0) for i in range(len(request.clouds))])
-    ledger.add_tasks([Task(f"solve:{tile}", "solve", len(members)) for tile, members in plan.tiles.items()])
+    ledger.add_tasks(
+        [Task(f"solve:{tile}", "solve", len(members)) for tile, members in plan.tiles.items()]
+    )
 
 
 def enter(request: Request, ledger: Ledger) -> None:
@@ -130,7 +144,9 @@ def is_of(inputs: dict, ledger: Ledger) -> bool:
 
 
 def is_begun(ledger: Ledger) -> bool:
-    """Whether any task is done: a run that ended before, by a setting that is wrong, is nothing to keep."""
+    """Whether any task is done: a run that ended before, by a setting that is wrong, is nothing to
+    keep.
+    """
     return any(task.state == "done" for task in ledger.tasks())
 
 
@@ -138,36 +154,49 @@ def refuse_other_inputs(out: Path, inputs: dict, ledger: Ledger) -> None:
     """Raise OutputError, naming what differs, where the folder holds a run of another request."""
     if is_of(inputs, ledger):
         return
-    known, told = json.loads(ledger.get("inputs") or "{}"), json.loads(json.dumps(masked_values(inputs), default=str))
+    known, told = (
+        json.loads(ledger.get("inputs") or "{}"),
+        json.loads(json.dumps(masked_values(inputs), default=str)),
+    )
     other = [
         name + changed_files(told.get(name), known.get(name))
         for name in told | known
         if told.get(name) != known.get(name)
     ]
     raise OutputError(
-        f"expected {out} to be new or to hold a run of the same inputs, settings and version, got a run that differs in "
-        f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or begin anew with --restart"
+        f"expected {out} to be new or to hold a run of the same inputs, settings and version, got "
+        "a run that differs in "
+        f"{', '.join(other) or 'the part of an address that is masked'}; choose another --out, or "
+        "begin anew with --restart"
     )
 
 
 def refuse_other_operations(out: Path, plan: WorkPlan) -> None:
-    """Raise OutputError where PROJ no longer transforms coordinates as it did when the run was planned."""
+    """Raise OutputError where PROJ no longer transforms coordinates as it did when the run was
+    planned.
+    """
     from ..read.operations import is_current
 
     changed = [operation for operation in plan.operations if not is_current(operation)]
     if changed:
         raise OutputError(
-            f"expected PROJ to transform {changed[0].subject} in {out} as before ({changed[0].name}), got another operation: "
-            "a grid was installed or removed since; choose another --out, or begin anew with --restart"
+            f"expected PROJ to transform {changed[0].subject} in {out} as before "
+            f"({changed[0].name}), got another operation: "
+            "a grid was installed or removed since; choose another --out, or begin anew with "
+            "--restart"
         )
 
 
 def stands(out: Path, ledger: Ledger) -> bool:
-    """Whether a run may go on from what is there: not where files of a finished run were removed or changed since."""
+    """Whether a run may go on from what is there: not where files of a finished run were removed or
+    changed since.
+    """
     broken = broken_claims(ledger.claims(), Path(out)) if ledger.get("merged") == "yes" else []
     if broken:
         names = ", ".join(broken[:5]) + (" and others" if len(broken) > 5 else "")
-        warnings.warn(f"{out}: {names} is gone or not as the run left it; all is made again", OutputWarning)
+        warnings.warn(
+            f"{out}: {names} is gone or not as the run left it; all is made again", OutputWarning
+        )
     return not broken
 
 
@@ -185,7 +214,9 @@ def remove_unasked(plan: WorkPlan, out: Path, ledger: Ledger) -> None:
 
 
 def forget(state: Path, ledger: Ledger) -> None:
-    """Drop all that an earlier run in this folder has left of its state (output files that it will replace stay until then)."""
+    """Drop all that an earlier run in this folder has left of its state (output files that it will
+    replace stay until then).
+    """
     remove_tiles(state.parent)
     remove_bundles(state.parent)
     ledger.forget()

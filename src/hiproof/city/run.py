@@ -1,4 +1,6 @@
-"""The main job over an area: plan, sort, solve, merge; each step goes on where an earlier run stopped."""
+"""The main job over an area: plan, sort, solve, merge; each step goes on where an earlier run
+stopped.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +47,9 @@ Progress = Callable[[str, int, int], None]
 
 @dataclass(frozen=True)
 class Summary:
-    """What came of it: where the models are, buildings by status and type, figures, input that could not be used, seconds by step."""
+    """What came of it: where the models are, buildings by status and type, figures, input that
+    could not be used, seconds by step.
+    """
 
     models: tuple[Path, ...]
     buildings: int
@@ -63,17 +67,23 @@ class Summary:
 
     @property
     def exit_code(self) -> int:
-        """0 all modelled or explained by their data, 1 an internal error, 2 some input could not be read."""
+        """0 all modelled or explained by their data, 1 an internal error, 2 some input could not be
+        read.
+        """
         if self.by_status.get("internal_error"):
             return 1
         return 2 if self.broken_inputs else 0
 
 
-def reconstruct_area(request: Request, progress: Progress = lambda step, done, total: None) -> Summary:
-    """Reconstruct every building of an area into `request.out`; see the package's docstring for the steps.
+def reconstruct_area(
+    request: Request, progress: Progress = lambda step, done, total: None
+) -> Summary:
+    """Reconstruct every building of an area into `request.out`; see the package's docstring for the
+    steps.
 
-    Raises InputError, SettingsError or OutputError (full sentences) when the run cannot start or go on, or when another
-    one works in that folder; what was done so far stays, and the same call goes on from there.
+    Raises InputError, SettingsError or OutputError (full sentences) when the run cannot start or go
+    on, or when another one works in that folder; what was done so far stays, and the same call goes
+    on from there.
     """
     refuse_unusable(request)
     state = open_state(request.out)
@@ -104,7 +114,12 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
             merge(plan, state, Path(request.out), progress)
         remove_bundles(Path(request.out), ledger.failed_ids())
         summary = summarise(request, plan, ledger, clock)
-        LOGGER.info("%s: %s; seconds: %s", counted(summary.buildings, "building"), summary.by_status, summary.seconds)
+        LOGGER.info(
+            "%s: %s; seconds: %s",
+            counted(summary.buildings, "building"),
+            summary.by_status,
+            summary.seconds,
+        )
         write_run_record(request, plan, summary)
         if ledger.get("merged") != "yes":
             ledger.claim(claims(output_files(plan, Path(request.out)), Path(request.out)))
@@ -112,7 +127,8 @@ def reconstruct_alone(request: Request, state: Path, progress: Progress) -> Summ
         return summary
     except sqlite3.OperationalError as error:
         raise OutputError(
-            f"expected to write the ledger in {state}, got: {error}; free some space, the same command then goes on"
+            f"expected to write the ledger in {state}, got: {error}; free some space, the same "
+            "command then goes on"
         ) from error
     finally:
         executor.close()
@@ -149,9 +165,15 @@ class Clock:
 
 
 def work_off(
-    ledger: Ledger, executor, kind: str, function: Callable, arguments: Callable[[str], tuple], progress: Progress
+    ledger: Ledger,
+    executor,
+    kind: str,
+    function: Callable,
+    arguments: Callable[[str], tuple],
+    progress: Progress,
 ) -> None:
-    """Run all open tasks of a kind; one whose process dies is tried again, and after MOST_LOSSES alone.
+    """Run all open tasks of a kind; one whose process dies is tried again, and after MOST_LOSSES
+    alone.
 
     `arguments` are those of `function` by the name of a task.
     """
@@ -167,7 +189,9 @@ def work_off(
             name = f"{kind}:{task[1]}"
             if is_loss(error):
                 ledger.lose(name)
-                LOGGER.warning("%s was lost (%s) and is tried again", name, error or "out of memory")
+                LOGGER.warning(
+                    "%s was lost (%s) and is tried again", name, error or "out of memory"
+                )
                 continue
             done += 1
             record(ledger, kind, name, result, error)
@@ -182,7 +206,9 @@ def started(ledger: Ledger, names: list[str], arguments: Callable[[str], tuple])
 
 
 def task_arguments(request: Request, state: Path, name: str) -> tuple:
-    """The arguments of a task: the run's folder, the number or name of what it works on, and the address that it reads."""
+    """The arguments of a task: the run's folder, the number or name of what it works on, and the
+    address that it reads.
+    """
     kind, key = name.split(":", 1)
     folder = str(state.absolute())
     if kind == "sort":
@@ -196,16 +222,23 @@ def absolute(name: str) -> str:
 
 
 def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None) -> None:
-    """Enter a finished task. Only unreadable point files may fail; any other error ends the run with what is done kept."""
+    """Enter a finished task.
+
+    Only unreadable point files may fail; any other error ends the run with what is done kept.
+    """
     if error is None:
         if kind == "sort":
             ledger.finish(name, "done", json.dumps(result))
         else:
             ledger.finish(name, "done", "", result)
             for outcome in result:
-                level = logging.ERROR if outcome.status == Status.INTERNAL_ERROR.code else logging.DEBUG
+                level = (
+                    logging.ERROR if outcome.status == Status.INTERNAL_ERROR.code else logging.DEBUG
+                )
                 LOGGER.log(level, "building %s: %s", outcome.id, outcome.detail)
-        LOGGER.info("%s is done: %s", name, counted(len(result), "building") if kind == "solve" else result)
+        LOGGER.info(
+            "%s is done: %s", name, counted(len(result), "building") if kind == "solve" else result
+        )
     elif kind == "sort" and isinstance(error, InputError):
         ledger.finish(name, "failed", str(error))
         LOGGER.error("a point file could not be read: %s", error)
@@ -213,11 +246,17 @@ def record(ledger: Ledger, kind: str, name: str, result, error: Exception | None
         raise error
 
 
-def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple) -> None:
+def work_off_alone(
+    ledger: Ledger, executor, kind: str, name: str, function: Callable, task: tuple
+) -> None:
     """A task whose process died again and again, in a process of its own; see quarantine.py."""
-    LOGGER.warning("%s was lost %s and is now tried alone", name, counted(ledger.losses(name), "time"))
+    LOGGER.warning(
+        "%s was lost %s and is now tried alone", name, counted(ledger.losses(name), "time")
+    )
     with closing(executor.isolated()) as alone:
-        result, error = (solve_in_quarantine if kind == "solve" else run_alone)(alone, function, task)
+        result, error = (solve_in_quarantine if kind == "solve" else run_alone)(
+            alone, function, task
+        )
     if is_loss(error):
         died = "the process died each time it read this file; not enough memory, or a damaged file"
         ledger.finish(name, "failed", died)
@@ -228,13 +267,16 @@ def work_off_alone(ledger: Ledger, executor, kind: str, name: str, function: Cal
 def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
     """A clear sentence when no file could be read, or none holds a point of the building classes.
 
-    A run that goes on is past the second: it may have read a few runs of points alone, near what it does again.
+    A run that goes on is past the second: it may have read a few runs of points alone, near what it
+    does again.
     """
     tasks = [task for task in ledger.tasks() if task.kind == "sort"]
     failed = [task.message for task in tasks if task.state == "failed"]
     if tasks and len(failed) == len(tasks):
         raise InputError(
-            failed[0] if len(failed) == 1 else f"none of the {len(tasks)} point files could be read; first: {failed[0]}"
+            failed[0]
+            if len(failed) == 1
+            else f"none of the {len(tasks)} point files could be read; first: {failed[0]}"
         )
     if ledger.counts("status"):
         return
@@ -246,7 +288,8 @@ def refuse_without_points(plan: WorkPlan, ledger: Ledger) -> None:
     if sum(classes.values()) and not any(classes[c] for c in wanted):
         present = ", ".join(f"{c} ({counted(n, 'point')})" for c, n in sorted(classes.items()))
         raise InputError(
-            f"expected points of building class {', '.join(map(str, wanted))}, got classes {present}; "
+            f"expected points of building class {', '.join(map(str, wanted))}, got classes "
+            f"{present}; "
             "say which class holds roofs with --building-class"
         )
 
@@ -288,7 +331,9 @@ def mean(values: list) -> float | None:
 
 
 def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None:
-    """run.json: version, effective settings, inputs, counts, timings: the only file of a run that knows the time."""
+    """run.json: version, effective settings, inputs, counts, timings: the only file of a run that
+    knows the time.
+    """
     record = {
         "hiproof": __version__,
         "settings": plan.settings.to_dict(),
@@ -318,11 +363,16 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
         "seconds": summary.seconds,
     }
     with atomic(Path(request.out) / "run.json") as beside:
-        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
+        Path(beside).write_text(
+            json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
+        )
 
 
 def clean(state: Path) -> None:
-    """Remove what a finished run no longer needs. The ledger and the plan stay for `status` and for a repeated call, the texts
-    of the buildings for one with other overrides."""
+    """Remove what a finished run no longer needs.
+
+    The ledger and the plan stay for `status` and for a repeated call, the texts of the buildings
+    for one with other overrides.
+    """
     shutil.rmtree(state / "points", ignore_errors=True)
     (state / REDO).unlink(missing_ok=True)

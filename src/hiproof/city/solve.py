@@ -1,4 +1,6 @@
-"""Reconstruct the buildings of one work tile and leave their parts of the output files, ready to be joined."""
+"""Reconstruct the buildings of one work tile and leave their parts of the output files, ready to be
+joined.
+"""
 
 from __future__ import annotations
 
@@ -32,25 +34,43 @@ from ..write.fragments import Fragments, load_fragments, save_fragments
 from ..write.run_files import fragments
 from .bundles import TerrainRecorder, keep_failure
 from .found import BESIDE_M, FEWEST_BESIDE, FoundRoof, found_alone, found_roof
-from .ground import BareAround, Cells, GroundAround, LowestAround, WhereSeen, ground_cells, lowest_in_cells
+from .ground import (
+    BareAround,
+    Cells,
+    GroundAround,
+    LowestAround,
+    WhereSeen,
+    ground_cells,
+    lowest_in_cells,
+)
 from .ledger import Outcome
 from .merge import tile_parts, write_tile
-from .other_classes import OtherPoints, bare_ground, ground_under_roof, roof_of_other_classes, why_no_points
+from .other_classes import (
+    OtherPoints,
+    bare_ground,
+    ground_under_roof,
+    roof_of_other_classes,
+    why_no_points,
+)
 from .outlines import row_outline
 from .overrides import load_overrides, load_redo
 from .plan import Job, WorkPlan, job_of_footprint, load_plan, neighbourhood
 from .sort import load_points
 from .terrain_check import TerrainModel, WhereLikeGround, doubt_of_terrain
 
-NEEDLESS_M = 0.05  # corners that change an outline by less make the area beside it slow to draw and no truer
+# corners that change an outline by less make the area beside it slow to draw and no truer
+NEEDLESS_M = 0.05
 
 DIED = "the process died while it worked on this building"
 
-BESIDE_ALL_M = 10.0  # m around a building that show whether there is ground between roofs; yards are as wide
+# m around a building that show whether there is ground between roofs; yards are as wide
+BESIDE_ALL_M = 10.0
 
 
 class Surroundings:
-    """All points of a work tile, ready to be asked building by building, and the terrain model if there is one."""
+    """All points of a work tile, ready to be asked building by building, and the terrain model if
+    there is one.
+    """
 
     def __init__(self, points: dict[str, np.ndarray], model: TerrainModel | None, plan: WorkPlan):
         self.roof, self.noise, self.model, self.plan = points["roof"], points["noise"], model, plan
@@ -61,7 +81,11 @@ class Surroundings:
 
     def shift_of(self, job: Job) -> Shift:
         """How far the job's area lies beside its roof, as that of its whole row does."""
-        row = self.plan.outlines.row(job.index) if self.plan.moves_rows and not job.area.is_empty else []
+        row = (
+            self.plan.outlines.row(job.index)
+            if self.plan.moves_rows and not job.area.is_empty
+            else []
+        )
         if not row:
             return Shift()
         label = int(self.plan.outlines.labels[job.index])
@@ -69,7 +93,9 @@ class Surroundings:
             outline = row_outline(row)
             origin = np.floor(outline.bounds[:2])
             near = distinct(self.roof.take(self.grid.within(outline, self.plan.around_m), axis=0))
-            self.shifts[label] = find_shift(near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin))
+            self.shifts[label] = find_shift(
+                near[:, :2] - origin, shapely.transform(outline, lambda xy: xy - origin)
+            )
         return self.shifts[label]
 
     def moved(self, job: Job) -> tuple[Job, str]:
@@ -77,7 +103,9 @@ class Surroundings:
         shift = self.shift_of(job)
         if job.footprint is None:
             return job, ""
-        remark = shift_remark(shift, len(self.plan.outlines.row(job.index)) if shift.is_clear else 1)
+        remark = shift_remark(
+            shift, len(self.plan.outlines.row(job.index)) if shift.is_clear else 1
+        )
         if not shift.is_clear:
             return job, remark
         x, y = (round(float(value), 3) for value in shift.xy)
@@ -85,9 +113,11 @@ class Surroundings:
         return job_of_footprint(job.index, job.footprint, whole), remark
 
     def roof_of(self, job: Job) -> FoundRoof:
-        """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be moved onto them.
+        """Roof points (n, 3) inside the job's area, or so near that its footprint may have to be
+        moved onto them.
 
-        A point that stands in two files comes twice. Roofs found by shape, or alone, are those inside the area.
+        A point that stands in two files comes twice. Roofs found by shape, or alone, are those
+        inside the area.
         """
         read = self.plan.settings.read
         if read.by_class or job.area.is_empty:
@@ -99,43 +129,60 @@ class Surroundings:
         return found_roof(near, job.area, height, job.footprint is not None)
 
     def noise_over(self, job: Job, roof: np.ndarray) -> np.ndarray:
-        """Points (m, 3) of noise classes in the job's area that lie higher than half of its `roof` points (n, 3): where they are many
-        they are a spire, not birds."""
+        """Points (m, 3) of noise classes in the job's area that lie higher than half of its `roof`
+        points (n, 3): where they are many they are a spire, not birds.
+        """
         if job.area.is_empty or not len(roof) or not len(self.noise):
             return np.zeros((0, 3))
         noise = self.noise.take(self.noise_grid.within(job.area, self.plan.around_m), axis=0)
         return without_repeats(noise[noise[:, 2] > np.median(roof[:, 2])])
 
     def points_near(self, job: Job, reach_m: float) -> np.ndarray:
-        """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the building, each once."""
+        """The points (n, 3) that may be roofs in the whole-metre box that reaches so far around the
+        building, each once.
+        """
         low, high = neighbourhood(job, reach_m).reshape(2, 2)
         near = self.roof[self.grid.candidates((*low, *high))]
         return without_repeats(near[((near[:, :2] >= low) & (near[:, :2] <= high)).all(axis=1)])
 
     def ground_to_leave_out(self, job: Job) -> TerrainChain:
-        """The ground around the building; the terrain model's alone among roofs cut out beforehand, whose lowest are no ground."""
+        """The ground around the building; the terrain model's alone among roofs cut out beforehand,
+        whose lowest are no ground.
+        """
         from ..classify.cut_out import is_cut_out
 
-        if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):  # classes tell it
+        # classes tell it
+        if len(self.ground.inside(neighbourhood(job, self.plan.terrain_reach_m))):
             return TerrainChain(self.grounds_of(job))
         around = self.points_near(job, BESIDE_ALL_M)
-        return TerrainChain([self.model] if len(around) and is_cut_out(around) else self.grounds_of(job))
+        return TerrainChain(
+            [self.model] if len(around) and is_cut_out(around) else self.grounds_of(job)
+        )
 
     def grounds_of(self, job: Job) -> list[Terrain | None]:
-        """The terrain model, the ground points in the whole-metre box around the building, and the ground found there."""
+        """The terrain model, the ground points in the whole-metre box around the building, and the
+        ground found there.
+        """
         box = neighbourhood(job, self.plan.terrain_reach_m)
         found = WhereSeen(BareAround(self.low, box), lambda: self.is_seen_around(job, box))
         points = GroundAround(self.ground, box)
         return [self.model and WhereLikeGround(self.model, points), points, found]
 
     def is_seen_around(self, job: Job, box: np.ndarray) -> bool:
-        """Whether anything beside the building is known: else the lowest points are the roof's own."""
+        """Whether anything beside the building is known: else the lowest points are the roof's
+        own.
+        """
         beside = self.low.inside(box)
         outline = grown(shapely.simplify(job.area, NEEDLESS_M), BESIDE_M)
-        return int((~shapely.intersects_xy(outline, beside[:, 0], beside[:, 1])).sum()) >= FEWEST_BESIDE
+        return (
+            int((~shapely.intersects_xy(outline, beside[:, 0], beside[:, 1])).sum())
+            >= FEWEST_BESIDE
+        )
 
     def terrain_of(self, job: Job) -> TerrainChain | None:
-        """What answers for the ground around the building: that of `grounds_of`, else the lowest points."""
+        """What answers for the ground around the building: that of `grounds_of`, else the lowest
+        points.
+        """
         if job.area.is_empty:
             return None
         box = neighbourhood(job, self.plan.terrain_reach_m)
@@ -143,14 +190,21 @@ class Surroundings:
         return TerrainChain([*self.grounds_of(job), lowest])
 
     def doubt_of_terrain(self, job: Job) -> str:
-        """A remark where the terrain model contradicts the ground points around a building; empty otherwise."""
+        """A remark where the terrain model contradicts the ground points around a building; empty
+        otherwise.
+        """
         if self.model is None or job.area.is_empty:
             return ""
         box = neighbourhood(job, self.plan.terrain_reach_m)
-        return doubt_of_terrain(self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area))
+        return doubt_of_terrain(
+            self.model, GroundAround(self.ground, box), shapely.get_coordinates(job.area)
+        )
 
     def other_points(self, job: Job) -> OtherPoints | None:
-        """What lies inside the building's area beside the points of its class; None where classes tell no roofs."""
+        """What lies inside the building's area beside the points of its class;
+
+        None where classes tell no roofs.
+        """
         if not self.plan.settings.read.by_class or job.area.is_empty:
             return None
         box = neighbourhood(job, 0.0)
@@ -158,8 +212,10 @@ class Surroundings:
         return OtherPoints.inside(job.area, self.ground.inside(box), self.low.inside(box), terrain)
 
     def bare(self, job: Job, found: FoundRoof, others: OtherPoints | None) -> np.ndarray:
-        """Points (n, 3) of bare ground inside the building's area: those of the ground class where nothing of another class
-        stands over them, and those that were told from the roof by their height."""
+        """Points (n, 3) of bare ground inside the building's area: those of the ground class where
+        nothing of another class stands over them, and those that were told from the roof by their
+        height.
+        """
         if job.area.is_empty or job.footprint is None:
             return found.ground
         if others is not None:
@@ -167,26 +223,37 @@ class Surroundings:
         classified = self.ground.inside(neighbourhood(job, 0.0))
         return np.concatenate([found.ground, classified])
 
-    def looked_at(self, building: Building, points: OtherPoints | None, roof: np.ndarray) -> Building:
-        """The building with what the points of other classes say of it, where classes tell roofs; `roof` (n, 3) are its own."""
+    def looked_at(
+        self, building: Building, points: OtherPoints | None, roof: np.ndarray
+    ) -> Building:
+        """The building with what the points of other classes say of it, where classes tell roofs;
+
+        `roof` (n, 3) are its own.
+        """
         if points is None:
             return building
         if building.status is Status.NO_POINTS:
             why = why_no_points(points, self.plan.settings.read.building_classes)
             return dataclasses.replace(building, detail=why) if why else building
-        return remarked(remarked(building, roof_of_other_classes(points, roof)), ground_under_roof(points, roof))
+        return remarked(
+            remarked(building, roof_of_other_classes(points, roof)), ground_under_roof(points, roof)
+        )
 
 
-def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
+def solve_tile(
+    folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
+) -> list[Outcome]:
     """Reconstruct all buildings of `tile` over the terrain model `terrain` and write its part file.
 
-    `avoid` are the buildings that killed their worker before: they become internal errors without being tried again.
-    Returns a row a building for the ledger.
+    `avoid` are the buildings that killed their worker before: they become internal errors without
+    being tried again. Returns a row a building for the ledger.
     """
     root = Path(folder)
     plan = load_plan(root)
     surroundings = Surroundings(
-        load_points(root, tile), terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()), plan
+        load_points(root, tile),
+        terrain_model(terrain, plan.crs_wkt, plan.units, threading.get_ident()),
+        plan,
     )
     overrides, kept = load_overrides(root), kept_parts(root, tile, plan)
     keep = functools.partial(keep_failure, root, tile, plan)
@@ -210,7 +277,9 @@ def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[
 
 
 def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
-    """The texts of buildings that need not be made again, by number: all of a tile but those whose override changed."""
+    """The texts of buildings that need not be made again, by number: all of a tile but those whose
+    override changed.
+    """
     redo = load_redo(root).get(tile)
     if redo is None or set(redo) == set(plan.tiles[tile]):
         return {}
@@ -219,7 +288,9 @@ def kept_parts(root: Path, tile: str, plan: WorkPlan) -> dict[int, Fragments]:
 
 
 @functools.lru_cache(maxsize=32)
-def terrain_model(path: str | None, crs_wkt: str | None, units: Units, thread: int) -> RasterTerrain | None:
+def terrain_model(
+    path: str | None, crs_wkt: str | None, units: Units, thread: int
+) -> RasterTerrain | None:
     """The terrain model, opened once a thread: GDAL's data sets are not to be shared."""
     from pyproj import CRS
 
@@ -245,8 +316,8 @@ def solve_one(
 
     `keep` is called with the traceback.
 
-    MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried again alone. So is
-    DamagedRaster, for the terrain model is the run's and not the building's.
+    MemoryError is raised: whether memory lasts depends on the neighbours, so the building is tried
+    again alone. So is DamagedRaster, for the terrain model is the run's and not the building's.
     """
     record_terrain = functools.partial(recorded_terrain, plan, job, surroundings, override)
     if job.error is not None:
@@ -257,7 +328,8 @@ def solve_one(
         found, most = surroundings.roof_of(job), plan.settings.city.max_points_a_building
         if not found.is_seen and override is None and not (found.is_ground and keeps_empty(plan)):
             return fragments(not_seen(job, found), plan.names_of(job), plan.head)
-        points = without_repeats(found.points)  # first of all: a footprint is put where points are many
+        # first of all: a footprint is put where points are many
+        points = without_repeats(found.points)
         used = thin_to_count(points, most)
         others = surroundings.other_points(job)
         bare = surroundings.bare(job, found, others)
@@ -266,7 +338,9 @@ def solve_one(
             building = told_of_thinning(building, len(used), len(points))
         building = remarked(remarked(building, moved), found.remark)
         building = remarked(building, surroundings.doubt_of_terrain(job))
-        building = remarked(surroundings.looked_at(building, others, points), doubt_of_ground(building))
+        building = remarked(
+            surroundings.looked_at(building, others, points), doubt_of_ground(building)
+        )
         building, texts = fragments(building, plan.names_of(job), plan.head)
         if building.status is Status.INTERNAL_ERROR:
             keep(job, building.detail, record_terrain)
@@ -282,7 +356,10 @@ def solve_one(
 def recorded_terrain(
     plan: WorkPlan, job: Job, surroundings: Surroundings, override: Override | None
 ) -> TerrainRecorder | None:
-    """Solve the building again to record the heights of the terrain model that it looks up; None without a model."""
+    """Solve the building again to record the heights of the terrain model that it looks up;
+
+    None without a model.
+    """
     if surroundings.model is None:
         return None
     again = copy.copy(surroundings)
@@ -299,7 +376,8 @@ def modelled(
     surroundings: Surroundings,
     override: Override | None,
 ) -> Building:
-    """The building fitted to the `used` of its `points` (n, 3) and judged by all, noise over it included; or as its override says.
+    """The building fitted to the `used` of its `points` (n, 3) and judged by all, noise over it
+    included; or as its override says.
 
     `bare` (m, 3) are points of bare ground inside its area.
     """
@@ -319,17 +397,24 @@ def thinned_out(points: np.ndarray, used: np.ndarray) -> np.ndarray:
 
 
 def told_of_thinning(building: Building, used: int, count: int) -> Building:
-    """The building with the density of all its `count` points, not of those `used`; a model says that it is fitted to these."""
+    """The building with the density of all its `count` points, not of those `used`; a model says
+    that it is fitted to these.
+    """
     quality = dataclasses.replace(building.quality, density=building.quality.density * count / used)
     remark = f"fitted to {used} of its {count} points" if building.status is Status.MODELLED else ""
     return remarked(dataclasses.replace(building, quality=quality), remark)
 
 
 def doubt_of_ground(building: Building) -> str:
-    """A remark where no ground was found around a building: volume and height over ground then hang on a wall's usual height."""
+    """A remark where no ground was found around a building: volume and height over ground then hang
+    on a wall's usual height.
+    """
     if building.built is None or not building.ground_source.startswith("assumed"):
         return ""
-    return f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over ground are guesses"
+    return (
+        f"{Doubt.ASSUMED_GROUND.value}, for none is seen near it: its volume and height over "
+        "ground are guesses"
+    )
 
 
 def keeps_empty(plan: WorkPlan) -> bool:
@@ -348,7 +433,9 @@ def with_input(building: Building, job: Job) -> Building:
     if job.footprint is None:
         return dataclasses.replace(building, footprint=largest_polygon(job.area))
     footprint, attributes = largest_polygon(job.footprint.polygon), job.footprint.attributes
-    return dataclasses.replace(building, footprint=footprint, attributes=attributes, shift=job.footprint.shift)
+    return dataclasses.replace(
+        building, footprint=footprint, attributes=attributes, shift=job.footprint.shift
+    )
 
 
 def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
@@ -361,12 +448,18 @@ def failed(plan: WorkPlan, job: Job, detail: str) -> tuple[Building, Fragments]:
     try:
         return fragments(with_input(building, job), plan.names_of(job), plan.head)
     except Exception as error:
-        LOGGER.info("building %s: its outline cannot be written: %s", job.id, report_error(error).detail)
+        LOGGER.info(
+            "building %s: its outline cannot be written: %s", job.id, report_error(error).detail
+        )
         return fragments(building, plan.names_of(job), plan.head)
 
 
 def outcome_of(position: int, building: Building, seconds: float) -> Outcome:
     quality = building.quality
-    share, psd = (float(v) if np.isfinite(v) else None for v in (quality.share_within_20cm, quality.psd_mean))
+    share, psd = (
+        float(v) if np.isfinite(v) else None for v in (quality.share_within_20cm, quality.psd_mean)
+    )
     status, grade = building.status.code, None if building.grade is None else building.grade.code
-    return Outcome(position, building.id, status, grade, building.type, building.detail, share, psd, seconds)
+    return Outcome(
+        position, building.id, status, grade, building.type, building.detail, share, psd, seconds
+    )

@@ -1,8 +1,10 @@
-"""Read each point file once, in chunks, and leave for each work tile the points its buildings may need.
+"""Read each point file once, in chunks, and leave for each work tile the points its buildings may
+need.
 
-Roof points are those of the building classes in the whole-metre box of a building; terrain points those of the ground
-classes in the wider box around it; of all others the lowest a cell is kept, in case there is no ground class, and of
-noise what lies where roof points may, in case it is a spire. What a building gets out of them depends on its own area alone, not on tiles, files or chunks.
+Roof points are those of the building classes in the whole-metre box of a building; terrain points
+those of the ground classes in the wider box around it; of all others the lowest a cell is kept, in
+case there is no ground class, and of noise what lies where roof points may, in case it is a spire.
+What a building gets out of them depends on its own area alone, not on tiles, files or chunks.
 """
 
 from __future__ import annotations
@@ -36,7 +38,8 @@ from .plan import PLAN_FILE, WorkPlan, load_plan
 NOISE_CLASSES = (7, 18)  # of ASPRS: low and high noise
 KINDS = ("roof", "ground", "low", "noise")
 ROOF, GROUND, OTHER, NOISE = range(4)  # kinds of points, by what a work tile needs them for
-SQUARE_M = 50.0  # points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
+# points of a chunk are grouped by squares of this side, so that a tile looks at its own alone
+SQUARE_M = 50.0
 HELD_POINTS = 4_000_000  # about 100 MB: beyond it what was gathered goes to disk
 MASKS_KEPT = 200  # of 100 kB each
 QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its points
@@ -44,7 +47,9 @@ QUERY_M = 500.0  # side of the boxes in which an indexed file is asked for its p
 
 @dataclass(frozen=True)
 class Reach:
-    """Where the points of a tile's buildings may lie: whole-metre boxes (m, 4) of the areas and of their surroundings."""
+    """Where the points of a tile's buildings may lie: whole-metre boxes (m, 4) of the areas and of
+    their surroundings.
+    """
 
     roof_boxes: np.ndarray
     terrain_boxes: np.ndarray
@@ -57,7 +62,9 @@ class Reach:
 
     @cached_property
     def mask(self) -> np.ndarray:
-        """A byte a whole-metre cell (columns, rows): bit 0 in a roof box, bit 1 in a terrain box."""
+        """A byte a whole-metre cell (columns, rows): bit 0 in a roof box, bit 1 in a terrain
+        box.
+        """
         low, high = self.bounds[:2], self.bounds[2:]
         mask = np.zeros((high - low).astype(int), np.uint8)
         for bit, boxes in ((1, self.roof_boxes), (2, self.terrain_boxes)):
@@ -66,14 +73,18 @@ class Reach:
         return mask
 
     def bits(self, xy: np.ndarray, index: np.ndarray) -> np.ndarray:
-        """The mask (k,) at the points `xy[index]` of (n, 2 or more), 0 outside the bounds; boxes exclude upper sides."""
+        """The mask (k,) at the points `xy[index]` of (n, 2 or more), 0 outside the bounds; boxes
+        exclude upper sides.
+        """
         return mask_at(self.mask, xy, index, *self.bounds[:2])
 
 
 class Reaches:
-    """Reach of every work tile that has an area to gather points for, found by place; made once a process.
+    """Reach of every work tile that has an area to gather points for, found by place; made once a
+    process.
 
-    Where `only` names tiles, and of each the buildings that points are wanted for, it is the reach of these alone.
+    Where `only` names tiles, and of each the buildings that points are wanted for, it is the reach
+    of these alone.
     """
 
     def __init__(self, plan: WorkPlan, only: Mapping[str, Sequence[int]] | None = None):
@@ -88,8 +99,13 @@ class Reaches:
         self.members = {tile: own for tile, own in members.items() if own}
         self.names = list(self.members)
         self.place = {tile: number for number, tile in enumerate(self.names)}
-        boxes = [np.vstack([self.terrain_boxes[own], self.roof_boxes[own]]) for own in self.members.values()]
-        self.bounds = np.array([[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]).reshape(-1, 4)
+        boxes = [
+            np.vstack([self.terrain_boxes[own], self.roof_boxes[own]])
+            for own in self.members.values()
+        ]
+        self.bounds = np.array(
+            [[*b[:, :2].min(axis=0), *b[:, 2:].max(axis=0)] for b in boxes]
+        ).reshape(-1, 4)
         self.tree = shapely.STRtree(shapely.box(*self.bounds.T))
 
     def near(self, box: Iterable[float]) -> list[str]:
@@ -107,12 +123,16 @@ class Reaches:
 
 @functools.lru_cache(maxsize=1)
 def reaches_of(root: Path, stamp: int) -> Reaches:
-    """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone, theirs alone."""
+    """Reaches of the plan in `root`, whose file has the time `stamp`; where buildings are redone,
+    theirs alone.
+    """
     return Reaches(load_plan(root), load_redo(root) or None)
 
 
 class Gatherer:
-    """Collects the points of one file by work tile and writes them to `folder`, as often as memory asks for it."""
+    """Collects the points of one file by work tile and writes them to `folder`, as often as memory
+    asks for it.
+    """
 
     def __init__(self, reaches: Reaches, read: ReadSettings, folder: Path, number: int):
         self.folder, self.number, self.read = folder, number, read
@@ -136,9 +156,17 @@ class Gatherer:
             wanted = bits > 0
             candidates, bits = candidates[wanted], bits[wanted]
             kind = kinds[candidates]
-            self.keep(tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0))
-            self.keep(tile, "ground", cloud.xyz.take(candidates[(kind == GROUND) & (bits & 2 > 0)], axis=0))
-            self.keep(tile, "noise", cloud.xyz.take(candidates[(kind == NOISE) & (bits & 1 > 0)], axis=0))
+            self.keep(
+                tile, "roof", cloud.xyz.take(candidates[(kind == ROOF) & (bits & 1 > 0)], axis=0)
+            )
+            self.keep(
+                tile,
+                "ground",
+                cloud.xyz.take(candidates[(kind == GROUND) & (bits & 2 > 0)], axis=0),
+            )
+            self.keep(
+                tile, "noise", cloud.xyz.take(candidates[(kind == NOISE) & (bits & 1 > 0)], axis=0)
+            )
             low = candidates[np.isin(kind, self.low_kinds) & (bits & 2 > 0)]
             self.keep(tile, "low", lowest_in_cells(cloud.xyz.take(low, axis=0)))
         if self.held > HELD_POINTS:
@@ -164,7 +192,9 @@ class Gatherer:
         """Write what is held, a file a tile; done again after a kill it writes the same files."""
         for tile, found in sorted(self.found.items()):
             with atomic_file(self.folder / tile / f"{self.number}-{self.flushes}.npz") as file:
-                arrays: dict[str, Any] = {kind: np.concatenate(several) for kind, several in found.items()}
+                arrays: dict[str, Any] = {
+                    kind: np.concatenate(several) for kind, several in found.items()
+                }
                 np.savez(file, **arrays)
         self.found, self.held, self.flushes = {}, 0, self.flushes + 1
 
@@ -177,9 +207,9 @@ class Gatherer:
 def sort_cloud(folder: str, number: int, address: str) -> dict:
     """Sort the point file at `address`, file `number` of the plan in `folder`.
 
-    Returns {"points": read, "classes": {class: count}}.
-    Of a file that breaks off, or is not what its header says, nothing is kept. Raises InputError for whatever reading
-    it comes to, so that a file's failure is that file's alone; what writing comes to passes through.
+    Returns {"points": read, "classes": {class: count}}. Of a file that breaks off, or is not what
+    its header says, nothing is kept. Raises InputError for whatever reading it comes to, so that a
+    file's failure is that file's alone; what writing comes to passes through.
     """
     root = Path(folder)
     plan, reaches = load_plan(root), reaches_of(root, newest(root / PLAN_FILE, root / REDO))
@@ -210,9 +240,10 @@ def newest(*paths: Path) -> int:
 def wanted_points(
     path: str, reaches: Reaches, units: Units, noted: Path, found: list[np.ndarray] | None = None
 ) -> Iterator[PointCloud]:
-    """All chunks of a file in `units`; of one with a spatial index, or where a part of the area is wanted and `noted` is the file
-    that tells where its points lie, only what holds buildings' surroundings. Where it is read from end to end, `found` is
-    told so (noted.py)."""
+    """All chunks of a file in `units`; of one with a spatial index, or where a part of the area is
+    wanted and `noted` is the file that tells where its points lie, only what holds buildings'
+    surroundings. Where it is read from end to end, `found` is told so (noted.py).
+    """
     if file_kind(path) != "las":
         return iter_points(path, units=units)
     header = read_header(path)
@@ -232,12 +263,17 @@ def wanted_points(
 def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[PointCloud]:
     """Points of a COPC file in the boxes that hold buildings' surroundings.
 
-    The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at their common borders
-    are decoded twice. A point on a border may come twice, as in files that overlap.
+    The boxes are squares of QUERY_M, so that memory stays bounded; of the octree only nodes at
+    their common borders are decoded twice. A point on a border may come twice, as in files that
+    overlap.
     """
-    (xmin, ymin), (xmax, ymax) = units.to_metres(np.reshape(read_header(path).bounds, (2, 3))[:, :2])
+    (xmin, ymin), (xmax, ymax) = units.to_metres(
+        np.reshape(read_header(path).bounds, (2, 3))[:, :2]
+    )
     wanted = reaches.bounds_of(reaches.near((xmin, ymin, xmax, ymax)))
-    corners = np.floor(np.clip(wanted, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M).astype(np.int64)
+    corners = np.floor(
+        np.clip(wanted, (xmin, ymin, xmin, ymin), (xmax, ymax, xmax, ymax)) / QUERY_M
+    ).astype(np.int64)
     columns_and_rows = {
         (column, row)
         for left, low, right, high in corners.tolist()
@@ -256,7 +292,9 @@ def points_by_squares(path: str, reaches: Reaches, units: Units) -> Iterator[Poi
 def load_points(root: Path, tile: str) -> dict[str, np.ndarray]:
     """Points (n, 3) of a work tile from all files, by kind: "roof", "ground", "low", "noise"."""
     # a name that starts with a dot is what a killed worker left unfinished
-    files = sorted(path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith("."))
+    files = sorted(
+        path for path in (root / "points" / tile).glob("*.npz") if not path.name.startswith(".")
+    )
     found: dict[str, list[np.ndarray]] = {kind: [np.zeros((0, 3))] for kind in KINDS}
     for path in files:
         with np.load(path) as part:

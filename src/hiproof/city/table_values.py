@@ -1,8 +1,8 @@
 """Values of a table's or the footprints' columns as the keys of an override want them.
 
-Columns are filled by people and programs: text stands where numbers should, and codes such as -9999, or a block height of
-0, stand for "unknown". What no building can have is left out and counted, so that one cell spoils neither its building nor
-the run.
+Columns are filled by people and programs: text stands where numbers should, and codes such as
+-9999, or a block height of 0, stand for "unknown". What no building can have is left out and
+counted, so that one cell spoils neither its building nor the run.
 """
 
 from __future__ import annotations
@@ -50,7 +50,8 @@ class LeftOut:
             low, high = possible_range(key) or (0.0, 0.0)
             some = ", ".join(told[:SHOWN]) + (", ..." if len(told) > SHOWN else "")
             warnings.warn(
-                f"{self.source}: expected {key} from {low:g} to {high:g}, left out {len(told)} of its values: {some}",
+                f"{self.source}: expected {key} from {low:g} to {high:g}, left out {len(told)} of "
+                f"its values: {some}",
                 InputWarning,
             )
 
@@ -85,7 +86,8 @@ def says_nothing(value: Any) -> bool:
 def is_possible(key: str, value: Any) -> bool:
     """Whether a building can have the value: a number within the key's range; other keys have none.
 
-    >>> is_possible("z_ground", -9999), is_possible("parts", 0), is_possible("parts", [{}]), is_possible("note", -9999)
+    >>> is_possible("z_ground", -9999), is_possible("parts", 0), is_possible("parts",
+    ...     [{}]), is_possible("note", -9999)
     (False, False, True, True)
     """
     bounds = possible_range(key)

@@ -1,5 +1,8 @@
-"""The tasks of a run by name. What they need is imported where they run: a main process that only hands them out does
-without compiled code, the network and the readers of points."""
+"""The tasks of a run by name.
+
+What they need is imported where they run: a main process that only hands them out does without
+compiled code, the network and the readers of points.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,9 @@ def sort_cloud(folder: str, number: int, address: str) -> dict:
     return sort.sort_cloud(folder, number, address)
 
 
-def solve_tile(folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()) -> list[Outcome]:
+def solve_tile(
+    folder: str, tile: str, terrain: str | None = None, avoid: tuple[int, ...] = ()
+) -> list[Outcome]:
     """See solve.py."""
     from . import solve
 

@@ -1,7 +1,9 @@
-"""A terrain model against the ground points around a building: where the two contradict each other, the points count.
+"""A terrain model against the ground points around a building: where the two contradict each other,
+the points count.
 
-A terrain model may be of another height system or another date, and a raster may hold codes for "no data" that its file
-does not declare. The cloud's own ground points fit the cloud's roofs, so they decide.
+A terrain model may be of another height system or another date, and a raster may hold codes for "no
+data" that its file does not declare. The cloud's own ground points fit the cloud's roofs, so they
+decide.
 """
 
 from __future__ import annotations
@@ -14,11 +16,15 @@ from ..read.terrain import Terrain
 from ..status import Doubt
 
 FAR_GROUND_M = 2.0
-"""Difference (m) between a terrain model and ground points from which on it is remarked: two dates, or two systems."""
+"""Difference (m) between a terrain model and ground points from which on it is remarked: two dates,
+or two systems.
+"""
 
 OTHER_GROUND_M = 5.0
-"""Difference (m) from which on the model's height is not used: height systems differ by 10 to 100 m, codes for "no data"
-by more, while a model and ground points of one place agree within 2 m also on slopes."""
+"""Difference (m) from which on the model's height is not used: height systems differ by 10 to 100
+m, codes for "no data" by more, while a model and ground points of one place agree within 2 m also
+on slopes.
+"""
 
 
 class TerrainModel(Terrain, Protocol):
@@ -28,27 +34,35 @@ class TerrainModel(Terrain, Protocol):
 
 
 class WhereLikeGround:
-    """A terrain model that knows nothing where it lies far from the `ground` points; where these are unknown it counts."""
+    """A terrain model that knows nothing where it lies far from the `ground` points; where these
+    are unknown it counts.
+    """
 
     def __init__(self, model: Terrain, ground: Terrain):
         self.model, self.ground, self.source = model, ground, model.source
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """The model's height (n,) at `xy_world` (n, 2), NaN where it has none or contradicts the ground points."""
+        """The model's height (n,) at `xy_world` (n, 2), NaN where it has none or contradicts the
+        ground points.
+        """
         heights = self.model.height_at(xy_world)
         apart = np.abs(heights - self.ground.height_at(xy_world))
         return np.where(apart > OTHER_GROUND_M, np.nan, heights)
 
 
 def doubt_of_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> str:
-    """A remark where the terrain model has no true height at some of the corners `xy` (n, 2) of an outline, or lies far
-    above or below the ground points there. Empty otherwise."""
+    """A remark where the terrain model has no true height at some of the corners `xy` (n, 2) of an
+    outline, or lies far above or below the ground points there. Empty otherwise.
+    """
     coded = model.is_coded_at(xy)
     if coded.any():
         where = "" if coded.all() else "part of "
         known = np.isfinite(ground.height_at(xy[coded])).all()
         use = "the ground points are used there" if known else "it is not used there"
-        return f"the {model.source} {Doubt.TERRAIN_WITHOUT_HEIGHTS.value} under {where}the building; {use}"
+        return (
+            f"the {model.source} {Doubt.TERRAIN_WITHOUT_HEIGHTS.value} under {where}the building; "
+            f"{use}"
+        )
     apart = model.height_at(xy) - ground.height_at(xy)
     apart = apart[np.isfinite(apart)]
     is_other = np.abs(apart) > OTHER_GROUND_M
@@ -57,4 +71,7 @@ def doubt_of_terrain(model: TerrainModel, ground: Terrain, xy: np.ndarray) -> st
         return ""
     way = "above" if above > 0 else "below"
     use = ", which are used instead" if is_other.any() else ""
-    return f"the {model.source} lies {abs(above):.1f} m {way} {Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}{use}"
+    return (
+        f"the {model.source} lies {abs(above):.1f} m {way} "
+        f"{Doubt.TERRAIN_UNLIKE_GROUND_POINTS.value}{use}"
+    )

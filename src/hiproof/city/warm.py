@@ -1,8 +1,10 @@
-"""Compile before any work starts, in as many processes as there are cores; later runs only look at a mark.
+"""Compile before any work starts, in as many processes as there are cores; later runs only look at
+a mark.
 
-The processes are fresh ones that run `warm_pieces`, one piece of the code after the other, so that what pieces share of
-numba's own is compiled once a process: where they cannot be started, or one fails, the functions are compiled when they
-are called. A mark a piece lies beside the compiled code, and names the functions that were ready by then.
+The processes are fresh ones that run `warm_pieces`, one piece of the code after the other, so that
+what pieces share of numba's own is compiled once a process: where they cannot be started, or one
+fails, the functions are compiled when they are called. A mark a piece lies beside the compiled
+code, and names the functions that were ready by then.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ from .cores import cores
 
 
 def make_ready(pieces: Sequence[str], own: bool = False) -> None:
-    """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news` tells.
+    """Compile those of the `pieces` that no run compiled before: a minute or so, of which `news`
+    tells.
 
     Code that came with hiproof for processors like this one will do, unless it is to be its `own`.
     """
@@ -32,13 +35,16 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
     stamp, processors = stamp_of_all(), (own_processor(), KIND)[: 1 if own else 1 + runs_kind()]
     missing = []
     for piece in pieces:
-        marks = [place / mark(piece, stamp, processor) for processor in processors for place in places]
+        marks = [
+            place / mark(piece, stamp, processor) for processor in processors for place in places
+        ]
         if made := next(filter(Path.exists, marks), None):
             news.ready.update(made.read_text(encoding="utf-8", errors="replace").split())
         else:
             missing.append(piece)
     folder = kept.place_to_write(places) if missing else None
-    if folder is None:  # all is there, or nothing can be kept, so that every process has to compile anyway
+    # all is there, or nothing can be kept, so that every process has to compile anyway
+    if folder is None:
         return
     kept.remove_outdated(folder, "warm", stamp)
     news.processes = min(cores(), len(missing))
@@ -56,7 +62,10 @@ def make_ready(pieces: Sequence[str], own: bool = False) -> None:
 
 
 def keep_mark(file: Path) -> None:
-    """Write the mark `file`: the functions that are ready. Where it cannot be written, the next run compiles the piece again."""
+    """Write the mark `file`: the functions that are ready.
+
+    Where it cannot be written, the next run compiles the piece again.
+    """
     try:
         file.write_text("\n".join(sorted(news.ready.copy())), encoding="utf-8")
     except OSError:  # a full disk, most of all
@@ -66,10 +75,15 @@ def keep_mark(file: Path) -> None:
 
 
 def compiled_pieces(left: Iterator[str]) -> Iterator[str]:
-    """Have a process of its own compile pieces while any are `left`, which other threads take from as well; each that came
-    to its end. The process' functions count as ready here too."""
+    """Have a process of its own compile pieces while any are `left`, which other threads take from
+    as well; each that came to its end. The process' functions count as ready here too.
+    """
     command = [sys.executable, "-m", "hiproof.city.warm_pieces"]
-    pipes: dict[str, Any] = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.DEVNULL}
+    pipes: dict[str, Any] = {
+        "stdin": subprocess.PIPE,
+        "stdout": subprocess.PIPE,
+        "stderr": subprocess.DEVNULL,
+    }
     try:
         with subprocess.Popen(command, text=True, bufsize=1, env=environment(), **pipes) as at_work:
             assert at_work.stdin and at_work.stdout
@@ -95,5 +109,7 @@ def environment() -> dict[str, str]:
 
 
 def mark(piece: str, stamp: str, processor: str) -> str:
-    """The name of a piece's mark: another state of any compiled source, another processor or Python has another."""
+    """The name of a piece's mark: another state of any compiled source, another processor or Python
+    has another.
+    """
     return f"warm.{piece}.{processor}-{stamp}-run.{kept.PYTHON}.nbc"

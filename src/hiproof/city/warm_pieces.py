@@ -1,8 +1,11 @@
-"""What a run compiles, in pieces that share next to nothing, so that several processes can compile at the same time.
+"""What a run compiles, in pieces that share next to nothing, so that several processes can compile
+at the same time.
 
-    echo check | python -m hiproof.city.warm_pieces     # the names of functions as they become ready, a line each
+    echo check | python -m hiproof.city.warm_pieces # the names of functions as they become ready, a
+    line each
 
-Each piece calls what the main job calls, on next to no data: compiling asks for the types of the arguments alone.
+Each piece calls what the main job calls, on next to no data: compiling asks for the types of the
+arguments alone.
 """
 
 from __future__ import annotations
@@ -17,21 +20,27 @@ import shapely
 
 from ..compiled import news
 
-# new objects between collections of garbage: at Python's own 700 a twelfth of compiling was spent on them
+# new objects between collections of garbage: at Python's own 700 a twelfth of compiling was spent
+# on them
 RARELY = 50_000
-OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)  # m; a house small enough to be fitted while code compiles
+# m; a house small enough to be fitted while code compiles
+OUTLINE = shapely.box(0.0, 0.0, 9.0, 7.0)
 # m; and one with a corner that points inwards
 L_OUTLINE = shapely.box(0.0, 0.0, 6.0, 7.0) | shapely.box(6.0, 2.0, 9.0, 7.0)
 
 
 def house() -> np.ndarray:
     """Points (n, 3) of a gable and a flat annex over OUTLINE."""
-    x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.3, 9.0, 0.6), np.arange(0.3, 7.0, 0.6)))
+    x, y = (
+        axis.ravel() for axis in np.meshgrid(np.arange(0.3, 9.0, 0.6), np.arange(0.3, 7.0, 0.6))
+    )
     return np.column_stack([x, y, np.where(x < 6.0, 8.0 - 0.7 * np.abs(y - 3.5), 3.0)])
 
 
 def moves() -> None:
-    """The search for volumes; their moves come first, so that `planes` is ready elsewhere when it is needed."""
+    """The search for volumes; their moves come first, so that `planes` is ready elsewhere when it
+    is needed.
+    """
     from ..fit.union import fit_building
     from ..fit.union.improve import improve, simplify
     from ..fit.union.objective import objective
@@ -59,7 +68,9 @@ def scene_of_house() -> tuple:
     from ..fit.union.scene import directions_of, scene_of
 
     plan = lay_out_plan(house(), OUTLINE)
-    return plan, scene_of(plan, OUTLINE, directions_of(OUTLINE, plan), 1.5, 0.25, allowed_shapes(()))
+    return plan, scene_of(
+        plan, OUTLINE, directions_of(OUTLINE, plan), 1.5, 0.25, allowed_shapes(())
+    )
 
 
 def check() -> None:
@@ -77,7 +88,9 @@ def check() -> None:
 
 
 def solid() -> None:
-    """Plan cells, the closed shell, its quality and its texts; a building of three points is composed without a fit."""
+    """Plan cells, the closed shell, its quality and its texts; a building of three points is
+    composed without a fit.
+    """
     from .. import reconstruct
     from ..compose import compose
     from ..frames import LocalFrame
@@ -115,7 +128,9 @@ def outlines() -> None:
 
 
 def points() -> None:
-    """Sorting points into work tiles, those of one building, the ground around it, whether its footprint lies off."""
+    """Sorting points into work tiles, those of one building, the ground around it, whether its
+    footprint lies off.
+    """
     from ..fit.align import find_shift
     from ..read.assign import PointGrid
     from .ground import Cells, GroundAround, LowestAround, ground_cells, lowest_in_cells
@@ -130,13 +145,15 @@ def points() -> None:
 
 
 PIECES: dict[str, Callable[[], None]] = {
-    piece.__name__: piece for piece in (moves, planes, outlines, solid, check, points, single, recognising)
+    piece.__name__: piece
+    for piece in (moves, planes, outlines, solid, check, points, single, recognising)
 }
 
 
 def main() -> None:
-    """Compile the pieces whose names come in, a line each, and print the names of functions as they become ready; after
-    each piece its own."""
+    """Compile the pieces whose names come in, a line each, and print the names of functions as they
+    become ready; after each piece its own.
+    """
     said: set[str] = set()
 
     def tell(done: int, total: int) -> None:

@@ -14,7 +14,8 @@ from .surfaces import Surfaces, surfaces_of
 
 UNKNOWN, GROUND, BUILDING = 1, 2, 6  # classes of ASPRS
 
-WORK_M, BORDER_M = 250.0, 40.0  # a cloud is worked through in squares, with what lies so far around each
+# a cloud is worked through in squares, with what lies so far around each
+WORK_M, BORDER_M = 250.0, 40.0
 GROUND_M = 0.25  # of a point above or below the ground; on slopes more, by what half a cell rises
 HIGH_M = 1.5  # what is lower is no roof
 OPEN_M = 0.5  # what is lower is taken for ground when it is counted around a point
@@ -38,11 +39,14 @@ def raise_error(inside: np.ndarray, error: Exception) -> None:
     raise error
 
 
-def classify(xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error) -> np.ndarray:
+def classify(
+    xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] = raise_error
+) -> np.ndarray:
     """Class (n,) uint8 of each point (n, 3) in world metres: BUILDING, GROUND or UNKNOWN.
 
-    Points within 40 m decide, and so the answer for a place is much the same whatever else the cloud holds.
-    `on_error` is called with the indices of the points of a square that fails; they stay UNKNOWN.
+    Points within 40 m decide, and so the answer for a place is much the same whatever else the
+    cloud holds. `on_error` is called with the indices of the points of a square that fails; they
+    stay UNKNOWN.
     """
     classes = np.full(len(xyz), UNKNOWN, np.uint8)
     if not len(xyz):
@@ -60,7 +64,9 @@ def classify(xyz: np.ndarray, on_error: Callable[[np.ndarray, Exception], None] 
 
 
 def cell_for(xyz: np.ndarray) -> float:
-    """Side of the cells that buildings are put together of: the smallest that most often holds a point where any are."""
+    """Side of the cells that buildings are put together of: the smallest that most often holds a
+    point where any are.
+    """
     density = plan_density(xyz)
     return next((cell for cell in CELLS_M if density * cell**2 >= 1.0), CELLS_M[-1])
 
@@ -69,14 +75,16 @@ def classes_of_square(xyz: np.ndarray, cell_m: float) -> np.ndarray:
     """Class (n,) of all points of a small cloud (n, 3), n > 0."""
     ground = ground_grid(xyz)
     rise = 0.5 * ground.cell_m * ground.slope_at(xyz)
-    height = xyz[:, 2] - ground.height_at(xyz) - rise  # the ground's cells lie as low as their lowest point
+    # the ground's cells lie as low as their lowest point
+    height = xyz[:, 2] - ground.height_at(xyz) - rise
     classes = np.where(np.abs(height) <= GROUND_M + rise, GROUND, UNKNOWN).astype(np.uint8)
     classes[building_points(xyz, height, cell_m)] = BUILDING
     return classes
 
 
 def roof_points(xyz: np.ndarray, more_odds: float = 0.0) -> np.ndarray:
-    """Which (n,) of points (n, 3) within one building's outline lie on a surface, and not among leaves.
+    """Which (n,) of points (n, 3) within one building's outline lie on a surface, and not among
+    leaves.
 
     `more_odds` are the log odds of a roof there by what is known besides.
     """
@@ -115,15 +123,22 @@ def building_points(xyz: np.ndarray, height: np.ndarray, cell_m: float) -> np.nd
     in_the_open = cells.share_around(height < OPEN_M, AROUND_M)[cells.of(surfaces.xyz)]
     odds[high] = smoothed(surfaces, log_odds(surfaces) + GROUND_SHARE * in_the_open)[surfaces.voxel]
     is_large[high] = surfaces.extent_m2[surfaces.voxel] >= CORE_M2
-    plan = building_cells(cells.count(odds > 0), cells.count(high), cells.count(is_large & (odds > 0)) > 0, cell_m)
-    inside, near = (where.ravel()[cells.index] for where in (plan, ndimage.binary_dilation(plan, SQUARE)))
+    plan = building_cells(
+        cells.count(odds > 0), cells.count(high), cells.count(is_large & (odds > 0)) > 0, cell_m
+    )
+    inside, near = (
+        where.ravel()[cells.index] for where in (plan, ndimage.binary_dilation(plan, SQUARE))
+    )
     below_roof = (height < cells.highest(height, odds > 0).ravel()[cells.index]) & (odds > UNLIKELY)
     return (inside & ~high & (height > FOOT_M)) | (near & high & ((odds > 0) | below_roof))
 
 
-def building_cells(solid: np.ndarray, high: np.ndarray, core: np.ndarray, cell_m: float) -> np.ndarray:
-    """Which cells (c, r) are buildings', from the points in each that are high, those of them that are solid, and
-    whether it holds a large surface."""
+def building_cells(
+    solid: np.ndarray, high: np.ndarray, core: np.ndarray, cell_m: float
+) -> np.ndarray:
+    """Which cells (c, r) are buildings', from the points in each that are high, those of them that
+    are solid, and whether it holds a large surface.
+    """
     likely = closed((solid > 0) & (2 * solid >= high))
     core = closed(core & likely)
     narrowest = max(1, round(NARROWEST_M / cell_m))
@@ -132,8 +147,14 @@ def building_cells(solid: np.ndarray, high: np.ndarray, core: np.ndarray, cell_m
     area = ndimage.sum_labels(core, label, np.arange(count + 1)) * cell_m**2
     core = core & (area >= FEWEST_M2)[label]
     reach = round(REACH_M / cell_m)
-    plan = core | (likely & ndimage.binary_dilation(core, SQUARE, iterations=reach) if reach else likely & core)
-    gaps = ndimage.binary_fill_holes(plan) & (high > 0) & (ndimage.uniform_filter(plan.astype(float), 7) > 0.6)
+    plan = core | (
+        likely & ndimage.binary_dilation(core, SQUARE, iterations=reach) if reach else likely & core
+    )
+    gaps = (
+        ndimage.binary_fill_holes(plan)
+        & (high > 0)
+        & (ndimage.uniform_filter(plan.astype(float), 7) > 0.6)
+    )
     return plan | gaps
 
 

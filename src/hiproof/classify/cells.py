@@ -9,7 +9,9 @@ from ..read.thin import cell_range
 
 
 class SquareCells:
-    """The cells of side `cell_m` (m) that points (n, 3) lie in; tables are (columns, rows), `index` (n,) is flat."""
+    """The cells of side `cell_m` (m) that points (n, 3) lie in; tables are (columns, rows), `index`
+    (n,) is flat.
+    """
 
     def __init__(self, xyz: np.ndarray, cell_m: float):
         self.cell_m = cell_m
@@ -17,38 +19,55 @@ class SquareCells:
         self.index = self.of(xyz)
 
     def of(self, xyz: np.ndarray) -> np.ndarray:
-        """Flat index (k,) of the cells that hold the points `xyz` (k, 3), which lie among those given before."""
+        """Flat index (k,) of the cells that hold the points `xyz` (k, 3), which lie among those
+        given before.
+        """
         column, row = (np.floor(xyz[:, :2] / self.cell_m).astype(np.int64) - self.first).T
         return column * self.shape[1] + row
 
     def count(self, chosen: np.ndarray) -> np.ndarray:
         """Table of how many of the points `chosen` (n,) each cell holds."""
-        return np.bincount(self.index[chosen], minlength=self.shape[0] * self.shape[1]).reshape(self.shape)
+        return np.bincount(self.index[chosen], minlength=self.shape[0] * self.shape[1]).reshape(
+            self.shape
+        )
 
     def top(self, values: np.ndarray) -> np.ndarray:
-        """Table of the largest of the `values` (n,) of all points in each cell, minus infinity where there is none."""
+        """Table of the largest of the `values` (n,) of all points in each cell, minus infinity
+        where there is none.
+        """
         table = np.full(self.shape[0] * self.shape[1], -np.inf)
         np.maximum.at(table, self.index, values)
         return table.reshape(self.shape)
 
     def highest(self, values: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-        """Table of the largest of the `values` (n,) of points `chosen` (n,) in each cell and those around it."""
+        """Table of the largest of the `values` (n,) of points `chosen` (n,) in each cell and those
+        around it.
+        """
         return ndimage.maximum_filter(self.top(np.where(chosen, values, -np.inf)), 3)
 
     def share_around(self, chosen: np.ndarray, width_m: float) -> np.ndarray:
-        """Share, flat by cells, of the points in a window of `width_m` about each cell that are `chosen` (n,)."""
+        """Share, flat by cells, of the points in a window of `width_m` about each cell that are
+        `chosen` (n,).
+        """
         size = 2 * round((width_m / self.cell_m - 1) / 2) + 1
-        mean = [ndimage.uniform_filter(self.count(c).astype(float), size) for c in (chosen, np.ones(len(chosen), bool))]
+        mean = [
+            ndimage.uniform_filter(self.count(c).astype(float), size)
+            for c in (chosen, np.ones(len(chosen), bool))
+        ]
         return (mean[0] / np.maximum(mean[1], 1e-9)).ravel()
 
 
 def plan_density(xy: np.ndarray) -> float:
-    """Points a square metre where there are points: the median over occupied cells, large enough for four points."""
+    """Points a square metre where there are points: the median over occupied cells, large enough
+    for four points.
+    """
     xy = np.asarray(xy, float)[:, :2]
     for cell_m in (1.0, 2.0, 4.0, 8.0):
         cells = np.floor(xy / cell_m).astype(np.int64)
         cells -= cells.min(axis=0)
-        counts = np.unique(cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0], return_counts=True)[1]
+        counts = np.unique(cells[:, 1] * (cells[:, 0].max() + 1) + cells[:, 0], return_counts=True)[
+            1
+        ]
         if np.median(counts) >= 4:
             break
     return float(np.median(counts)) / cell_m**2

@@ -1,7 +1,7 @@
 """Roofs cut out beforehand, told from a scene with its ground: by where what is high ends.
 
-A scene's houses end in walls, down to the ground around them. What somebody cut out along its outline ends where the cloud does,
-or in a roof's own slopes.
+A scene's houses end in walls, down to the ground around them. What somebody cut out along its
+outline ends where the cloud does, or in a roof's own slopes.
 """
 
 from __future__ import annotations
@@ -16,19 +16,24 @@ from .ground import plane_through
 
 CELL_M, SPACINGS_A_CELL = 1.0, 2.0  # side of the cells, at least so many spacings of points
 REACH_CELLS = 2  # that no beam may have hit between a roof and the ground
-WALL_M = 2.0  # from a cell down to the next: no house's wall is lower, no roof's slope falls so far over a cell
-# of the border of what is high, without a wall down to something lower. Roofs cut out of three simulated towns, at 2 to 19 points/m2, with
-# walls and without, have 0.85 to 1 in nine of ten, Delft's along footprints 0.83 to 1; with ground around 0 to 0.09, Delft's boxes 0.34 to 0.56
+# from a cell down to the next: no house's wall is lower, no roof's slope falls so far over a cell
+WALL_M = 2.0
+# of the border of what is high, without a wall down to something lower. Roofs cut out of three
+# simulated towns, at 2 to 19 points/m2, with walls and without, have 0.85 to 1 in nine of ten,
+# Delft's along footprints 0.83 to 1; with ground around 0 to 0.09, Delft's boxes 0.34 to 0.56
 OPEN_SHARE = 0.7
 SMOOTH_SHARE = 0.6  # of the points of roofs; woods have less
 
 
 def is_cut_out(xyz: np.ndarray) -> bool | None:
-    """Whether points (n, 3), n > 0, are roofs alone and not a scene with its ground; None where nothing on their surface is high.
+    """Whether points (n, 3), n > 0, are roofs alone and not a scene with its ground;
+
+    None where nothing on their surface is high.
 
     >>> x, y = (axis.ravel() for axis in np.mgrid[0:20, 0:20] / 2)
     >>> gable, house = 8 - abs(x - 5), (abs(x - 5) < 3) & (abs(y - 5) < 3)
-    >>> is_cut_out(np.column_stack([x, y, gable])), is_cut_out(np.column_stack([x, y, np.where(house, gable, 0)]))
+    >>> is_cut_out(np.column_stack([x, y, gable])), is_cut_out(np.column_stack([x, y,
+    ...     np.where(house, gable, 0)]))
     (True, False)
     """
     cell_m = max(CELL_M, SPACINGS_A_CELL / math.sqrt(plan_density(xyz)))
@@ -47,7 +52,9 @@ def is_cut_out(xyz: np.ndarray) -> bool | None:
 
 
 def next_seen(height: np.ndarray, axis: int, way: int) -> np.ndarray:
-    """Of each cell (c, r) the height of the next one with points within REACH_CELLS on one side; minus infinity where there is none."""
+    """Of each cell (c, r) the height of the next one with points within REACH_CELLS on one side;
+    minus infinity where there is none.
+    """
     wide = np.pad(height, REACH_CELLS, constant_values=-np.inf)
     found = np.full(wide.shape, -np.inf)
     for step in range(REACH_CELLS, 0, -1):

@@ -1,4 +1,6 @@
-"""`hiproof classify`: a LAS or LAZ file's points get classes, and everything else in it stays as it is."""
+"""`hiproof classify`: a LAS or LAZ file's points get classes, and everything else in it stays as it
+is.
+"""
 
 from __future__ import annotations
 
@@ -22,17 +24,19 @@ LEFT_ALONE = (7, 9, 17, 18)  # noise, water, bridges
 
 
 def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
-    """Write `path` to `out` with its ground and buildings as classes 2 and 6; how many "points", "ground", "building".
+    """Write `path` to `out` with its ground and buildings as classes 2 and 6; how many "points",
+    "ground", "building".
 
-    Raises InputError for a file that cannot be read or holds nothing but noise, water and bridges, OutputError for one
-    that cannot be written.
+    Raises InputError for a file that cannot be read or holds nothing but noise, water and bridges,
+    OutputError for one that cannot be written.
     """
     path, out = Path(path), Path(out)
     if out.suffix.lower() not in (".laz", ".las"):
         raise OutputError(f"expected a .laz or .las file to write, got {out}; name one")
     if out.exists() and out.samefile(path):
         raise OutputError(
-            f"expected another file to write than the one that is read, got {out} for both; name a new one"
+            f"expected another file to write than the one that is read, got {out} for both; name a "
+            "new one"
         )
     las = read_whole(path)
     units = units_in(las, path, settings)
@@ -40,29 +44,45 @@ def classify_file(path: Path, out: Path, settings: Settings) -> dict[str, int]:
     asked = ~np.isin(before, LEFT_ALONE) & ~np.asarray(las.withheld, bool)
     if not asked.any():
         raise InputError(
-            f"expected points that may be ground or buildings in {path}, got {len(before):,} of noise, water or bridges alone; "
+            f"expected points that may be ground or buildings in {path}, got {len(before):,} of "
+            "noise, water or bridges alone; "
             "check the file's classes"
         )
     found = classify(units.to_metres(np.asarray(las.xyz)[asked]))
     las.classification[asked] = classes_after(before[asked], found)
     write_whole(las, out)
-    counts = {"points": len(before), "ground": (found == GROUND).sum(), "building": (found == BUILDING).sum()}
+    counts = {
+        "points": len(before),
+        "ground": (found == GROUND).sum(),
+        "building": (found == BUILDING).sum(),
+    }
     return {name: int(count) for name, count in counts.items()}
 
 
 def units_in(las: laspy.LasData, path: Path, settings: Settings) -> Units:
-    """Units of the file's coordinates. Raises InputError for degrees, also where no CRS says that they are."""
-    crs = common_crs({str(path): las_crs(facts_of(path).projection)}, parse_crs(settings.read.crs), settings.read.unit)
+    """Units of the file's coordinates.
+
+    Raises InputError for degrees, also where no CRS says that they are.
+    """
+    crs = common_crs(
+        {str(path): las_crs(facts_of(path).projection)},
+        parse_crs(settings.read.crs),
+        settings.read.unit,
+    )
     if crs is None:
         box = np.r_[las.header.mins[:2], las.header.maxs[:2]].reshape(1, 4)
         refuse_degrees(
-            box, str(path), "reproject it to the UTM zone or the national grid of the place (`pdal translate`)"
+            box,
+            str(path),
+            "reproject it to the UTM zone or the national grid of the place (`pdal translate`)",
         )
     return units_of(crs, str(path), settings.read.unit)
 
 
 def classes_after(before: np.ndarray, found: np.ndarray) -> np.ndarray:
-    """Classes (n,) from those `before` and those `found`: neither ground nor building keeps its own, unless it was one."""
+    """Classes (n,) from those `before` and those `found`: neither ground nor building keeps its
+    own, unless it was one.
+    """
     own = np.where(np.isin(before, (GROUND, BUILDING)), UNKNOWN, before)
     return np.where(found == UNKNOWN, own, found).astype(np.uint8)
 
@@ -71,7 +91,8 @@ def read_whole(path: Path) -> laspy.LasData:
     """Everything in the file. Raises InputError where it cannot be read, is empty, or is no LAS."""
     if file_kind(path) != "las":
         raise InputError(
-            f"expected a LAS, LAZ or COPC file at {path}, got another kind of point cloud; convert it first"
+            f"expected a LAS, LAZ or COPC file at {path}, got another kind of point cloud; convert "
+            "it first"
         )
     if not read_las_header(path).point_count:
         raise InputError(f"expected points in {path}, got none; copy or download it again")
@@ -82,7 +103,9 @@ def read_whole(path: Path) -> laspy.LasData:
 
 
 def write_whole(las: laspy.LasData, out: Path) -> None:
-    """The file under its name, whole or not at all; an octree of COPC is left out, as the copy has none."""
+    """The file under its name, whole or not at all; an octree of COPC is left out, as the copy has
+    none.
+    """
     header = las.header
     header.vlrs = [record for record in header.vlrs if record.user_id != "copc"]
     header.evlrs = [record for record in header.evlrs or [] if record.user_id != "copc"]

@@ -1,9 +1,11 @@
-"""The ground under a cloud: what stands on it is taken away by openings of growing windows, the gaps are filled.
+"""The ground under a cloud: what stands on it is taken away by openings of growing windows, the
+gaps are filled.
 
-A simple morphological filter after Pingel, Clarke and McBride (An improved simple morphological filter for the terrain
-classification of airborne LIDAR data, ISPRS Journal 77, 2013), with two changes: a plane through all cells is taken away
-first, so that the upper border of a steep slope is no step, and cells without points take no part instead of being
-filled before. The cloth filter's packages were weighed and left: their answer for a place depends on the whole cloud.
+A simple morphological filter after Pingel, Clarke and McBride (An improved simple morphological
+filter for the terrain classification of airborne LIDAR data, ISPRS Journal 77, 2013), with two
+changes: a plane through all cells is taken away first, so that the upper border of a steep slope is
+no step, and cells without points take no part instead of being filled before. The cloth filter's
+packages were weighed and left: their answer for a place depends on the whole cloud.
 """
 
 from __future__ import annotations
@@ -19,21 +21,27 @@ CELL_M = 1.0  # m; a car or a bush covers a few cells, a street is some wide
 WINDOWS_M = (1.0, 2.0, 3.0, 4.0, 6.0, 8.0, 11.0, 15.0, 20.0)  # half sides of the openings' windows
 SLOPE = 0.15  # a rise above the opened surface of more than this much of the half side is no ground
 PIT_M = 2.0  # a cell that lies so far below all around it is noise
-ABYSS_M = 500.0  # m below the middle of all heights, which no ground falls within a square: -9999 would tilt the plane under all
+# m below the middle of all heights, which no ground falls within a square: -9999 would tilt the
+# plane under all
+ABYSS_M = 500.0
 PLANES = 3  # rounds of fitting the plane under all cells, each to the lower half of the last
 SMOOTHINGS = 30  # passes of a mean over neighbours that smooth what fills a gap
 
 
 @dataclass(frozen=True)
 class GroundGrid:
-    """Heights `z` (columns, rows) of the ground at the centres of square cells; the first cell's corner is `corner` (2,)."""
+    """Heights `z` (columns, rows) of the ground at the centres of square cells; the first cell's
+    corner is `corner` (2,).
+    """
 
     corner: np.ndarray
     z: np.ndarray
     cell_m: float
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy` (n, 2 or more), bilinear between cells' centres; the border's beyond them."""
+        """Height (n,) at `xy` (n, 2 or more), bilinear between cells' centres; the border's beyond
+        them.
+        """
         place = (np.asarray(xy, float)[:, :2] - self.corner) / self.cell_m - 0.5
         return ndimage.map_coordinates(self.z, place.T, order=1, mode="nearest")
 
@@ -68,7 +76,9 @@ def bare_points(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
 
 
 def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np.ndarray]:
-    """The first cell of the world's grid, and the lowest height of points (n, 3) a cell (c, r), NaN where there is none."""
+    """The first cell of the world's grid, and the lowest height of points (n, 3) a cell (c, r), NaN
+    where there is none.
+    """
     first, size = cell_range(xyz, cell_m)
     column, row = (np.floor(xyz[:, :2] / cell_m).astype(np.int64) - first).T
     lowest = np.full(size, np.inf)
@@ -77,7 +87,9 @@ def lowest_in_cells(xyz: np.ndarray, cell_m: float) -> tuple[tuple[int, int], np
 
 
 def bare_ground(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
-    """The lowest heights of cells (c, r), NaN where no point is, with NaN also where they are not the ground's."""
+    """The lowest heights of cells (c, r), NaN where no point is, with NaN also where they are not
+    the ground's.
+    """
     lowest = np.where(lowest < np.nanmedian(lowest) - ABYSS_M, np.nan, lowest)
     level = lowest - plane_through(lowest, cell_m)
     pit = -opened(-level, 1) - level > PIT_M
@@ -92,7 +104,9 @@ def bare_ground(lowest: np.ndarray, cell_m: float = CELL_M) -> np.ndarray:
 
 
 def plane_through(z: np.ndarray, cell_m: float) -> np.ndarray:
-    """Heights at every cell of the plane through the known cells of `z`: of all, then twice of the half farthest below."""
+    """Heights at every cell of the plane through the known cells of `z`: of all, then twice of the
+    half farthest below.
+    """
     column, row = (index * cell_m for index in np.indices(z.shape))
     terms, known = np.stack([column, row, np.ones(z.shape)], axis=-1), np.isfinite(z)
     for _ in range(PLANES):
@@ -102,14 +116,22 @@ def plane_through(z: np.ndarray, cell_m: float) -> np.ndarray:
 
 
 def opened(z: np.ndarray, half: int) -> np.ndarray:
-    """The opening of `z` by squares of 2 half + 1 cells whose middles are known cells; unknown ones (NaN) take no part."""
+    """The opening of `z` by squares of 2 half + 1 cells whose middles are known cells; unknown ones
+    (NaN) take no part.
+    """
     known, size = np.isfinite(z), 2 * half + 1
-    eroded = ndimage.grey_erosion(np.where(known, z, np.inf), size=size, mode="constant", cval=np.inf)
-    return ndimage.grey_dilation(np.where(known, eroded, -np.inf), size=size, mode="constant", cval=-np.inf)
+    eroded = ndimage.grey_erosion(
+        np.where(known, z, np.inf), size=size, mode="constant", cval=np.inf
+    )
+    return ndimage.grey_dilation(
+        np.where(known, eroded, -np.inf), size=size, mode="constant", cval=-np.inf
+    )
 
 
 def filled(z: np.ndarray) -> np.ndarray:
-    """`z` with the nearest known height in unknown cells (NaN), smoothed there; zeros where nothing is known."""
+    """`z` with the nearest known height in unknown cells (NaN), smoothed there; zeros where nothing
+    is known.
+    """
     known = np.isfinite(z)
     if not known.any():
         return np.zeros(z.shape)

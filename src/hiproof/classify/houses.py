@@ -1,8 +1,10 @@
-"""Houses that touch, told apart where their roofs say so: a step, another ridge or another eave all along a straight line.
+"""Houses that touch, told apart where their roofs say so: a step, another ridge or another eave all
+along a straight line.
 
-A bond joins two neighbouring points in plan; it holds where one surface goes on from one to the other. A line is crossed by
-bonds in runs; it may cut the block in those runs across which hardly any holds, from border to border, where that leaves roof
-enough for a house on either side. The best cut is made, then both sides are looked at again. A row of equal houses stays one.
+A bond joins two neighbouring points in plan; it holds where one surface goes on from one to the
+other. A line is crossed by bonds in runs; it may cut the block in those runs across which hardly
+any holds, from border to border, where that leaves roof enough for a house on either side. The best
+cut is made, then both sides are looked at again. A row of equal houses stays one.
 """
 
 from __future__ import annotations
@@ -27,7 +29,8 @@ UPRIGHT = 0.25  # cosine of the slope from which a surface is a wall
 HOLD = 3.0  # what a bond that holds counts against one that does not
 AWAY_M = 0.5  # of a line: nearer to it is its own border
 SHORT_M = 0.3  # bonds count by their shortness down to this
-# m between the lines that cuts are looked for on, at first and when refined; m of a line judged as one stretch
+# m between the lines that cuts are looked for on, at first and when refined; m of a line judged as
+# one stretch
 LINE_M, FINE_LINE_M, STRETCH_M = 0.25, 0.1, 0.5
 NEXT_M = 2.0  # what lies so far from a line tells what is on its sides
 # degrees that a cut is turned by, and m that it is moved by at most, when it is refined
@@ -42,15 +45,18 @@ LEAST_HOUSE_M2, LEAST_DEPTH_M = 25.0, 4.0  # of roof on either side, and by the 
 NECK_M = 1.5  # what is narrower joins no houses
 TRIES = 20  # cuts tried of an area, the best first
 LIKE_DEG, LIKE_M = 12.0, 1.0  # degrees and m within which two cuts are one
-# degrees within which edges and slopes support a direction, and between two directions; how many at most; least share of all support
+# degrees within which edges and slopes support a direction, and between two directions; how many at
+# most; least share of all support
 DIRECTION_DEG, APART_DEG, MOST_DIRECTIONS, LEAST_SUPPORT = 3.0, 8.0, 6, 0.05
 STRAIGHT_M = 0.7  # corners of the block's border that are none
 
 
 @dataclass(frozen=True)
 class Bonds:
-    """Pairs of points (b, 2), by their numbers: their places `ends` (b, 2, 2) in plan, `middle` (b, 2) between these, `state` (b,): HELD,
-    LOOSE, or UNKNOWN between leaves, and `weight` (b,): short ones count more."""
+    """Pairs of points (b, 2), by their numbers: their places `ends` (b, 2, 2) in plan, `middle` (b,
+    2) between these, `state` (b,): HELD, LOOSE, or UNKNOWN between leaves, and `weight` (b,): short
+    ones count more.
+    """
 
     points: np.ndarray
     ends: np.ndarray
@@ -76,8 +82,9 @@ HELD, LOOSE, UNKNOWN = 0, 1, 2  # states of a bond between neighbouring points
 
 @dataclass(frozen=True)
 class Cut:
-    """The line at `offset` (m) along `normal` (2,), which bonds cross in `runs` (r, 4): low, high (m along it), whether it may
-    be cut there, and what speaks for that (m)."""
+    """The line at `offset` (m) along `normal` (2,), which bonds cross in `runs` (r, 4): low, high
+    (m along it), whether it may be cut there, and what speaks for that (m).
+    """
 
     normal: np.ndarray
     offset: float
@@ -118,13 +125,16 @@ class Cut:
 
 
 def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[shapely.Geometry]:
-    """The areas of the single houses among roof points (n, 3) in `area`, all in world metres: they share it without a rest.
+    """The areas of the single houses among roof points (n, 3) in `area`, all in world metres: they
+    share it without a rest.
 
     Parts of the area within `gap_m` of each other are one block.
 
-    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 16, 0.4), np.arange(0.2, 9, 0.4)))
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 16, 0.4), np.arange(0.2, 9,
+    ...     0.4)))
     >>> pair = np.column_stack([x, y, np.where(x < 8, 6.0, 7.0) - 0.6 * abs(y - 4.5)])
-    >>> [bool(abs(house.area - 72) < 1.5) for house in told_apart(pair, shapely.box(0, 0, 16, 9), 1.0)]
+    >>> [bool(abs(house.area - 72) < 1.5) for house in told_apart(pair, shapely.box(0, 0, 16, 9),
+    ...     1.0)]
     [True, True]
     """
     origin = np.floor(xyz.min(axis=0))
@@ -132,16 +142,26 @@ def told_apart(xyz: np.ndarray, area: shapely.Geometry, gap_m: float) -> list[sh
     roofs, bonds = roofs_of(surfaces), bonds_of(surfaces)
     houses = [
         with_area(shapely.intersection(house, block))
-        for block in without_necks(shapely.transform(area, lambda xy: xy - origin[:2]), gap_m, roofs)
+        for block in without_necks(
+            shapely.transform(area, lambda xy: xy - origin[:2]), gap_m, roofs
+        )
         for house in houses_in(shapely.buffer(block, gap_m, join_style="mitre"), roofs, bonds)
     ]
-    return [area] if len(houses) == 1 else [shapely.transform(house, lambda xy: xy + origin[:2]) for house in houses]
+    return (
+        [area]
+        if len(houses) == 1
+        else [shapely.transform(house, lambda xy: xy + origin[:2]) for house in houses]
+    )
 
 
 def without_necks(area: shapely.Geometry, gap_m: float, roofs: Roofs) -> list[shapely.Geometry]:
-    """`area` in parts where hardly more than a few returns of what stands between two houses joins them: a gutter, a tree."""
+    """`area` in parts where hardly more than a few returns of what stands between two houses joins
+    them: a gutter, a tree.
+    """
     wide = shapely.buffer(
-        shapely.buffer(area, 0.5 * gap_m, join_style="mitre"), -0.5 * (gap_m + NECK_M), join_style="mitre"
+        shapely.buffer(area, 0.5 * gap_m, join_style="mitre"),
+        -0.5 * (gap_m + NECK_M),
+        join_style="mitre",
     )
     sides, rest = [], area
     for part in shapely.get_parts(wide):
@@ -171,7 +191,9 @@ def is_roof(surfaces: Surfaces) -> np.ndarray:
 
 
 class Roofs(NamedTuple):
-    """Voxels on smooth surfaces that are no walls: places (r, 2), `m2` (r,) in plan, normals (r, 3)."""
+    """Voxels on smooth surfaces that are no walls: places (r, 2), `m2` (r,) in plan, normals (r,
+    3).
+    """
 
     xy: np.ndarray
     m2: np.ndarray
@@ -199,14 +221,22 @@ def depth_m(side: shapely.Geometry, cut: Cut, roofs: Roofs) -> float:
 def bonds_of(surfaces: Surfaces) -> Bonds:
     """All pairs of neighbours in plan, walls left out.
 
-    A surface holds both where the plane of one goes through the other, or where their planes meet between them (a ridge, a valley).
+    A surface holds both where the plane of one goes through the other, or where their planes meet
+    between them (a ridge, a valley).
     """
     from scipy.spatial import cKDTree
 
     kept = is_roof(surfaces) | ~surfaces.is_smooth
-    xyz, normal, smooth = (values[kept] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth))
+    xyz, normal, smooth = (
+        values[kept] for values in (surfaces.xyz, surfaces.normal, surfaces.is_smooth)
+    )
     if len(xyz) < 2:
-        return Bonds(np.empty((0, 2), np.int64), np.empty((0, 2, 2)), np.empty((0, 2)), *np.empty((2, 0), np.int64))
+        return Bonds(
+            np.empty((0, 2), np.int64),
+            np.empty((0, 2, 2)),
+            np.empty((0, 2)),
+            *np.empty((2, 0), np.int64),
+        )
     tree = cKDTree(xyz[:, :2])
     spacing = np.median(tree.query(xyz[:, :2], k=2)[0][:, 1])
     points = tree.query_pairs(max(REACH_M, REACH_SPACINGS * spacing), output_type="ndarray")
@@ -223,7 +253,9 @@ def bonds_of(surfaces: Surfaces) -> Bonds:
 
 
 def directions_of(area: shapely.Geometry, roofs: Roofs) -> np.ndarray:
-    """Azimuths (d,) in which cuts are looked for: those of slopes and of the block's border, and across them."""
+    """Azimuths (d,) in which cuts are looked for: those of slopes and of the block's border, and
+    across them.
+    """
     shapely.prepare(area)
     normal = roofs.normal[shapely.intersects_xy(area, *roofs.xy.T)]
     rings = [
@@ -256,16 +288,24 @@ def best_cuts(bonds: Bonds, directions: np.ndarray) -> list[Cut]:
 
 
 def refined(cut: Cut, bonds: Bonds) -> Cut | None:
-    """The best of the lines near `cut`, turned a little and at a tenth of a metre; None where it is none to cut at."""
+    """The best of the lines near `cut`, turned a little and at a tenth of a metre;
+
+    None where it is none to cut at.
+    """
     x, y = bonds.middle.T
     away2 = (x - cut.middle[0]) ** 2 + (y - cut.middle[1]) ** 2
     near = bonds.among(away2 < (0.5 * cut.length + 2.0) ** 2)
     angle = math.atan2(cut.normal[1], cut.normal[0])
-    tried = [other for turn in np.radians(FINE_TURNS_DEG) for other in cuts_along(angle + turn, near, FINE_LINE_M)]
+    tried = [
+        other
+        for turn in np.radians(FINE_TURNS_DEG)
+        for other in cuts_along(angle + turn, near, FINE_LINE_M)
+    ]
     like = [
         other
         for other in tried
-        if abs(other.normal @ cut.middle - other.offset) < FINE_SHIFT_M and other.length > 0.7 * cut.length
+        if abs(other.normal @ cut.middle - other.offset) < FINE_SHIFT_M
+        and other.length > 0.7 * cut.length
     ]
     if not like:
         return None
@@ -273,7 +313,9 @@ def refined(cut: Cut, bonds: Bonds) -> Cut | None:
     one, other = bonds.across(best).T
     crossing = bonds.among((np.minimum(one, other) < NEXT_M) & (np.maximum(one, other) > -NEXT_M))
     whole = cuts_along(math.atan2(best.normal[1], best.normal[0]), crossing, FINE_LINE_M)
-    return next((other for other in whole if abs(other.offset - best.offset) < 0.5 * FINE_LINE_M), None)
+    return next(
+        (other for other in whole if abs(other.offset - best.offset) < 0.5 * FINE_LINE_M), None
+    )
 
 
 def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1.0) -> list[Cut]:
@@ -285,14 +327,19 @@ def cuts_along(angle: float, bonds: Bonds, lines_m: float, strictness: float = 1
     crossed *= is_between(bonds.points, bonds.ends, normal, lines_m, first, start, crossed[0])
     line, runs = runs_of(crossed, start, strictness * LEAST_APART)
     length = runs[:, 1] - runs[:, 0]
-    is_long = (runs[:, 2] > 0) & (runs[:, 3] > strictness * LEAST_GAIN * length) & (length >= LEAST_LENGTH_M)
+    is_long = (
+        (runs[:, 2] > 0)
+        & (runs[:, 3] > strictness * LEAST_GAIN * length)
+        & (length >= LEAST_LENGTH_M)
+    )
     return [Cut(normal, (first + k) * lines_m, runs[line == k]) for k in np.unique(line[is_long])]
 
 
 @compiled
 def crossings(ends, state, weight, normal, lines_m):
-    """How many bonds of each state cross each line in each stretch (3, lines, stretches), by their `weight` (b,); the first line's number,
-    and where the first stretch begins along it."""
+    """How many bonds of each state cross each line in each stretch (3, lines, stretches), by their
+    `weight` (b,); the first line's number, and where the first stretch begins along it.
+    """
     n, c, s = len(ends), normal[0] / lines_m, normal[1] / lines_m
     v, u, along = np.empty((2, n)), np.empty((2, n)), lines_m / STRETCH_M
     for e in range(2):
@@ -300,20 +347,25 @@ def crossings(ends, state, weight, normal, lines_m):
         for b in range(n):
             across[b], beside[b] = c * x[b] + s * y[b], (c * y[b] - s * x[b]) * along
     first, start = math.floor(v.min()), math.floor(u.min())
-    crossed = np.zeros((3, int(math.floor(v.max()) - first) + 1, int(math.floor(u.max()) - start) + 1))
+    crossed = np.zeros(
+        (3, int(math.floor(v.max()) - first) + 1, int(math.floor(u.max()) - start) + 1)
+    )
     for b in range(n):
         low, high = (0, 1) if v[0, b] < v[1, b] else (1, 0)
         v_low, u_low = v[low, b], u[low, b]
         slope = (u[high, b] - u_low) / max(v[high, b] - v_low, 1e-9)
         for line in range(math.ceil(v_low), math.floor(v[high, b]) + 1):
-            crossed[state[b], int(line - first), int(u_low + (line - v_low) * slope - start)] += weight[b]
+            crossed[state[b], int(line - first), int(u_low + (line - v_low) * slope - start)] += (
+                weight[b]
+            )
     return crossed, first, start * STRETCH_M
 
 
 @compiled
 def is_between(points, ends, normal, lines_m, first, start, like):
-    """Whether something lies on both sides of each line, away from it, in each stretch, as a table (lines, stretches) `like` this:
-    along the border of a block there is nothing to be cut."""
+    """Whether something lies on both sides of each line, away from it, in each stretch, as a table
+    (lines, stretches) `like` this: along the border of a block there is nothing to be cut.
+    """
     beside, seen = np.zeros((2, *like.shape), np.bool_), np.zeros(points.max() + 1, np.bool_)
     for b in range(len(ends)):
         for e in range(2):
@@ -321,19 +373,24 @@ def is_between(points, ends, normal, lines_m, first, start, like):
                 continue
             seen[points[b, e]] = True
             v = ends[b, e, 0] * normal[0] + ends[b, e, 1] * normal[1]
-            stretch = int((ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1] - start) / STRETCH_M)
+            stretch = int(
+                (ends[b, e, 1] * normal[0] - ends[b, e, 0] * normal[1] - start) / STRETCH_M
+            )
             for side in range(2):
                 low = v - AWAY_M - REACH_M if side else v + AWAY_M
                 last = math.floor((low + REACH_M) / lines_m) - first
-                for line in range(max(math.ceil(low / lines_m) - first, 0), min(last + 1, like.shape[0])):
+                for line in range(
+                    max(math.ceil(low / lines_m) - first, 0), min(last + 1, like.shape[0])
+                ):
                     beside[side, int(line), stretch] = True
     return beside[0] & beside[1]
 
 
 @compiled
 def runs_of(crossed, start, least_apart):
-    """Line (m,) and low, high, whether hardly any bond holds, and gain (m, 4) of each run of stretches that bonds cross; a run
-    goes on beyond a single stretch that none crosses."""
+    """Line (m,) and low, high, whether hardly any bond holds, and gain (m, 4) of each run of
+    stretches that bonds cross; a run goes on beyond a single stretch that none crosses.
+    """
     line, runs, m = np.empty(crossed[0].size, np.int64), np.empty((crossed[0].size, 4)), 0
     for k in range(crossed.shape[1]):
         low, high, count, apart, gain = -1, -1, 0, 0, 0.0
@@ -351,21 +408,31 @@ def runs_of(crossed, start, least_apart):
 
 
 def sides_of(area: shapely.Geometry, cut: Cut) -> list[shapely.Geometry]:
-    """What `area` falls into where it is cut: all that goes on around its ends, or across it elsewhere, stays together."""
+    """What `area` falls into where it is cut: all that goes on around its ends, or across it
+    elsewhere, stays together.
+    """
     far = 2.0 * math.hypot(*np.ptp(np.array(area.bounds).reshape(2, 2), axis=0)) + 10.0
     low, high = cut.middle @ cut.along - far, cut.middle @ cut.along + far
-    halves = [[cut.at(low), cut.at(high), cut.at(high, side * far), cut.at(low, side * far)] for side in (-1, 1)]
+    halves = [
+        [cut.at(low), cut.at(high), cut.at(high, side * far), cut.at(low, side * far)]
+        for side in (-1, 1)
+    ]
     halves = [shapely.intersection(area, shapely.Polygon(half)) for half in halves]
     parts = [part for half in halves for part in shapely.get_parts(half) if part.area > 0.0]
     group, held = list(range(len(parts))), cut.runs[cut.runs[:, 2] == 0]
-    for segment in shapely.get_parts(shapely.intersection(area, shapely.LineString([cut.at(low), cut.at(high)]))):
+    for segment in shapely.get_parts(
+        shapely.intersection(area, shapely.LineString([cut.at(low), cut.at(high)]))
+    ):
         u = shapely.get_coordinates(segment) @ cut.along
         if not segment.length or not ((held[:, 0] < u.max()) & (held[:, 1] > u.min())).any():
             continue
         across = [shapely.Point(cut.at(u.mean(), side * 0.01)) for side in (-1, 1)]
         one, other = (group[int(np.argmin(shapely.distance(parts, point)))] for point in across)
         group = [one if number == other else number for number in group]
-    return [joined([p for p, g in zip(parts, group, strict=True) if g == number]) for number in sorted(set(group))]
+    return [
+        joined([p for p, g in zip(parts, group, strict=True) if g == number])
+        for number in sorted(set(group))
+    ]
 
 
 def with_crumbs(sides: list[shapely.Geometry], roofs: Roofs) -> list[shapely.Geometry]:

@@ -15,7 +15,9 @@ NO_ROOFS = {3: "low vegetation", 7: "noise", 9: "water", 17: "bridges", 18: "noi
 
 
 def roofs_by_shape(
-    cloud: PointCloud, ground_classes: tuple[int, ...], on_error: Callable[[np.ndarray, Exception], None]
+    cloud: PointCloud,
+    ground_classes: tuple[int, ...],
+    on_error: Callable[[np.ndarray, Exception], None],
 ) -> np.ndarray:
     """Ascending indices of the roofs' points. Raises InputError where there are none.
 
@@ -31,11 +33,18 @@ def roofs_by_shape(
 
     classes = classify(cloud.xyz[asked], skip_square)
     roofs = asked[(classes == BUILDING) & ~np.isin(cloud.classes[asked], ground_classes)]
-    return roofs if n_failed else some(roofs, cloud, "none of which lies on a smooth surface above the ground")
+    return (
+        roofs
+        if n_failed
+        else some(roofs, cloud, "none of which lies on a smooth surface above the ground")
+    )
 
 
 def points_that_may_be_roofs(cloud: PointCloud, ground_classes: tuple[int, ...]) -> np.ndarray:
-    """Ascending indices of all points but those of classes that hold no roofs. Raises InputError where there are none."""
+    """Ascending indices of all points but those of classes that hold no roofs.
+
+    Raises InputError where there are none.
+    """
     asked = np.flatnonzero(~np.isin(cloud.classes, (*NO_ROOFS, *ground_classes)))
     return some(asked, cloud, "all of them ground, water, noise, low vegetation or bridges")
 
@@ -46,6 +55,7 @@ def some(roofs: np.ndarray, cloud: PointCloud, why_not: str) -> np.ndarray:
         return roofs
     where = ", ".join(cloud.sources) or "the cloud"
     raise InputError(
-        f"expected buildings in {where}, got {counted(len(cloud), 'point')} {why_not}; give --footprints, or name the class that "
+        f"expected buildings in {where}, got {counted(len(cloud), 'point')} {why_not}; give "
+        "--footprints, or name the class that "
         "holds roofs with --building-class"
     )

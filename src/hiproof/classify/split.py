@@ -1,4 +1,6 @@
-"""A cloud without footprints becomes buildings: roof points connected in plan, and touching houses told apart."""
+"""A cloud without footprints becomes buildings: roof points connected in plan, and touching houses
+told apart.
+"""
 
 from __future__ import annotations
 
@@ -20,9 +22,12 @@ from .cut_out import is_cut_out
 from .houses import told_apart
 from .scene import points_that_may_be_roofs, roofs_by_shape
 
-GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)  # steps, so that neighbouring tiles of one survey choose the same gap
-SPACINGS_PER_GAP = 2.5  # a gap is no gap between houses where points lie sparser than this many to it
-# m, points and share of one connected group: what may be one roof cut out beforehand, the paper's case
+# steps, so that neighbouring tiles of one survey choose the same gap
+GAPS_M = (1.0, 1.5, 2.0, 3.0, 4.5, 6.0)
+# a gap is no gap between houses where points lie sparser than this many to it
+SPACINGS_PER_GAP = 2.5
+# m, points and share of one connected group: what may be one roof cut out beforehand, the paper's
+# case
 SINGLE_EXTENT_M, SINGLE_POINTS, SINGLE_SHARE = 60.0, 200_000, 0.9
 BLOCK_EXTENT_M = 250.0  # of a block of houses cut out beforehand; a plane lies under it
 NEVER_CLASSIFIED = (0, 1)  # of ASPRS: created, unclassified
@@ -35,10 +40,11 @@ SPACINGS_BEYOND = 0.35  # a roof ends about so far beyond its outermost points
 class FoundBuilding:
     """A group of points taken for one building: ascending `index` (n,) into the cloud.
 
-    `area` is the union of the cells that hold the group's points, in world metres, less what lies beyond a wall between
-    touching houses: all of them lie in it, and none of another group. The roof's outline is the fit's business.
-    `is_cut_out`: the cloud holds roofs alone, cut out beforehand, so that all its points but noise count.
-    `error`: an unexpected error while its points were split into houses, or while roofs were looked for among them.
+    `area` is the union of the cells that hold the group's points, in world metres, less what lies
+    beyond a wall between touching houses: all of them lie in it, and none of another group. The
+    roof's outline is the fit's business. `is_cut_out`: the cloud holds roofs alone, cut out
+    beforehand, so that all its points but noise count. `error`: an unexpected error while its
+    points were split into houses, or while roofs were looked for among them.
     """
 
     id: str
@@ -49,7 +55,9 @@ class FoundBuilding:
 
 
 class Place(NamedTuple):
-    """Points (ascending indices) of one building with their area; or of a place where the search failed."""
+    """Points (ascending indices) of one building with their area; or of a place where the search
+    failed.
+    """
 
     members: np.ndarray
     area: shapely.Geometry
@@ -57,13 +65,16 @@ class Place(NamedTuple):
 
 
 def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list[FoundBuilding]:
-    """The buildings of `cloud`, from the points of its building class, or where it has none from roofs found by shape.
+    """The buildings of `cloud`, from the points of its building class, or where it has none from
+    roofs found by shape.
 
-    A small file that holds one roof alone is one building; one of several roofs cut out beforehand is as if their class were
-    known. Houses that touch are told apart where their roofs say so (`settings.read.split_houses`), else they stay together. Groups
-    with fewer than `settings.read.split_min_points` points or less than 4 m2 are left out with an InputWarning. Ids name the metre that
-    holds the group's middle, not its number, so that they do not depend on what else was read. Raises InputError where no point may be a
-    building's. An unexpected error stays with the group, or the square of the cloud, where it happens.
+    A small file that holds one roof alone is one building; one of several roofs cut out beforehand
+    is as if their class were known. Houses that touch are told apart where their roofs say so
+    (`settings.read.split_houses`), else they stay together. Groups with fewer than
+    `settings.read.split_min_points` points or less than 4 m2 are left out with an InputWarning. Ids
+    name the metre that holds the group's middle, not its number, so that they do not depend on what
+    else was read. Raises InputError where no point may be a building's. An unexpected error stays
+    with the group, or the square of the cloud, where it happens.
     """
     read = (settings or Settings()).read
     roof, is_cut_out, failed = roof_points_of(cloud, read)
@@ -71,7 +82,9 @@ def split_buildings(cloud: PointCloud, settings: Settings | None = None) -> list
     return [dataclasses.replace(one, is_cut_out=is_cut_out) for one in found]
 
 
-def places_of(roof: np.ndarray, xyz: np.ndarray, read: ReadSettings, is_cut_out: bool) -> list[Place]:
+def places_of(
+    roof: np.ndarray, xyz: np.ndarray, read: ReadSettings, is_cut_out: bool
+) -> list[Place]:
     """Divide the `roof` points (indices) among buildings."""
     if not len(roof):
         return []
@@ -80,18 +93,25 @@ def places_of(roof: np.ndarray, xyz: np.ndarray, read: ReadSettings, is_cut_out:
         return houses_or_error(roof, xyz, adapted_gap(xy), split_houses=False)
     gap_m = read.split_gap_m or adapted_gap(xy)
     groups = large_enough([roof[group] for group in connected_groups(xy, gap_m)], xyz, read)
-    return [house for group in groups for house in houses_or_error(group, xyz, gap_m, read.split_houses)]
+    return [
+        house for group in groups for house in houses_or_error(group, xyz, gap_m, read.split_houses)
+    ]
 
 
 def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) -> list[np.ndarray]:
-    """Those of the groups that are large enough for a building; an InputWarning counts the others."""
+    """Those of the groups that are large enough for a building; an InputWarning counts the
+    others.
+    """
     large = [
-        group for group in groups if len(group) >= read.split_min_points and hull_area(xyz[group, :2]) >= MIN_AREA_M2
+        group
+        for group in groups
+        if len(group) >= read.split_min_points and hull_area(xyz[group, :2]) >= MIN_AREA_M2
     ]
     left_out = len(groups) - len(large)
     if left_out:
         warnings.warn(
-            f"{counted(left_out, 'group')} of building points left out as too small (fewer than {read.split_min_points} points "
+            f"{counted(left_out, 'group')} of building points left out as too small (fewer than "
+            f"{read.split_min_points} points "
             f"or {MIN_AREA_M2:g} m2); [read] split_min_points sets the limit",
             InputWarning,
         )
@@ -99,14 +119,18 @@ def large_enough(groups: list[np.ndarray], xyz: np.ndarray, read: ReadSettings) 
 
 
 def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, bool, list[Place]]:
-    """Ascending indices of the points that may be roofs, whether they are roofs alone, cut out beforehand, and the places
-    where the search for them failed."""
+    """Ascending indices of the points that may be roofs, whether they are roofs alone, cut out
+    beforehand, and the places where the search for them failed.
+    """
     if read.roofs == "alone":
         return points_that_may_be_roofs(cloud, read.ground_classes), True, []
     index = building_points(cloud, read.building_classes) if read.roofs != "shape" else None
     if index is not None:
         return index, False, []
-    unclassified, is_chosen = never_classified(cloud), read.building_classes != ReadSettings().building_classes
+    unclassified, is_chosen = (
+        never_classified(cloud),
+        read.building_classes != ReadSettings().building_classes,
+    )
     if read.roofs == "class" or (read.roofs == "auto" and is_chosen):
         if unclassified is None or not is_single(cloud.xyz[unclassified, :2]):
             raise InputError(without_building_class(cloud, read.building_classes))
@@ -115,10 +139,15 @@ def roof_points_of(cloud: PointCloud, read: ReadSettings) -> tuple[np.ndarray, b
         return unclassified, True, []
     failed: list[Place] = []
     roofs = roofs_by_shape(
-        cloud, read.ground_classes, lambda index, error: failed.append(failed_place(index, cloud.xyz, error))
+        cloud,
+        read.ground_classes,
+        lambda index, error: failed.append(failed_place(index, cloud.xyz, error)),
     )
     if read.roofs == "auto":
-        said = f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs were found by shape"
+        said = (
+            f"the cloud has no building class ({classes_text(read.building_classes)}): its roofs "
+            "were found by shape"
+        )
         warnings.warn(said, InputWarning)
     return roofs, False, failed
 
@@ -136,7 +165,9 @@ def building_points(cloud: PointCloud, classes: tuple[int, ...]) -> np.ndarray |
 
 
 def never_classified(cloud: PointCloud) -> np.ndarray | None:
-    """Ascending indices of all points that are no noise, None where there are none, or any has a class."""
+    """Ascending indices of all points that are no noise, None where there are none, or any has a
+    class.
+    """
     index = np.flatnonzero(~np.isin(cloud.classes, NOISE))
     return index if len(index) and np.isin(cloud.classes, NEVER_CLASSIFIED + NOISE).all() else None
 
@@ -144,7 +175,8 @@ def never_classified(cloud: PointCloud) -> np.ndarray | None:
 def is_single(xy: np.ndarray) -> bool:
     """Whether points (n, 2) are few and close enough for one building, the paper's case.
 
-    They are at most 60 m wide and 200,000, a drone's of a large house, nine tenths of them connected.
+    They are at most 60 m wide and 200,000, a drone's of a large house, nine tenths of them
+    connected.
     """
     if len(xy) > SINGLE_POINTS or np.ptp(xy, axis=0).max() > SINGLE_EXTENT_M:
         return False
@@ -152,9 +184,11 @@ def is_single(xy: np.ndarray) -> bool:
 
 
 def holds_roofs_alone(xyz: np.ndarray) -> bool:
-    """Whether the points (n, 3) are one roof or several, each a group by itself, that were cut out beforehand.
+    """Whether the points (n, 3) are one roof or several, each a group by itself, that were cut out
+    beforehand.
 
-    Of several most are known for roofs, and hardly any is none; what has nothing high on it may be either.
+    Of several most are known for roofs, and hardly any is none; what has nothing high on it may be
+    either.
     """
     if is_single(xyz[:, :2]):
         return is_cut_out(xyz) is not False
@@ -171,32 +205,43 @@ def holds_roofs_alone(xyz: np.ndarray) -> bool:
 
 def without_building_class(cloud: PointCloud, wanted: tuple[int, ...]) -> str:
     if cloud.classification is None:
-        got = f"{counted(len(cloud), 'point')} without classes, too many or too scattered for a single building"
+        got = (
+            f"{counted(len(cloud), 'point')} without classes, too many or too scattered for a "
+            "single building"
+        )
     else:
         counts = sorted(Counter(cloud.classification.tolist()).items())
-        got = "classes " + ", ".join(f"{number} ({counted(count, 'point')})" for number, count in counts)
+        got = "classes " + ", ".join(
+            f"{number} ({counted(count, 'point')})" for number, count in counts
+        )
     return (
-        f"expected points of class {classes_text(wanted)} (building), got {got}; name the class that holds the roofs with "
+        f"expected points of class {classes_text(wanted)} (building), got {got}; name the class "
+        "that holds the roofs with "
         "--building-class, give --footprints, or classify the cloud first"
     )
 
 
 def adapted_gap(xy: np.ndarray) -> float:
-    """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points are sparse."""
+    """Gap in metres that separates buildings at the density of `xy` (n, 2): 1 m, more where points
+    are sparse.
+    """
     needed = SPACINGS_PER_GAP / np.sqrt(plan_density(xy))
     return next((gap for gap in GAPS_M if gap >= needed), GAPS_M[-1])
 
 
 def roughly_connected(xy: np.ndarray) -> list[np.ndarray]:
-    """The groups of `xy` (n, 2) that are connected across twice the gap between buildings: a roof may have holes."""
+    """The groups of `xy` (n, 2) that are connected across twice the gap between buildings: a roof
+    may have holes.
+    """
     return connected_groups(xy, 2 * adapted_gap(xy))
 
 
 def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
-    """Ascending indices of each group of `xy` (n, 2) that is connected across gaps up to about `gap_m`.
+    """Ascending indices of each group of `xy` (n, 2) that is connected across gaps up to about
+    `gap_m`.
 
-    Occupied cells of half the gap, on the world's own grid, are connected where their centres are at most the gap apart;
-    groups come in the order of their first cell, by rows.
+    Occupied cells of half the gap, on the world's own grid, are connected where their centres are
+    at most the gap apart; groups come in the order of their first cell, by rows.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -234,10 +279,15 @@ def named(places: list[Place], xyz: np.ndarray) -> list[FoundBuilding]:
     return found
 
 
-def houses_or_error(group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool) -> list[Place]:
+def houses_or_error(
+    group: np.ndarray, xyz: np.ndarray, gap_m: float, split_houses: bool
+) -> list[Place]:
     """Divide a group of points into houses, or keep it whole with the error that this ended in."""
     try:
-        return [Place(index, shapely.make_valid(area)) for index, area in houses_of(group, xyz, gap_m, split_houses)]
+        return [
+            Place(index, shapely.make_valid(area))
+            for index, area in houses_of(group, xyz, gap_m, split_houses)
+        ]
     except Exception as error:
         return [failed_place(group, xyz, error)]
 
@@ -264,8 +314,12 @@ def houses_of(
 
 
 def hull_area(xy: np.ndarray) -> float:
-    """Plan area of the points' convex hull, wider by what a roof is expected to reach beyond its outermost points."""
-    return shapely.multipoints(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
+    """Plan area of the points' convex hull, wider by what a roof is expected to reach beyond its
+    outermost points.
+    """
+    return (
+        shapely.multipoints(xy).convex_hull.buffer(SPACINGS_BEYOND / np.sqrt(plan_density(xy))).area
+    )
 
 
 def cell_area(xy: np.ndarray, cell_m: float) -> shapely.Geometry:

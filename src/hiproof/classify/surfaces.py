@@ -1,4 +1,6 @@
-"""How smooth and how large the surface is that a point lies on: what tells roofs and walls from leaves."""
+"""How smooth and how large the surface is that a point lies on: what tells roofs and walls from
+leaves.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ import numpy as np
 
 from ..read.thin import hashes
 
-VOXEL_M = 0.5  # m; clouds are thinned to one point in such a cube, so that a drone's cloud costs no more
+# m; clouds are thinned to one point in such a cube, so that a drone's cloud costs no more
+VOXEL_M = 0.5
 NEIGHBOURS = 12  # points that tell how smooth the surface around one is
 SMOOTH_M = 0.1  # a plane with larger residuals is no surface, and a point farther off is not on it
 TURN_DEG = 10.0  # neighbours of one surface have planes that differ by less
@@ -17,11 +20,14 @@ LARGEST_M2 = 50.0  # surfaces of that size and larger are all alike
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Points thinned to one a voxel, (v, ...), and what each lies on; `voxel` (n,) is the one of each point given.
+    """Points thinned to one a voxel, (v, ...), and what each lies on;
 
-    `neighbours` (v, k) are the nearest voxels, itself first; `roughness_m` (v,) is the residual of the smoothest plane
-    among those through a neighbour's neighbours, `normal` (v, 3) that plane's, `is_smooth` (v,) whether the voxel lies on
-    it, and `extent_m2` (v,) the size of the surface that it belongs to.
+    `voxel` (n,) is the one of each point given.
+
+    `neighbours` (v, k) are the nearest voxels, itself first; `roughness_m` (v,) is the residual of
+    the smoothest plane among those through a neighbour's neighbours, `normal` (v, 3) that plane's,
+    `is_smooth` (v,) whether the voxel lies on it, and `extent_m2` (v,) the size of the surface that
+    it belongs to.
     """
 
     voxel: np.ndarray
@@ -39,7 +45,8 @@ class Surfaces:
 
 
 def surfaces_of(xyz: np.ndarray) -> Surfaces:
-    """The surfaces that points (n, 3), in world metres, lie on; the same whatever order they come in.
+    """The surfaces that points (n, 3), in world metres, lie on; the same whatever order they come
+    in.
 
     >>> x, y = np.meshgrid(np.arange(0, 8, 0.5), np.arange(0, 8, 0.5))
     >>> found = surfaces_of(np.column_stack([x.ravel(), y.ravel(), 0.5 * x.ravel()]))
@@ -64,7 +71,9 @@ def surfaces_of(xyz: np.ndarray) -> Surfaces:
 
 
 def one_a_voxel(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the voxel (n,) of each point."""
+    """Index (v,) of the point of each voxel whose coordinates' hash is the lowest, and the voxel
+    (n,) of each point.
+    """
     cell = np.floor(xyz / VOXEL_M).astype(np.int64)
     cell -= cell.min(axis=0)
     size = cell.max(axis=0) + 1
@@ -77,15 +86,21 @@ def one_a_voxel(xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def planes_through(groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Centre (v, 3), unit normal (v, 3) and residual (v,), one sigma, of the plane through each group of points (v, k, 3)."""
+    """Centre (v, 3), unit normal (v, 3) and residual (v,), one sigma, of the plane through each
+    group of points (v, k, 3).
+    """
     centre = groups.mean(axis=1)
     offset = groups - centre[:, None]
     values, vectors = np.linalg.eigh(np.einsum("vki,vkj->vij", offset, offset) / groups.shape[1])
     return centre, vectors[:, :, 0], np.sqrt(np.maximum(values[:, 0], 0.0))
 
 
-def connected(xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbours: np.ndarray) -> np.ndarray:
-    """Number (v,) of the surface of each voxel: neighbours are of one where both are smooth and lie in each other's plane."""
+def connected(
+    xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbours: np.ndarray
+) -> np.ndarray:
+    """Number (v,) of the surface of each voxel: neighbours are of one where both are smooth and lie
+    in each other's plane.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
@@ -96,5 +111,7 @@ def connected(xyz: np.ndarray, normal: np.ndarray, smooth: np.ndarray, neighbour
     same = np.abs((normal[one] * normal[other]).sum(axis=1)) > np.cos(np.radians(TURN_DEG))
     for end in (one, other):
         same &= np.abs((between * normal[end]).sum(axis=1)) < SMOOTH_M
-    links = coo_array((np.ones(same.sum(), np.int8), (one[same], other[same])), shape=(len(xyz),) * 2)
+    links = coo_array(
+        (np.ones(same.sum(), np.int8), (one[same], other[same])), shape=(len(xyz),) * 2
+    )
     return connected_components(links, directed=False)[1]

@@ -10,7 +10,10 @@ from itertools import takewhile
 from ..early import INTERRUPTED, interrupt_as_usual
 
 CUT_OFF = re.compile(r"//[^/@\s]*:(?!\d*(?:/|$))[^@]*$")  # an address that ends within its password
-KEPT = "interrupted; no file is left half written. What a run had finished is kept: the same command goes on from there"
+KEPT = (
+    "interrupted; no file is left half written. What a run had finished is kept: the same command "
+    "goes on from there"
+)
 
 
 def main() -> None:

@@ -45,7 +45,9 @@ class MaskingGroup(TyperGroup):
 
 @contextmanager
 def complaints_masked() -> Iterator[None]:
-    """Mask what click, which some versions of typer hold inside, says of wrong usage: it names arguments as they are."""
+    """Mask what click, which some versions of typer hold inside, says of wrong usage: it names
+    arguments as they are.
+    """
     try:
         yield
     except Exception as error:

@@ -6,7 +6,9 @@ import typer
 
 
 def attributes() -> None:
-    """Print every attribute and table that a run writes, with kind, unit and meaning, as Markdown."""
+    """Print every attribute and table that a run writes, with kind, unit and meaning, as
+    Markdown.
+    """
     from ..write.attribute_list import attributes_text
 
     typer.echo(attributes_text(), nl=False)

@@ -31,19 +31,35 @@ def print_schema(wanted: bool) -> None:
 
 @with_settings("write")
 def build(
-    parameters: Annotated[Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")],
+    parameters: Annotated[
+        Path, typer.Argument(help="a parameters.jsonl, as a run wrote it or changed by hand")
+    ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
     shapes: Annotated[
-        bool, typer.Option("--shapes", callback=print_shapes, is_eager=True, help="print every roof type's parameters")
+        bool,
+        typer.Option(
+            "--shapes",
+            callback=print_shapes,
+            is_eager=True,
+            help="print every roof type's parameters",
+        ),
     ] = False,
     schema: Annotated[
-        bool, typer.Option("--schema", callback=print_schema, is_eager=True, help="print the JSON schema of the file")
+        bool,
+        typer.Option(
+            "--schema",
+            callback=print_schema,
+            is_eager=True,
+            help="print the JSON schema of the file",
+        ),
     ] = False,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
-    """Build the models of a parameters.jsonl again, or of what a person made of it, drawn as the file says or as options do.
+    """Build the models of a parameters.jsonl again, or of what a person made of it, drawn as the
+    file says or as options do.
 
-    Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid solid, or unusable input.
+    Exit code: 0 all buildings were built, 1 an internal error, 2 some parameters make no valid
+    solid, or unusable input.
     """
     from ..parametric.run import build_file
     from .running import Bar, graded_words

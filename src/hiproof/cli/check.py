@@ -40,9 +40,13 @@ def count_invalid(files: list[Path], planarity_m: float) -> int:
             if findings:
                 bad += 1
                 codes.update({finding.code for finding in findings})
-                typer.echo(f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3]))
+                typer.echo(
+                    f"{path}: {id}: " + "; ".join(finding.message for finding in findings[:3])
+                )
         by_code = "".join(f", {number} with code {code}" for code, number in sorted(codes.items()))
         by_code += left_out.told()
-        typer.echo(f"{path}: {counted(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}")
+        typer.echo(
+            f"{path}: {counted(total, 'solid')}, {total - bad} valid, {bad} invalid{by_code}"
+        )
         invalid += bad + left_out.count
     return invalid

@@ -12,16 +12,23 @@ def classify(
     cloud: Annotated[Path, typer.Argument(help="LAS, LAZ or COPC file")],
     out: Annotated[Path, typer.Argument(help="LAZ or LAS file to write")],
     crs: Annotated[str | None, typer.Option(help="CRS of the cloud [default: as it says]")] = None,
-    unit: Annotated[str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
+    ] = None,
 ) -> None:
-    """Find ground (class 2) and buildings (6) by the shape of the cloud, and write a copy with these classes.
+    """Find ground (class 2) and buildings (6) by the shape of the cloud, and write a copy with
+    these classes.
 
-    Points that were of these classes and are found to be neither become unclassified (1); all other classes, and everything
-    else of the file, stay as they are. Noise, water and bridges are left alone.
+    Points that were of these classes and are found to be neither become unclassified (1); all other
+    classes, and everything else of the file, stay as they are. Noise, water and bridges are left
+    alone.
     """
     from ..classify.files import classify_file
     from ..settings import Settings
 
     read = {name: value for name, value in (("crs", crs), ("unit", unit)) if value is not None}
     counts = classify_file(cloud, out, Settings().replace({"read": read}))
-    typer.echo(f"{out}: {counts['ground']:,} ground and {counts['building']:,} building points of {counts['points']:,}")
+    typer.echo(
+        f"{out}: {counts['ground']:,} ground and {counts['building']:,} building points of "
+        f"{counts['points']:,}"
+    )

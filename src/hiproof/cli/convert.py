@@ -21,15 +21,22 @@ KINDS = ", ".join(f"{name} ({format.what})" for name, format in OF_MODELS.items(
 def convert(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     out: Annotated[
-        Path | None, typer.Argument(help="what to write [default: in the folder, named buildings as the run's own]")
+        Path | None,
+        typer.Argument(
+            help="what to write [default: in the folder, named buildings as the run's own]"
+        ),
     ] = None,
     format: Annotated[
-        Made | None, typer.Option(help=f"what to make: {KINDS} [default: by the name to write, else glb]")
+        Made | None,
+        typer.Option(help=f"what to make: {KINDS} [default: by the name to write, else glb]"),
     ] = None,
     crs: Annotated[str | None, typer.Option(help="CRS of the models [default: the run's]")] = None,
     geoid_height: Annotated[
         float | None,
-        typer.Option(help="height of the geoid above the ellipsoid, m, for 3dtiles [default: by pyproj's grid]"),
+        typer.Option(
+            help="height of the geoid above the ellipsoid, m, for 3dtiles [default: by pyproj's "
+            "grid]"
+        ),
     ] = None,
 ) -> None:
     """Convert the models of a run to a format of 3D viewers, with building ids, roof types and
@@ -40,7 +47,9 @@ def convert(
     name = format.value if format else format_of(out)
     given = {} if geoid_height is None else {"geoid_height_m": geoid_height}
     if given and name != "3dtiles":
-        raise InputError(f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out")
+        raise InputError(
+            f"expected --geoid-height with 3dtiles alone, got it with {name}; leave it out"
+        )
     path = out or Path(folder) / OF_MODELS[name].file
     try:
         left_out = convert_run(folder, path, name, crs, **given)
@@ -50,14 +59,18 @@ def convert(
         raise typer.Exit(left_out.exit_code)
 
 
-def convert_run(folder: Path, path: Path, name: str, crs: str | None = None, **given: float) -> LeftOut:
+def convert_run(
+    folder: Path, path: Path, name: str, crs: str | None = None, **given: float
+) -> LeftOut:
     """Write the models of the run in `folder` to `path` in the format `name`; returns what damage
     left out."""
     from ..view.run_models import run_buildings, run_crs_text
 
     left_out = LeftOut()
     buildings = left_out.sound(run_buildings(folder, left_out))
-    count = module_of(OF_MODELS[name].module).write_models(path, buildings, crs or run_crs_text(folder), **given)
+    count = module_of(OF_MODELS[name].module).write_models(
+        path, buildings, crs or run_crs_text(folder), **given
+    )
     typer.echo(f"{path}: {counted(count, 'building')}{left_out.told()}")
     return left_out
 
@@ -67,5 +80,7 @@ def format_of(out: Path | None) -> str:
     ending = "glb" if out is None else out.suffix.lower().removeprefix(".")
     if ending not in OF_MODELS:
         endings = ", ".join(f".{name}" for name in OF_MODELS)
-        raise InputError(f"expected a name that ends in one of {endings}, got {out}; or say --format")
+        raise InputError(
+            f"expected a name that ends in one of {endings}, got {out}; or say --format"
+        )
     return ending

@@ -13,18 +13,25 @@ from ..log import counted
 
 def edit(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
-    who: Annotated[str | None, typer.Option(help="name under which edits are kept [default: the user's]")] = None,
+    who: Annotated[
+        str | None, typer.Option(help="name under which edits are kept [default: the user's]")
+    ] = None,
     clouds: Annotated[
         Path | None,
         typer.Option(
-            exists=True, file_okay=False, help="folder in which the run's files lie now, where they were moved"
+            exists=True,
+            file_okay=False,
+            help="folder in which the run's files lie now, where they were moved",
         ),
     ] = None,
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port of the page [default: any that is free]")] = 0,
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="port of the page [default: any that is free]")
+    ] = 0,
 ) -> None:
     """Open a page on this machine to go through doubtful buildings, mend and accept them.
 
-    What is accepted stands in edits.jsonl in the folder, which `--overrides` of the next run obeys. Ctrl-C ends it.
+    What is accepted stands in edits.jsonl in the folder, which `--overrides` of the next run obeys.
+    Ctrl-C ends it.
     """
     from ..edit.desk import Desk
     from ..edit.edits import FILE
@@ -33,7 +40,10 @@ def edit(
     service = Service(Desk(folder, who or user_name(), clouds))
     with Server(service, port) as server:
         desk = service.desk
-        typer.echo(f"{counted(len(desk.run.rows), 'building')}, the most doubtful first; edits go into {folder / FILE}")
+        typer.echo(
+            f"{counted(len(desk.run.rows), 'building')}, the most doubtful first; edits go into "
+            f"{folder / FILE}"
+        )
         if desk.points.missing:
             typer.echo(desk.points.missing, err=True)
         typer.echo(f"open {service.address}")

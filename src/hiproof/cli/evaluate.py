@@ -1,4 +1,6 @@
-"""`hiproof evaluate`: how well the models of a run stand for points, footprints and a reference model."""
+"""`hiproof evaluate`: how well the models of a run stand for points, footprints and a reference
+model.
+"""
 
 from __future__ import annotations
 
@@ -21,24 +23,41 @@ SHOWN = {
     "share_within_20cm": "<0.2 m",
     "outline_iou": "IoU",
 }
-CAPTION = "<0.2 m: share of the points 0.3 m or more inside the outline that lie within 0.2 m over or under the roof"
-COMPARED = {"ref_ridge_height_m": "ridge", "ref_slope_deg": "slope", "ref_volume_relative": "volume"}
+CAPTION = (
+    "<0.2 m: share of the points 0.3 m or more inside the outline that lie within 0.2 m over or "
+    "under the roof"
+)
+COMPARED = {
+    "ref_ridge_height_m": "ridge",
+    "ref_slope_deg": "slope",
+    "ref_volume_relative": "volume",
+}
 DIFFERENCES = "ridge in m, slope in degrees, volume as a share of the reference's"
 
 
 def evaluate(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     clouds: Annotated[
-        list[str] | None, typer.Argument(help="point files to measure against [default: those of the run]")
+        list[str] | None,
+        typer.Argument(help="point files to measure against [default: those of the run]"),
     ] = None,
     footprints: Annotated[
-        str | None, typer.Option(help="building polygons [default: those of the run, else the models' own outlines]")
+        str | None,
+        typer.Option(
+            help="building polygons [default: those of the run, else the models' own outlines]"
+        ),
     ] = None,
-    layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
+    layer: Annotated[
+        str | None, typer.Option(help="layer of the footprints, where a file has several")
+    ] = None,
     reference: Annotated[str | None, typer.Option(help="CityJSON model to compare with")] = None,
-    out: Annotated[Path | None, typer.Option(help="folder for evaluation.csv and .json [default: the run's]")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="folder for evaluation.csv and .json [default: the run's]")
+    ] = None,
 ) -> None:
-    """Measure the models of a run: distances of points, shares, IoU and volume per building, per type and overall."""
+    """Measure the models of a run: distances of points, shares, IoU and volume per building, per
+    type and overall.
+    """
     from ..evaluate.evaluation import summarise, to_csv, to_json
     from ..evaluate.run import evaluate_run
     from ..write.files import atomic_file
@@ -47,17 +66,25 @@ def evaluate(
     run = evaluate_run(folder, clouds or (), footprints, reference, layer, left_out)
     left_out.refuse_all(model.is_damaged for model in run.models)
     if not run.clouds:
-        raise InputError(f"expected point files to measure {folder} against, got none; name them after it")
+        raise InputError(
+            f"expected point files to measure {folder} against, got none; name them after it"
+        )
     place = Path(out or folder)
     try:
-        for name, text in (("evaluation.csv", to_csv(run.figures)), ("evaluation.json", to_json(run.figures))):
+        for name, text in (
+            ("evaluation.csv", to_csv(run.figures)),
+            ("evaluation.json", to_json(run.figures)),
+        ):
             with atomic_file(place / name) as file:
                 file.write(text.encode())
     except OutputError as error:
-        raise elsewhere(error, f"hiproof evaluate {folder} --out FOLDER") if out is None else error from error
+        raise (
+            elsewhere(error, f"hiproof evaluate {folder} --out FOLDER") if out is None else error
+        ) from error
     print_summary(summarise(run.figures), reference is not None)
     typer.echo(
-        f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: {counted(len(run.figures), 'building')}{left_out.told()}"
+        f"{place / 'evaluation.csv'}, {place / 'evaluation.json'}: "
+        f"{counted(len(run.figures), 'building')}{left_out.told()}"
     )
     unmeasured = sum(math.isnan(figures.quality.psd_mean) for figures in run.figures)
     if unmeasured:
@@ -68,14 +95,17 @@ def evaluate(
 
 
 def print_summary(summary: dict, has_reference: bool) -> None:
-    """Means of the figures over the buildings of each roof type; those against a reference in a table of their own, so that
-    both fit a terminal of 80 columns."""
+    """Means of the figures over the buildings of each roof type; those against a reference in a
+    table of their own, so that both fit a terminal of 80 columns.
+    """
     from rich.console import Console
 
     console = Console(soft_wrap=True, markup=False)  # a roof type from outside may look like markup
     console.print(table_of(summary, SHOWN, "mean over buildings", CAPTION))
     if has_reference:
-        console.print(table_of(summary, COMPARED, "mean difference from the reference", DIFFERENCES))
+        console.print(
+            table_of(summary, COMPARED, "mean difference from the reference", DIFFERENCES)
+        )
 
 
 def table_of(summary: dict, columns: dict[str, str], title: str, caption: str) -> Any:
@@ -83,9 +113,18 @@ def table_of(summary: dict, columns: dict[str, str], title: str, caption: str) -
     from rich.table import Column, Table
 
     table = Table(
-        Column("type", no_wrap=True), "buildings", *columns.values(), title=title, caption=caption, pad_edge=False
+        Column("type", no_wrap=True),
+        "buildings",
+        *columns.values(),
+        title=title,
+        caption=caption,
+        pad_edge=False,
     )
     for kind, figures in summary.items():
         means = [figures[name]["mean"] if name in figures else None for name in columns]
-        table.add_row(kind, str(figures["buildings"]), *("" if mean is None else f"{mean:.3f}" for mean in means))
+        table.add_row(
+            kind,
+            str(figures["buildings"]),
+            *("" if mean is None else f"{mean:.3f}" for mean in means),
+        )
     return table

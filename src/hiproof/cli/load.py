@@ -15,7 +15,10 @@ def load(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     database: Annotated[str, typer.Argument(help="postgresql://user@host/database")],
     prefix: Annotated[
-        str, typer.Option(help="first part of the table names, at most 48 letters, digits and underscores")
+        str,
+        typer.Option(
+            help="first part of the table names, at most 48 letters, digits and underscores"
+        ),
     ] = "hiproof",
 ) -> None:
     """Load the models of a run into PostGIS tables; loading again replaces them.

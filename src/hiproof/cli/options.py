@@ -1,4 +1,6 @@
-"""Options of the command line that settings declare: name, help and default are told once, in `settings.py`."""
+"""Options of the command line that settings declare: name, help and default are told once, in
+`settings.py`.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ from ..settings import Settings, shown, toml_value
 
 
 class Declared(NamedTuple):
-    """A setting that the command line has: its section's name, the heading of that, and its field."""
+    """A setting that the command line has: its section's name, the heading of that, and its
+    field.
+    """
 
     section: str
     heading: str
@@ -28,21 +32,29 @@ class Declared(NamedTuple):
 
 
 def with_settings(*sections: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """Make of `command(..., changes)` one with an option for each setting that declares one, of all sections or those named.
+    """Make of `command(..., changes)` one with an option for each setting that declares one, of all
+    sections or those named.
 
-    What is given of them comes as `changes`. The options follow the command's own, a panel of its help a section.
+    What is given of them comes as `changes`. The options follow the command's own, a panel of its
+    help a section.
     """
     return functools.partial(with_options, sections=sections)
 
 
 def with_options(command: Callable[..., None], sections: tuple[str, ...]) -> Callable[..., None]:
-    """`command` with the options of the settings in `sections`, of all where none is named; see `with_settings`."""
+    """`command` with the options of the settings in `sections`, of all where none is named; see
+    `with_settings`.
+    """
     chosen = [one for one in declared_settings() if not sections or one.section in sections]
     declared = [one for one in chosen if one.field.metadata["option"]]
     by_name: dict[str, list[Declared]] = {}
     for one in declared:
         by_name.setdefault(one.parameter, []).append(one)
-    own = [p for p in inspect.signature(command, eval_str=True).parameters.values() if p.name != "changes"]
+    own = [
+        p
+        for p in inspect.signature(command, eval_str=True).parameters.values()
+        if p.name != "changes"
+    ]
     parameters = [*own, *(parameter_of(name, same) for name, same in by_name.items())]
 
     def typed(**values: Any) -> None:
@@ -70,7 +82,9 @@ def parameter_of(name: str, same: list[Declared]) -> inspect.Parameter:
     told = same[-1].field.metadata
     metavar = "|".join(map(str, told["choices"])) or None
     option = typer.Option(
-        help="; ".join(help_of(one.field) for one in same), metavar=metavar, rich_help_panel=same[0].heading
+        help="; ".join(help_of(one.field) for one in same),
+        metavar=metavar,
+        rich_help_panel=same[0].heading,
     )
     kind: Any = Annotated[KINDS[same[0].field.type] | None, option]
     return inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None, annotation=kind)
@@ -85,7 +99,9 @@ KINDS: dict[Any, Any] = {
     "tuple[float, ...]": list[float],
     "tuple[str, ...]": str,
 }
-"""What the command line takes for a setting of a declared type: numbers one option each, texts joined by commas."""
+"""What the command line takes for a setting of a declared type: numbers one option each, texts
+joined by commas.
+"""
 
 
 def help_of(field: dataclasses.Field) -> str:
@@ -107,7 +123,9 @@ def changes_of(declared: list[Declared], given: dict[str, Any]) -> dict[str, dic
 
 
 def box_of(text: str) -> tuple[float, float, float, float]:
-    """The box that `--bbox` names. Raises SettingsError for anything else than four numbers in order.
+    """The box that `--bbox` names.
+
+    Raises SettingsError for anything else than four numbers in order.
 
     >>> box_of("85000,446000, 85100,446050")
     (85000.0, 446000.0, 85100.0, 446050.0)
@@ -120,6 +138,7 @@ def box_of(text: str) -> tuple[float, float, float, float]:
         if xmin < xmax and ymin < ymax:
             return xmin, ymin, xmax, ymax
     raise SettingsError(
-        f"expected --bbox as xmin,ymin,xmax,ymax with xmin < xmax and ymin < ymax, got {shown(text)}; "
+        "expected --bbox as xmin,ymin,xmax,ymax with xmin < xmax and ymin < ymax, got "
+        f"{shown(text)}; "
         "try --bbox 85000,446000,85500,446500"
     )

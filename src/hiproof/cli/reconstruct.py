@@ -17,36 +17,69 @@ BESIDE = "hiproof.toml"
 
 @with_settings()
 def reconstruct(
-    clouds: Annotated[list[str], typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them")],
+    clouds: Annotated[
+        list[str],
+        typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
+    ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
-    footprints: Annotated[str | None, typer.Option(help="building polygons; without them the cloud is split")] = None,
-    layer: Annotated[str | None, typer.Option(help="layer of the footprints, where a file has several")] = None,
-    where: Annotated[str | None, typer.Option(help='SQL condition on the footprints, such as "year < 1950"')] = None,
-    bbox: Annotated[
-        str | None, typer.Option(help="only buildings in this box: xmin,ymin,xmax,ymax in the clouds' coordinates")
+    footprints: Annotated[
+        str | None, typer.Option(help="building polygons; without them the cloud is split")
     ] = None,
-    id_attribute: Annotated[str | None, typer.Option(help="footprint attribute that names buildings")] = None,
+    layer: Annotated[
+        str | None, typer.Option(help="layer of the footprints, where a file has several")
+    ] = None,
+    where: Annotated[
+        str | None, typer.Option(help='SQL condition on the footprints, such as "year < 1950"')
+    ] = None,
+    bbox: Annotated[
+        str | None,
+        typer.Option(
+            help="only buildings in this box: xmin,ymin,xmax,ymax in the clouds' coordinates"
+        ),
+    ] = None,
+    id_attribute: Annotated[
+        str | None, typer.Option(help="footprint attribute that names buildings")
+    ] = None,
     terrain: Annotated[
-        str | None, typer.Option(help="terrain model (GeoTIFF; extra `terrain`); else the cloud's ground class")
+        str | None,
+        typer.Option(
+            help="terrain model (GeoTIFF; extra `terrain`); else the cloud's ground class"
+        ),
     ] = None,
     overrides: Annotated[
-        str | None, typer.Option(help="what is known better of some buildings (JSONL or a table); the fit obeys it")
+        str | None,
+        typer.Option(
+            help="what is known better of some buildings (JSONL or a table); the fit obeys it"
+        ),
     ] = None,
     config: Annotated[
-        Path | None, typer.Option(help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)")
+        Path | None,
+        typer.Option(
+            help="settings file, see `hiproof settings` (default: hiproof.toml beside the data)"
+        ),
     ] = None,
     jobs: Annotated[
-        int | None, typer.Option(help="processes on this machine (default: as many as pay, a core each)")
+        int | None,
+        typer.Option(help="processes on this machine (default: as many as pay, a core each)"),
     ] = None,
-    scheduler: Annotated[str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")] = None,
-    restart: Annotated[bool, typer.Option("--restart", help="begin anew in a folder that holds another run")] = False,
-    log_file: Annotated[Path | None, typer.Option(help="keep the log from progress on here, added at the end")] = None,
-    log_level: Annotated[Level, typer.Option(help="what of the log to show; debug also in the file")] = Level.warning,
+    scheduler: Annotated[
+        str | None, typer.Option(help="address of a Dask scheduler (extra `city`)")
+    ] = None,
+    restart: Annotated[
+        bool, typer.Option("--restart", help="begin anew in a folder that holds another run")
+    ] = False,
+    log_file: Annotated[
+        Path | None, typer.Option(help="keep the log from progress on here, added at the end")
+    ] = None,
+    log_level: Annotated[
+        Level, typer.Option(help="what of the log to show; debug also in the file")
+    ] = Level.warning,
     changes: dict[str, dict[str, Any]] | None = None,
 ) -> None:
     """Reconstruct the buildings of point clouds into CityGML, CityJSON, parameters and attributes.
 
-    Exit code: 0 all buildings were modelled or explained by their data, 1 an internal error, 2 unusable input.
+    Exit code: 0 all buildings were modelled or explained by their data, 1 an internal error, 2
+    unusable input.
     """
     from ..city.request import Request
     from ..read.pointcloud import expand_paths
@@ -83,7 +116,9 @@ def settings_beside(*inputs: str | None) -> Path | None:
     found = [folder / BESIDE for folder in folders if (folder / BESIDE).is_file()]
     if len(found) > 1:
         names = ", ".join(map(str, found))
-        raise SettingsError(f"expected one {BESIDE} beside the data, got {names}; name one with --config")
+        raise SettingsError(
+            f"expected one {BESIDE} beside the data, got {names}; name one with --config"
+        )
     if found:
         LOGGER.warning("settings are those of %s; name others with --config", found[0])
     return found[0] if found else None

@@ -16,11 +16,16 @@ from ..write.files import elsewhere
 def report(
     folder: Annotated[Path, typer.Argument(help="output folder of a run")],
     clouds: Annotated[
-        list[str] | None, typer.Argument(help="point files [default: those of the run, if still there]")
+        list[str] | None,
+        typer.Argument(help="point files [default: those of the run, if still there]"),
     ] = None,
-    footprints: Annotated[str | None, typer.Option(help="building polygons [default: those of the run]")] = None,
+    footprints: Annotated[
+        str | None, typer.Option(help="building polygons [default: those of the run]")
+    ] = None,
     layer: Annotated[str | None, typer.Option(help="layer of the footprints")] = None,
-    out: Annotated[Path | None, typer.Option(help="file to write [default: report.html in the folder]")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="file to write [default: report.html in the folder]")
+    ] = None,
 ) -> None:
     """Write one HTML page (no network needed): map, 3D view, distributions, the worst buildings,
     settings.
@@ -32,12 +37,16 @@ def report(
     from ..evaluate.run import evaluate_run
 
     path, left_out = out or Path(folder) / "report.html", LeftOut()
-    run = evaluate_run(folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True)
+    run = evaluate_run(
+        folder, clouds or (), footprints, layer=layer, damaged=left_out, must_be_valid=True
+    )
     left_out.refuse_all(model.is_damaged for model in run.models)
     try:
         write_report(path, run, title=f"hiproof: {Path(folder).resolve().name}")
     except OutputError as error:
-        raise elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error from error
+        raise (
+            elsewhere(error, f"hiproof report {folder} --out FILE") if out is None else error
+        ) from error
     size = f"{path.stat().st_size / 1e6:.1f} MB"
     typer.echo(f"{path}: {counted(len(run.models), 'building')}, {size}{left_out.told()}")
     if left_out.exit_code:

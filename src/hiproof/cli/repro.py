@@ -11,11 +11,14 @@ from ..log import Level, start
 
 
 def repro(
-    folder: Annotated[Path, typer.Argument(help="folder that a run kept of a failed building (OUT/failures/ID)")],
+    folder: Annotated[
+        Path, typer.Argument(help="folder that a run kept of a failed building (OUT/failures/ID)")
+    ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
     log_level: Annotated[Level, typer.Option(help="what of the log to show")] = Level.warning,
 ) -> None:
-    """Run a building again that hiproof failed on, to repeat the failure or to see that it is mended.
+    """Run a building again that hiproof failed on, to repeat the failure or to see that it is
+    mended.
 
     Exit code: 0 the building has an outcome, 1 the failure repeats, 2 the folder cannot be used.
     """

@@ -64,7 +64,9 @@ def graded_words(by_quality: Mapping[str, int]) -> str:
 
 
 def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> None:
-    """The table at the end: buildings by status and by type, figures, time, and every failure by name."""
+    """The table at the end: buildings by status and by type, figures, time, and every failure by
+    name.
+    """
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -78,18 +80,29 @@ def print_summary(summary: Summary, show: Callable[..., None] | None = None) -> 
     if summary.by_quality:
         show("quality: " + graded_words(summary.by_quality))
     if summary.by_type:
-        show("roof types: " + ", ".join(f"{number} {name}" for name, number in summary.by_type.items()))
+        show(
+            "roof types: "
+            + ", ".join(f"{number} {name}" for name, number in summary.by_type.items())
+        )
     if summary.median_psd is not None:
-        show(f"median over buildings of the mean distance of all points, facades included: {summary.median_psd:.3f} m")
+        show(
+            "median over buildings of the mean distance of all points, facades included: "
+            f"{summary.median_psd:.3f} m"
+        )
     if summary.mean_share is not None:
         share = f"{100 * summary.mean_share:.1f} % of the points 0.3 m or more inside the outline"
         show(f"mean over buildings: {share} lie within 0.2 m of the roof")
     if summary.doubts:
-        doubtful = (f"{counted(count, 'building')} ({doubt.told})" for doubt, count in summary.doubts.items())
+        doubtful = (
+            f"{counted(count, 'building')} ({doubt.told})"
+            for doubt, count in summary.doubts.items()
+        )
         show("read the detail of " + ", ".join(doubtful))
     if not summary.units.are_metres:
         show(f"coordinates are in {summary.units}; attributes and parameters in metres")
-    show("time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items()))
+    show(
+        "time: " + ", ".join(f"{step} {seconds:.1f} s" for step, seconds in summary.seconds.items())
+    )
     for name, why in summary.broken_inputs:
         show(Text.assemble(("could not be read:", "red"), f" {name}: {why}"))
     for id, why in summary.failures:

@@ -1,4 +1,6 @@
-"""`hiproof segment`: label the points of buildings with roof types and write them with a table of types."""
+"""`hiproof segment`: label the points of buildings with roof types and write them with a table of
+types.
+"""
 
 from __future__ import annotations
 
@@ -10,19 +12,29 @@ import typer
 
 def segment(
     clouds: Annotated[
-        list[Path], typer.Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)")
+        list[Path],
+        typer.Argument(help="point files, one building each (LAS, LAZ, COPC, XYZ, CSV, PLY)"),
     ],
-    out: Annotated[Path, typer.Option(help="LAZ file for the labelled points; the table lies beside it as CSV")],
-    crs: Annotated[str | None, typer.Option(help="CRS of the clouds [default: as they say]")] = None,
-    unit: Annotated[str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")] = None,
-    weights: Annotated[str, typer.Option(help="ONNX file with other weights than the shipped ones")] = "",
+    out: Annotated[
+        Path, typer.Option(help="LAZ file for the labelled points; the table lies beside it as CSV")
+    ],
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of the clouds [default: as they say]")
+    ] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="metre, foot or us-survey-foot, for clouds without a CRS")
+    ] = None,
+    weights: Annotated[
+        str, typer.Option(help="ONNX file with other weights than the shipped ones")
+    ] = "",
     device: Annotated[str, typer.Option(help="cpu or cuda")] = "cpu",
 ) -> None:
-    """Label every point with a roof type or not-roof, and name each building's type (extra `network`).
+    """Label every point with a roof type or not-roof, and name each building's type (extra
+    `network`).
 
-    The LAZ has the extra dimensions roof_type (number of the type in the table's columns, from 1; 0 is no roof),
-    not_roof (probability) and building (the file's number on the command line, from 1). Exit code 1 if a building
-    could not be labelled; the others are written all the same.
+    The LAZ has the extra dimensions roof_type (number of the type in the table's columns, from 1; 0
+    is no roof), not_roof (probability) and building (the file's number on the command line, from
+    1). Exit code 1 if a building could not be labelled; the others are written all the same.
     """
     from ..segment.files import segment_files
     from ..settings import Settings

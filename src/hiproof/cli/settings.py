@@ -13,7 +13,9 @@ from ..settings import Settings
 
 def settings(
     config: Annotated[Path | None, typer.Option(help="start from this settings file")] = None,
-    write: Annotated[Path | None, typer.Option(help="write the TOML here instead of printing it")] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="write the TOML here instead of printing it")
+    ] = None,
 ) -> None:
     """Print every setting as TOML, with default, unit, bounds and meaning."""
     text = (Settings.from_toml(config) if config else Settings()).to_toml()
@@ -23,4 +25,6 @@ def settings(
     try:
         write.write_text(text, encoding="utf-8")
     except OSError as error:
-        raise OutputError(f"expected to write settings to {write}, got: {error}; choose another place") from error
+        raise OutputError(
+            f"expected to write settings to {write}, got: {error}; choose another place"
+        ) from error

@@ -17,9 +17,16 @@ from .convert import convert_run
 
 
 def view(
-    folder: Annotated[Path, typer.Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote")],
-    port: Annotated[int, typer.Option(min=0, max=65535, help="port on this machine [default: any that is free]")] = 0,
-    browser: Annotated[bool, typer.Option(help="open the browser, or only tell the address")] = True,
+    folder: Annotated[
+        Path,
+        typer.Argument(help="output folder of a run, or a folder of 3D Tiles that hiproof wrote"),
+    ],
+    port: Annotated[
+        int, typer.Option(min=0, max=65535, help="port on this machine [default: any that is free]")
+    ] = 0,
+    browser: Annotated[
+        bool, typer.Option(help="open the browser, or only tell the address")
+    ] = True,
 ) -> None:
     """Show the models of a run in the browser, without a network: 3D Tiles are made of them first,
     where they are not yet.
@@ -30,7 +37,10 @@ def view(
 
     from ..view.server import server_of
 
-    with tiles_of(folder) as tiles, server_of(tiles, f"hiproof: {folder.resolve().name}", port) as server:
+    with (
+        tiles_of(folder) as tiles,
+        server_of(tiles, f"hiproof: {folder.resolve().name}", port) as server,
+    ):
         typer.echo(f"{server.address} shows {folder}; Ctrl-C ends")
         if browser:
             webbrowser.open(server.address)
@@ -53,7 +63,10 @@ def tiles_of(folder: Path) -> Iterator[Path]:
         return
     tiles, models = folder / FORMATS["3dtiles"].file, run_models(folder)
     with tempfile.TemporaryDirectory(prefix="hiproof-view-") as elsewhere:
-        if not (tiles / TILESET).is_file() or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime:
+        if (
+            not (tiles / TILESET).is_file()
+            or (tiles / TILESET).stat().st_mtime < models.stat().st_mtime
+        ):
             try:
                 convert_run(folder, tiles, "3dtiles")
             except OutputError as error:

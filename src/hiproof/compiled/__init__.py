@@ -3,10 +3,11 @@
     @compiled
     def distance(points, planes): ...
 
-numba's own cache looks at the file of the function alone, though functions and constants of other files are compiled
-into it, and takes old code for new after an upgrade. Here code belongs to a stamp of all its sources (stamp.py) and is
-kept under it (kept.py); wheels and images carry code for a kind of processors (kinds.py); large functions are called, not
-copied (linking.py); who wants to show that something is being compiled is told by news.py.
+numba's own cache looks at the file of the function alone, though functions and constants of other
+files are compiled into it, and takes old code for new after an upgrade. Here code belongs to a
+stamp of all its sources (stamp.py) and is kept under it (kept.py); wheels and images carry code for
+a kind of processors (kinds.py); large functions are called, not copied (linking.py); who wants to
+show that something is being compiled is told by news.py.
 """
 
 from __future__ import annotations
@@ -18,10 +19,12 @@ from typing import Any
 
 
 def compiled(function: Callable | None = None, *, allocates: bool = True, **options: Any) -> Any:
-    """`numba.njit` with its options, as a decorator with or without them, for functions at the top of a module.
+    """`numba.njit` with its options, as a decorator with or without them, for functions at the top
+    of a module.
 
-    A division by zero gives infinity or NaN, as in NumPy. A function that makes no array and is called a million times
-    says `allocates=False`: then it counts no references to those it reads, which cost a tenth of its time.
+    A division by zero gives infinity or NaN, as in NumPy. A function that makes no array and is
+    called a million times says `allocates=False`: then it counts no references to those it reads,
+    which cost a tenth of its time.
 
     >>> @compiled(fastmath=True)
     ... def half(x):
@@ -33,7 +36,8 @@ def compiled(function: Callable | None = None, *, allocates: bool = True, **opti
         return functools.partial(compiled, allocates=allocates, **options)
     import numba  # not before it is needed: the command line shows its help without
 
-    options = {"error_model": "numpy", "no_cfunc_wrapper": True} | options  # both only for what is compiled sooner
+    # both only for what is compiled sooner
+    options = {"error_model": "numpy", "no_cfunc_wrapper": True} | options
     if not allocates:
         options["_nrt"] = False
     file = Path(function.__code__.co_filename)
@@ -44,5 +48,8 @@ def compiled(function: Callable | None = None, *, allocates: bool = True, **opti
 
     kept = Kept(function, file)
     dispatcher = numba.njit(pipeline_class=pipeline_of(kept.stamp), **options)(function)
-    dispatcher._cache, dispatcher.get_call_template = kept, without_literals(dispatcher.get_call_template)
+    dispatcher._cache, dispatcher.get_call_template = (
+        kept,
+        without_literals(dispatcher.get_call_template),
+    )
     return dispatcher

@@ -1,10 +1,13 @@
-"""Where compiled code is kept: a file for each function, stamp of its sources, argument types and processor.
+"""Where compiled code is kept: a file for each function, stamp of its sources, argument types and
+processor.
 
-Code for the kind of processors that wheels carry (kinds.py) is read where there is none for this machine's own.
+Code for the kind of processors that wheels carry (kinds.py) is read where there is none for this
+machine's own.
 
-What has another stamp is never read, and is removed when its successor is written. Files lie in NUMBA_CACHE_DIR, beside
-the sources, or in the user's cache folder: read from any, written to the first that can be written. Where none can,
-functions are compiled in every process, and a warning says so once.
+What has another stamp is never read, and is removed when its successor is written. Files lie in
+NUMBA_CACHE_DIR, beside the sources, or in the user's cache folder: read from any, written to the
+first that can be written. Where none can, functions are compiled in every process, and a warning
+says so once.
 """
 
 from __future__ import annotations
@@ -32,7 +35,9 @@ from .stamp import PYTHON, stamp_of
 
 
 class Kept:
-    """One function's code on disk, a file for each tuple of argument types; numba asks it as it asks its own cache."""
+    """One function's code on disk, a file for each tuple of argument types; numba asks it as it
+    asks its own cache.
+    """
 
     def __init__(self, function: Callable, file: Path):
         self.function, self.name = function, f"{function.__module__}.{function.__qualname__}"
@@ -47,7 +52,8 @@ class Kept:
     def load_overload(self, signature: Any, context: Any) -> Any:
         """The code for these argument types, or None where it has to be compiled.
 
-        What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs its memory alone.
+        What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs
+        its memory alone.
         """
         rtsys.initialize(context)
         for file in self.places(signature, context.codegen().magic_tuple()):
@@ -100,15 +106,18 @@ class Kept:
         return f"{self.start}-{key}.{PYTHON}.nbc"
 
     def flush(self) -> None:
-        """Forget the code that is kept; numba asks for it when a function is to be compiled again."""
+        """Forget the code that is kept; numba asks for it when a function is to be compiled
+        again.
+        """
         for folder in self.folders:
             for file in folder.glob(f"{self.start}-*.{PYTHON}.nbc"):
                 file.unlink(missing_ok=True)
 
 
 def reduced(result: Any) -> tuple:
-    """What is pickled of a result: without the environments of copied functions that hold no constant, which no code
-    reads; loading them would import half of numba."""
+    """What is pickled of a result: without the environments of copied functions that hold no
+    constant, which no code reads; loading them would import half of numba.
+    """
     *code, environments = result._reduce()
     return *code, tuple(environment for environment in environments if environment.consts)
 
@@ -119,7 +128,8 @@ def folders(function: Callable, file: str) -> tuple[Path, ...]:
     if numba.config.CACHE_DIR:
         kinds.insert(0, caching.UserProvidedCacheLocator)
     places = (Path(kind(function, file).get_cache_path()) for kind in kinds)
-    return tuple(place for place in places if place.is_absolute())  # a user without a home has "~/.cache"
+    # a user without a home has "~/.cache"
+    return tuple(place for place in places if place.is_absolute())
 
 
 @functools.cache
@@ -140,8 +150,10 @@ def place_to_write(places: tuple[Path, ...]) -> Path | None:
 def warn_not_kept() -> None:
     """Say once what it costs, and what to do."""
     warnings.warn(
-        "expected a folder where compiled functions can be kept, got none that can be written (beside the installed "
-        "package, the user's cache folder); every process compiles for minutes until NUMBA_CACHE_DIR names one",
+        "expected a folder where compiled functions can be kept, got none that can be written "
+        "(beside the installed "
+        "package, the user's cache folder); every process compiles for minutes until "
+        "NUMBA_CACHE_DIR names one",
         NotKeptWarning,
         stacklevel=2,
     )
@@ -149,7 +161,9 @@ def warn_not_kept() -> None:
 
 @functools.cache
 def remove_outdated(folder: Path, module: str, stamp: str) -> None:
-    """Remove what this Python compiled from another state of the module's sources; other Pythons still use theirs."""
+    """Remove what this Python compiled from another state of the module's sources; other Pythons
+    still use theirs.
+    """
     for file in folder.glob(f"{module}.*.{PYTHON}.*"):
         if f"-{stamp}-" not in file.name:
             file.unlink(missing_ok=True)

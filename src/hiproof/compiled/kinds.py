@@ -1,6 +1,8 @@
-"""The kind of processors that code in wheels and images is for: it was made on another machine than it runs on.
+"""The kind of processors that code in wheels and images is for: it was made on another machine than
+it runs on.
 
-Code of one's own processor comes first (`hiproof warm` compiles it); it is 1.05 to 1.1 times as fast.
+Code of one's own processor comes first (`hiproof warm` compiles it); it is 1.05 to 1.1 times as
+fast.
 """
 
 from __future__ import annotations
@@ -12,17 +14,22 @@ import numba
 from llvmlite.binding import get_host_cpu_features, get_host_cpu_name
 
 KIND = "x86-64-v3"  # AVX2: Intel since 2013, AMD since 2015
-FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")  # beyond those of any x86-64 processor with AVX
+# beyond those of any x86-64 processor with AVX
+FEATURES = ("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe")
 
 
 def own_processor() -> str:
-    """What is compiled for: this machine's processor, or the kind that numba's own variable names."""
+    """What is compiled for: this machine's processor, or the kind that numba's own variable
+    names.
+    """
     return numba.config.CPU_NAME or get_host_cpu_name()
 
 
 @functools.cache
 def runs_kind() -> bool:
-    """Whether this machine's processor is of that KIND; not where numba's own variables say what to compile for."""
+    """Whether this machine's processor is of that KIND; not where numba's own variables say what to
+    compile for.
+    """
     if numba.config.CPU_NAME or numba.config.CPU_FEATURES or not numba.config.ENABLE_AVX:
         return False
     if platform.machine() not in ("x86_64", "AMD64"):

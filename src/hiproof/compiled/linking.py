@@ -1,9 +1,9 @@
 """Large functions are called by other compiled functions, not copied into them.
 
-numba links a function's code into every caller's, where LLVM optimises all of it once more. Of what is too large to be
-inlined nothing comes of that but time: here a caller gets an empty module in its place, and the address when it is
-loaded. So a function's symbol has to be the same in whatever process it was compiled (its stamp is in it), and what a
-function calls has to be loaded before it.
+numba links a function's code into every caller's, where LLVM optimises all of it once more. Of what
+is too large to be inlined nothing comes of that but time: here a caller gets an empty module in its
+place, and the address when it is loaded. So a function's symbol has to be the same in whatever
+process it was compiled (its stamp is in it), and what a function calls has to be loaded before it.
 """
 
 from __future__ import annotations
@@ -18,8 +18,9 @@ import llvmlite.binding as llvm
 from numba.core import bytecode, compiler, types
 from numba.core.codegen import JITCodeLibrary
 
-# numba numbers the functions of its own library from 1 in every process, and the numbers stand in their symbols: code that
-# two processes kept would meet in a third with one symbol for two functions.
+# numba numbers the functions of its own library from 1 in every process, and the numbers stand in
+# their symbols: code that two processes kept would meet in a third with one symbol for two
+# functions.
 bytecode.FunctionIdentity._unique_ids = itertools.count(uuid.uuid4().int >> 80)
 
 LARGE = 80  # instructions; LLVM inlines fewer
@@ -38,8 +39,9 @@ class Callee(NamedTuple):
 
 
 class Loaded(JITCodeLibrary):
-    """numba's library of a function that was compiled before: its machine code as it is; what callers would copy of it is
-    read when one is compiled."""
+    """numba's library of a function that was compiled before: its machine code as it is; what
+    callers would copy of it is read when one is compiled.
+    """
 
     _shared_module: Any
 
@@ -56,7 +58,9 @@ class Loaded(JITCodeLibrary):
 
 
 def pipeline_of(stamp: str) -> type[compiler.Compiler]:
-    """numba's compiler for functions of a source file with this `stamp`, which is part of their symbols."""
+    """numba's compiler for functions of a source file with this `stamp`, which is part of their
+    symbols.
+    """
 
     class Stamped(compiler.Compiler):
         def compile_extra(self, function: Callable) -> Any:
@@ -81,12 +85,16 @@ def without_literals(call_template: Callable) -> Callable:
 
 
 def settle(result: Any, function: Callable, signature: Any) -> None:
-    """Note which large functions the code of a just compiled `result` calls, and be called as one if it is one."""
+    """Note which large functions the code of a just compiled `result` calls, and be called as one
+    if it is one.
+    """
     library = result.library
     library.calls, library.is_called_as = tuple(dict.fromkeys(called_by(library))), None
     if is_large(library.get_function(result.fndesc.mangled_name)):
         library.is_called_as = Callee(function.__module__, function.__qualname__, signature)
-        library._shared_module = llvm.parse_assembly(str(library.codegen._create_empty_module(library.name)))
+        library._shared_module = llvm.parse_assembly(
+            str(library.codegen._create_empty_module(library.name))
+        )
 
 
 def links(result: Any) -> tuple[tuple[Callee, ...], Callee | None]:
@@ -95,7 +103,9 @@ def links(result: Any) -> tuple[tuple[Callee, ...], Callee | None]:
 
 
 def called_by(library: Any) -> Iterator[Callee]:
-    """The large functions that a library's code refers to, by itself or in what was copied into it."""
+    """The large functions that a library's code refers to, by itself or in what was copied
+    into it.
+    """
     for linked in library._linking_libraries:
         callee = getattr(linked, "is_called_as", None)
         yield from getattr(linked, "calls", ()) if callee is None else (callee,)
@@ -106,14 +116,30 @@ def is_large(function: Any) -> bool:
     return next(itertools.islice(instructions, LARGE, None), None) is not None
 
 
-def rebuilt(context: Any, code: tuple, calls: tuple[Callee, ...], is_called_as: Callee | None) -> Any:
+def rebuilt(
+    context: Any, code: tuple, calls: tuple[Callee, ...], is_called_as: Callee | None
+) -> Any:
     """The result of compiling from what was kept of it, after what it calls."""
     for callee in calls:
         callee.load()
-    (name, _, kept), described, constants, signature, objectmode, lifted, annotation, _, environments = code
+    (
+        (name, _, kept),
+        described,
+        constants,
+        signature,
+        objectmode,
+        lifted,
+        annotation,
+        _,
+        environments,
+    ) = code
     codegen = context.codegen()
     codegen._engine._defined_symbols.update(
-        (described.llvm_func_name, described.llvm_cpython_wrapper_name, described.llvm_cfunc_wrapper_name)
+        (
+            described.llvm_func_name,
+            described.llvm_cpython_wrapper_name,
+            described.llvm_cfunc_wrapper_name,
+        )
     )
     library = Loaded(codegen, name, *kept)
     library.calls, library.is_called_as = calls, is_called_as

@@ -1,7 +1,8 @@
 """News of compiling: how many functions are ready, and who shows it while the user waits.
 
-`listener` is called before and after a function is compiled, with the numbers of ready and of all functions. Compiling
-takes a minute or so, once for each version, and silence would look like a hang; where nobody listens the news goes into the log.
+`listener` is called before and after a function is compiled, with the numbers of ready and of all
+functions. Compiling takes a minute or so, once for each version, and silence would look like a
+hang; where nobody listens the news goes into the log.
 """
 
 from __future__ import annotations
@@ -11,10 +12,13 @@ from collections.abc import Callable
 
 from .stamp import count_compiled
 
-FAILED = "failed"  # what a process that compiles answers where a piece did not come to its end; else the piece's name
-SECONDS_A_FUNCTION = 0.35  # of one core, with everything that it stands on: 82 to 127 s for 315 of them
+# what a process that compiles answers where a piece did not come to its end; else the piece's name
+FAILED = "failed"
+# of one core, with everything that it stands on: 82 to 127 s for 315 of them
+SECONDS_A_FUNCTION = 0.35
 
-ready: set[str] = set()  # functions that were compiled or loaded in this process, or by those that it started
+# functions that were compiled or loaded in this process, or by those that it started
+ready: set[str] = set()
 processes = 1  # that compile at the moment
 
 
@@ -26,11 +30,16 @@ def headline(done: int, total: int) -> str:
     """
     number = total - done
     seconds = 10 * -(-number * SECONDS_A_FUNCTION // (10 * processes))
-    return f"compiling for this machine, once for each version: up to {number} functions, about {seconds:.0f} s"
+    return (
+        f"compiling for this machine, once for each version: up to {number} functions, about "
+        f"{seconds:.0f} s"
+    )
 
 
 class Lines:
-    """The news as a few lines: the headline before anything is compiled, then one at every further tenth."""
+    """The news as a few lines: the headline before anything is compiled, then one at every further
+    tenth.
+    """
 
     def __init__(self, say: Callable[[str], None]):
         self.say = say

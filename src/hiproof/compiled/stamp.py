@@ -1,9 +1,9 @@
 """The stamp of a source file: one digest of all that decides what its functions compile to.
 
-Compiling puts functions and constants of other files into a function, so the stamp is made of the file's text and of the
-texts of all files of its package that imports lead to from there, with the versions of the compiler and of NumPy. A
-change of any of them is a new stamp; one elsewhere is not. Imports inside functions do not count: compiled code knows the
-names at the top of a module alone.
+Compiling puts functions and constants of other files into a function, so the stamp is made of the
+file's text and of the texts of all files of its package that imports lead to from there, with the
+versions of the compiler and of NumPy. A change of any of them is a new stamp; one elsewhere is not.
+Imports inside functions do not count: compiled code knows the names at the top of a module alone.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 IMPORT = re.compile(
-    r"^(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ \t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
+    r"^(?:from[ \t]+(?P<dots>\.*)(?P<module>[\w.]*)[ \t]+import[ "
+    r"\t]+(?P<names>\([^)]*\)|.+)|import[ \t]+(?P<modules>.+))$",
     re.MULTILINE,
 )
 # the same for all its patches, which run the same code
@@ -59,12 +60,15 @@ def digest(files: Iterable[Path]) -> str:
 @functools.cache
 def digest_of(file: Path) -> bytes:
     """Digests of a file's place and of its text, one after the other."""
-    return b"".join(hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), text_of(file)))
+    return b"".join(
+        hashlib.sha256(text).digest() for text in (place_in_package(file).encode(), text_of(file))
+    )
 
 
 @functools.cache
 def version_of(library: str) -> str:
-    from importlib.metadata import version  # slow to import, and the command line's help needs no stamp
+    # slow to import, and the command line's help needs no stamp
+    from importlib.metadata import version
 
     return version(library)
 
@@ -77,7 +81,8 @@ def text_of(file: Path) -> bytes:
 def closure(file: Path) -> set[Path]:
     """The file and all files that its imports lead to, within its own package and hiproof.
 
-    How code is kept changes nothing of it, so of this folder only the decorator and the linking count, which no import names.
+    How code is kept changes nothing of it, so of this folder only the decorator and the linking
+    count, which no import names.
     """
     found: set[Path] = set()
     open_ends = [file, *(HERE / name for name in DECIDING)]
@@ -96,7 +101,9 @@ def imported(file: Path) -> frozenset[Path]:
     for statement in IMPORT.finditer(text_of(file).decode()):
         for path in named(file, statement):
             found.update(
-                source for source in (path.with_name(path.name + ".py"), path / "__init__.py") if source.is_file()
+                source
+                for source in (path.with_name(path.name + ".py"), path / "__init__.py")
+                if source.is_file()
             )
     return frozenset(found)
 
@@ -107,7 +114,9 @@ def named(file: Path, statement: re.Match) -> Iterator[Path]:
         for name in re.findall(r"[\w.]+", statement["modules"]):
             parts = name.split(".")
             yield from (
-                start.joinpath(*parts[:n]) for start in starts(file, parts[0]) for n in range(1, len(parts) + 1)
+                start.joinpath(*parts[:n])
+                for start in starts(file, parts[0])
+                for n in range(1, len(parts) + 1)
             )
         return
     parts = [part for part in statement["module"].split(".") if part]
@@ -119,7 +128,9 @@ def named(file: Path, statement: re.Match) -> Iterator[Path]:
 
 
 def starts(file: Path, package: str) -> Iterator[Path]:
-    """Where absolute imports of `package` are looked up: beside the file's own package and beside hiproof."""
+    """Where absolute imports of `package` are looked up: beside the file's own package and beside
+    hiproof.
+    """
     for top in {top_of(file), PACKAGE}:
         if top.name == package:
             yield top.parent
@@ -127,7 +138,9 @@ def starts(file: Path, package: str) -> Iterator[Path]:
 
 @functools.cache
 def top_of(file: Path) -> Path:
-    """The outermost folder of the package that `file` belongs to; for a file outside packages, itself without ending."""
+    """The outermost folder of the package that `file` belongs to; for a file outside packages,
+    itself without ending.
+    """
     top = file.with_suffix("")
     while (top.parent / "__init__.py").exists():
         top = top.parent

@@ -1,4 +1,5 @@
-"""From a fitted roof to a valid solid: plan cells -> levels -> closed shell, and the check every solid passes.
+"""From a fitted roof to a valid solid: plan cells -> levels -> closed shell, and the check every
+solid passes.
 
 settle            the roof made of exactly the numbers that are written of it
 simpler           parts given up one by one, where a roof cannot become a valid solid

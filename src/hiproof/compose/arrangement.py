@@ -1,12 +1,13 @@
-"""The planar arrangement behind a solid: compiled, on an integer grid, so that every orientation test is exact.
+"""The planar arrangement behind a solid: compiled, on an integer grid, so that every orientation
+test is exact.
 
-Plan coordinates are int64 in units of `GRID_M` (0.1 mm), which is also how CityJSON rounds: what is valid here stays
-valid when written. Segments are noded with a *reach*: afterwards no two vertices are closer than it, no vertex is
-closer than it to an edge it does not end, and no two edges cross. That well-separated arrangement is what the rest
-can rely on.
+Plan coordinates are int64 in units of `GRID_M` (0.1 mm), which is also how CityJSON rounds: what is
+valid here stays valid when written. Segments are noded with a *reach*: afterwards no two vertices
+are closer than it, no vertex is closer than it to an edge it does not end, and no two edges cross.
+That well-separated arrangement is what the rest can rely on.
 
-Half-edges are numbered 2 e (edge e from its first to its second vertex) and 2 e + 1 (back), so the twin of h is h ^ 1.
-Polygons are soups of edges (x0, y0, x1, y1) in any order; inside is by parity.
+Half-edges are numbered 2 e (edge e from its first to its second vertex) and 2 e + 1 (back), so the
+twin of h is h ^ 1. Polygons are soups of edges (x0, y0, x1, y1) in any order; inside is by parity.
 """
 
 from __future__ import annotations
@@ -21,7 +22,8 @@ GRID_M = 1e-4  # m; how CityJSON is rounded, so that what is checked is what is 
 OUTSIDE, UNCOVERED = -1, -2  # labels of faces that no plane covers
 UNSEEN_UNITS = 100.0  # a centimetre: a face thinner than that is none
 BEYOND_UNITS = 1000.0  # a decimetre by which a face may rise or fall further than what is around it
-COLLINEAR_UNITS = 5.0  # units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
+# units of GRID_M, half a millimetre: a vertex nearer to its neighbours' line is none
+COLLINEAR_UNITS = 5.0
 
 
 @compiled
@@ -34,7 +36,9 @@ def grown(array):
 
 @compiled
 def appended(rows, count, a, b):
-    """`rows` (m, 2), of which `count` are used, with (a, b) as one more, and the count with it; a copy where all were used."""
+    """`rows` (m, 2), of which `count` are used, with (a, b) as one more, and the count with it; a
+    copy where all were used.
+    """
     if count == len(rows):
         rows = grown(rows)
     rows[count, 0], rows[count, 1] = a, b
@@ -83,7 +87,10 @@ def first_vertex_beside(xy, count, a, b, reach):
 
 @compiled
 def turn(a, b, c):
-    """Twice the signed area of triangle abc: positive when c lies left of ab. Exact for integers."""
+    """Twice the signed area of triangle abc: positive when c lies left of ab.
+
+    Exact for integers.
+    """
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 
@@ -119,7 +126,9 @@ def crossing_point(a, b, c, d):
 
 @compiled
 def numbered_ends(segments, reach):
-    """End points of the segments as numbered vertices: (xy with room to grow, how many, ends (m, 2))."""
+    """End points of the segments as numbered vertices: (xy with room to grow, how many, ends (m,
+    2)).
+    """
     xy, count = np.empty((2 * len(segments) + 16, 2), np.int64), 0
     ends = np.empty((len(segments), 2), np.int64)
     for s in range(len(segments)):
@@ -145,10 +154,12 @@ def has_edge(edges, count, a, b):
 
 @compiled
 def node(segments, reach):
-    """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by `reach` grid units.
+    """Vertices (n, 2) and edges (e, 2) of the arrangement of `segments` (m, 4), well separated by
+    `reach` grid units.
 
-    Earlier segments have the right of way: their end points stay, later ones within reach move onto them. Returns no
-    edges if it does not come to rest (never seen; the bound keeps a broken input from hanging a run).
+    Earlier segments have the right of way: their end points stay, later ones within reach move onto
+    them. Returns no edges if it does not come to rest (never seen; the bound keeps a broken input
+    from hanging a run).
     """
     xy, count, ends = numbered_ends(segments, reach)
     stack, top = ends[::-1].copy(), len(ends)  # the first on top
@@ -185,11 +196,14 @@ def node(segments, reach):
 
 @compiled
 def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
-    """Put every live edge that must go through the new `vertex`, the `crossed` one and those beside it, back onto the stack;
-    returns its new top."""
+    """Put every live edge that must go through the new `vertex`, the `crossed` one and those beside
+    it, back onto the stack; returns its new top.
+    """
     for other in range(edge_count):
         c = edges[other, 0]
-        if c >= 0 and (other == crossed or is_beside(xy[vertex], xy[c], xy[edges[other, 1]], reach)):
+        if c >= 0 and (
+            other == crossed or is_beside(xy[vertex], xy[c], xy[edges[other, 1]], reach)
+        ):
             stack[top] = edges[other]
             edges[other, 0] = edges[other, 1] = -1
             top += 1
@@ -198,7 +212,9 @@ def taken_back(xy, vertex, crossed, edges, edge_count, stack, top, reach):
 
 @compiled
 def half_edge_order(xy, edges):
-    """Half-edges sorted by origin, then counter-clockwise: (order (2e,), start (n + 1,) of each vertex's run in it)."""
+    """Half-edges sorted by origin, then counter-clockwise: (order (2e,), start (n + 1,) of each
+    vertex's run in it).
+    """
     size = 2 * len(edges)
     angle = np.empty(size)
     start = np.zeros(len(xy) + 1, np.int64)
@@ -229,7 +245,9 @@ def next_half_edges(edges, order, start):
 
 @compiled
 def face_left_of(xy, edges, x, y):
-    """Half-edge first hit by the ray from (x, y) towards -x, with that point on its left; -1 if none. y is no integer."""
+    """Half-edge first hit by the ray from (x, y) towards -x, with that point on its left; -1 if
+    none. y is no integer.
+    """
     best, best_x = -1, -np.inf
     for e in range(len(edges)):
         a, b = edges[e, 0], edges[e, 1]
@@ -245,10 +263,11 @@ def face_left_of(xy, edges, x, y):
 
 @compiled
 def trace_faces(xy, edges, follow):
-    """Face on the left of each half-edge (2e,), and each face's area (f,) in square grid units; face 0 is unbounded.
+    """Face on the left of each half-edge (2e,), and each face's area (f,) in square grid units;
+    face 0 is unbounded.
 
-    Holes belong to the face around them: the outer walk of every island is handed to the face found by a ray from its
-    leftmost vertex.
+    Holes belong to the face around them: the outer walk of every island is handed to the face found
+    by a ray from its leftmost vertex.
     """
     size = len(follow)
     walk = np.full(size, -1, np.int64)
@@ -286,7 +305,9 @@ def trace_faces(xy, edges, follow):
 
 @compiled
 def chord(xy, edges, h):
-    """Length of the ray from the middle of half-edge `h` to its left until the first edge, and its unit direction."""
+    """Length of the ray from the middle of half-edge `h` to its left until the first edge, and its
+    unit direction.
+    """
     a, b = edges[h >> 1, h & 1], edges[h >> 1, 1 - (h & 1)]
     ax, ay = 0.5 * (xy[a, 0] + xy[b, 0]), 0.5 * (xy[a, 1] + xy[b, 1])
     dx, dy = float(xy[b, 0] - xy[a, 0]), float(xy[b, 1] - xy[a, 1])
@@ -310,7 +331,9 @@ def chord(xy, edges, h):
 
 @compiled
 def face_points(xy, edges, face, faces):
-    """A point (f, 2) well inside each face: the middle of its longest chord at right angles to an edge's middle."""
+    """A point (f, 2) well inside each face: the middle of its longest chord at right angles to an
+    edge's middle.
+    """
     longest, best = np.zeros(faces), np.zeros(faces)
     points = np.zeros((faces, 2))
     for h in range(2 * len(edges)):
@@ -341,7 +364,9 @@ def covers(soup, low, high, x, y):
 
 @compiled
 def active_plane(x, y, soup, soup_start, planes, plane_start):
-    """Plane active at (x, y): the lowest of each covering piece, the highest of those; UNCOVERED, OUTSIDE the outline.
+    """Plane active at (x, y): the lowest of each covering piece, the highest of those;
+
+    UNCOVERED, OUTSIDE the outline.
 
     Polygon 0 of the soup is the outline, polygon k + 1 the outline of piece k.
     """
@@ -362,8 +387,12 @@ def active_plane(x, y, soup, soup_start, planes, plane_start):
 
 
 @compiled
-def label_faces(points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label):
-    """Label of each face (f,): the group of the plane active at its point, or what the last patch over it says; and which have a patch."""
+def label_faces(
+    points, soup, soup_start, planes, plane_start, group, patches, patch_start, patch_label
+):
+    """Label of each face (f,): the group of the plane active at its point, or what the last patch
+    over it says; and which have a patch.
+    """
     label, patched = np.full(len(points), OUTSIDE, np.int64), np.zeros(len(points), np.bool_)
     for f in range(1, len(points)):
         plane = active_plane(points[f, 0], points[f, 1], soup, soup_start, planes, plane_start)
@@ -397,9 +426,13 @@ def edge_lengths(xy, edges):
 
 @compiled
 def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_width):
-    """Give every region too small or too thin to the neighbour it shares the longest border with, smallest first.
+    """Give every region too small or too thin to the neighbour it shares the longest border with,
+    smallest first.
 
-    A patch alone comes last, for what lies between it and the region it belongs to may become that region's. One that would carry its plane on to where no roof is around keeps out, unless nobody could see the region."""
+    A patch alone comes last, for what lies between it and the region it belongs to may become that
+    region's. One that would carry its plane on to where no roof is around keeps out, unless nobody
+    could see the region.
+    """
     length, kept = edge_lengths(xy, edges), np.zeros(len(label), np.bool_)
     for _ in range(len(label)):
         region = regions_of(edges, face, label)
@@ -417,14 +450,25 @@ def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_w
                     open_to[a] = open_to[b] = True
         smallest = -1
         for r in range(1, len(label)):
-            sliver = region[r] == r and open_to[r] and (size[r] < min_area or 2 * size[r] < min_width * border[r])
+            sliver = (
+                region[r] == r
+                and open_to[r]
+                and (size[r] < min_area or 2 * size[r] < min_width * border[r])
+            )
             if sliver and not kept[r]:
                 sooner = is_patch[smallest] and not is_patch[r]
-                if smallest < 0 or sooner or (is_patch[smallest] == is_patch[r] and size[r] < size[smallest]):
+                if (
+                    smallest < 0
+                    or sooner
+                    or (is_patch[smallest] == is_patch[r] and size[r] < size[smallest])
+                ):
                     smallest = r
         if smallest < 0:
             break
-        unseen = size[smallest] < min_area or 2 * size[smallest] < min(min_width, UNSEEN_UNITS) * border[smallest]
+        unseen = (
+            size[smallest] < min_area
+            or 2 * size[smallest] < min(min_width, UNSEEN_UNITS) * border[smallest]
+        )
         into = heir_of(xy, edges, face, label, region, length, planes, smallest, unseen)
         for f in range(len(label)):
             if region[f] == smallest:
@@ -434,8 +478,9 @@ def merge_slivers(xy, edges, face, area, label, patched, planes, min_area, min_w
 
 @compiled
 def heir_of(xy, edges, face, label, region, length, planes, sliver, anyone):
-    """The label of the region that shares the longest border with a sliver, of those whose planes stay over it within the heights around
-    it (or `anyone`'s); OUTSIDE where there is none."""
+    """The label of the region that shares the longest border with a sliver, of those whose planes
+    stay over it within the heights around it (or `anyone`'s); OUTSIDE where there is none.
+    """
     shared, fits = np.zeros(len(label)), np.ones(len(label), np.bool_)
     low, high = np.inf, -np.inf
     for e in range(len(edges)):
@@ -469,7 +514,9 @@ def height_of(plane, place):
 
 @compiled
 def keep_largest_component(edges, face, area, label):
-    """Turn everything but the largest connected inside to OUTSIDE (a neck thinner than the reach was cut)."""
+    """Turn everything but the largest connected inside to OUTSIDE (a neck thinner than the reach
+    was cut).
+    """
     parent = np.arange(len(label))
     for e in range(len(edges)):
         a, b = face[2 * e], face[2 * e + 1]
@@ -487,7 +534,9 @@ def keep_largest_component(edges, face, area, label):
 
 @compiled
 def renumbered(xy, edges, side):
-    """The edges that are left (first vertex not negative), their sides, and the vertices they use, numbered anew."""
+    """The edges that are left (first vertex not negative), their sides, and the vertices they use,
+    numbered anew.
+    """
     number = np.full(len(xy), -1, np.int64)
     out_xy, out_edges, out_side = np.empty_like(xy), np.empty_like(edges), np.empty_like(side)
     count, kept = 0, 0
@@ -507,10 +556,13 @@ def renumbered(xy, edges, side):
 
 @compiled
 def dissolve(xy, edges, side):
-    """Drop edges with one label on both sides, then vertices on straight stretches; (xy, edges, side) compacted.
+    """Drop edges with one label on both sides, then vertices on straight stretches;
 
-    `side` (e, 2) holds the labels left and right of each edge. A vertex goes when it lies within COLLINEAR_UNITS of the
-    line between its two neighbours, counting what was already dropped along them.
+    (xy, edges, side) compacted.
+
+    `side` (e, 2) holds the labels left and right of each edge. A vertex goes when it lies within
+    COLLINEAR_UNITS of the line between its two neighbours, counting what was already dropped along
+    them.
     """
     kept = 0
     for e in range(len(edges)):
@@ -539,7 +591,11 @@ def dissolve(xy, edges, side):
                 np.hypot(float(xy[a, 0] - xy[b, 0]), float(xy[a, 1] - xy[b, 1])), 1
             )
             off += max(drift[e], drift[g])
-            if a == b or off > COLLINEAR_UNITS or not is_beside(xy[v], xy[a], xy[b], 2 * COLLINEAR_UNITS):
+            if (
+                a == b
+                or off > COLLINEAR_UNITS
+                or not is_beside(xy[v], xy[a], xy[b], 2 * COLLINEAR_UNITS)
+            ):
                 continue
             edges[e, 0 if edges[e, 0] == v else 1] = b
             drift[e] = off
@@ -565,10 +621,11 @@ def plan_cells(
     min_area,
     min_width,
 ):
-    """Cells of the plan in which one plane is active, as labelled edges: (xy (n, 2), edges (e, 2), side (e, 2)).
+    """Cells of the plan in which one plane is active, as labelled edges: (xy (n, 2), edges (e, 2),
+    side (e, 2)).
 
-    `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones; what remains
-    UNCOVERED is for the caller to see in `side`.
+    `planes` give grid units from grid units. Cells too small are merged away, also uncovered ones;
+    what remains UNCOVERED is for the caller to see in `side`.
     """
     xy, edges = node(segments, reach)
     order, start = half_edge_order(xy, edges)
@@ -585,7 +642,9 @@ def plan_cells(
 
 @compiled
 def inside_intervals(soup, low, high, px, py, dx, dy):
-    """Sorted parameters (even in number) at which the line (px, py) + t (dx, dy) enters and leaves a polygon."""
+    """Sorted parameters (even in number) at which the line (px, py) + t (dx, dy) enters and leaves
+    a polygon.
+    """
     cuts = np.empty(high - low)
     count = 0
     for e in range(low, high):
@@ -593,7 +652,10 @@ def inside_intervals(soup, low, high, px, py, dx, dy):
         side_b = dx * (soup[e, 3] - py) - dy * (soup[e, 2] - px)
         if (side_a > 0) != (side_b > 0):
             s = side_a / (side_a - side_b)
-            x, y = soup[e, 0] + s * (soup[e, 2] - soup[e, 0]), soup[e, 1] + s * (soup[e, 3] - soup[e, 1])
+            x, y = (
+                soup[e, 0] + s * (soup[e, 2] - soup[e, 0]),
+                soup[e, 1] + s * (soup[e, 3] - soup[e, 1]),
+            )
             cuts[count] = dx * (x - px) + dy * (y - py)
             count += 1
     return np.sort(cuts[:count])
@@ -619,7 +681,9 @@ def clip_to_lowest(planes, low, high, j, px, py, dx, dy, t_low, t_high):
 
 @compiled
 def meeting_lines(soup, soup_start, planes, plane_start):
-    """Segments (m, 4) in the plan along which the active plane changes, within a piece and between overlapping ones."""
+    """Segments (m, 4) in the plan along which the active plane changes, within a piece and between
+    overlapping ones.
+    """
     out, count = np.empty((64, 4), np.int64), 0
     pieces = len(plane_start) - 1
     for p in range(pieces):
@@ -631,12 +695,20 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                     if steep < 1e-7:
                         continue
                     px, py, dx, dy = -c * a / steep**2, -c * b / steep**2, -b / steep, a / steep
-                    low, high = clip_to_lowest(planes, plane_start[p], plane_start[p + 1], i, px, py, dx, dy, -1e9, 1e9)
-                    low, high = clip_to_lowest(planes, plane_start[q], plane_start[q + 1], j, px, py, dx, dy, low, high)
+                    low, high = clip_to_lowest(
+                        planes, plane_start[p], plane_start[p + 1], i, px, py, dx, dy, -1e9, 1e9
+                    )
+                    low, high = clip_to_lowest(
+                        planes, plane_start[q], plane_start[q + 1], j, px, py, dx, dy, low, high
+                    )
                     if high - low < 1:
                         continue
-                    in_p = inside_intervals(soup, soup_start[p + 1], soup_start[p + 2], px, py, dx, dy)
-                    in_q = inside_intervals(soup, soup_start[q + 1], soup_start[q + 2], px, py, dx, dy)
+                    in_p = inside_intervals(
+                        soup, soup_start[p + 1], soup_start[p + 2], px, py, dx, dy
+                    )
+                    in_q = inside_intervals(
+                        soup, soup_start[q + 1], soup_start[q + 2], px, py, dx, dy
+                    )
                     for k in range(0, len(in_p) - 1, 2):
                         for m in range(0, len(in_q) - 1, 2):
                             t0, t1 = max(low, in_p[k], in_q[m]), min(high, in_p[k + 1], in_q[m + 1])
@@ -644,7 +716,13 @@ def meeting_lines(soup, soup_start, planes, plane_start):
                                 continue
                             if count == len(out):
                                 out = grown(out)
-                            out[count, 0], out[count, 1] = np.rint(px + t0 * dx), np.rint(py + t0 * dy)
-                            out[count, 2], out[count, 3] = np.rint(px + t1 * dx), np.rint(py + t1 * dy)
+                            out[count, 0], out[count, 1] = (
+                                np.rint(px + t0 * dx),
+                                np.rint(py + t0 * dy),
+                            )
+                            out[count, 2], out[count, 3] = (
+                                np.rint(px + t1 * dx),
+                                np.rint(py + t1 * dy),
+                            )
                             count += 1
     return out[:count].copy()

@@ -1,4 +1,6 @@
-"""Which faces are bent: two triangles of their constrained Delaunay triangulation over 20 degrees apart (val3dity's 204)."""
+"""Which faces are bent: two triangles of their constrained Delaunay triangulation over 20 degrees
+apart (val3dity's 204).
+"""
 
 from __future__ import annotations
 
@@ -22,9 +24,11 @@ def bent_faces(
     face_start: np.ndarray,
     normals: np.ndarray,
 ) -> np.ndarray:
-    """Those of `faces` (k,) that are bent; the solid is flattened as for `check_faces`, `normals` (f, 3) its best planes'.
+    """Those of `faces` (k,) that are bent; the solid is flattened as for `check_faces`, `normals`
+    (f, 3) its best planes'.
 
-    >>> saddle = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1, 0]]), np.arange(4), np.array([0, 4]), np.array([0, 1])
+    >>> saddle = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 1], [0, 1,
+    ...     0]]), np.arange(4), np.array([0, 4]), np.array([0, 1])
     >>> bent_faces(np.array([0]), *saddle, np.array([[-0.4, -0.4, 0.8]])).tolist()
     [0]
     """
@@ -36,14 +40,18 @@ def bent_faces(
         bounds = ring_start[face_start[face] : face_start[face + 1] + 1]
         outer, *holes = (flat[low + a : low + b] for a, b in pairwise(bounds - bounds[0]))
         polygons.append(shapely.Polygon(outer, holes))
-    triangles, owner = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons), return_index=True)
+    triangles, owner = shapely.get_parts(
+        shapely.constrained_delaunay_triangles(polygons), return_index=True
+    )
     places = shapely.get_coordinates(triangles).reshape(-1, 4, 2)
     return faces[are_bent(places, owner, corners, flat, start, normals[faces])]
 
 
 @compiled
 def in_their_planes(faces, vertices, index, ring_start, face_start, normals):
-    """Vertices (m, 3) of all rings of `faces`, the same in the planes of their faces (m, 2), and each face's start."""
+    """Vertices (m, 3) of all rings of `faces`, the same in the planes of their faces (m, 2), and
+    each face's start.
+    """
     start = np.zeros(len(faces) + 1, np.int64)
     for k in range(len(faces)):
         face = faces[k]
@@ -73,7 +81,9 @@ def corner_at(x, y, flat, low, high):
 
 @compiled
 def triangle_normals(places, owner, corners, flat, start, normals):
-    """Unit normals (t, 3) of triangles given by their `places` (t, 4, 2) in their face's plane; zero without an area."""
+    """Unit normals (t, 3) of triangles given by their `places` (t, 4, 2) in their face's plane;
+    zero without an area.
+    """
     found = np.zeros((len(places), 3))
     for t in range(len(places)):
         low, high = start[owner[t]], start[owner[t] + 1]
@@ -89,11 +99,18 @@ def triangle_normals(places, owner, corners, flat, start, normals):
 
 @compiled
 def are_bent(places, owner, corners, flat, start, normals):
-    """Whether each face (k,) has two triangles over 20 degrees apart; `owner` (t,) is the face of each triangle."""
+    """Whether each face (k,) has two triangles over 20 degrees apart;
+
+    `owner` (t,) is the face of each triangle.
+    """
     bent = np.zeros(len(normals), np.bool_)
     found = triangle_normals(places, owner, corners, flat, start, normals)
     for t in range(len(found)):
-        if dot(found[t], normals[owner[t]]) >= SURELY_FLAT_COSINE or not found[t].any() or bent[owner[t]]:
+        if (
+            dot(found[t], normals[owner[t]]) >= SURELY_FLAT_COSINE
+            or not found[t].any()
+            or bent[owner[t]]
+        ):
             continue  # two triangles within 10 degrees of the face are within 20 of one another
         for s in range(len(found)):
             if owner[s] == owner[t] and found[s].any() and dot(found[s], found[t]) < FLAT_COSINE:

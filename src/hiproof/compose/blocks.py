@@ -15,7 +15,8 @@ from .solid import compose
 
 
 def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
-    """The prism over `outline` (m, any frame) between two heights; its walls are the outline's edges.
+    """The prism over `outline` (m, any frame) between two heights; its walls are the outline's
+    edges.
 
     >>> from hiproof.compose import check_solid
     >>> yard = shapely.box(0, 0, 10, 10).difference(shapely.box(3, 3, 7, 7))
@@ -38,17 +39,32 @@ def block(outline: shapely.Polygon, z_low: float, z_high: float) -> Solid:
     return Solid(np.concatenate([low, high]), (top, *walls, bottom))
 
 
-def blocks(outlines: Sequence[shapely.Polygon], heights: Sequence[float], z_low: float) -> Solid | None:
-    """One solid of blocks that stand side by side over `outlines`, each of its own height; None where they make no valid one."""
+def blocks(
+    outlines: Sequence[shapely.Polygon], heights: Sequence[float], z_low: float
+) -> Solid | None:
+    """One solid of blocks that stand side by side over `outlines`, each of its own height;
+
+    None where they make no valid one.
+    """
     whole = shapely.union_all(outlines)
     if whole.geom_type != "Polygon":
         return None
     origin = np.array([*np.floor(whole.bounds[:2]), 0.0])
     flat = [
-        Part("flat", (Piece(shapely.transform(outline, lambda xy: xy - origin[:2]), np.array([[0.0, 0.0, height]])),))
+        Part(
+            "flat",
+            (
+                Piece(
+                    shapely.transform(outline, lambda xy: xy - origin[:2]),
+                    np.array([[0.0, 0.0, height]]),
+                ),
+            ),
+        )
         for outline, height in zip(outlines, heights, strict=True)
     ]
-    roof = Roof(tuple(flat), shapely.transform(whole, lambda xy: xy - origin[:2]), LocalFrame(origin))
+    roof = Roof(
+        tuple(flat), shapely.transform(whole, lambda xy: xy - origin[:2]), LocalFrame(origin)
+    )
     try:
         return compose(roof, z_low).moved(origin)
     except CompositionError:

@@ -1,8 +1,9 @@
-"""Building parts: a solid cut along the walls at which its roofs meet, so that each part has a solid of its own.
+"""Building parts: a solid cut along the walls at which its roofs meet, so that each part has a
+solid of its own.
 
-Roof faces that share an edge belong to one part: wings that run into each other, a dormer on its slope. Where roofs meet at a wall
-alone, or one stands out of another, parts end. They stand side by side over the plan, on its own vertices, so they cannot
-overlap and their volumes are the whole's.
+Roof faces that share an edge belong to one part: wings that run into each other, a dormer on its
+slope. Where roofs meet at a wall alone, or one stands out of another, parts end. They stand side by
+side over the plan, on its own vertices, so they cannot overlap and their volumes are the whole's.
 """
 
 from __future__ import annotations
@@ -20,13 +21,16 @@ from .check import check_solid
 from .shell import compacted
 
 LEAST_PART_M2 = 4.0
-"""Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders most."""
+"""Of a part in plan; a smaller one (a chimney, a box on a roof) stays with the neighbour it borders
+most.
+"""
 
 
 @dataclass(frozen=True)
 class BuildingPart:
-    """A part's `solid`, in the frame of the whole, the plan polygon `outline` that it stands over, and its roof parts `members`
-    (indices into `Roof.parts`), the largest first."""
+    """A part's `solid`, in the frame of the whole, the plan polygon `outline` that it stands over,
+    and its roof parts `members` (indices into `Roof.parts`), the largest first.
+    """
 
     solid: Solid
     outline: shapely.Polygon
@@ -34,7 +38,9 @@ class BuildingPart:
 
 
 class Border(NamedTuple):
-    """A plan edge of a roof face, which lies left of it: the `face` and its vertices at the edge's ends."""
+    """A plan edge of a roof face, which lies left of it: the `face` and its vertices at the edge's
+    ends.
+    """
 
     face: int
     start: int
@@ -49,15 +55,19 @@ Borders = dict[tuple[Place, Place], Border]
 
 
 def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPart, ...]:
-    """The parts of a valid `solid` whose roof faces name their roof parts, the lowest member first; none where it is one alone.
+    """The parts of a valid `solid` whose roof faces name their roof parts, the lowest member first;
+    none where it is one alone.
 
-    There are none either where a part would not be valid by itself, as where it touches itself at a corner.
+    There are none either where a part would not be valid by itself, as where it touches itself at a
+    corner.
 
     >>> from hiproof.frames import LocalFrame
     >>> from hiproof.model import Part, Piece, Roof
     >>> from hiproof.compose import compose
-    >>> low, high = (Piece(shapely.box(x, 0, x + 5, 4), np.array([[0.0, 0.0, z]])) for x, z in ((0, 3.0), (5, 6.0)))
-    >>> roof = Roof((Part("flat", (low,)), Part("flat", (high,))), shapely.box(0, 0, 10, 4), LocalFrame(np.zeros(3)))
+    >>> low, high = (Piece(shapely.box(x, 0, x + 5, 4), np.array([[0.0, 0.0, z]])) for x, z in ((0,
+    ...     3.0), (5, 6.0)))
+    >>> roof = Roof((Part("flat", (low,)), Part("flat", (high,))), shapely.box(0, 0, 10, 4),
+    ...     LocalFrame(np.zeros(3)))
     >>> [(part.members, part.solid.volume) for part in building_parts(compose(roof, 0.0))]
     [((0,), 60.0), ((1,), 120.0)]
     """
@@ -67,14 +77,18 @@ def building_parts(solid: Solid, planarity_m: float = 0.001) -> tuple[BuildingPa
     groups = without_small(joined_at_edges(roofs, borders), solid, borders)
     if len(groups) < 2:
         return ()
-    parts = sorted((part_of(solid, group, borders, place_of) for group in groups), key=lambda part: min(part.members))
+    parts = sorted(
+        (part_of(solid, group, borders, place_of) for group in groups),
+        key=lambda part: min(part.members),
+    )
     return () if any(check_solid(part.solid, planarity_m) for part in parts) else tuple(parts)
 
 
 def whole_of(parts: Solid) -> Solid:
     """The one solid of which `parts`, the shells of building parts over common vertices, were cut.
 
-    Its roof faces come first, in the order in which they stand in `parts`; its walls are not joined along straight stretches.
+    Its roof faces come first, in the order in which they stand in `parts`; its walls are not joined
+    along straight stretches.
     """
     place_of = places_of(parts)
     roofs = [index for index, face in enumerate(parts.faces) if face.kind == ROOF]
@@ -123,7 +137,9 @@ def distinct(group_of: dict[int, set[int]]) -> list[set[int]]:
 
 
 def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> list[set[int]]:
-    """The groups, each smaller than LEAST_PART_M2 taken in by the neighbour with which it shares the longest border, smallest first."""
+    """The groups, each smaller than LEAST_PART_M2 taken in by the neighbour with which it shares
+    the longest border, smallest first.
+    """
     area = {index: solid.plan_of(solid.faces[index]).area for group in groups for index in group}
     group_of = {index: group for group in groups for index in group}
     while len(groups := distinct(group_of)) > 1:
@@ -141,7 +157,9 @@ def without_small(groups: list[set[int]], solid: Solid, borders: Borders) -> lis
 
 
 def part_of(solid: Solid, group: set[int], borders: Borders, place_of: list[Place]) -> BuildingPart:
-    """The part under the roof faces `group`: these, the steps between them, walls down to the ground around them, and the ground."""
+    """The part under the roof faces `group`: these, the steps between them, walls down to the
+    ground around them, and the ground.
+    """
     own = {edge: border for edge, border in borders.items() if border.face in group}
     vertices, levels = with_base(solid, {border.start for border in own.values()}, place_of)
     rings = closed_rings([(b, a) for a, b in own if (b, a) not in own])
@@ -149,12 +167,23 @@ def part_of(solid: Solid, group: set[int], borders: Borders, place_of: list[Plac
     ground = Face(tuple(tuple(levels[place][0] for place in ring) for ring in rings), GROUND)
     faces = [*(solid.faces[index] for index in sorted(group)), *walls, ground]
     outer, *holes = (np.array(ring) * GRID_M for ring in rings)
-    return BuildingPart(compacted(vertices, faces), shapely.Polygon(outer, holes), members_of(solid, group))
+    return BuildingPart(
+        compacted(vertices, faces), shapely.Polygon(outer, holes), members_of(solid, group)
+    )
 
 
-def with_base(solid: Solid, used: set[int], place_of: list[Place]) -> tuple[np.ndarray, dict[Place, list[int]]]:
-    """The solid's vertices (n, 3) and new ones on the ground below those `used`, and all of them over each place, from below."""
-    z_base = min(solid.vertices[index, 2] for face in solid.of_kind(GROUND) for ring in face.rings for index in ring)
+def with_base(
+    solid: Solid, used: set[int], place_of: list[Place]
+) -> tuple[np.ndarray, dict[Place, list[int]]]:
+    """The solid's vertices (n, 3) and new ones on the ground below those `used`, and all of them
+    over each place, from below.
+    """
+    z_base = min(
+        solid.vertices[index, 2]
+        for face in solid.of_kind(GROUND)
+        for ring in face.rings
+        for index in ring
+    )
     levels: dict[Place, list[int]] = {}
     for vertex in sorted(used, key=lambda vertex: solid.vertices[vertex, 2]):
         levels.setdefault(place_of[vertex], []).append(vertex)
@@ -164,8 +193,12 @@ def with_base(solid: Solid, used: set[int], place_of: list[Place]) -> tuple[np.n
     return np.concatenate([solid.vertices, np.array(below)]), levels
 
 
-def wall_ring(edge: tuple[Place, Place], own: Borders, levels: dict[Place, list[int]]) -> tuple[int, ...]:
-    """The wall below a border, down to its neighbour or to the ground, through every level on its way; none where it lies lower."""
+def wall_ring(
+    edge: tuple[Place, Place], own: Borders, levels: dict[Place, list[int]]
+) -> tuple[int, ...]:
+    """The wall below a border, down to its neighbour or to the ground, through every level on its
+    way; none where it lies lower.
+    """
     a, b = edge
     here, there = own[edge], own.get((b, a))
     low_a, low_b = (levels[a][0], levels[b][0]) if there is None else (there.end, there.start)

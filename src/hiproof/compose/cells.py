@@ -1,4 +1,6 @@
-"""From a roof to the cells of its plan: outline, pieces and the lines where the active plane changes, arranged."""
+"""From a roof to the cells of its plan: outline, pieces and the lines where the active plane
+changes, arranged.
+"""
 
 from __future__ import annotations
 
@@ -21,15 +23,18 @@ from .arrangement import (
 )
 from .tidy import without_short_edges
 
-MAX_EXTENT_M = 50_000.0  # m from the frame's origin: on the integer grid, areas beyond would not fit 64 bits
+# m from the frame's origin: on the integer grid, areas beyond would not fit 64 bits
+MAX_EXTENT_M = 50_000.0
 
 
 @dataclass(frozen=True)
 class PlanProblem:
-    """A roof in grid units: polygons as soups of edges, polygon 0 the outline and polygon k + 1 that of piece k.
+    """A roof in grid units: polygons as soups of edges, polygon 0 the outline and polygon k + 1
+    that of piece k.
 
-    `planes` (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within its roof part,
-    `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that overrule the height function.
+    `planes` (p, 3) give heights in grid units; `group` (p,) the first plane equal to each within
+    its roof part, `part` (p,) the roof part it belongs to. `patches` are (soup, label) pairs that
+    overrule the height function.
     """
 
     soups: list[np.ndarray]
@@ -42,7 +47,8 @@ class PlanProblem:
 
 @dataclass(frozen=True)
 class PlanCells:
-    """The plan as labelled edges: `xy` (n, 2) int64 grid units, `edges` (e, 2), `side` (e, 2) labels left and right.
+    """The plan as labelled edges: `xy` (n, 2) int64 grid units, `edges` (e, 2), `side` (e, 2)
+    labels left and right.
 
     A label is the index of the plane that roofs the cell, OUTSIDE (-1) beyond the outline.
     """
@@ -53,13 +59,16 @@ class PlanCells:
 
 
 def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
-    """Edges (m, 4) of all rings of each polygon (or of several in one), rounded to the grid, without those of no length."""
+    """Edges (m, 4) of all rings of each polygon (or of several in one), rounded to the grid,
+    without those of no length.
+    """
     parts, polygon_of_part = shapely.get_parts(np.array(polygons, object), return_index=True)
     rings, part_of_ring = shapely.get_rings(parts, return_index=True)
     xy, ring = shapely.get_coordinates(rings, return_index=True)
     if not np.isfinite(xy).all() or np.abs(xy).max(initial=0) > MAX_EXTENT_M:
         raise CompositionError(
-            "expected plan coordinates within 50 km of the roof's local origin, got larger or non-finite ones;"
+            "expected plan coordinates within 50 km of the roof's local origin, got larger or "
+            "non-finite ones;"
             " give the outline in the roof's local frame"
         )
     xy = np.rint(xy / GRID_M)
@@ -71,7 +80,10 @@ def polygon_soups(polygons: list[shapely.Polygon]) -> list[np.ndarray]:
 
 
 def plan_problem(roof: Roof) -> PlanProblem:
-    """The roof on the grid. Raises CompositionError when it has no outline, no pieces or planes that are not finite."""
+    """The roof on the grid.
+
+    Raises CompositionError when it has no outline, no pieces or planes that are not finite.
+    """
     outline, *borders = polygon_soups([roof.outline, *(piece.outline for piece in roof.pieces)])
     part_of_piece = [index for index, part in enumerate(roof.parts) for _ in part.pieces]
     pieces = [
@@ -81,22 +93,32 @@ def plan_problem(roof: Roof) -> PlanProblem:
     ]
     if len(outline) == 0 or not pieces:
         raise CompositionError(
-            "expected a roof with an outline and at least one piece with planes, got none; fall back to a flat block"
+            "expected a roof with an outline and at least one piece with planes, got none; fall "
+            "back to a flat block"
         )
     borders, planes, part = zip(*pieces, strict=True)
     counts = [len(own) for own in planes]
     stacked = np.concatenate(planes)
     if not np.isfinite(stacked).all():
-        raise CompositionError("expected finite roof planes, got NaN or infinity; fall back to a flat block")
+        raise CompositionError(
+            "expected finite roof planes, got NaN or infinity; fall back to a flat block"
+        )
     plane_start = np.array([0, *itertools.accumulate(counts)])
     in_grid_units = stacked / [1, 1, GRID_M]
-    return PlanProblem([outline, *borders], in_grid_units, plane_start, equal_planes(stacked), np.repeat(part, counts))
+    return PlanProblem(
+        [outline, *borders],
+        in_grid_units,
+        plane_start,
+        equal_planes(stacked),
+        np.repeat(part, counts),
+    )
 
 
 def equal_planes(planes: np.ndarray) -> np.ndarray:
     """Index (p,) of the first plane that equals each within a micrometre and a millionth of slope.
 
-    Parts that share a plane share its faces: where they touch, one face carries the first part's index.
+    Parts that share a plane share its faces: where they touch, one face carries the first part's
+    index.
     """
     return (np.abs(planes[:, None] - planes[None]) < 1e-6).all(axis=2).argmax(axis=1)
 
@@ -108,8 +130,12 @@ def stacked_soups(soups: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     return np.ascontiguousarray(edges, float), start
 
 
-def arrange(problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_m: float) -> PlanCells:
-    """Plan cells of a roof, well separated by `reach_m`; where no piece covers the outline, the piece beside it is extended."""
+def arrange(
+    problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_m: float
+) -> PlanCells:
+    """Plan cells of a roof, well separated by `reach_m`; where no piece covers the outline, the
+    piece beside it is extended.
+    """
     for _ in range(4):
         soup, soup_start = stacked_soups(problem.soups)
         patches, patch_start = stacked_soups([patch for patch, _ in problem.patches])
@@ -131,13 +157,19 @@ def arrange(problem: PlanProblem, reach_m: float, min_area_m2: float, min_width_
             min_width_m / GRID_M,
         )
         if not (side == UNCOVERED).any():
-            return PlanCells(*without_short_edges(xy, edges, side, problem.planes, reach_m / GRID_M))
+            return PlanCells(
+                *without_short_edges(xy, edges, side, problem.planes, reach_m / GRID_M)
+            )
         problem = extend_over_gaps(problem, PlanCells(xy, edges, side))
-    raise CompositionError("expected the roof's pieces to reach all of its outline, got gaps that no piece borders")
+    raise CompositionError(
+        "expected the roof's pieces to reach all of its outline, got gaps that no piece borders"
+    )
 
 
 def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
-    """The problem with a further piece over each uncovered cell, its planes those of the piece it borders most."""
+    """The problem with a further piece over each uncovered cell, its planes those of the piece it
+    borders most.
+    """
     follow = next_half_edges(cells.edges, *half_edge_order(cells.xy, cells.edges))
     face, _ = trace_faces(cells.xy, cells.edges, follow)
     label = cells.side.ravel()
@@ -149,11 +181,17 @@ def extend_over_gaps(problem: PlanProblem, cells: PlanCells) -> PlanProblem:
 
 
 def with_gap_covered(problem: PlanProblem, gap: np.ndarray, neighbour: np.ndarray) -> PlanProblem:
-    """The problem with one more piece over the polygon `gap` (m, 4), whose edges border cells labelled `neighbour` (m,)."""
+    """The problem with one more piece over the polygon `gap` (m, 4), whose edges border cells
+    labelled `neighbour` (m,).
+    """
     length = np.hypot(gap[:, 2] - gap[:, 0], gap[:, 3] - gap[:, 1])
-    piece_of_plane = np.searchsorted(problem.plane_start, np.arange(len(problem.planes)), side="right") - 1
+    piece_of_plane = (
+        np.searchsorted(problem.plane_start, np.arange(len(problem.planes)), side="right") - 1
+    )
     roofed = neighbour >= 0
-    shared = np.bincount(piece_of_plane[neighbour[roofed]], length[roofed], minlength=len(problem.plane_start) - 1)
+    shared = np.bincount(
+        piece_of_plane[neighbour[roofed]], length[roofed], minlength=len(problem.plane_start) - 1
+    )
     piece = int(shared.argmax()) if shared.any() else nearest_piece(problem, gap)
     low, high = problem.plane_start[piece], problem.plane_start[piece + 1]
     return PlanProblem(

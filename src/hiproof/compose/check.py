@@ -36,7 +36,9 @@ FARTHEST_M = 1e9  # coordinates beyond it are of no system in use, and their pro
 
 @dataclass(frozen=True)
 class Finding:
-    """One defect: `code` as val3dity numbers it, index of the `face` (-1: the whole shell) and a `message` sentence."""
+    """One defect: `code` as val3dity numbers it, index of the `face` (-1: the whole shell) and a
+    `message` sentence.
+    """
 
     code: int
     face: int
@@ -53,30 +55,42 @@ def finding(code: int, face: int = -1, other: int = -1) -> Finding:
 def check_solid(solid: Solid, planarity_m: float = 0.001) -> tuple[Finding, ...]:
     """Everything wrong with the shell of `solid`, nothing if it is valid.
 
-    Rings count as closed; points closer than 1 mm are one; `planarity_m` is how far a vertex may lie from its face's
-    plane (val3dity's default is 0.01). As in val3dity, the shell is looked at only when every face is sound by
-    itself.
+    Rings count as closed; points closer than 1 mm are one; `planarity_m` is how far a vertex may
+    lie from its face's plane (val3dity's default is 0.01). As in val3dity, the shell is looked at
+    only when every face is sound by itself.
 
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> from hiproof.model import Face
     >>> rings = [(0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)]
     >>> check_solid(Solid(corners, tuple(Face((ring,), "WallSurface") for ring in rings)))
     ()
-    >>> check_solid(Solid(corners, tuple(Face((ring,), "WallSurface") for ring in rings[:3])))[0].code
+    >>> check_solid(Solid(corners, tuple(Face((ring,),
+    ...     "WallSurface") for ring in rings[:3])))[0].code
     301
     """
     vertices = np.ascontiguousarray(solid.vertices, float).reshape(-1, 3)
     index, ring_start, face_start = solid.flattened()
     if len(index) == 0:
         return (finding(301),)
-    if not (np.abs(vertices) <= FARTHEST_M).all() or index.min() < 0 or index.max() >= len(vertices):
+    if (
+        not (np.abs(vertices) <= FARTHEST_M).all()
+        or index.min() < 0
+        or index.max() >= len(vertices)
+    ):
         return (
-            Finding(101, -1, "101: expected vertices on Earth and indices into them, got others; the file is damaged"),
+            Finding(
+                101,
+                -1,
+                "101: expected vertices on Earth and indices into them, got others; the file is "
+                "damaged",
+            ),
         )
     read = tuple(finding(code, face) for code, face in solid.defects)
     local = vertices - vertices[index].mean(axis=0)
     index = weld(local, SAME_POINT_M)[index]
-    rows, normals, offsets, flatness, risky = check_faces(local, index, ring_start, face_start, float(planarity_m))
+    rows, normals, offsets, flatness, risky = check_faces(
+        local, index, ring_start, face_start, float(planarity_m)
+    )
     risky[rows[:, 1]] = False  # what is unsound otherwise cannot be triangulated
     bent = bent_faces(np.flatnonzero(risky), local, index, ring_start, face_start, normals)
     rows = [*rows, *((204, face, -1) for face in bent)]

@@ -1,8 +1,8 @@
 """The compiled tests behind `check_solid`: each finding is a row (code, face, other face or -1).
 
 Faces are flattened: ring r has vertices `index[ring_start[r]:ring_start[r + 1]]`, face f the rings
-`face_start[f]:face_start[f + 1]`, the outer one first. Polygons are tested in the projection along the largest
-component of their normal, which only drops a coordinate and so moves nothing.
+`face_start[f]:face_start[f + 1]`, the outer one first. Polygons are tested in the projection along
+the largest component of their normal, which only drops a coordinate and so moves nothing.
 """
 
 from __future__ import annotations
@@ -17,8 +17,10 @@ from .joined import join, root_of
 
 SAME_POINT_M = 1e-3  # m; val3dity's snap tolerance
 TOUCH_M = 1e-9  # m; numerically on the segment
-MOST_VERTICES_IN_THREES = 40  # vertices up to which all triples of a ring are looked at: they grow with the cube
-SKEW = np.array([0.43, 0.61, 0.67])  # shorter than one: what is further apart along it is further apart in space
+# vertices up to which all triples of a ring are looked at: they grow with the cube
+MOST_VERTICES_IN_THREES = 40
+# shorter than one: what is further apart along it is further apart in space
+SKEW = np.array([0.43, 0.61, 0.67])
 
 
 @compiled
@@ -51,7 +53,11 @@ def cross2(a, b, c):
 def distance_to_segment(p, a, b):
     dx, dy = b[0] - a[0], b[1] - a[1]
     length2 = dx * dx + dy * dy
-    t = 0.0 if length2 == 0 else min(1.0, max(0.0, ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length2))
+    t = (
+        0.0
+        if length2 == 0
+        else min(1.0, max(0.0, ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / length2))
+    )
     return np.hypot(p[0] - a[0] - t * dx, p[1] - a[1] - t * dy)
 
 
@@ -85,7 +91,10 @@ def depth_in_face(p, flat, index, ring_start, first, last):
         if inside_ring(p, flat, index, low, high):
             inside = not inside
         for k in range(low, high):
-            nearest = min(nearest, distance_to_segment(p, flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]))
+            nearest = min(
+                nearest,
+                distance_to_segment(p, flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]),
+            )
     return nearest if inside else -nearest
 
 
@@ -101,7 +110,9 @@ def segments_touch(a, b, c, d):
 
 @compiled
 def ring_is_simple(flat, index, low, high):
-    """Whether a ring neither crosses nor touches nor folds back on itself (vertices already welded)."""
+    """Whether a ring neither crosses nor touches nor folds back on itself (vertices already
+    welded).
+    """
     size = high - low
     for i in range(size):
         a, b = index[low + i], index[low + (i + 1) % size]
@@ -116,9 +127,13 @@ def ring_is_simple(flat, index, low, high):
             if i == 0 and j == size - 1:
                 continue
             c, d = index[low + j], index[low + j + 1 if j + 1 < size else low]
-            if (flat[c, 0] < west and flat[d, 0] < west) or (flat[c, 0] > east and flat[d, 0] > east):
+            if (flat[c, 0] < west and flat[d, 0] < west) or (
+                flat[c, 0] > east and flat[d, 0] > east
+            ):
                 continue
-            if (flat[c, 1] < south and flat[d, 1] < south) or (flat[c, 1] > north and flat[d, 1] > north):
+            if (flat[c, 1] < south and flat[d, 1] < south) or (
+                flat[c, 1] > north and flat[d, 1] > north
+            ):
                 continue
             if a in (c, d) or b in (c, d) or segments_touch(flat[a], flat[b], flat[c], flat[d]):
                 return False
@@ -154,7 +169,10 @@ def rings_meet(flat, index, low, high, low2, high2):
             on_other = on_other or distance_to_segment(a, c, d) <= TOUCH_M
             middle_on_other = middle_on_other or distance_to_segment(middle, c, d) <= TOUCH_M
             if distance_to_segment(c, a, b) <= TOUCH_M:
-                apart = np.hypot(c[0] - a[0], c[1] - a[1]) > TOUCH_M and np.hypot(c[0] - b[0], c[1] - b[1]) > TOUCH_M
+                apart = (
+                    np.hypot(c[0] - a[0], c[1] - a[1]) > TOUCH_M
+                    and np.hypot(c[0] - b[0], c[1] - b[1]) > TOUCH_M
+                )
                 touches += apart
         if on_other and middle_on_other:
             return True, touches
@@ -164,14 +182,19 @@ def rings_meet(flat, index, low, high, low2, high2):
 
 @compiled
 def ring_in_ring(flat, index, low, high, low2, high2):
-    """Whether the first ring lies in the second, by its first vertex or edge middle that is not on the second's border."""
+    """Whether the first ring lies in the second, by its first vertex or edge middle that is not on
+    the second's border.
+    """
     for k in range(low, high):
         a, b = flat[index[k]], flat[index[k + 1 if k + 1 < high else low]]
         for p in (a, 0.5 * (a + b)):
             nearest = np.inf
             for m in range(low2, high2):
                 nearest = min(
-                    nearest, distance_to_segment(p, flat[index[m]], flat[index[m + 1 if m + 1 < high2 else low2]])
+                    nearest,
+                    distance_to_segment(
+                        p, flat[index[m]], flat[index[m + 1 if m + 1 < high2 else low2]]
+                    ),
                 )
             if nearest > TOUCH_M:
                 return inside_ring(p, flat, index, low2, high2)
@@ -180,7 +203,10 @@ def ring_in_ring(flat, index, low, high, low2, high2):
 
 @compiled
 def check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f):
-    """Codes 201, 202, 205, 206, 207, 208 of one face; `signed` are the rings' areas along the face's normal."""
+    """Codes 201, 202, 205, 206, 207, 208 of one face;
+
+    `signed` are the rings' areas along the face's normal.
+    """
     parent = np.arange(last - first)
     for r in range(first + 1, last):
         low, high = ring_start[r], ring_start[r + 1]
@@ -194,7 +220,9 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, found, count
             if meet:
                 code = 201
                 break
-            if touches > 1 or (touches == 1 and root_of(parent, r - first) == root_of(parent, s - first)):
+            if touches > 1 or (
+                touches == 1 and root_of(parent, r - first) == root_of(parent, s - first)
+            ):
                 code = 205
                 break
             if touches == 1:
@@ -203,7 +231,8 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, found, count
                 code = 206
                 break
             if s > first and (
-                ring_in_ring(flat, index, low, high, low2, high2) or ring_in_ring(flat, index, low2, high2, low, high)
+                ring_in_ring(flat, index, low, high, low2, high2)
+                or ring_in_ring(flat, index, low2, high2, low, high)
             ):
                 code = 207
                 break
@@ -219,7 +248,8 @@ def check_inner_rings(flat, index, ring_start, first, last, signed, found, count
 def may_bend(vertices, index, low, high, normal):
     """Whether some three of a face's vertices span a triangle over 10 degrees off its `normal`.
 
-    Where none do, no two triangles of any triangulation are over 20 degrees apart. Large faces are not asked.
+    Where none do, no two triangles of any triangulation are over 20 degrees apart. Large faces are
+    not asked.
     """
     if high - low > MOST_VERTICES_IN_THREES:
         return True
@@ -240,7 +270,9 @@ def may_bend(vertices, index, low, high, normal):
 
 @compiled
 def ring_lengths_code(index, ring_start, first, last):
-    """Code 101 or 102 of the rings first to last, 0 where they have points enough and none twice in a row."""
+    """Code 101 or 102 of the rings first to last, 0 where they have points enough and none twice in
+    a row.
+    """
     code = 101 if first == last else 0
     for r in range(first, last):
         low, high = ring_start[r], ring_start[r + 1]
@@ -254,7 +286,9 @@ def ring_lengths_code(index, ring_start, first, last):
 
 @compiled
 def check_faces(vertices, index, ring_start, face_start, planarity):
-    """Ring and face codes but 204: (rows found, unit normals (f, 3), offsets (f,), flatness (f,), may bend (f,))."""
+    """Ring and face codes but 204: (rows found, unit normals (f, 3), offsets (f,), flatness (f,),
+    may bend (f,)).
+    """
     faces = len(face_start) - 1
     normals, offsets, flatness = np.zeros((faces, 3)), np.zeros(faces), np.zeros(faces)
     risky = np.zeros(faces, np.bool_)
@@ -263,7 +297,11 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
     for f in range(faces):
         first, last = face_start[f], face_start[f + 1]
         code = ring_lengths_code(index, ring_start, first, last)
-        area = np.zeros(3) if code else newell(vertices, index, ring_start[first], ring_start[first + 1])
+        area = (
+            np.zeros(3)
+            if code
+            else newell(vertices, index, ring_start[first], ring_start[first + 1])
+        )
         size = np.sqrt(dot(area, area))
         if code == 0 and size < 1e-7:
             code = 104
@@ -288,16 +326,20 @@ def check_faces(vertices, index, ring_start, face_start, planarity):
         elif last - first > 1:
             signed = np.empty(last - first)
             for r in range(first, last):
-                signed[r - first] = dot(newell(vertices, index, ring_start[r], ring_start[r + 1]), normals[f])
+                signed[r - first] = dot(
+                    newell(vertices, index, ring_start[r], ring_start[r + 1]), normals[f]
+                )
             count = check_inner_rings(flat, index, ring_start, first, last, signed, found, count, f)
     return found[:count].copy(), normals, offsets, flatness, risky
 
 
 @compiled
 def best_plane(vertices, index, low, high, normal):
-    """The plane by least squares through index[low:high]: (unit normal, offset, how far vertices lie off it).
+    """The plane by least squares through index[low:high]: (unit normal, offset, how far vertices
+    lie off it).
 
-    `normal` is about right and is turned to the best; that of the area goes far astray where a face is long and thin.
+    `normal` is about right and is turned to the best; that of the area goes far astray where a face
+    is long and thin.
     """
     centre = np.zeros(3)
     for k in range(low, high):
@@ -315,7 +357,11 @@ def best_plane(vertices, index, low, high, normal):
         uu, uv, vv, ud, vd = uu + pu * pu, uv + pu * pv, vv + pv * pv, ud + pu * pd, vd + pv * pd
     determinant = uu * vv - uv * uv
     if determinant > 1e-9 * uu * vv:
-        normal = normal - u * ((ud * vv - vd * uv) / determinant) - v * ((vd * uu - ud * uv) / determinant)
+        normal = (
+            normal
+            - u * ((ud * vv - vd * uv) / determinant)
+            - v * ((vd * uu - ud * uv) / determinant)
+        )
         normal = normal / np.sqrt(dot(normal, normal))
     farthest = 0.0
     for k in range(low, high):
@@ -342,7 +388,9 @@ def project(flat, vertices, index, low, high, axis):
 
 @compiled
 def directed_edges(index, ring_start, face_start):
-    """All directed edges sorted by their vertices: (edge (e, 4): low vertex, high vertex, +1 or -1, face)."""
+    """All directed edges sorted by their vertices: (edge (e, 4): low vertex, high vertex, +1 or -1,
+    face).
+    """
     edges = np.empty((len(index), 4), np.int64)
     count = 0
     for f in range(len(face_start) - 1):
@@ -364,7 +412,11 @@ def check_edges(edges, faces, found, count):
     start, clean = 0, True
     while start < len(edges):
         stop, balance = start, 0
-        while stop < len(edges) and edges[stop, 0] == edges[start, 0] and edges[stop, 1] == edges[start, 1]:
+        while (
+            stop < len(edges)
+            and edges[stop, 0] == edges[start, 0]
+            and edges[stop, 1] == edges[start, 1]
+        ):
             balance += edges[stop, 2]
             join(parent, edges[start, 3], edges[stop, 3])
             stop += 1
@@ -385,9 +437,12 @@ def check_edges(edges, faces, found, count):
 
 @compiled
 def check_umbrellas(index, ring_start, face_start, found, count):
-    """Code 303 where the faces around a vertex form more than one fan. Only for shells whose edges are all paired.
+    """Code 303 where the faces around a vertex form more than one fan.
 
-    A vertex in which two rings of one face touch is not asked: which corners adjoin there is not told by the rings.
+    Only for shells whose edges are all paired.
+
+    A vertex in which two rings of one face touch is not asked: which corners adjoin there is not
+    told by the rings.
     """
     corners = len(index)
     parent = np.arange(corners)
@@ -449,7 +504,12 @@ def holds_edge(index, low, high, a, b):
 @compiled
 def above(vertices, v, normal, offset):
     """Height of vertex v over a plane."""
-    return vertices[v, 0] * normal[0] + vertices[v, 1] * normal[1] + vertices[v, 2] * normal[2] - offset
+    return (
+        vertices[v, 0] * normal[0]
+        + vertices[v, 1] * normal[1]
+        + vertices[v, 2] * normal[2]
+        - offset
+    )
 
 
 @compiled
@@ -463,10 +523,13 @@ def is_outside(vertices, a, b, low, high, slack):
 
 
 @compiled
-def edges_pierce(vertices, index, ring_start, face_start, f, g, normal, offset, low, high, flat, slack):
+def edges_pierce(
+    vertices, index, ring_start, face_start, f, g, normal, offset, low, high, flat, slack
+):
     """Whether an edge of face g meets face f elsewhere than in shared vertices.
 
-    `normal` and `offset` are those of f, `low` and `high` its box; `slack` is how far off its plane counts.
+    `normal` and `offset` are those of f, `low` and `high` its box; `slack` is how far off its plane
+    counts.
     """
     first, last = face_start[f], face_start[f + 1]
     begin, end = ring_start[first], ring_start[last]
@@ -486,7 +549,12 @@ def edges_pierce(vertices, index, ring_start, face_start, f, g, normal, offset, 
                     return True
             elif (da > slack and db < -slack) or (da < -slack and db > slack):
                 t = da / (da - db)
-                if depth_in_face(flat[a] + t * (flat[b] - flat[a]), flat, index, ring_start, first, last) > slack:
+                if (
+                    depth_in_face(
+                        flat[a] + t * (flat[b] - flat[a]), flat, index, ring_start, first, last
+                    )
+                    > slack
+                ):
                     return True
     return False
 
@@ -525,7 +593,9 @@ def face_boxes(vertices, index, ring_start, face_start):
 
 @compiled
 def sweep_axis(low_box, high_box):
-    """The axis along which faces are shortest compared with the whole: sweeping along it meets the fewest pairs."""
+    """The axis along which faces are shortest compared with the whole: sweeping along it meets the
+    fewest pairs.
+    """
     best, fewest = 0, np.inf
     for axis in range(3):
         whole = high_box[:, axis].max() - low_box[:, axis].min()
@@ -536,8 +606,12 @@ def sweep_axis(low_box, high_box):
 
 
 @compiled
-def check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count):
-    """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; only those whose boxes meet are compared."""
+def check_intersections(
+    vertices, index, ring_start, face_start, normals, offsets, flatness, found, count
+):
+    """Code 306: pairs of faces that meet elsewhere than along shared edges and vertices; only those
+    whose boxes meet are compared.
+    """
     low_box, high_box = face_boxes(vertices, index, ring_start, face_start)
     slack = flatness + 2e-4
     widest, axis = slack.max(), sweep_axis(low_box, high_box)
@@ -551,7 +625,9 @@ def check_intersections(vertices, index, ring_start, face_start, normals, offset
                 break
             for one, other in ((f, g), (g, f)):
                 low, high = low_box[one], high_box[one]
-                if count == len(found) or apart(low, high, low_box[other], high_box[other], slack[one]):
+                if count == len(found) or apart(
+                    low, high, low_box[other], high_box[other], slack[one]
+                ):
                     continue
                 for face in (one, other):
                     begin, end = ring_start[face_start[face]], ring_start[face_start[face + 1]]
@@ -596,7 +672,9 @@ def check_shell(vertices, index, ring_start, face_start, normals, offsets, flatn
     count, clean = check_edges(edges, faces, found, 0)
     if clean:
         count = check_umbrellas(index, ring_start, face_start, found, count)
-    count = check_intersections(vertices, index, ring_start, face_start, normals, offsets, flatness, found, count)
+    count = check_intersections(
+        vertices, index, ring_start, face_start, normals, offsets, flatness, found, count
+    )
     if count == 0 and enclosed_volume(vertices, index, ring_start, face_start) <= 0:
         found[0, 0], found[0, 1], found[0, 2] = 405, -1, -1
         return found[:1]

@@ -1,9 +1,9 @@
 """Turn flat corners in, so that rounded heights cannot fold the face beside them. Compiled.
 
-A plan vertex in the middle of a cell's straight border (another edge ends there) is a corner of the cell's face. It
-lies off the line between its neighbours by a fraction of a millimetre, and so do rounded heights off the face's
-plane. Where the three are the face's tip, they make a triangle of any slope (val3dity's 204). A corner that points
-into its cell makes no such triangle.
+A plan vertex in the middle of a cell's straight border (another edge ends there) is a corner of the
+cell's face. It lies off the line between its neighbours by a fraction of a millimetre, and so do
+rounded heights off the face's plane. Where the three are the face's tip, they make a triangle of
+any slope (val3dity's 204). A corner that points into its cell makes no such triangle.
 """
 
 from __future__ import annotations
@@ -13,9 +13,13 @@ import numpy as np
 from ..compiled import compiled
 from .arrangement import OUTSIDE, half_edge_order, next_half_edges, turn
 
-FLAT_UNITS = 3.0  # units of the grid, 0.3 mm: heights rounded to 0.1 mm can turn a thinner triangle by over 20 degrees
+# units of the grid, 0.3 mm: heights rounded to 0.1 mm can turn a thinner triangle by over 20
+# degrees
+FLAT_UNITS = 3.0
 INWARD_UNITS = (
-    3.0  # units of the grid, 0.3 mm: far enough that the corner points inwards in the plane of a steep face too
+    # units of the grid, 0.3 mm: far enough that the corner points inwards in the plane of a steep
+    # face too
+    3.0
 )
 
 
@@ -23,7 +27,9 @@ INWARD_UNITS = (
 def borders_outside(edges, side, v):
     """Whether the outline passes through vertex v."""
     for e in range(len(edges)):
-        if (edges[e, 0] == v or edges[e, 1] == v) and (side[e, 0] == OUTSIDE or side[e, 1] == OUTSIDE):
+        if (edges[e, 0] == v or edges[e, 1] == v) and (
+            side[e, 0] == OUTSIDE or side[e, 1] == OUTSIDE
+        ):
             return True
     return False
 
@@ -48,17 +54,22 @@ def is_free(xy, edges, v, x, y, reach):
 
 @compiled
 def turn_flat_corners_in(xy, edges, side, ties, reach):
-    """Plan vertices (n, 2) with every flat corner moved to the cell's side of the line between its neighbours.
+    """Plan vertices (n, 2) with every flat corner moved to the cell's side of the line between its
+    neighbours.
 
-    `edges` (e, 2), `side` (e, 2) and `ties` (k, 3) as `split_at_crossings` returns them. Corners of the outline stay,
-    and so do those with a tie and those without room.
+    `edges` (e, 2), `side` (e, 2) and `ties` (k, 3) as `split_at_crossings` returns them. Corners of
+    the outline stay, and so do those with a tie and those without room.
     """
     xy = xy.copy()
     follow = next_half_edges(edges, *half_edge_order(xy, edges))
     label = side.ravel()
     for h in range(len(follow)):
         after = follow[h]
-        a, v, b = edges[h >> 1, h & 1], edges[after >> 1, after & 1], edges[after >> 1, 1 - (after & 1)]
+        a, v, b = (
+            edges[h >> 1, h & 1],
+            edges[after >> 1, after & 1],
+            edges[after >> 1, 1 - (after & 1)],
+        )
         if label[h] == OUTSIDE or a == b or borders_outside(edges, side, v):
             continue
         if (ties[:, 0] == v).any():

@@ -1,4 +1,6 @@
-"""Sets that are joined one after the other (union-find): each member names another of its set, the root names itself."""
+"""Sets that are joined one after the other (union-find): each member names another of its set, the
+root names itself.
+"""
 
 from __future__ import annotations
 

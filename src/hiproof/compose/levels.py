@@ -1,4 +1,6 @@
-"""Heights over the plan: which levels meet at each plan vertex, and where faces of neighbours cross. Compiled."""
+"""Heights over the plan: which levels meet at each plan vertex, and where faces of neighbours
+cross. Compiled.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,8 @@ import numpy as np
 from ..compiled import compiled
 from .arrangement import OUTSIDE, half_edge_order, next_half_edges, trace_faces
 
-LEVEL_GAP_M = 1.1e-3  # levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
+# levels closer than this become one: points within 1 mm are one by ISO 19107 as checked
+LEVEL_GAP_M = 1.1e-3
 NEAR_UNITS = 2000.0  # units of the grid, 0.2 m: a crossing nearer to a corner is moved aside of it
 # units of the grid that it is moved by, about a millimetre; the first that leaves the face flat
 ASIDE_UNITS = (6.0, 7.0, 8.0, 9.0, 10.0, 11.0, 12.0)
@@ -34,16 +37,19 @@ def has_room(xy, edges, e, x, y, reach):
 
 @compiled
 def crossing_place(xy, edges, side, planes, e, x, y, reach):
-    """Grid point for the crossing at (x, y) of the planes on both sides of edge e, a millimetre aside where there is room.
+    """Grid point for the crossing at (x, y) of the planes on both sides of edge e, a millimetre
+    aside where there is room.
 
-    On the edge itself rounding would leave it hundredths of a millimetre off the line between its neighbours, and so
-    make a triangle of any slope. It moves along the line on which the planes meet, to where both are nearest the grid.
+    On the edge itself rounding would leave it hundredths of a millimetre off the line between its
+    neighbours, and so make a triangle of any slope. It moves along the line on which the planes
+    meet, to where both are nearest the grid.
     """
     left, right = side[e, 0], side[e, 1]
     gx, gy = planes[left, 0] - planes[right, 0], planes[left, 1] - planes[right, 1]
     dx, dy = xy[edges[e, 1], 0] - xy[edges[e, 0], 0], xy[edges[e, 1], 1] - xy[edges[e, 0], 1]
     size = np.hypot(gx, gy)
-    across = (gx * dx + gy * dy) / (size * np.hypot(float(dx), float(dy)))  # sine of the angle between that line and e
+    # sine of the angle between that line and e
+    across = (gx * dx + gy * dy) / (size * np.hypot(float(dx), float(dy)))
     best, best_x, best_y = np.inf, x, y
     if abs(across) < 0.3:
         return best_x, best_y
@@ -52,7 +58,9 @@ def crossing_place(xy, edges, side, planes, e, x, y, reach):
             step = way * aside / abs(across) / size
             at_x, at_y = np.rint(x - step * gy), np.rint(y + step * gx)
             z0, z1 = height(planes, left, at_x, at_y), height(planes, right, at_x, at_y)
-            off = max(abs(z0 - np.rint(0.5 * (z0 + z1))), abs(z1 - np.rint(0.5 * (z0 + z1)))) / aside
+            off = (
+                max(abs(z0 - np.rint(0.5 * (z0 + z1))), abs(z1 - np.rint(0.5 * (z0 + z1)))) / aside
+            )
             if off < best and has_room(xy, edges, e, at_x, at_y, reach):
                 best, best_x, best_y = off, at_x, at_y
     return best_x, best_y
@@ -60,10 +68,12 @@ def crossing_place(xy, edges, side, planes, e, x, y, reach):
 
 @compiled
 def split_at_crossings(xy, edges, side, planes, reach):
-    """Split every edge over which the two cells' heights swap order. Returns (xy, edges, side, ties (k, 3)).
+    """Split every edge over which the two cells' heights swap order.
 
-    A tie (vertex, z low, z high) replaces a split that would fall within reach of a vertex: there the levels become
-    one.
+    Returns (xy, edges, side, ties (k, 3)).
+
+    A tie (vertex, z low, z high) replaces a split that would fall within reach of a vertex: there
+    the levels become one.
     """
     room = len(edges)
     out_xy = np.empty((len(xy) + room, 2), np.int64)
@@ -99,7 +109,12 @@ def split_at_crossings(xy, edges, side, planes, reach):
         out_side[count] = side[e]
         vertices += 1
         count += 1
-    return out_xy[:vertices].copy(), out_edges[:count].copy(), out_side[:count].copy(), ties[:tied].copy()
+    return (
+        out_xy[:vertices].copy(),
+        out_edges[:count].copy(),
+        out_side[:count].copy(),
+        ties[:tied].copy(),
+    )
 
 
 @compiled
@@ -115,9 +130,9 @@ def tied(ties, v, low, high):
 def stack_levels(xy, edges, side, planes, z_ground, ties):
     """Levels over every plan vertex. All in grid units.
 
-    Returns (order, start, follow, face) of the half-edges, `level` (2e,) the 3D vertex over each half-edge's origin
-    at the height of the cell on its left, and `vertices` (m, 3). Vertices over one plan vertex are numbered upwards
-    without gaps.
+    Returns (order, start, follow, face) of the half-edges, `level` (2e,) the 3D vertex over each
+    half-edge's origin at the height of the cell on its left, and `vertices` (m, 3). Vertices over
+    one plan vertex are numbered upwards without gaps.
     """
     order, start = half_edge_order(xy, edges)
     follow = next_half_edges(edges, order, start)
@@ -151,7 +166,8 @@ def stack_levels(xy, edges, side, planes, z_ground, ties):
 def first_saddle(order, start, level, face, label):
     """First plan vertex around which the solid is no clean manifold, -1 if there is none.
 
-    That is where the levels rise and fall more than once, or where one cell has two sectors that do not adjoin.
+    That is where the levels rise and fall more than once, or where one cell has two sectors that do
+    not adjoin.
     """
     for v in range(len(start) - 1):
         size = start[v + 1] - start[v]

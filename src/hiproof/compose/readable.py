@@ -46,21 +46,33 @@ def refuse_wrong_parts(roof: Roof) -> None:
 def refuse_many(parts: Sequence) -> None:
     """Raise InputError for more parts than a building has."""
     if len(parts) > MOST_PARTS:
-        raise InputError(f"expected at most {MOST_PARTS} parts, got {len(parts)}; split the building")
+        raise InputError(
+            f"expected at most {MOST_PARTS} parts, got {len(parts)}; split the building"
+        )
 
 
 def refuse_wrong_part(part: Part, index: int, roof: Roof, seen: dict[tuple, int]) -> None:
-    """Raise InputError for a part without finite planes, off the outline, or equal to one `seen` before.
+    """Raise InputError for a part without finite planes, off the outline, or equal to one `seen`
+    before.
 
     `seen` holds the numbers of earlier parts by their content; the part is added to it.
     """
     if not all(np.isfinite(piece.planes).all() for piece in part.pieces):
-        raise InputError(f"expected parameters that make finite planes, got others in part {index}; check their sizes")
+        raise InputError(
+            f"expected parameters that make finite planes, got others in part {index}; check their "
+            "sizes"
+        )
     if not any(shapely.intersects(piece.outline, roof.outline) for piece in part.pieces):
         raise InputError(
-            f"expected part {index} to roof some of the building's outline, got one outside it; move it there"
+            f"expected part {index} to roof some of the building's outline, got one outside it; "
+            "move it there"
         )
-    place, outlines = (part.kappa, *part.translation.tolist()), tuple(piece.outline.wkb for piece in part.pieces)
+    place, outlines = (
+        (part.kappa, *part.translation.tolist()),
+        tuple(piece.outline.wkb for piece in part.pieces),
+    )
     same = seen.setdefault((part.type, tuple(part.parameters.items()), place, outlines), index)
     if same != index:
-        raise InputError(f"expected parts that differ, got part {index} the same as part {same}; remove one")
+        raise InputError(
+            f"expected parts that differ, got part {index} the same as part {same}; remove one"
+        )

@@ -1,7 +1,9 @@
-"""A fitted roof made of exactly the numbers that are written of it, so that its file builds the same bytes again.
+"""A fitted roof made of exactly the numbers that are written of it, so that its file builds the
+same bytes again.
 
-Everything is rounded before the solid is composed: lengths and angles to a millionth of a metre or degree, plans and heights of
-the ground to the tenth of a millimetre on which solids are composed. Planes then follow from the rounded parameters.
+Everything is rounded before the solid is composed: lengths and angles to a millionth of a metre or
+degree, plans and heights of the ground to the tenth of a millimetre on which solids are composed.
+Planes then follow from the rounded parameters.
 """
 
 from __future__ import annotations
@@ -23,12 +25,18 @@ PLAN_DIGITS = 4  # of outlines and the terrain: tenths of a millimetre, as solid
 
 
 def settled_roof(roof: Roof) -> Roof:
-    """The roof with its outline and parts as written; its frame's origin is on whole millimetres already."""
-    return replace(roof, parts=tuple(map(settled_part, roof.parts)), outline=settled_outline(roof.outline))
+    """The roof with its outline and parts as written; its frame's origin is on whole millimetres
+    already.
+    """
+    return replace(
+        roof, parts=tuple(map(settled_part, roof.parts)), outline=settled_outline(roof.outline)
+    )
 
 
 def settled_part(part: Part) -> Part:
-    """The part with parameters, position, rotation and pieces as written, its planes made of them."""
+    """The part with parameters, position, rotation and pieces as written, its planes made
+    of them.
+    """
     parameters = {name: settled(value) for name, value in part.parameters.items()}
     kappa = math.radians(settled(math.degrees(part.kappa)))
     translation = np.array([settled(value) for value in part.translation])
@@ -36,7 +44,9 @@ def settled_part(part: Part) -> Part:
     try:
         pieces = pieces_of(part.type, parameters, kappa, translation, outlines)
     except (FitError, KeyError):  # a shape of somebody's own, which parameters do not make
-        pieces = tuple(Piece(o, piece.planes) for o, piece in zip(outlines, part.pieces, strict=True))
+        pieces = tuple(
+            Piece(o, piece.planes) for o, piece in zip(outlines, part.pieces, strict=True)
+        )
     return Part(part.type, pieces, parameters, kappa, translation, settled_sigma(part.sigma))
 
 
@@ -47,7 +57,8 @@ def pieces_of(
     translation: np.ndarray,
     outlines: list[shapely.Polygon],
 ) -> tuple[Piece, ...]:
-    """The pieces of a part over `outlines`: every plane of its shape, of a saw-tooth the one of the tooth it lies in.
+    """The pieces of a part over `outlines`: every plane of its shape, of a saw-tooth the one of the
+    tooth it lies in.
 
     Raises FitError for a type or parameters that make no shape.
     """
@@ -58,14 +69,21 @@ def pieces_of(
     if kind != "shed":
         return tuple(Piece(outline, planes) for outline in outlines)
     across = np.array([-math.sin(kappa), math.cos(kappa)])
-    places = np.array([shapely.point_on_surface(outline).coords[0] for outline in outlines]).reshape(-1, 2)
+    places = np.array(
+        [shapely.point_on_surface(outline).coords[0] for outline in outlines]
+    ).reshape(-1, 2)
     share = (places - translation[:2]) @ across / parameters["width"] + 0.5
     teeth = np.clip(np.floor(share * len(planes)), 0, len(planes) - 1).astype(int)
-    return tuple(Piece(outline, planes[tooth : tooth + 1]) for outline, tooth in zip(outlines, teeth, strict=True))
+    return tuple(
+        Piece(outline, planes[tooth : tooth + 1])
+        for outline, tooth in zip(outlines, teeth, strict=True)
+    )
 
 
 def settled_sigma(sigma: Mapping[str, float]) -> dict[str, float]:
-    """Standard deviations as written; that of the rotation, `kappa` [rad], in whole millionths of a degree."""
+    """Standard deviations as written; that of the rotation, `kappa` [rad], in whole millionths of a
+    degree.
+    """
     return {
         name: math.radians(settled(math.degrees(value))) if name == "kappa" else settled(value)
         for name, value in sigma.items()
@@ -82,7 +100,9 @@ def rounded_outline(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def settled_outline(outline: shapely.Polygon) -> shapely.Polygon:
-    """The outline rounded; where that makes it cross itself, the largest valid polygon on the same grid."""
+    """The outline rounded; where that makes it cross itself, the largest valid polygon on the same
+    grid.
+    """
     found = rounded_outline(outline)
     if found.is_valid:
         return found

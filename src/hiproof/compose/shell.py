@@ -1,4 +1,6 @@
-"""From plan cells to a closed shell: roof faces over the cells, walls where levels part, one ground face below."""
+"""From plan cells to a closed shell: roof faces over the cells, walls where levels part, one ground
+face below.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,10 @@ class Levels(NamedTuple):
 
 
 class Saddle(Exception):
-    """Around a plan vertex levels rise and fall twice, or a cell meets itself; `patch` (soup, label) is the cure."""
+    """Around a plan vertex levels rise and fall twice, or a cell meets itself;
+
+    `patch` (soup, label) is the cure.
+    """
 
     def __init__(self, patch: tuple[np.ndarray, int]):
         super().__init__("the roof's levels form a checkerboard around a vertex")
@@ -47,25 +52,32 @@ def raise_shell(
     merge_walls: bool = True,
     turn_in: bool = False,
 ) -> Solid:
-    """Solid over the plan cells. Raises Saddle where the problem needs a patch first, CompositionError when none helps.
+    """Solid over the plan cells.
 
-    The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex. `merge_walls` makes one wall of
-    consecutive ones along a straight stretch of the outline. `turn_in` moves flat corners into their cells.
+    Raises Saddle where the problem needs a patch first, CompositionError when none helps.
+
+    The ground is lowered where needed to stay `clearance_m` under the lowest roof vertex.
+    `merge_walls` makes one wall of consecutive ones along a straight stretch of the outline.
+    `turn_in` moves flat corners into their cells.
     """
     planes = problem.planes
-    xy, edges, side, ties = split_at_crossings(cells.xy, cells.edges, cells.side, planes, reach_m / GRID_M)
+    xy, edges, side, ties = split_at_crossings(
+        cells.xy, cells.edges, cells.side, planes, reach_m / GRID_M
+    )
     if turn_in:
         xy = turn_flat_corners_in(xy, edges, side, ties, reach_m / GRID_M)
     if len(edges) == 0:
         raise CompositionError(
-            "expected an outline with an area, got one thinner than a millimetre; repair or remove the footprint"
+            "expected an outline with an area, got one thinner than a millimetre; repair or remove "
+            "the footprint"
         )
     z_low = lowest_roof(xy, edges, side, planes) - clearance_m / GRID_M
     z_base = np.floor(min(z_ground / GRID_M, z_low))
     levels = Levels(*stack_levels(xy, edges, side, planes, z_base, ties))
     saddle = first_saddle(levels.order, levels.start, levels.level, levels.face, side.ravel())
     if saddle >= 0:
-        radius = max(SETBACK_M, 4 * reach_m) / GRID_M * (1 + 0.25 * len(problem.patches))  # grows: a cure may need room
+        # grows: a cure may need room
+        radius = max(SETBACK_M, 4 * reach_m) / GRID_M * (1 + 0.25 * len(problem.patches))
         raise Saddle(cure(sectors_at(saddle, xy, edges, side, levels), radius))
     # from here on numbers of a few dozen edges: plain lists are faster than arrays
     label, xyz = side.ravel().tolist(), levels.vertices.tolist()
@@ -74,7 +86,9 @@ def raise_shell(
     rises = wall_rises(follow, level)
     runs = wall_runs(rises, follow, label, xyz) if merge_walls else [[h] for h in rises]
     skip = {rises[h][0] for run in runs for h in run[1:]}
-    faces += [Face((tuple([v for v in wall_ring(run, rises) if v not in skip]),), WALL) for run in runs]
+    faces += [
+        Face((tuple([v for v in wall_ring(run, rises) if v not in skip]),), WALL) for run in runs
+    ]
     faces.append(ground_face(follow, level, label, skip, xyz))
     return compacted(np.round(levels.vertices * GRID_M, 4), faces)
 
@@ -130,7 +144,12 @@ def signed_area(ring: list[int], xyz: list[list[float]]) -> float:
 
 
 def roof_faces(
-    follow: list[int], face: list[int], level: list[int], label: list[int], xyz: list[list[float]], part: np.ndarray
+    follow: list[int],
+    face: list[int],
+    level: list[int],
+    label: list[int],
+    xyz: list[list[float]],
+    part: np.ndarray,
 ) -> list[Face]:
     """A RoofSurface a cell: its outer walk counter-clockwise from above, then its holes."""
     rings_of: dict[int, list[list[int]]] = {}
@@ -146,7 +165,9 @@ def roof_faces(
     return faces
 
 
-def ground_face(follow: list[int], level: list[int], label: list[int], skip: set[int], xyz: list[list[float]]) -> Face:
+def ground_face(
+    follow: list[int], level: list[int], label: list[int], skip: set[int], xyz: list[list[float]]
+) -> Face:
     """The GroundSurface: the walks around the outside, which run counter-clockwise seen from below.
 
     `skip` are ground vertices in the middle of a straight wall, which nothing else needs.
@@ -160,19 +181,31 @@ def ground_face(follow: list[int], level: list[int], label: list[int], skip: set
 
 
 def wall_rises(follow: list[int], level: list[int]) -> dict[int, tuple[int, int, int, int]]:
-    """Half-edges whose left cell stands above the right one, with their levels (low, high at origin, low, high at end)."""
+    """Half-edges whose left cell stands above the right one, with their levels (low, high at
+    origin, low, high at end).
+    """
     rises = {}
     for h in range(len(follow)):
-        low_u, high_u, low_v, high_v = level[follow[h ^ 1]], level[h], level[h ^ 1], level[follow[h]]
+        low_u, high_u, low_v, high_v = (
+            level[follow[h ^ 1]],
+            level[h],
+            level[h ^ 1],
+            level[follow[h]],
+        )
         if high_u > low_u or high_v > low_v:
             rises[h] = (low_u, high_u, low_v, high_v)
     return rises
 
 
 def wall_runs(
-    rises: dict[int, tuple[int, int, int, int]], follow: list[int], label: list[int], xyz: list[list[float]]
+    rises: dict[int, tuple[int, int, int, int]],
+    follow: list[int],
+    label: list[int],
+    xyz: list[list[float]],
 ) -> list[list[int]]:
-    """Half-edges with walls, grouped: consecutive ones on a straight stretch of the outline make one wall."""
+    """Half-edges with walls, grouped: consecutive ones on a straight stretch of the outline make
+    one wall.
+    """
     outer = {follow[h ^ 1] ^ 1: h for h in rises if label[h ^ 1] == OUTSIDE}
     after = {before: h for before, h in outer.items() if is_straight([before, h], rises, xyz)}
     runs = [[h] for h in rises if label[h ^ 1] != OUTSIDE]
@@ -190,7 +223,9 @@ def wall_runs(
     return runs
 
 
-def is_straight(run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz: list[list[float]]) -> bool:
+def is_straight(
+    run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz: list[list[float]]
+) -> bool:
     """Whether all ground vertices inside a run lie on the line between its ends."""
     ax, ay, _ = xyz[rises[run[0]][0]]
     bx, by, _ = xyz[rises[run[-1]][2]]
@@ -205,7 +240,9 @@ def is_straight(run: list[int], rises: dict[int, tuple[int, int, int, int]], xyz
 
 
 def wall_ring(run: list[int], rises: dict[int, tuple[int, int, int, int]]) -> list[int]:
-    """Ring of the wall over a run of plan edges, counter-clockwise seen from its right, through every level on the way."""
+    """Ring of the wall over a run of plan edges, counter-clockwise seen from its right, through
+    every level on the way.
+    """
     low_u, high_u, _, _ = rises[run[0]]
     _, _, low_v, high_v = rises[run[-1]]
     ring = [low_u, *range(low_v, high_v)]
@@ -223,14 +260,17 @@ def compacted(vertices: np.ndarray, faces: list[Face]) -> Solid:
     used = sorted({v for face in faces for ring in face.rings for v in ring})
     number = {vertex: index for index, vertex in enumerate(used)}
     faces = [
-        Face(tuple([tuple([number[v] for v in ring]) for ring in face.rings]), face.kind, face.part) for face in faces
+        Face(tuple([tuple([number[v] for v in ring]) for ring in face.rings]), face.kind, face.part)
+        for face in faces
     ]
     return Solid(vertices[used], tuple(faces))
 
 
 @dataclass(frozen=True)
 class Sectors:
-    """The cells around a plan vertex, counter-clockwise: sector k lies between arm k and the next."""
+    """The cells around a plan vertex, counter-clockwise: sector k lies between arm k and
+    the next.
+    """
 
     corner: np.ndarray
     angle: list[float]
@@ -251,13 +291,17 @@ class Sectors:
     def tip(self, run: tuple[int, int], radius: float) -> np.ndarray:
         """Edges (m, 4) of the wedge over a run of sectors, `radius` grid units long."""
         width = self.width(run)
-        steps = np.linspace(0, width, max(2, math.ceil(width / (np.pi / 3)) + 1)) + self.angle[run[0]]
+        steps = (
+            np.linspace(0, width, max(2, math.ceil(width / (np.pi / 3)) + 1)) + self.angle[run[0]]
+        )
         tips = np.rint(self.corner + radius * np.column_stack((np.cos(steps), np.sin(steps))))
         polygon = np.vstack((self.corner, tips))
         return np.hstack((polygon, np.roll(polygon, -1, axis=0)))
 
 
-def sectors_at(v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels) -> Sectors:
+def sectors_at(
+    v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, levels: Levels
+) -> Sectors:
     """The sectors around plan vertex v."""
     around = levels.order[levels.start[v] : levels.start[v + 1]]
     arms = (xy[edges[around >> 1, 1 - (around & 1)]] - xy[v]).astype(float)
@@ -275,9 +319,11 @@ def sectors_at(v: int, xy: np.ndarray, edges: np.ndarray, side: np.ndarray, leve
 
 
 def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
-    """Patch (soup, label) for a vertex that is no manifold: the tip of its narrowest peak goes to the higher neighbour.
+    """Patch (soup, label) for a vertex that is no manifold: the tip of its narrowest peak goes to
+    the higher neighbour.
 
-    Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to that cell.
+    Where no levels cross but a cell meets itself, the tip of what lies between its two arms goes to
+    that cell.
     """
     size = len(sectors.level)
     peaks = []
@@ -289,22 +335,30 @@ def cure(sectors: Sectors, radius: float) -> tuple[np.ndarray, int]:
     if len(peaks) < 2:
         peaks = pinches(sectors)
     if not peaks:
-        raise CompositionError("expected levels that can be told apart around every corner, got a corner that has none")
+        raise CompositionError(
+            "expected levels that can be told apart around every corner, got a corner that has none"
+        )
     _, run, label = min(peaks)
     return sectors.tip(run, radius), label
 
 
 def pinches(sectors: Sectors) -> list[tuple[float, tuple[int, int], int]]:
-    """(width, run, label) of what a cell that meets itself encloses on either side, as far as it is roofed."""
+    """(width, run, label) of what a cell that meets itself encloses on either side, as far as it is
+    roofed.
+    """
     found = []
-    for cell in {face for face, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE}:
+    for cell in {
+        face for face, label in zip(sectors.face, sectors.label, strict=True) if label != OUTSIDE
+    }:
         runs = sectors.runs([int(face == cell) for face in sectors.face])
         between = [run for run in runs if sectors.face[run[0]] != cell]
         if len(between) < 2:
             continue
         label = sectors.label[sectors.face.index(cell)]
         for first, count in between:
-            roofed = all(sectors.label[(first + j) % len(sectors.label)] != OUTSIDE for j in range(count))
+            roofed = all(
+                sectors.label[(first + j) % len(sectors.label)] != OUTSIDE for j in range(count)
+            )
             if roofed:
                 found.append((sectors.width((first, count)), (first, count), label))
     return found

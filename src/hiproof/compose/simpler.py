@@ -16,7 +16,11 @@ NEAR_M = 0.2  # m; points so near a roof are on it, as in a building's quality
 
 
 def compose_simpler(
-    roof: Roof, z_ground_local: float, points: np.ndarray, failure: CompositionError, settings: Settings
+    roof: Roof,
+    z_ground_local: float,
+    points: np.ndarray,
+    failure: CompositionError,
+    settings: Settings,
 ) -> tuple[Roof, Solid, str]:
     """Compose the roof without the parts that fail, and say what was given up.
 
@@ -31,15 +35,23 @@ def compose_simpler(
             raise failure
         for _, simpler, sentence in options:
             try:
-                return simpler, compose_readable(simpler, z_ground_local, settings), "; ".join([*given_up, sentence])
+                return (
+                    simpler,
+                    compose_readable(simpler, z_ground_local, settings),
+                    "; ".join([*given_up, sentence]),
+                )
             except CompositionError as error:
                 last = error
         _, roof, sentence = options[0]
         given_up, failure = [*given_up, sentence], last
 
 
-def simpler_roofs(roof: Roof, failing: tuple[int, ...], points: np.ndarray) -> Iterator[tuple[float, Roof, str]]:
-    """Yield (share of points on it, roof, what was given up) for each part that fails, or for all."""
+def simpler_roofs(
+    roof: Roof, failing: tuple[int, ...], points: np.ndarray
+) -> Iterator[tuple[float, Roof, str]]:
+    """Yield (share of points on it, roof, what was given up) for each part that fails, or
+    for all.
+    """
     if len(roof.parts) < 2:
         return
     for k in failing or range(len(roof.parts)):
@@ -58,7 +70,9 @@ def level_part(part: Part, points: np.ndarray) -> Part:
     height = round(float(np.median(z)) if len(z) else float(part.translation[2]), 6)
     pieces = tuple(Piece(piece.outline, np.array([[0.0, 0.0, height]])) for piece in part.pieces)
     size: dict[str, float] = {
-        name: part.parameters[name] for name in ("width", "length") if part.parameters.get(name, 0.0) > 0.0
+        name: part.parameters[name]
+        for name in ("width", "length")
+        if part.parameters.get(name, 0.0) > 0.0
     }
     return Part("flat", pieces, size, part.kappa, np.array([*part.translation[:2], height]))
 

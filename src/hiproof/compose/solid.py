@@ -15,8 +15,8 @@ from .cells import PlanProblem, arrange, plan_problem
 from .check import Finding, check_solid
 from .shell import Saddle, raise_shell
 
-# factor on the snap distance, whether straight walls become one and whether flat corners are turned in, tried in turn
-# until the solid is valid
+# factor on the snap distance, whether straight walls become one and whether flat corners are turned
+# in, tried in turn until the solid is valid
 ATTEMPTS = (
     (1.0, True, False),
     (1.0, False, False),
@@ -29,20 +29,23 @@ ATTEMPTS = (
     (10.0, False, True),
     (30.0, False, True),
 )
-LENIENT_M = 0.01  # val3dity's default planarity: steep planes cannot meet within less where vertices moved a centimetre
+# val3dity's default planarity: steep planes cannot meet within less where vertices moved a
+# centimetre
+LENIENT_M = 0.01
 MAX_PATCHES = 40  # crosswise corners mended in one building, so that it comes to an end
 
 
 def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None) -> Solid:
-    """The valid solid (ISO 19107) under `roof` and above `z_ground_local` [m], both in the roof's local frame.
+    """The valid solid (ISO 19107) under `roof` and above `z_ground_local` [m], both in the roof's
+    local frame.
 
-    Over the roof's outline the top is max over covering pieces of min over their planes. Parts of the outline no
-    piece covers are roofed by the piece they border most. Faces under the smallest area are merged away, vertices
-    closer than the snap distance are one. Where the roof would come closer to the ground than the clearance, the
-    ground gives way.
+    Over the roof's outline the top is max over covering pieces of min over their planes. Parts of
+    the outline no piece covers are roofed by the piece they border most. Faces under the smallest
+    area are merged away, vertices closer than the snap distance are one. Where the roof would come
+    closer to the ground than the clearance, the ground gives way.
 
-    RoofSurface faces carry the index of their roof part. Coordinates are multiples of 0.1 mm. Raises CompositionError
-    when no valid solid comes out, even with coarser snapping.
+    RoofSurface faces carry the index of their roof part. Coordinates are multiples of 0.1 mm.
+    Raises CompositionError when no valid solid comes out, even with coarser snapping.
 
     >>> import numpy as np, shapely
     >>> from hiproof.frames import LocalFrame
@@ -50,13 +53,15 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     >>> house = shapely.box(0, 0, 10, 8)
     >>> gable = Piece(house, np.array([[0.0, 0.5, 5.0], [0.0, -0.5, 9.0]]))
     >>> solid = compose(Roof((Part("gable", (gable,)),), house, LocalFrame(np.zeros(3))), 0.0)
-    >>> [len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface", "GroundSurface")], solid.volume
+    >>> [len(solid.of_kind(kind)) for kind in ("RoofSurface", "WallSurface",
+    ...     "GroundSurface")], solid.volume
     ([2, 4, 1], 480.0)
     """
     options = (settings or Settings()).compose
     if not np.isfinite(z_ground_local):
         raise CompositionError(
-            f"expected a finite ground height, got {z_ground_local}; take the lowest terrain under the outline"
+            f"expected a finite ground height, got {z_ground_local}; take the lowest terrain under "
+            "the outline"
         )
     problem = plan_problem(roof)
     bent: list[Solid] = []
@@ -64,7 +69,9 @@ def compose(roof: Roof, z_ground_local: float, settings: Settings | None = None)
     parts: tuple[int, ...] = ()
     for factor, merge_walls, turn_in in ATTEMPTS:
         try:
-            solid = compose_at(problem, z_ground_local, options, factor * options.snap_m, merge_walls, turn_in)
+            solid = compose_at(
+                problem, z_ground_local, options, factor * options.snap_m, merge_walls, turn_in
+            )
         except CompositionError as error:
             failure = str(error)
             continue
@@ -98,15 +105,21 @@ def compose_at(
     merge_walls: bool,
     turn_in: bool = False,
 ) -> Solid:
-    """One attempt at the given snap distance; corners where levels meet crosswise are set back one by one."""
+    """One attempt at the given snap distance; corners where levels meet crosswise are set back one
+    by one.
+    """
     reach_m = snap_m + 2e-4  # rounding to the grid moves a crossing by less
     for _ in range(MAX_PATCHES):
         cells = arrange(problem, reach_m, options.min_face_area_m2, options.min_face_width_m)
         try:
-            return raise_shell(cells, problem, z_ground, options.ground_clearance_m, reach_m, merge_walls, turn_in)
+            return raise_shell(
+                cells, problem, z_ground, options.ground_clearance_m, reach_m, merge_walls, turn_in
+            )
         except Saddle as saddle:
             problem = replace(problem, patches=[*problem.patches, saddle.patch])
-    raise CompositionError("expected at most forty corners where roof levels meet crosswise, got more")
+    raise CompositionError(
+        "expected at most forty corners where roof levels meet crosswise, got more"
+    )
 
 
 def terrain_intersection(
@@ -115,10 +128,12 @@ def terrain_intersection(
     z_floor: float = float("nan"),
     spacing_m: float = 1.0,
 ) -> tuple[np.ndarray, ...]:
-    """Closed lines (m, 3) where the outline's walls meet the terrain: one a ring, a vertex at least every `spacing_m`.
+    """Closed lines (m, 3) where the outline's walls meet the terrain: one a ring, a vertex at least
+    every `spacing_m`.
 
-    `terrain_height_at` takes (n, 2) and returns (n,) in the outline's frame; where it knows nothing (NaN) the height
-    is that of the ring's other points on average, and `z_floor` if it knows nothing along the whole ring.
+    `terrain_height_at` takes (n, 2) and returns (n,) in the outline's frame; where it knows nothing
+    (NaN) the height is that of the ring's other points on average, and `z_floor` if it knows
+    nothing along the whole ring.
 
     >>> line, = terrain_intersection(shapely.box(0, 0, 2, 1), lambda xy: xy[:, 0] * 0.1, 0.0)
     >>> line.shape, line[0].tolist() == line[-1].tolist()

@@ -8,7 +8,8 @@ from ..compiled import compiled
 from .arrangement import OUTSIDE, is_beside, renumbered, turn
 from .levels import height
 
-SHORT_UNITS = 30.0  # units of the grid, 3 mm: beside a shorter edge no face can be flat to val3dity's 20 degrees
+# units of the grid, 3 mm: beside a shorter edge no face can be flat to val3dity's 20 degrees
+SHORT_UNITS = 30.0
 
 
 @compiled
@@ -25,19 +26,28 @@ def edges_at(edges, v):
 @compiled
 def gap_at(xy, side, planes, e, v):
     """How far apart the planes left and right of edge e are over vertex v."""
-    return abs(height(planes, side[e, 0], xy[v, 0], xy[v, 1]) - height(planes, side[e, 1], xy[v, 0], xy[v, 1]))
+    return abs(
+        height(planes, side[e, 0], xy[v, 0], xy[v, 1])
+        - height(planes, side[e, 1], xy[v, 0], xy[v, 1])
+    )
 
 
 @compiled
 def is_clear(xy, edges, gone, stays, far, reach):
-    """Whether edge (gone, far) can become (stays, far): no vertex in the triangle between them or within reach of it."""
+    """Whether edge (gone, far) can become (stays, far): no vertex in the triangle between them or
+    within reach of it.
+    """
     for e in range(len(edges)):
         for v in edges[e]:
             if v < 0 or v in (gone, stays, far):
                 continue
             if is_beside(xy[v], xy[stays], xy[far], reach):
                 return False
-            a, b, c = turn(xy[gone], xy[stays], xy[v]), turn(xy[stays], xy[far], xy[v]), turn(xy[far], xy[gone], xy[v])
+            a, b, c = (
+                turn(xy[gone], xy[stays], xy[v]),
+                turn(xy[stays], xy[far], xy[v]),
+                turn(xy[far], xy[gone], xy[v]),
+            )
             if (a >= 0) == (b >= 0) and (b >= 0) == (c >= 0):
                 return False
     return True
@@ -45,9 +55,11 @@ def is_clear(xy, edges, gone, stays, far, reach):
 
 @compiled
 def without_short_edges(xy, edges, side, planes, reach):
-    """Drop an end of every edge between two cells that is shorter than 3 mm: (xy, edges, side) compacted.
+    """Drop an end of every edge between two cells that is shorter than 3 mm: (xy, edges, side)
+    compacted.
 
-    Only an end where nothing else meets can go, of two the one over which the cells are further apart. Outlines stay.
+    Only an end where nothing else meets can go, of two the one over which the cells are further
+    apart. Outlines stay.
     """
     edges = edges.copy()
     for e in range(len(edges)):

@@ -1,4 +1,5 @@
-"""Pictures of models: a view for notebooks without network, a plot over points, every primitive with its parameters' names.
+"""Pictures of models: a view for notebooks without network, a plot over points, every primitive
+with its parameters' names.
 
 view          how a solid is seen: faces turned, projected, ordered from far to near
 html          a notebook's view, which turns

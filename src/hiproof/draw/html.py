@@ -1,4 +1,6 @@
-"""A building in a notebook: a small view that turns when dragged, its parts in a table; no request leaves the page."""
+"""A building in a notebook: a small view that turns when dragged, its parts in a table; no request
+leaves the page.
+"""
 
 from __future__ import annotations
 
@@ -20,10 +22,13 @@ MM = 3  # digits of coordinates sent to the page: millimetres
 
 
 def html_of(building: Building) -> str:
-    """The building as HTML: its view where it has a solid, status, and the parameters of its parts."""
+    """The building as HTML: its view where it has a solid, status, and the parameters of
+    its parts.
+    """
     head = f"<b>{escape(building.id)}</b>: {escape(building.detail or building.status.value)}"
     view = view_of(building) if building.built is not None else ""
-    return f'<div style="font-family:sans-serif;font-size:12px">{view}<div>{head}</div>{parts_table(building)}</div>'
+    style = "font-family:sans-serif;font-size:12px"
+    return f'<div style="{style}">{view}<div>{head}</div>{parts_table(building)}</div>'
 
 
 def view_of(building: Building) -> str:
@@ -35,15 +40,20 @@ def view_of(building: Building) -> str:
         {"r": [list(ring) for ring in face.rings], "c": shaded(colour, lightness(solid, face))}
         for face, colour in zip(solid.faces, colours, strict=True)
     ]
-    data = json.dumps({"v": corners.tolist(), "f": faces, "s": scale, "t": [turn, TILT_DEG]}, separators=(",", ":"))
+    data = json.dumps(
+        {"v": corners.tolist(), "f": faces, "s": scale, "t": [turn, TILT_DEG]},
+        separators=(",", ":"),
+    )
     name = "hiproof-" + hashlib.sha256((building.id + data).encode()).hexdigest()[:12]
     polygons = "".join(
-        path_of(face.rings, shaded(face.colour, face.light), scale) for face in seen_faces(solid, colours, turn)
+        path_of(face.rings, shaded(face.colour, face.light), scale)
+        for face in seen_faces(solid, colours, turn)
     )
     box = f"{-SIZE[0] / 2} {-SIZE[1] / 2} {SIZE[0]} {SIZE[1]}"
     script = (files("hiproof.draw") / "turn.js").read_text(encoding="utf-8")
     return (
-        f'<svg id="{name}" width="{SIZE[0]}" height="{SIZE[1]}" viewBox="{box}" style="cursor:grab;touch-action:none" '
+        f'<svg id="{name}" width="{SIZE[0]}" height="{SIZE[1]}" viewBox="{box}" '
+        'style="cursor:grab;touch-action:none" '
         f'role="img" aria-label="model of {escape(building.id, quote=True)}">{polygons}</svg>'
         f'<script>({script.strip()})("{name}",{data.replace("<", chr(92) + "u003c")})</script>'
     )
@@ -51,7 +61,9 @@ def view_of(building: Building) -> str:
 
 def path_of(rings: tuple[np.ndarray, ...], colour: str, scale: float) -> str:
     """A face as an SVG path."""
-    d = "".join("M" + "L".join(f"{x * scale:.1f} {y * scale:.1f}" for x, y in ring) + "Z" for ring in rings)
+    d = "".join(
+        "M" + "L".join(f"{x * scale:.1f} {y * scale:.1f}" for x, y in ring) + "Z" for ring in rings
+    )
     return f'<path d="{d}" fill="{colour}" fill-rule="evenodd" stroke="#333" stroke-width="0.7"/>'
 
 

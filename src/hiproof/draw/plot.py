@@ -16,11 +16,12 @@ MOST_POINTS = 5000  # points drawn; more make a black patch
 
 
 def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -> Any:
-    """Draw the building's solid, and `points` (n, 3) world metres coloured by their height over its roof, into matplotlib axes.
+    """Draw the building's solid, and `points` (n, 3) world metres coloured by their height over its
+    roof, into matplotlib axes.
 
-    ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the roof are blue, others red.
-    Raises NoModelError for a building without a model, InputError for points of another shape and where matplotlib (extra
-    `report`) is missing.
+    ax: three-dimensional axes to draw into; made if None. Returns them. Points within 0.2 m of the
+    roof are blue, others red. Raises NoModelError for a building without a model, InputError for
+    points of another shape and where matplotlib (extra `report`) is missing.
     """
     model = building.model
     ax = ax if ax is not None else new_axes(turn_of(building))
@@ -29,10 +30,15 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
     origin = model.roof.frame.origin
     vertices = model.solid.vertices - origin
     faces = model.solid.faces
-    colours = [shaded(c, lightness(model.solid, f)) for c, f in zip(colours_of(building), faces, strict=True)]
+    colours = [
+        shaded(c, lightness(model.solid, f))
+        for c, f in zip(colours_of(building), faces, strict=True)
+    ]
     polygons = [vertices[list(face.rings[0])] for face in faces]
     ax.add_collection3d(
-        Poly3DCollection(polygons, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.75)
+        Poly3DCollection(
+            polygons, facecolors=colours, edgecolors="#333333", linewidths=0.6, alpha=0.75
+        )
     )
     shown = vertices
     if points is not None and len(points):
@@ -41,7 +47,10 @@ def plot(building: Building, points: np.ndarray | None = None, ax: Any = None) -
         local = points[:: max(1, len(points) // MOST_POINTS)] - origin
         gap = local[:, 2] - model.roof.height_at(local[:, :2])
         near = np.abs(gap) <= NEAR_M
-        for chosen, colour, label in ((near, "#1f5fbf", "within 0.2 m"), (~near, "#c8321e", "further")):
+        for chosen, colour, label in (
+            (near, "#1f5fbf", "within 0.2 m"),
+            (~near, "#c8321e", "further"),
+        ):
             ax.scatter(
                 *local[chosen].T,
                 s=2,
@@ -62,5 +71,6 @@ def new_axes(turn_deg: float) -> Any:
     """Three-dimensional axes in a figure of their own, seen as the view of a notebook is."""
     plt = needed("matplotlib.pyplot", "report", "plots")
     ax = plt.figure(figsize=(7, 6)).add_subplot(projection="3d")
-    ax.view_init(elev=TILT_DEG, azim=-90.0 - turn_deg)  # seen from the south where nothing is turned
+    # seen from the south where nothing is turned
+    ax.view_init(elev=TILT_DEG, azim=-90.0 - turn_deg)
     return ax

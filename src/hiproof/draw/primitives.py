@@ -1,6 +1,8 @@
-"""One figure a roof type: an ordinary roof of it with every parameter drawn where it is measured and called by its name.
+"""One figure a roof type: an ordinary roof of it with every parameter drawn where it is measured
+and called by its name.
 
-Roofs come from the catalogue and the family, and a line's ends from the parameters, so a figure cannot say what the code does not.
+Roofs come from the catalogue and the family, and a line's ends from the parameters, so a figure
+cannot say what the code does not.
 """
 
 from __future__ import annotations
@@ -16,7 +18,8 @@ from ..primitives.catalogue import CATALOGUE
 from .view import SeenFace, colours_of, projected, seen_faces, shaded
 
 WIDTH, LENGTH, RISE, WALL = 8.0, 12.0, 3.6, 1.6  # m; an ordinary house
-TURN_DEG, TILT_DEG = -38.0, 30.0  # degrees; a view from the front left in which no side hides a parameter
+# degrees; a view from the front left in which no side hides a parameter
+TURN_DEG, TILT_DEG = -38.0, 30.0
 SCALE, MARGIN = 26.0, 46.0  # pixels a metre; pixels of margin, for the names beside the roof
 ASIDE = 1.1  # m from the roof to a line outside it
 LINE, TEXT = "#8c1c13", "#1a1a1a"
@@ -24,7 +27,9 @@ LINE, TEXT = "#8c1c13", "#1a1a1a"
 
 @dataclass(frozen=True)
 class Measure:
-    """A parameter in the figure: from `start` to `end` (3,), in the part's frame above the lowest eave; a mark without `end`."""
+    """A parameter in the figure: from `start` to `end` (3,), in the part's frame above the lowest
+    eave; a mark without `end`.
+    """
 
     name: str
     start: np.ndarray
@@ -45,7 +50,15 @@ def typical_building(kind: str) -> Building:
     u, v = LENGTH / 2, WIDTH / 2
     part = {"type": kind, "parameters": typical_parameters(kind), "position": [0.0, 0.0, 0.0]}
     ring = [[-u, -v], [u, -v], [u, v], [-u, v], [-u, -v]]
-    return build({"id": kind, "origin": [0.0, 0.0, 0.0], "outline": [ring], "z_ground": -WALL, "parts": [part]})
+    return build(
+        {
+            "id": kind,
+            "origin": [0.0, 0.0, 0.0],
+            "outline": [ring],
+            "z_ground": -WALL,
+            "parts": [part],
+        }
+    )
 
 
 def measures(kind: str) -> list[Measure]:
@@ -61,7 +74,9 @@ def measures(kind: str) -> list[Measure]:
 
 
 def measure_of(name: str, p: dict[str, float], highest: np.ndarray) -> Measure:
-    """One parameter `name` among all, `p`; `highest` (k, 3) are the corners of the roof's ridge or top.
+    """One parameter `name` among all, `p`;
+
+    `highest` (k, 3) are the corners of the roof's ridge or top.
 
     A parameter that no line is known for is only named, beside the roof.
     """
@@ -94,12 +109,16 @@ def primitive_svg(kind: str) -> str:
     colours = colours_of(building)
     centre = building.solid.vertices.mean(axis=0)
     lines = measures(kind)
-    page = {id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None] for m in lines}
+    page = {
+        id(m): [on_page(point - centre) for point in (m.start, m.end) if point is not None]
+        for m in lines
+    }
     corners = SCALE * projected(building.solid.vertices - centre, TURN_DEG, TILT_DEG)[:, :2]
     spots = np.array([*corners, *(point for points in page.values() for point in points)])
     (x0, y0), (x1, y1) = spots.min(axis=0) - MARGIN, spots.max(axis=0) + MARGIN
     text = [
-        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x0:.0f} {y0:.0f} {x1 - x0:.0f} {y1 - y0:.0f}" '
+        f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="{x0:.0f} {y0:.0f} {x1 - x0:.0f} '
+        f'{y1 - y0:.0f}" '
         f'width="{x1 - x0:.0f}" height="{y1 - y0:.0f}" font-family="sans-serif" font-size="13">',
         f"<title>{kind}</title>",
         '<rect x="-2000" y="-2000" width="4000" height="4000" fill="white"/>',
@@ -115,8 +134,14 @@ def on_page(point: np.ndarray) -> np.ndarray:
 
 
 def face_path(face: SeenFace) -> str:
-    d = "".join("M" + "L".join(f"{SCALE * x:.1f} {SCALE * y:.1f}" for x, y in ring) + "Z" for ring in face.rings)
-    return f'<path d="{d}" fill="{shaded(face.colour, face.light)}" stroke="#333" stroke-width="1" fill-opacity="0.8"/>'
+    d = "".join(
+        "M" + "L".join(f"{SCALE * x:.1f} {SCALE * y:.1f}" for x, y in ring) + "Z"
+        for ring in face.rings
+    )
+    return (
+        f'<path d="{d}" fill="{shaded(face.colour, face.light)}" stroke="#333" stroke-width="1" '
+        'fill-opacity="0.8"/>'
+    )
 
 
 def drawn(measure: Measure, page: list[np.ndarray]) -> str:
@@ -128,15 +153,22 @@ def drawn(measure: Measure, page: list[np.ndarray]) -> str:
     (x0, y0), (x1, y1) = page
     across = np.array([y1 - y0, x0 - x1]) / max(math.hypot(x1 - x0, y1 - y0), 1e-9) * 4
     ends = "".join(
-        f'<path d="M{x - across[0]:.1f} {y - across[1]:.1f}L{x + across[0]:.1f} {y + across[1]:.1f}"/>' for x, y in page
+        f'<path d="M{x - across[0]:.1f} {y - across[1]:.1f}L{x + across[0]:.1f} '
+        f'{y + across[1]:.1f}"/>'
+        for x, y in page
     )
-    line = f'<g stroke="{LINE}" stroke-width="2" fill="none"><path d="M{x0:.1f} {y0:.1f}L{x1:.1f} {y1:.1f}"/>{ends}</g>'
-    share = 0.1 if measure.name == "height" else 0.5  # so that it stays clear of others at the same end
+    line = (
+        f'<g stroke="{LINE}" stroke-width="2" fill="none"><path d="M{x0:.1f} {y0:.1f}L{x1:.1f} '
+        f'{y1:.1f}"/>{ends}</g>'
+    )
+    # so that it stays clear of others at the same end
+    share = 0.1 if measure.name == "height" else 0.5
     return line + label(x0 + share * (x1 - x0), y0 + share * (y1 - y0), measure.name)
 
 
 def label(x: float, y: float, text: str) -> str:
     return (
-        f'<text x="{x:.1f}" y="{y - 4:.1f}" text-anchor="middle" fill="{TEXT}" stroke="white" stroke-width="3" '
+        f'<text x="{x:.1f}" y="{y - 4:.1f}" text-anchor="middle" fill="{TEXT}" stroke="white" '
+        'stroke-width="3" '
         f'paint-order="stroke">{text}</text>'
     )

@@ -1,4 +1,6 @@
-"""How a solid is seen: faces turned, projected and ordered from far to near (painter's algorithm)."""
+"""How a solid is seen: faces turned, projected and ordered from far to near (painter's
+algorithm).
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,8 @@ from ..geometry.rings import ring_normal
 from ..model import ROOF, Building, Solid
 from ..write.meshes.viewed import look_of
 
-TURN_DEG, TILT_DEG = -35.0, 35.0  # degrees; from the front left and above, so that two walls and the roof show
+# degrees; from the front left and above, so that two walls and the roof show
+TURN_DEG, TILT_DEG = -35.0, 35.0
 
 
 @dataclass(frozen=True)
@@ -25,15 +28,21 @@ class SeenFace:
 
 
 def projected(xyz: np.ndarray, turn_deg: float, tilt_deg: float) -> np.ndarray:
-    """Page coordinates and nearness (n, 3) of points seen from a `tilt_deg` above the horizon, turned by `turn_deg`."""
+    """Page coordinates and nearness (n, 3) of points seen from a `tilt_deg` above the horizon,
+    turned by `turn_deg`.
+    """
     a, t = math.radians(turn_deg), math.radians(tilt_deg)
     x = xyz[:, 0] * math.cos(a) - xyz[:, 1] * math.sin(a)
     y = xyz[:, 0] * math.sin(a) + xyz[:, 1] * math.cos(a)
-    return np.column_stack([x, -(y * math.sin(t) + xyz[:, 2] * math.cos(t)), xyz[:, 2] * math.sin(t) - y * math.cos(t)])
+    return np.column_stack(
+        [x, -(y * math.sin(t) + xyz[:, 2] * math.cos(t)), xyz[:, 2] * math.sin(t) - y * math.cos(t)]
+    )
 
 
 def turn_of(building: Building) -> float:
-    """Degrees to turn a building by, so that it is seen from a corner whichever way its main part stands."""
+    """Degrees to turn a building by, so that it is seen from a corner whichever way its main part
+    stands.
+    """
     return TURN_DEG - math.degrees(building.parts[building.model.main].kappa)
 
 
@@ -55,7 +64,12 @@ def seen_faces(
         area = float((outer[:, 0] * ahead[:, 1] - ahead[:, 0] * outer[:, 1]).sum())
         if area < -1e-9:  # y points down, so what is counter-clockwise in space turns the other way
             rings = tuple(page[list(ring), :2] for ring in face.rings)
-            seen.append((float(outer[:, 2].mean()), SeenFace(rings, colour, lightness(solid, face), face.kind == ROOF)))
+            seen.append(
+                (
+                    float(outer[:, 2].mean()),
+                    SeenFace(rings, colour, lightness(solid, face), face.kind == ROOF),
+                )
+            )
     return [face for _, face in sorted(seen, key=lambda pair: pair[0])]
 
 
@@ -72,4 +86,6 @@ def shaded(colour: str, light: float) -> str:
     >>> shaded("#ff8000", 0.5)
     '#804000'
     """
-    return "#" + "".join(f"{round(int(colour[k : k + 2], 16) * max(min(light, 1.0), 0.0)):02x}" for k in (1, 3, 5))
+    return "#" + "".join(
+        f"{round(int(colour[k : k + 2], 16) * max(min(light, 1.0), 0.0)):02x}" for k in (1, 3, 5)
+    )

@@ -1,4 +1,6 @@
-"""One edit of a building, as the page asks for it: parts in, a building out, by the functions of `parametric`."""
+"""One edit of a building, as the page asks for it: parts in, a building out, by the functions of
+`parametric`.
+"""
 
 from __future__ import annotations
 
@@ -23,15 +25,20 @@ from ..status import Status
 Record = Mapping[str, Any]
 
 
-def edited(record: Record, asked: Any, points: np.ndarray, settings: Settings, is_measured: bool = True) -> Building:
-    """The building of `record` (an object of parameters.jsonl) after the edit `asked`: {"action": ..., "part": ..., ...}.
+def edited(
+    record: Record, asked: Any, points: np.ndarray, settings: Settings, is_measured: bool = True
+) -> Building:
+    """The building of `record` (an object of parameters.jsonl) after the edit `asked`: {"action":
+    ..., "part": ..., ...}.
 
-    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags (`is_measured` False). settings: those
-    of its run. Raises InputError, FitError or CompositionError, one sentence, for an edit that makes no building.
+    points: world points (n, 3) it is refitted to and measured on, unless a hand still drags
+    (`is_measured` False). settings: those of its run. Raises InputError, FitError or
+    CompositionError, one sentence, for an edit that makes no building.
 
     >>> ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
     >>> flat = {"type": "flat", "position": [0, 0, 5], "parameters": {"width": 8, "length": 12}}
-    >>> shed = {"id": "shed", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0, "parts": [flat]}
+    >>> shed = {"id": "shed", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0,
+    ...     "parts": [flat]}
     >>> gable = {"action": "change", "part": 0, "change": {"type": "gable", "height": 3}}
     >>> edited(shed, gable, np.zeros((0, 3)), Settings()).type
     'gable'
@@ -60,14 +67,20 @@ def change(record: Record, parts: list, asked: Record, points: np.ndarray) -> li
     """Part `part` with the values of `change`, as `Building.with_part` takes them."""
     index = part_at(parts, asked, "part")
     return placed(
-        parts, index, changed_part(parts[index], dict(mapping(asked.get("change"), "change")), record["origin"][2])
+        parts,
+        index,
+        changed_part(
+            parts[index], dict(mapping(asked.get("change"), "change")), record["origin"][2]
+        ),
     )
 
 
 def remove(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     index = part_at(parts, asked, "part")
     if len(parts) < 2:
-        raise InputError("expected two or more parts to leave one out, got one; keep it, or change its type")
+        raise InputError(
+            "expected two or more parts to leave one out, got one; keep it, or change its type"
+        )
     return [*parts[:index], *parts[index + 1 :]]
 
 
@@ -75,7 +88,11 @@ def split(record: Record, parts: list, asked: Record, points: np.ndarray) -> lis
     """Part `part` cut across `side` at `share` of it."""
     index = part_at(parts, asked, "part")
     share = number(asked.get("share", 0.5), "share")
-    return [*parts[:index], *split_part(parts[index], asked.get("side", "length"), share), *parts[index + 1 :]]
+    return [
+        *parts[:index],
+        *split_part(parts[index], asked.get("side", "length"), share),
+        *parts[index + 1 :],
+    ]
 
 
 def merge(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
@@ -84,7 +101,9 @@ def merge(record: Record, parts: list, asked: Record, points: np.ndarray) -> lis
     if first == second:
         raise InputError("expected two parts to merge, got one twice; choose another")
     merged = merged_parts(parts[first], parts[second])
-    return [merged if index == first else part for index, part in enumerate(parts) if index != second]
+    return [
+        merged if index == first else part for index, part in enumerate(parts) if index != second
+    ]
 
 
 def dormer(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
@@ -112,7 +131,9 @@ def clicked(asked: Record) -> tuple[float, float] | None:
 def refit(record: Record, parts: list, asked: Record, points: np.ndarray) -> list:
     """All parts fitted to the points again but for what is `held`."""
     roof = building_of(record)[1]
-    return parts if roof is None else refitted_parts(roof, parts, within(roof, points), held_of(asked))
+    return (
+        parts if roof is None else refitted_parts(roof, parts, within(roof, points), held_of(asked))
+    )
 
 
 ACTIONS: dict[str, Callable[[Record, list, Record, np.ndarray], list]] = {
@@ -131,7 +152,10 @@ def part_at(parts: list, asked: Record, name: str) -> int:
     """The index of a part that an edit names."""
     index = asked.get(name)
     if not isinstance(index, int) or isinstance(index, bool) or not 0 <= index < len(parts):
-        raise InputError(f"expected {name} from 0 to {len(parts) - 1}, got {index!r:.40}; choose one of the parts")
+        raise InputError(
+            f"expected {name} from 0 to {len(parts) - 1}, got {index!r:.40}; choose one of the "
+            "parts"
+        )
     return index
 
 
@@ -141,4 +165,6 @@ def held_of(asked: Record) -> dict[int, tuple[str, ...]]:
     try:
         return {int(index): tuple(map(str, names)) for index, names in held.items()}
     except (TypeError, ValueError) as error:
-        raise InputError(f"expected held as names by part, got {error}; give part numbers and lists") from error
+        raise InputError(
+            f"expected held as names by part, got {error}; give part numbers and lists"
+        ) from error

@@ -1,4 +1,6 @@
-"""What the page may ask: the list of buildings, one building, its points, an edit, and the two that write: accept, take back."""
+"""What the page may ask: the list of buildings, one building, its points, an edit, and the two that
+write: accept, take back.
+"""
 
 from __future__ import annotations
 
@@ -36,11 +38,16 @@ SAID = ("z_ground", "leave_out")  # of the building as a whole, by a person
 
 
 class Desk:
-    """The buildings of the run in `folder`, and the edits that `who` accepts; the run's files may have `moved_to` another folder."""
+    """The buildings of the run in `folder`, and the edits that `who` accepts; the run's files may
+    have `moved_to` another folder.
+    """
 
     def __init__(self, folder: Path, who: str, moved_to: Path | None = None) -> None:
         self.run, self.who = RunFolder(folder), plain_text(who)[:MOST_NOTE]
-        self.edits, self.points = Edits(folder, obeyed_by(folder, moved_to)), RunPoints(folder, moved_to)
+        self.edits, self.points = (
+            Edits(folder, obeyed_by(folder, moved_to)),
+            RunPoints(folder, moved_to),
+        )
 
     def buildings(self, find: str = "") -> dict[str, Any]:
         """The most doubtful buildings, of those whose id holds `find`."""
@@ -79,7 +86,10 @@ class Desk:
             "parts": finite(record.get("parts")),
         }
         found["said"] = {name: (override or {}).get(name) for name in SAID}
-        found |= {"outcome": record.get("detail") or "", "reasons": self.run.by_id[id].doubt.reasons}
+        found |= {
+            "outcome": record.get("detail") or "",
+            "reasons": self.run.by_id[id].doubt.reasons,
+        }
         if not record.get("parts"):
             return found | {"error": record.get("detail") or "no model"}
         try:
@@ -88,32 +98,48 @@ class Desk:
             return found | {"error": str(error)}
 
     def cloud(self, id: str) -> dict[str, Any]:
-        """The points drawn of a building, about the origin of its roof; `missing` says why there are none."""
+        """The points drawn of a building, about the origin of its roof;
+
+        `missing` says why there are none.
+        """
         record = self.record(id)[0]
         points = self.points.of(id, outline_of(record))
-        missing = self.points.missing or ("" if len(points) else "the run has no points of this building")
+        missing = self.points.missing or (
+            "" if len(points) else "the run has no points of this building"
+        )
         places = packed(drawn(points) - record["origin"], "<f4") if len(points) else ""
         return {"places": places, "count": len(points), "missing": missing}
 
     def draft(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """A building's object as the page has it: with its `parts`, and with its `z_ground` where a person said one."""
+        """A building's object as the page has it: with its `parts`, and with its `z_ground` where a
+        person said one.
+        """
         record = self.record(id)[0] | {
             "parts": list_at(body, "parts"),
             "terrain_line": [],
         }  # which no edit changes or shows
         if body.get("z_ground") is None:
             return record | {"z_ground": self.run.record(id).get("z_ground")}
-        return record | {"z_ground": number(body["z_ground"], "z_ground"), "ground_source": "override"}
+        return record | {
+            "z_ground": number(body["z_ground"], "z_ground"),
+            "ground_source": "override",
+        }
 
     def change(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """The building with the page's `parts` after the edit `asked`; while a hand drags (`dragged`) it is not measured."""
+        """The building with the page's `parts` after the edit `asked`; while a hand drags
+        (`dragged`) it is not measured.
+        """
         record = self.draft(id, body)
         points = self.points.of(id, outline_of(record))
-        found = edited(record, body.get("asked"), points, self.run.settings, not body.get("dragged"))
+        found = edited(
+            record, body.get("asked"), points, self.run.settings, not body.get("dragged")
+        )
         return seen(found, drawn(points))
 
     def alternatives(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Every type that part `part` may have, refitted: the share of points it explains, the best first."""
+        """Every type that part `part` may have, refitted: the share of points it explains, the best
+        first.
+        """
         record = self.draft(id, body)
         points, tried = self.points.of(id, outline_of(record)), []
         for kind in CATALOGUE:
@@ -127,22 +153,37 @@ class Desk:
         return {"types": sorted(tried, key=lambda row: -(row["share"] or 0.0))}
 
     def accept(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """Keep what the page has as an override of the building, if it is still of the `version` that the page knows."""
-        override = {"id": id, **(self.left_out(id) if body.get("leave_out") is True else self.accepted(id, body))}
+        """Keep what the page has as an override of the building, if it is still of the `version`
+        that the page knows.
+        """
+        override = {
+            "id": id,
+            **(self.left_out(id) if body.get("leave_out") is True else self.accepted(id, body)),
+        }
         now = datetime.datetime.now(datetime.UTC).isoformat(timespec="seconds")
         note = plain_text(text_at(body, "note")).strip()[:MOST_NOTE]
         override |= {"who": self.who, "when": now} | ({"note": note} if note else {})
         return {"version": self.edits.put(id, override, text_at(body, "version")), "when": now}
 
     def accepted(self, id: str, body: Mapping[str, Any]) -> dict[str, Any]:
-        """What an override says of a building as the page has it, which must be one that can be built."""
+        """What an override says of a building as the page has it, which must be one that can be
+        built.
+        """
         nothing = np.zeros((0, 3))
-        found = building_record(edited(self.draft(id, body), {"action": "show"}, nothing, self.run.settings))
-        said = BELONGS if body.get("z_ground") is not None else [name for name in BELONGS if name != "z_ground"]
+        found = building_record(
+            edited(self.draft(id, body), {"action": "show"}, nothing, self.run.settings)
+        )
+        said = (
+            BELONGS
+            if body.get("z_ground") is not None
+            else [name for name in BELONGS if name != "z_ground"]
+        )
         return {name: found[name] for name in said}
 
     def left_out(self, id: str) -> dict[str, Any]:
-        """What an override says of a building, which must be one of the run, that no model is to be made of."""
+        """What an override says of a building, which must be one of the run, that no model is to be
+        made of.
+        """
         self.run.record(id)
         return {"leave_out": True}
 
@@ -156,7 +197,9 @@ class Desk:
 def drawing(kind: str) -> str:
     """The figure of a roof type with its parameters, as SVG. Raises InputError for no type."""
     if kind not in CATALOGUE:
-        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r:.40}; choose one")
+        raise InputError(
+            f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r:.40}; choose one"
+        )
     return primitive_svg(kind)
 
 
@@ -170,12 +213,16 @@ def obeyed_by(folder: Path, moved_to: Path | None = None) -> dict[str, dict[str,
     Where edits were accepted already, these hold them.
     """
     record = run_record(folder)
-    told, path = (record.get("inputs") or {}).get("overrides"), found_inputs(record, moved_to).overrides
+    told, path = (
+        (record.get("inputs") or {}).get("overrides"),
+        found_inputs(record, moved_to).overrides,
+    )
     if not told or (folder / FILE).exists():
         return {}
     if path is None:
         warnings.warn(
-            f"{folder}: the overrides that the run obeyed are gone ({told}): a run with {FILE} will do without them; bring them back, "
+            f"{folder}: the overrides that the run obeyed are gone ({told}): a run with {FILE} "
+            "will do without them; bring them back, "
             "or say with --clouds FOLDER where the run's files lie now",
             InputWarning,
         )

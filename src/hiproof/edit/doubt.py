@@ -16,7 +16,8 @@ CLOSE_CALL = 0.2  # by which the most probable type leads
 LARGE_M2, LARGE_SHARE = 2.0, 0.05  # of area that the model does not explain
 LOOSE_M = 0.3  # standard deviation of a part that few points support
 UNSURE = (Status.SIMPLIFIED, Status.FLAT_FALLBACK, Status.NOT_BUILT, Status.NO_BUILDING)
-REMARKED = 0.3  # for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
+# for what the run itself leaves in doubt: less than a poor outcome, more than a few stray points
+REMARKED = 0.3
 
 
 @dataclass(frozen=True)
@@ -30,13 +31,22 @@ class Doubt:
 def doubt_of(record: Mapping[str, Any]) -> Doubt:
     """The doubt about a building, from its object in parameters.jsonl.
 
-    >>> doubt_of({"status": "modelled", "quality": "poor", "parts": [], "residuals": {"share_within_20cm": 0.6}})
+    >>> doubt_of({"status": "modelled", "quality": "poor", "parts": [],
+    ...     "residuals": {"share_within_20cm": 0.6}})
     Doubt(amount=1.4, reasons=('poor',))
     """
-    found = [share_off(record), unsure_grade(record), unsure_status(record), remarked(record), unexplained(record)]
+    found = [
+        share_off(record),
+        unsure_grade(record),
+        unsure_status(record),
+        remarked(record),
+        unexplained(record),
+    ]
     found += [loose_parts(record), close_call(record)]
     told = [pair for pair in found if pair is not None]
-    return Doubt(round(sum(amount for amount, _ in told), 4), tuple(reason for _, reason in told if reason))
+    return Doubt(
+        round(sum(amount for amount, _ in told), 4), tuple(reason for _, reason in told if reason)
+    )
 
 
 def share_off(record: Mapping[str, Any]) -> tuple[float, str] | None:
@@ -57,11 +67,17 @@ def unsure_status(record: Mapping[str, Any]) -> tuple[float, str] | None:
     """An outcome that the run itself calls doubtful."""
     unsure = {status.code: status for status in UNSURE}
     status = unsure.get(record.get("status", ""))
-    return None if status is None else (0.5, status.value.removeprefix("no model: ").split(":")[0].split(",")[0])
+    return (
+        None
+        if status is None
+        else (0.5, status.value.removeprefix("no model: ").split(":")[0].split(",")[0])
+    )
 
 
 def remarked(record: Mapping[str, Any]) -> tuple[float, str] | None:
-    """What the run says in the detail that it is not sure of: two surfaces, places without points, an assumed ground, ..."""
+    """What the run says in the detail that it is not sure of: two surfaces, places without points,
+    an assumed ground, ...
+    """
     told = [remark.told for remark in Remark if remark.value in (record.get("detail") or "")]
     return (REMARKED, ", ".join(told)) if told else None
 
@@ -86,7 +102,11 @@ def loose_parts(record: Mapping[str, Any]) -> tuple[float, str] | None:
 
 
 def is_loose(sigma: Mapping[str, float]) -> bool:
-    return any(value > LOOSE_M for name, value in sigma.items() if name != "rotation" and not name.startswith(ANGLES))
+    return any(
+        value > LOOSE_M
+        for name, value in sigma.items()
+        if name != "rotation" and not name.startswith(ANGLES)
+    )
 
 
 def close_call(record: Mapping[str, Any]) -> tuple[float, str] | None:

@@ -1,8 +1,9 @@
-"""The file of accepted edits: a file of overrides, one line a building, that `--overrides` of the next run obeys.
+"""The file of accepted edits: a file of overrides, one line a building, that `--overrides` of the
+next run obeys.
 
-Every change writes the whole file beside its place, synced, and renames it, so that kill -9 and power cuts leave the
-old or the new one. A change says on which version of its building it stands; where that is not the present one, somebody else
-was faster, and nothing is written.
+Every change writes the whole file beside its place, synced, and renames it, so that kill -9 and
+power cuts leave the old or the new one. A change says on which version of its building it stands;
+where that is not the present one, somebody else was faster, and nothing is written.
 """
 
 from __future__ import annotations
@@ -36,7 +37,9 @@ class OtherVersion(HiproofError):
 
 
 class Edits:
-    """The overrides in `folder`, by building. A folder without such a file starts with those `obeyed` by its run.
+    """The overrides in `folder`, by building.
+
+    A folder without such a file starts with those `obeyed` by its run.
 
     Raises InputError for a file that cannot be read, or that is a link to elsewhere.
     """
@@ -67,10 +70,11 @@ class Edits:
             return record, version_of(record)
 
     def put(self, id: str, record: dict[str, Any] | None, version: str) -> str:
-        """Keep an override of the building in place of that of `version`, or with None drop it; the new version, on disk.
+        """Keep an override of the building in place of that of `version`, or with None drop it; the
+        new version, on disk.
 
-        Raises OtherVersion where the building has another by now, InputError for what is no override, OutputError where the
-        file cannot be written.
+        Raises OtherVersion where the building has another by now, InputError for what is no
+        override, OutputError where the file cannot be written.
         """
         if record is not None:
             override_of(record)
@@ -83,23 +87,31 @@ class Edits:
             if record is not None:
                 records[id] = record
             with atomic(self.path) as beside:
-                beside.write_text("".join(json.dumps(r, allow_nan=False) + "\n" for r in records.values()))
+                beside.write_text(
+                    "".join(json.dumps(r, allow_nan=False) + "\n" for r in records.values())
+                )
             self.records, self.stamp = records, stamp_of(self.path)
             return version_of(record)
 
 
 @contextmanager
 def alone(path: Path) -> Iterator[None]:
-    """Nobody else, in whatever process, changes the file at `path` within the block; SQLite locks, as for runs."""
+    """Nobody else, in whatever process, changes the file at `path` within the block;
+
+    SQLite locks, as for runs.
+    """
     try:
         with closing(
-            sqlite3.connect(path.with_name(f".{path.name}.lock"), isolation_level=None, timeout=WAIT_S)
+            sqlite3.connect(
+                path.with_name(f".{path.name}.lock"), isolation_level=None, timeout=WAIT_S
+            )
         ) as lock:
             lock.execute("begin exclusive")
             yield
     except sqlite3.Error as error:
         raise OutputError(
-            f"expected to write {path}, got: {error}; is the folder writable, and nobody else accepting?"
+            f"expected to write {path}, got: {error}; is the folder writable, and nobody else "
+            "accepting?"
         ) from error
 
 
@@ -113,9 +125,15 @@ def version_of(record: dict[str, Any] | None) -> str:
 def told_of(id: str, record: dict[str, Any] | None) -> str:
     """Who was faster, in a sentence."""
     if record is None:
-        return f"expected building {id} as it was accepted, got it taken back in another window; look at it again"
+        return (
+            f"expected building {id} as it was accepted, got it taken back in another window; look "
+            "at it again"
+        )
     who, when = record.get("who") or "somebody", record.get("when") or "meanwhile"
-    return f"expected building {id} as this window knows it, got one that {who} accepted ({when}); look at theirs first"
+    return (
+        f"expected building {id} as this window knows it, got one that {who} accepted ({when}); "
+        "look at theirs first"
+    )
 
 
 def stamp_of(path: Path) -> tuple[int, int, int] | None:

@@ -40,7 +40,8 @@ class RunFolder:
         self.folder, self.path = folder, folder / PARAMETERS
         if not self.path.is_file():
             raise InputError(
-                f"expected the folder of a finished `hiproof reconstruct` or `hiproof build`, got {folder} without "
+                "expected the folder of a finished `hiproof reconstruct` or `hiproof build`, got "
+                f"{folder} without "
                 f"{PARAMETERS}; check the path"
             )
         self.stamp: tuple[int, int, int] | None = None
@@ -61,7 +62,10 @@ class RunFolder:
         self.refresh()
         row = self.by_id.get(id)
         if row is None:
-            raise InputError(f"expected a building of the run in {self.folder}, got {id!r:.80}; choose one of the list")
+            raise InputError(
+                f"expected a building of the run in {self.folder}, got {id!r:.80}; choose one of "
+                "the list"
+            )
         with self.path.open("rb") as file:
             file.seek(row.start)
             line = file.readline()
@@ -70,7 +74,9 @@ class RunFolder:
         except InputError:
             record = None
         if not isinstance(record, dict) or record.get("id") != id:
-            raise InputError(f"expected {self.path} as it was, got another file; start `hiproof edit` again")
+            raise InputError(
+                f"expected {self.path} as it was, got another file; start `hiproof edit` again"
+            )
         return record
 
 
@@ -98,17 +104,30 @@ def read_rows(path: Path) -> tuple[FileHead, list[Row]]:
             known = ((number, record) for number, record in found if record is not DAMAGED)
             rows = [row_of(number, record, starts[number - 1], path) for number, record in known]
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"expected parameters that hiproof wrote at {path}, got: {error}; check the file") from error
+        raise InputError(
+            f"expected parameters that hiproof wrote at {path}, got: {error}; check the file"
+        ) from error
     return head, rows
 
 
 def row_of(number: int, record: Any, start: int, path: Path) -> Row:
     """The row of a building's object; one that cannot be read is the most doubtful."""
     if not isinstance(record, dict) or not isinstance(record.get("id"), str):
-        raise InputError(f"expected a building in line {number} of {path}, got {excerpt(record)}; mend it there")
+        raise InputError(
+            f"expected a building in line {number} of {path}, got {excerpt(record)}; mend it there"
+        )
     try:
         refuse_other_kinds(record)
     except InputError as error:
-        return Row(record["id"], start, None, "damaged", None, Doubt(MOST_DOUBT, (f"cannot be read: {error}",)))
+        return Row(
+            record["id"],
+            start,
+            None,
+            "damaged",
+            None,
+            Doubt(MOST_DOUBT, (f"cannot be read: {error}",)),
+        )
     share = (record.get("residuals") or {}).get("share_within_20cm")
-    return Row(record["id"], start, record.get("type"), record.get("status", ""), share, doubt_of(record))
+    return Row(
+        record["id"], start, record.get("type"), record.get("status", ""), share, doubt_of(record)
+    )

@@ -1,4 +1,6 @@
-"""The roof points of one building, read from the clouds of its run exactly as the run read them: by its plan, a work tile at once."""
+"""The roof points of one building, read from the clouds of its run exactly as the run read them: by
+its plan, a work tile at once.
+"""
 
 from __future__ import annotations
 
@@ -26,8 +28,10 @@ KEPT_TILES, KEPT_BUILDINGS = 3, 64
 
 
 class RunPoints:
-    """Points of the run in `folder`, whose files may have `moved_to` another; `missing` is a sentence where they cannot be had,
-    empty otherwise."""
+    """Points of the run in `folder`, whose files may have `moved_to` another;
+
+    `missing` is a sentence where they cannot be had, empty otherwise.
+    """
 
     def __init__(self, folder: Path, moved_to: Path | None = None) -> None:
         self.lock, self.missing = threading.Lock(), ""
@@ -38,9 +42,15 @@ class RunPoints:
         self.state = folder / ".hiproof"
         plan = self.state / PLAN_FILE
         if not plan.is_file() or not (inputs.clouds or inputs.gone):
-            self.missing = "no run of `hiproof reconstruct` in this folder: its points are not known, refitting is off"
+            self.missing = (
+                "no run of `hiproof reconstruct` in this folder: its points are not known, "
+                "refitting is off"
+            )
         elif inputs.gone:
-            self.missing = f"{inputs.told_gone}: all but refitting works; say with --clouds FOLDER where they lie now"
+            self.missing = (
+                f"{inputs.told_gone}: all but refitting works; say with --clouds FOLDER where they "
+                "lie now"
+            )
         elif inputs.terrain:
             self.missing = missing_reader()
         self.known = None if self.missing else WorkPlan.load(plan)
@@ -57,8 +67,11 @@ class RunPoints:
         return self.known
 
     def of(self, id: str, outline: shapely.Polygon | None) -> np.ndarray:
-        """World points (n, 3) inside the `outline` of building `id`; (0, 3) where the run has none, or where its clouds cannot be read,
-        which `missing` then says."""
+        """World points (n, 3) inside the `outline` of building `id`;
+
+        (0, 3) where the run has none, or where its clouds cannot be read, which `missing` then
+        says.
+        """
         job = self.jobs.get(id)
         if job is None or outline is None or self.missing:
             return np.zeros((0, 3))
@@ -79,22 +92,31 @@ class RunPoints:
         return found if len(found) <= most else thin_to_count(stages.distinct(found), most)
 
     def read_tile(self, tile: str) -> Surroundings:
-        """All points that the buildings of a work tile may need; of files of which it is known where their points lie only these are
-        read."""
+        """All points that the buildings of a work tile may need; of files of which it is known
+        where their points lie only these are read.
+        """
         reaches = Reaches(self.plan, {tile: self.plan.tiles[tile]})
         with tempfile.TemporaryDirectory(prefix="hiproof-edit-") as folder:
             for number, cloud in enumerate(self.clouds):
-                gatherer = Gatherer(reaches, self.plan.settings.read, Path(folder) / "points", number)
-                for chunk in wanted_points(cloud, reaches, self.plan.units, noted_file(self.state, number)):
+                gatherer = Gatherer(
+                    reaches, self.plan.settings.read, Path(folder) / "points", number
+                )
+                for chunk in wanted_points(
+                    cloud, reaches, self.plan.units, noted_file(self.state, number)
+                ):
                     gatherer.add(chunk)
                 gatherer.flush()
             points = load_points(Path(folder), tile)
-        model = terrain_model(self.terrain, self.plan.crs_wkt, self.plan.units, threading.get_ident())
+        model = terrain_model(
+            self.terrain, self.plan.crs_wkt, self.plan.units, threading.get_ident()
+        )
         return Surroundings(points, model, self.plan)
 
 
 def missing_reader() -> str:
-    """A sentence where the run's terrain model cannot be read for want of a package; empty otherwise."""
+    """A sentence where the run's terrain model cannot be read for want of a package; empty
+    otherwise.
+    """
     try:
         import_rasterio()
     except InputError as error:

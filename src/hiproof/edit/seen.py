@@ -1,4 +1,6 @@
-"""What the page shows of a building: its mesh, parts with their handles, numbers, heights of points over the roof."""
+"""What the page shows of a building: its mesh, parts with their handles, numbers, heights of points
+over the roof.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,10 @@ FIGURES = ("points", "share_within_20cm", "unexplained_area_m2", "rmse", "p95", 
 
 
 def seen(building: Building, points: np.ndarray) -> dict[str, Any]:
-    """The building as JSON, everything about the origin of its roof; `points` (n, 3) are the world points drawn."""
+    """The building as JSON, everything about the origin of its roof;
+
+    `points` (n, 3) are the world points drawn.
+    """
     parts = building_record(building)["parts"]
     roof = building.roof
     local = roof.frame.to_local(points)
@@ -42,7 +47,9 @@ def drawn(points: np.ndarray) -> np.ndarray:
 
 
 def handles_of(part: dict[str, Any]) -> dict[str, Any]:
-    """Where a hand takes hold of a part: its rectangle, its eave and its ridge, about the origin."""
+    """Where a hand takes hold of a part: its rectangle, its eave and its ridge, about the
+    origin.
+    """
     try:
         sized = with_sizes(part)
         width, length = (sized["parameters"][name] for name in ("width", "length"))
@@ -51,7 +58,14 @@ def handles_of(part: dict[str, Any]) -> dict[str, Any]:
         return {}
     x, y, z = sized["position"]
     turn = math.radians(sized.get("rotation") or 0.0)
-    return {"place": [x, y], "turn": turn, "width": width, "length": length, "eave": z, "ridge": z + rise}
+    return {
+        "place": [x, y],
+        "turn": turn,
+        "width": width,
+        "length": length,
+        "eave": z,
+        "ridge": z + rise,
+    }
 
 
 def figures_of(building: Building) -> dict[str, float | None]:
@@ -66,7 +80,9 @@ def figures_of(building: Building) -> dict[str, float | None]:
 
 
 def mesh_of(building: Building) -> dict[str, str]:
-    """Triangles of the solid about the origin, the part that each roofs (-1: a wall), and the roof's edges."""
+    """Triangles of the solid about the origin, the part that each roofs (-1: a wall), and the
+    roof's edges.
+    """
     mesh = solid_mesh(building.solid.moved(-building.roof.frame.origin))
     return {
         "corners": packed(mesh.corners, "<f4"),

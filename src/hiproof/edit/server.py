@@ -1,8 +1,8 @@
 """The desk over HTTP, for one person at this machine.
 
-Whoever asks must know the token in the address, must have reached the loopback address by its name (so that no foreign name
-leads here), and must be the page itself where the browser says who asks. What can be asked is a fixed list; a building is
-named by its id, which is looked up, never opened.
+Whoever asks must know the token in the address, must have reached the loopback address by its name
+(so that no foreign name leads here), and must be the page itself where the browser says who asks.
+What can be asked is a fixed list; a building is named by its id, which is looked up, never opened.
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ ASSETS = {
 
 
 class Service:
-    """Answers to requests: `answer` is all of it, without a socket. `port` is where the server listens."""
+    """Answers to requests: `answer` is all of it, without a socket.
+
+    `port` is where the server listens.
+    """
 
     def __init__(self, desk: Desk, token: str | None = None) -> None:
         self.desk, self.token, self.port = desk, token or secrets.token_urlsafe(24), 0
@@ -68,7 +71,10 @@ class Service:
                 return refused
             split = urlsplit(target)
             name = split.path.removeprefix(f"/{self.token}/")
-            query = {key: values[-1] for key, values in parse_qs(split.query, keep_blank_values=True).items()}
+            query = {
+                key: values[-1]
+                for key, values in parse_qs(split.query, keep_blank_values=True).items()
+            }
             return self.asset(name, query) if method == "GET" else self.changed(name, body)
         except OtherVersion as error:
             return said(409, str(error), version=error.version)
@@ -77,8 +83,13 @@ class Service:
         except HiproofError as error:
             return said(422, str(error))
         except Exception as error:
-            LOGGER.error("failed on %s %s; please report this", method, unquote(target)[-80:], exc_info=True)
-            return said(500, f"hiproof failed on this ({type(error).__name__}: {error}); nothing was written")
+            LOGGER.error(
+                "failed on %s %s; please report this", method, unquote(target)[-80:], exc_info=True
+            )
+            return said(
+                500,
+                f"hiproof failed on this ({type(error).__name__}: {error}); nothing was written",
+            )
 
     def refusal(self, method: str, target: str, headers: Headers) -> Answer | None:
         """An answer to those who may not ask, None to those who may."""
@@ -86,7 +97,10 @@ class Service:
             return said(403, told)
         first = urlsplit(target).path.split("/")[1:2]
         if not first or not secrets.compare_digest(first[0].encode(), self.token.encode()):
-            return said(403, "expected the token in the address, got another; use the address that was printed")
+            return said(
+                403,
+                "expected the token in the address, got another; use the address that was printed",
+            )
         if method == "POST" and headers.get("Content-Type", "").split(";")[0] != JSON:
             return said(415, "expected JSON, got something else")
         return None

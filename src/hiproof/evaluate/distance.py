@@ -1,8 +1,10 @@
-"""Exact distances from points to bounded planar polygons, compiled: the measure under every residual figure.
+"""Exact distances from points to bounded planar polygons, compiled: the measure under every
+residual figure.
 
-The distance of a point to a polygon is the distance to its plane where the foot of the perpendicular lies inside the
-polygon, else the distance to the nearest edge. The plane distance bounds both from below, so a polygon whose plane is
-farther than the best distance so far is skipped.
+The distance of a point to a polygon is the distance to its plane where the foot of the
+perpendicular lies inside the polygon, else the distance to the nearest edge. The plane distance
+bounds both from below, so a polygon whose plane is farther than the best distance so far is
+skipped.
 """
 
 from __future__ import annotations
@@ -17,11 +19,16 @@ from ..geometry.point_in_polygon import flips
 from ..model import as_xyz
 
 Ring = np.ndarray
-"""(m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer first, holes after."""
+"""(m, 3) vertices without the closing one; a polygon is a ring or a sequence of rings, the outer
+first, holes after.
+"""
 
 
-def point_surface_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
-    """Distance (n,) in metres from `points` (n, 3) to the nearest of the bounded `polygons`, all in one frame.
+def point_surface_distances(
+    points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]
+) -> np.ndarray:
+    """Distance (n,) in metres from `points` (n, 3) to the nearest of the bounded `polygons`, all in
+    one frame.
 
     inf without polygons. Raises InputError for arrays of another shape.
 
@@ -34,7 +41,8 @@ def point_surface_distances(points: np.ndarray, polygons: Sequence[Ring | Sequen
 
 
 def vertical_distances(points: np.ndarray, polygons: Sequence[Ring | Sequence[Ring]]) -> np.ndarray:
-    """Least |dz| (n,) from `points` (n, 3) to the polygons over or under them; inf where none covers a point in plan.
+    """Least |dz| (n,) from `points` (n, 3) to the polygons over or under them; inf where none
+    covers a point in plan.
 
     >>> square = np.array([[0.0, 0, 0], [2, 0, 2], [2, 2, 2], [0, 2, 0]])
     >>> vertical_distances(np.array([[1.0, 1, 3], [5, 1, 4]]), [square]).tolist()
@@ -57,8 +65,12 @@ def checked_points(points: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(as_xyz(points))
 
 
-def flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """All vertices (m, 3), where each ring starts in them, and each polygon in the rings (both with the end)."""
+def flattened(
+    polygons: Sequence[Ring | Sequence[Ring]],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All vertices (m, 3), where each ring starts in them, and each polygon in the rings (both with
+    the end).
+    """
     rings: list[np.ndarray] = []
     polygon_start = [0]
     for polygon in polygons:
@@ -66,7 +78,9 @@ def flattened(polygons: Sequence[Ring | Sequence[Ring]]) -> tuple[np.ndarray, np
         for ring in (polygon,) if single else polygon:
             ring = np.asarray(ring, float)
             if ring.ndim != 2 or ring.shape[1] != 3 or len(ring) < 3:
-                raise InputError(f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}")
+                raise InputError(
+                    f"expected rings of shape (m, 3) with at least 3 vertices, got {ring.shape}"
+                )
             rings.append(ring)
         polygon_start.append(len(rings))
     vertices = np.concatenate(rings) if rings else np.empty((0, 3))
@@ -87,7 +101,9 @@ def nearest_distances(points, vertices, ring_start, polygon_start):
             height = 0.0
             if is_flat:
                 height = (
-                    (p[0] - origin[0]) * normal[0] + (p[1] - origin[1]) * normal[1] + (p[2] - origin[2]) * normal[2]
+                    (p[0] - origin[0]) * normal[0]
+                    + (p[1] - origin[1]) * normal[1]
+                    + (p[2] - origin[2]) * normal[2]
                 )
                 if abs(height) >= nearest[i]:
                     continue
@@ -101,7 +117,9 @@ def nearest_distances(points, vertices, ring_start, polygon_start):
 
 @compiled
 def vertical_gaps(points, vertices, ring_start, polygon_start):
-    """Least height (n,) between each point (n, 3) and a polygon over or under it, inf where there is none."""
+    """Least height (n,) between each point (n, 3) and a polygon over or under it, inf where there
+    is none.
+    """
     nearest = np.full(points.shape[0], np.inf)
     for polygon in range(polygon_start.shape[0] - 1):
         rings = ring_start[polygon_start[polygon] : polygon_start[polygon + 1] + 1]
@@ -110,7 +128,9 @@ def vertical_gaps(points, vertices, ring_start, polygon_start):
             continue
         for i in range(points.shape[0]):
             x, y = points[i, 0], points[i, 1]
-            height = origin[2] - ((x - origin[0]) * normal[0] + (y - origin[1]) * normal[1]) / normal[2]
+            height = (
+                origin[2] - ((x - origin[0]) * normal[0] + (y - origin[1]) * normal[1]) / normal[2]
+            )
             gap = abs(points[i, 2] - height)
             if gap < nearest[i] and contains(vertices, rings, 0, 1, x, y):
                 nearest[i] = gap
@@ -119,7 +139,9 @@ def vertical_gaps(points, vertices, ring_start, polygon_start):
 
 @compiled
 def plane_of(vertices, rings):
-    """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without area."""
+    """Unit normal (Newell) and centroid of the outer ring; the flag is false for a ring without
+    area.
+    """
     origin, normal = np.zeros(3), np.zeros(3)
     begin, end = rings[0], rings[1]
     for i in range(begin, end):
@@ -139,19 +161,30 @@ def plane_of(vertices, rings):
 
 @compiled
 def plan_axes(normal):
-    """The two coordinate axes onto which a polygon of this normal projects with the largest area."""
+    """The two coordinate axes onto which a polygon of this normal projects with the largest
+    area.
+    """
     largest = np.argmax(np.abs(normal))
     return (largest + 1) % 3, (largest + 2) % 3
 
 
 @compiled
 def contains(vertices, rings, first, second, x, y):
-    """Even-odd rule over all rings, so that holes are outside; a point on a shared edge belongs to one side only."""
+    """Even-odd rule over all rings, so that holes are outside; a point on a shared edge belongs to
+    one side only.
+    """
     inside = False
     for ring in range(rings.shape[0] - 1):
         j = rings[ring + 1] - 1
         for i in range(rings[ring], rings[ring + 1]):
-            if flips(vertices[i, first], vertices[i, second], vertices[j, first], vertices[j, second], x, y):
+            if flips(
+                vertices[i, first],
+                vertices[i, second],
+                vertices[j, first],
+                vertices[j, second],
+                x,
+                y,
+            ):
                 inside = not inside
             j = i
     return inside

@@ -1,7 +1,9 @@
-"""The figures of finished models against points, footprints and a reference model: a row a building, and summaries.
+"""The figures of finished models against points, footprints and a reference model: a row a
+building, and summaries.
 
-A building's points are those of the building classes inside its footprint; without footprints, inside the plan outline
-of its own roof (which then cannot show points that the outline left out, and the IoU is with their alpha shape).
+A building's points are those of the building classes inside its footprint; without footprints,
+inside the plan outline of its own roof (which then cannot show points that the outline left out,
+and the IoU is with their alpha shape).
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ TEXTS = ("id", "type", "status", "quality", "ref_id")
 
 @dataclass(frozen=True)
 class Comparison:
-    """A model minus its reference: metres, degrees and cubic metres, NaN where either has no such figure."""
+    """A model minus its reference: metres, degrees and cubic metres, NaN where either has no such
+    figure.
+    """
 
     reference_id: str
     ridge_height_m: float = float("nan")
@@ -54,10 +58,19 @@ class BuildingFigures:
 
     def row(self) -> dict[str, Any]:
         """One flat record, the comparison's columns prefixed with `ref_`."""
-        row = {"id": self.id, "type": self.type, "status": self.status, "quality": self.grade, **asdict(self.quality)}
+        row = {
+            "id": self.id,
+            "type": self.type,
+            "status": self.status,
+            "quality": self.grade,
+            **asdict(self.quality),
+        }
         row["volume_m3"] = self.volume_m3
         if self.comparison is not None:
-            row |= {f"ref_{name.removeprefix('reference_')}": v for name, v in asdict(self.comparison).items()}
+            row |= {
+                f"ref_{name.removeprefix('reference_')}": v
+                for name, v in asdict(self.comparison).items()
+            }
         return row
 
 
@@ -67,9 +80,13 @@ def evaluate_building(
     footprint: shapely.Polygon | None = None,
     reference: BuildingModel | None = None,
 ) -> BuildingFigures:
-    """Figures of one model against its `points` (n, 3), its footprint and another model, all in world metres."""
+    """Figures of one model against its `points` (n, 3), its footprint and another model, all in
+    world metres.
+    """
     if model.solid is None:
-        share = share_near(np.full(len(points), np.inf), well_inside(points, footprint or shapely.Polygon()))
+        share = share_near(
+            np.full(len(points), np.inf), well_inside(points, footprint or shapely.Polygon())
+        )
         missed = Quality(points=len(points), share_within_20cm=share)
         return BuildingFigures(model.id, model.roof_type, model.status, missed)
     from ..write.roof_figures import roof_figures
@@ -84,7 +101,9 @@ def evaluate_building(
         model.status,
         quality(solid, local, outline),
         roof_figures(solid).volume_m3 if solid.of_kind(ROOF) else float("nan"),
-        None if reference is None or reference.solid is None else compare(model.solid, reference.id, reference.solid),
+        None
+        if reference is None or reference.solid is None
+        else compare(model.solid, reference.id, reference.solid),
         model.grade,
     )
 
@@ -109,9 +128,16 @@ def compare(solid: Solid, reference_id: str, reference: Solid) -> Comparison:
     )
 
 
-def points_by_outline(points: np.ndarray, outlines: Sequence[shapely.Geometry | None]) -> list[np.ndarray]:
-    """For each outline (None is empty) the points (m, 3) inside it, in the order of `points` (n, 3)."""
-    areas = np.array([outline if outline is not None else shapely.Polygon() for outline in outlines], dtype=object)
+def points_by_outline(
+    points: np.ndarray, outlines: Sequence[shapely.Geometry | None]
+) -> list[np.ndarray]:
+    """For each outline (None is empty) the points (m, 3) inside it, in the order of `points` (n,
+    3).
+    """
+    areas = np.array(
+        [outline if outline is not None else shapely.Polygon() for outline in outlines],
+        dtype=object,
+    )
     if not len(areas):
         return []
     tree = shapely.STRtree(areas)
@@ -124,8 +150,10 @@ def points_by_outline(points: np.ndarray, outlines: Sequence[shapely.Geometry | 
 def match_by_id_or_overlap(
     models: Sequence[BuildingModel], others: Sequence[tuple[str, shapely.Geometry]]
 ) -> list[int | None]:
-    """Index of the other area that stands for each model: the one of the same id, unless another overlaps it in plan more than
-    twice as much: ids that are numbers name other buildings in another file."""
+    """Index of the other area that stands for each model: the one of the same id, unless another
+    overlaps it in plan more than twice as much: ids that are numbers name other buildings in
+    another file.
+    """
     by_id = {id: i for i, (id, _) in enumerate(others)}
     areas = np.array([area for _, area in others], dtype=object)
     tree = shapely.STRtree(areas)
@@ -143,11 +171,15 @@ def match_by_id_or_overlap(
 
 
 def summarise(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, Any]]:
-    """Overall and per roof type: number of buildings, and mean, median and 90th percentile of every figure."""
+    """Overall and per roof type: number of buildings, and mean, median and 90th percentile of every
+    figure.
+    """
     groups = {"all": list(figures)}
     for kind in sorted({f.type for f in figures}):
         groups[kind] = [f for f in figures if f.type == kind]
-    return {name: {"buildings": len(group), **column_summaries(group)} for name, group in groups.items()}
+    return {
+        name: {"buildings": len(group), **column_summaries(group)} for name, group in groups.items()
+    }
 
 
 def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, float]]:
@@ -158,7 +190,11 @@ def column_summaries(figures: Sequence[BuildingFigures]) -> dict[str, dict[str, 
         values = values[np.isfinite(values)]
         if len(values):
             middle, high = np.percentile(values, (50, 90))
-            summaries[name] = {"mean": rounded(values.mean()), "median": rounded(middle), "p90": rounded(high)}
+            summaries[name] = {
+                "mean": rounded(values.mean()),
+                "median": rounded(middle),
+                "p90": rounded(high),
+            }
     return summaries
 
 
@@ -173,7 +209,9 @@ def to_csv(figures: Sequence[BuildingFigures]) -> str:
     rows = [f.row() for f in figures]
     columns = dict.fromkeys(name for row in sorted(rows, key=len, reverse=True) for name in row)
     if not columns:
-        columns = dict.fromkeys(["id", "type", "status", "quality", *(f.name for f in fields(Quality))])
+        columns = dict.fromkeys(
+            ["id", "type", "status", "quality", *(f.name for f in fields(Quality))]
+        )
     text = io.StringIO()
     writer = csv.DictWriter(text, list(columns), restval="", lineterminator="\n")
     writer.writeheader()
@@ -184,7 +222,10 @@ def to_csv(figures: Sequence[BuildingFigures]) -> str:
 def to_json(figures: Sequence[BuildingFigures]) -> str:
     """The summary and every row; null where there is no figure."""
     rows = [{name: known(value) for name, value in f.row().items()} for f in figures]
-    return json.dumps({"summary": summarise(figures), "buildings": rows}, indent=1, allow_nan=False) + "\n"
+    return (
+        json.dumps({"summary": summarise(figures), "buildings": rows}, indent=1, allow_nan=False)
+        + "\n"
+    )
 
 
 def known(value: Any) -> Any:

@@ -1,4 +1,6 @@
-"""Where what a run was made from lies now: run.json keeps names as they were typed, and the folder in which they were."""
+"""Where what a run was made from lies now: run.json keeps names as they were typed, and the folder
+in which they were.
+"""
 
 from __future__ import annotations
 
@@ -11,10 +13,12 @@ from ..read.remote import is_url
 
 @dataclass(frozen=True)
 class RunInputs:
-    """What a run was made from, each where it lies now, None for what was not asked for or is not there.
+    """What a run was made from, each where it lies now, None for what was not asked for or is not
+    there.
 
-    `gone` are those of the clouds that are not there, as the run named them. `id_attribute`, `where` and `bbox` say how the run read
-    its footprints: read otherwise, ids may be those of other buildings.
+    `gone` are those of the clouds that are not there, as the run named them. `id_attribute`,
+    `where` and `bbox` say how the run read its footprints: read otherwise, ids may be those of
+    other buildings.
     """
 
     clouds: tuple[str, ...] = ()
@@ -34,7 +38,9 @@ class RunInputs:
 
     @property
     def footprint_file(self) -> str | None:
-        """The footprints, where they are a file of this machine: an address in run.json has lost its password."""
+        """The footprints, where they are a file of this machine: an address in run.json has lost
+        its password.
+        """
         return None if self.footprints is None or is_url(self.footprints) else self.footprints
 
     @property
@@ -43,14 +49,18 @@ class RunInputs:
         if not self.gone:
             return ""
         more = f" and {len(self.gone) - 1} more" if len(self.gone) > 1 else ""
-        return f"the run's points are gone ({self.gone[0]}{more} {'are' if more else 'is'} not there)"
+        return (
+            f"the run's points are gone ({self.gone[0]}{more} {'are' if more else 'is'} not there)"
+        )
 
 
 def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInputs:
-    """The inputs told of in run.json's `record`; files in the folder `moved_to` go before those where the run found them.
+    """The inputs told of in run.json's `record`; files in the folder `moved_to` go before those
+    where the run found them.
 
-    >>> found_inputs({"inputs": {"clouds": ["no/such.laz", "https://example.org/a.laz"]}})
-    RunInputs(clouds=('https://example.org/a.laz',), gone=('no/such.laz',), footprints=None, layer=None, id_attribute=None, where=None, bbox=None, terrain=None, overrides=None)
+    >>> found = found_inputs({"inputs": {"clouds": ["no/such.laz", "https://example.org/a.laz"]}})
+    >>> found.clouds, found.gone, found.footprints
+    (('https://example.org/a.laz',), ('no/such.laz',), None)
     """
     told = record.get("inputs") or {}
     started_in = told.get("started_in")
@@ -74,9 +84,12 @@ def found_inputs(record: dict[str, Any], moved_to: Path | None = None) -> RunInp
 
 
 def place_of(path: str, started_in: str | None, moved_to: Path | None) -> str | None:
-    """Where a file lies that a run started in the folder `started_in` called `path`; None where it is not there.
+    """Where a file lies that a run started in the folder `started_in` called `path`;
 
-    A whole project may have moved, and be worked in as before: so names are also tried as they stand.
+    None where it is not there.
+
+    A whole project may have moved, and be worked in as before: so names are also tried as they
+    stand.
     """
     if is_url(path):
         return path

@@ -1,8 +1,10 @@
-"""Do the points of a building lie all over it, and on one roof, or on two, one over the other: two flights, two dates, glass?
+"""Do the points of a building lie all over it, and on one roof, or on two, one over the other: two
+flights, two dates, glass?
 
-Heights over the modelled roof, so that slopes do not matter, are split in small plan cells at the place that leaves the least
-variance within the two groups (Otsu 1979). Where a cell holds two surfaces little variance is left; noise leaves more than a
-third, foliage a fourth. A step that the model lacks does so, too, but in the cells along it alone.
+Heights over the modelled roof, so that slopes do not matter, are split in small plan cells at the
+place that leaves the least variance within the two groups (Otsu 1979). Where a cell holds two
+surfaces little variance is left; noise leaves more than a third, foliage a fourth. A step that the
+model lacks does so, too, but in the cells along it alone.
 """
 
 from __future__ import annotations
@@ -17,58 +19,81 @@ from ..model.heights import highest_of
 from .metrics import NEAR_M, Inner, well_inside
 
 CELL_POINTS = 8.0
-"""Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large as what stands on a roof."""
+"""Points a cell holds in the mean: with fewer chance makes two groups, with more a cell is as large
+as what stands on a roof.
+"""
 
 FEWEST_POINTS = 30
-"""Points well inside the outline below which nothing is said: some four cells, in which a chimney is as large as a roof."""
+"""Points well inside the outline below which nothing is said: some four cells, in which a chimney
+is as large as a roof.
+"""
 
 LEAST_POINTS_A_CELL = 4
 """Two and two: below that any points fall into two groups."""
 
 MOST_WITHIN = 0.12
-"""Share of a cell's variance that two groups may leave: surfaces 0.25 m apart with 0.04 m of noise leave 0.1."""
+"""Share of a cell's variance that two groups may leave: surfaces 0.25 m apart with 0.04 m of noise
+leave 0.1.
+"""
 
 SMALLER_GROUP = 0.2
-"""Share of a cell's points in the lesser group, two at least: single points stray, a fifth of them does not."""
+"""Share of a cell's points in the lesser group, two at least: single points stray, a fifth of them
+does not.
+"""
 
 LEAST_SHARE = 0.4
-"""Share of the points in cells of two surfaces above which it is said: in single roofs of Delft up to 0.35."""
+"""Share of the points in cells of two surfaces above which it is said: in single roofs of Delft up
+to 0.35.
+"""
 
 MOST_OF_ALL, PLACES = 200, 120
 """Points that are enough to say where there are any, and places that are asked."""
 
 REACH = 1.5
-"""Distances between points, were they even, within which a place has one: by chance one place in a thousand has none."""
+"""Distances between points, were they even, within which a place has one: by chance one place in a
+thousand has none.
+"""
 
 
 def unseen_share(points: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the outline that none of the `points` (n, 2 or 3) are near, whatever their density."""
+    """Share of the outline that none of the `points` (n, 2 or 3) are near, whatever their
+    density.
+    """
     if not len(points):
         return 1.0
-    some = points[np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2]
+    some = points[
+        np.arange(min(len(points), MOST_OF_ALL)) * len(points) // min(len(points), MOST_OF_ALL), :2
+    ]
     places = places_in(outline)
     x, y = some.T.copy()  # side by side they are told from the places in a third of the time
     gap, north = places[:, :1] - x, places[:, 1:] - y
     gap *= gap  # in place: these are the largest arrays of a building
     north *= north
     gap += north
-    return float(np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(some))) if len(places) else 0.0
+    return (
+        float(np.mean(gap.min(axis=1) > REACH**2 * outline.area / len(some)))
+        if len(places)
+        else 0.0
+    )
 
 
 def places_in(outline: shapely.Polygon) -> np.ndarray:
     """Some PLACES places (m, 2), evenly spread over the outline."""
     apart = math.sqrt(outline.area / PLACES)
     west, south, east, north = outline.bounds
-    x, y = np.meshgrid(np.arange(west + 0.5 * apart, east, apart), np.arange(south + 0.5 * apart, north, apart))
+    x, y = np.meshgrid(
+        np.arange(west + 0.5 * apart, east, apart), np.arange(south + 0.5 * apart, north, apart)
+    )
     inside = shapely.intersects_xy(outline, x.ravel(), y.ravel())
     return np.column_stack([x.ravel()[inside], y.ravel()[inside]])
 
 
 def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> tuple[float, float]:
-    """Share of the `points` (n, 3), in the roof's frame, where they lie on two surfaces, and how far apart these are [m]; zeros
-    where that is not clear.
+    """Share of the `points` (n, 3), in the roof's frame, where they lie on two surfaces, and how
+    far apart these are [m]; zeros where that is not clear.
 
-    Those less than 0.3 m inside the outline do not count, `inner` are the others, where that is known. The distance is the median of the cells'.
+    Those less than 0.3 m inside the outline do not count, `inner` are the others, where that is
+    known. The distance is the median of the cells'.
     """
     inner = inner or well_inside(points, roof.outline)
     points = points.compress(inner.holds, axis=0)
@@ -77,9 +102,16 @@ def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> 
         points, dz = points[known], dz[known]
     if len(points) < FEWEST_POINTS:
         return 0.0, 0.0
-    counts, smaller, apart, within = split_cells(points, dz, math.sqrt(CELL_POINTS * inner.area_m2 / len(points)))
+    counts, smaller, apart, within = split_cells(
+        points, dz, math.sqrt(CELL_POINTS * inner.area_m2 / len(points))
+    )
     asked = counts >= LEAST_POINTS_A_CELL
-    two = asked & (within < MOST_WITHIN) & (apart > NEAR_M) & (smaller >= np.maximum(2, SMALLER_GROUP * counts))
+    two = (
+        asked
+        & (within < MOST_WITHIN)
+        & (apart > NEAR_M)
+        & (smaller >= np.maximum(2, SMALLER_GROUP * counts))
+    )
     share = counts[two].sum() / max(counts[asked].sum(), 1)
     return (float(share), float(np.median(apart[two]))) if share > LEAST_SHARE else (0.0, 0.0)
 
@@ -87,15 +119,19 @@ def two_surfaces(points: np.ndarray, roof: Roof, inner: Inner | None = None) -> 
 def split_cells(
     xy: np.ndarray, values: np.ndarray, cell_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The `values` (n,) at `xy` (n, 2 or 3) of each plan cell in two groups, lower and higher, with the least variance within them.
+    """The `values` (n,) at `xy` (n, 2 or 3) of each plan cell in two groups, lower and higher, with
+    the least variance within them.
 
-    Returns by cell (m,): how many values, how many in the lesser group, the distance of the groups' means, and the share of
-    the variance that is within the groups (1 where all values are one).
+    Returns by cell (m,): how many values, how many in the lesser group, the distance of the groups'
+    means, and the share of the variance that is within the groups (1 where all values are one).
     """
-    column, row = (np.floor((along - along.min()) / cell_m).astype(np.int64) for along in xy[:, :2].T)
+    column, row = (
+        np.floor((along - along.min()) / cell_m).astype(np.int64) for along in xy[:, :2].T
+    )
     cell = row * (column.max() + 1) + column
     order = np.argsort(values)
-    order = order[np.argsort(cell[order].astype(np.min_scalar_type(cell.max())), kind="stable")]  # 16 bits are counted
+    # 16 bits are counted
+    order = order[np.argsort(cell[order].astype(np.min_scalar_type(cell.max())), kind="stable")]
     start = np.flatnonzero(np.diff(cell[order], prepend=-1))
     counts = np.diff(start, append=len(order))
     cell = np.repeat(np.arange(len(start)), counts)

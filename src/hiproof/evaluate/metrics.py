@@ -1,4 +1,6 @@
-"""How well a model stands for its points: point-surface distance (PSD), outline IoU and the shares users ask for."""
+"""How well a model stands for its points: point-surface distance (PSD), outline IoU and the shares
+users ask for.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from ..read.thin import cell_range, occupied_cells
 from .distance import point_surface_distances, surface_and_vertical_distances
 
 NEAR_M = 0.2
-"""A point within this vertical distance of the roof counts as explained well (the field's share within 20 cm)."""
+"""A point within this vertical distance of the roof counts as explained well (the field's share
+within 20 cm).
+"""
 
 FACADE_M = 0.3
 """Points this close to the outline may be facade returns; the share leaves them out."""
@@ -25,7 +29,9 @@ MIN_INNER_POINTS = 10
 """A share of fewer points says nothing."""
 
 UNEXPLAINED_M = 0.5
-"""A cell most of whose points lie farther than this above or below the roof holds something the model lacks."""
+"""A cell most of whose points lie farther than this above or below the roof holds something the
+model lacks.
+"""
 
 CELL_M = 1.0
 """Side of the plan cells behind the no-data share and the unexplained area."""
@@ -37,7 +43,9 @@ Polygons = Sequence[np.ndarray | Sequence[np.ndarray]]
 
 
 class Inner(NamedTuple):
-    """Which (n,) of some points lie FACADE_M or more inside an outline, where walls do not answer, and the area there."""
+    """Which (n,) of some points lie FACADE_M or more inside an outline, where walls do not answer,
+    and the area there.
+    """
 
     holds: np.ndarray
     area_m2: float
@@ -51,7 +59,9 @@ def well_inside(points: np.ndarray, outline: shapely.Geometry) -> Inner:
 
 
 def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
-    """Roof surfaces of a model as lists of rings (m, 3), the outer first, in the model's own frame."""
+    """Roof surfaces of a model as lists of rings (m, 3), the outer first, in the model's
+    own frame.
+    """
     if isinstance(model, Solid):
         return [[model.vertices[list(ring)] for ring in face.rings] for face in model.of_kind(ROOF)]
     if isinstance(model, Fit):
@@ -60,20 +70,27 @@ def roof_polygons(model: Solid | Fit | Polygons) -> list[list[np.ndarray]]:
 
 
 def plan_outline(model: Solid | Fit | Polygons) -> shapely.Geometry:
-    """The roof's outline in plan: the union of its roof surfaces seen from above (empty without any)."""
+    """The roof's outline in plan: the union of its roof surfaces seen from above (empty without
+    any).
+    """
     polygons = [
-        shapely.polygons(outer[:, :2], holes=[shapely.linearrings(hole[:, :2]) for hole in holes] or None)
+        shapely.polygons(
+            outer[:, :2], holes=[shapely.linearrings(hole[:, :2]) for hole in holes] or None
+        )
         for outer, *holes in roof_polygons(model)
     ]
     polygons = [p if p.is_valid else p.buffer(0) for p in polygons]
     union = shapely.union_all(polygons)
-    # the grid, without which GEOS may lose a polygon, takes four times as long; those of a shell lie side by side, and none is lost
+    # the grid, without which GEOS may lose a polygon, takes four times as long; those of a shell
+    # lie side by side, and none is lost
     side_by_side = abs(union.area - sum(p.area for p in polygons)) < LOST_M2
     return union if side_by_side else shapely.union_all(polygons, grid_size=GRID_M)
 
 
 def psd(model: Solid | Fit | Polygons, points: np.ndarray) -> np.ndarray:
-    """Distance (n,) in metres of `points` (n, 3) to the nearest bounded roof surface of `model`, in the same frame."""
+    """Distance (n,) in metres of `points` (n, 3) to the nearest bounded roof surface of `model`, in
+    the same frame.
+    """
     return point_surface_distances(points, roof_polygons(model))
 
 
@@ -94,11 +111,14 @@ def quality(
     outline: shapely.Polygon | None = None,
     inner: Inner | None = None,
 ) -> Quality:
-    """Every residual figure of one model against the `points` (n, 3) it stands for, all in one frame.
+    """Every residual figure of one model against the `points` (n, 3) it stands for, all in one
+    frame.
 
-    `outline` is the plan polygon asked for (a footprint); without one the alpha shape of the points takes its place, as
-    in the paper; `inner` are the finite points well inside it, where that is known. `share_within_20cm` (of the points 0.3 m or more inside the outline, NaN for fewer than ten) and
-    `unexplained_area_m2` count vertical distances, and a point with no roof over or under it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
+    `outline` is the plan polygon asked for (a footprint); without one the alpha shape of the points
+    takes its place, as in the paper; `inner` are the finite points well inside it, where that is
+    known. `share_within_20cm` (of the points 0.3 m or more inside the outline, NaN for fewer than
+    ten) and `unexplained_area_m2` count vertical distances, and a point with no roof over or under
+    it as a miss; `nodata_share` is the share of the outline's 1 m cells that hold no point.
     """
     points = np.ascontiguousarray(points, float).reshape(-1, 3)
     if not np.isfinite(points).all():
@@ -126,27 +146,44 @@ def quality(
 
 
 def share_near(dz: np.ndarray, inner: Inner) -> float:
-    """Share of the points well inside an outline with |dz| (n,) below 0.2 m; NaN for fewer than ten."""
+    """Share of the points well inside an outline with |dz| (n,) below 0.2 m;
+
+    NaN for fewer than ten.
+    """
     well_inside = dz[inner.holds]
-    return float(np.mean(well_inside < NEAR_M)) if len(well_inside) >= MIN_INNER_POINTS else float("nan")
+    return (
+        float(np.mean(well_inside < NEAR_M))
+        if len(well_inside) >= MIN_INNER_POINTS
+        else float("nan")
+    )
 
 
 def percentile(values: np.ndarray, share: float) -> float:
-    """The level that `share` of `values` (n,) lie below, linear between two values; NumPy's own takes ten times as long."""
+    """The level that `share` of `values` (n,) lie below, linear between two values;
+
+    NumPy's own takes ten times as long.
+    """
     place = share * (len(values) - 1)
     low = int(place)
-    below, above = np.partition(values, (low, min(low + 1, len(values) - 1)))[[low, min(low + 1, len(values) - 1)]]
+    below, above = np.partition(values, (low, min(low + 1, len(values) - 1)))[
+        [low, min(low + 1, len(values) - 1)]
+    ]
     return float(above - (above - below) * (1 - (place - low)))
 
 
 def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
-    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2 or 3); NaN without cells."""
+    """Share of the 1 m cells centred in `outline` that hold none of the points `xy` (n, 2 or 3);
+
+    NaN without cells.
+    """
     west, south, east, north = np.array(outline.bounds) / CELL_M
     west, south = math.floor(west), math.floor(south)
     columns, rows = math.ceil(east) - west, math.ceil(north) - south
     row, column = np.divmod(np.arange(rows * columns), columns)
     shapely.prepare(outline)
-    wanted = shapely.intersects_xy(outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M)
+    wanted = shapely.intersects_xy(
+        outline, (column + west + 0.5) * CELL_M, (row + south + 0.5) * CELL_M
+    )
     if not wanted.any():
         return float("nan")
     column, row = np.floor(xy[:, 0] / CELL_M) - west, np.floor(xy[:, 1] / CELL_M) - south
@@ -157,7 +194,9 @@ def nodata_share(xy: np.ndarray, outline: shapely.Polygon) -> float:
 
 
 def unexplained_area(xy: np.ndarray, dz: np.ndarray) -> float:
-    """Area (m2) of the 1 m cells of `xy` (n, 2 or 3) most of whose points lie more than half a metre off the roof."""
+    """Area (m2) of the 1 m cells of `xy` (n, 2 or 3) most of whose points lie more than half a
+    metre off the roof.
+    """
     xy = np.ascontiguousarray(xy, float)
     low, (columns, rows) = cell_range(xy, CELL_M)
     _, cell, total = occupied_cells(cell_keys(xy, CELL_M, *low, columns), columns * rows)

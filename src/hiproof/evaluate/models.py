@@ -73,12 +73,14 @@ def run_models(folder: Path) -> Path:
     path, tiles = Path(folder) / RUN_MODELS, Path(folder) / TILE_FOLDER
     if not path.is_file() and any(tiles.glob(f"*{FORMATS['cityjson'].tile_ending}")):
         raise InputError(
-            f"expected models of the whole area in {folder}, got those of work tiles alone, in {tiles}; "
+            f"expected models of the whole area in {folder}, got those of work tiles alone, in "
+            f"{tiles}; "
             f"`hiproof build {Path(folder) / FORMATS['parameters'].file} --out OTHER` makes them"
         )
     if not path.is_file():
         raise InputError(
-            f"expected the output folder of `hiproof reconstruct`, got {folder} without {RUN_MODELS}; "
+            f"expected the output folder of `hiproof reconstruct`, got {folder} without "
+            f"{RUN_MODELS}; "
             "give what --out named"
         )
     return path
@@ -118,12 +120,19 @@ def building_of(id: str, city_object: Any, feature: Feature) -> BuildingModel:
     """Read a building with its parts. Raises one of UNUSABLE."""
     own = read_geometries(city_object)
     children = list_of(city_object.get("children") or [], "children")
-    family = [city_object, *(feature.objects[child] for child in children if child in feature.objects)]
+    family = [
+        city_object,
+        *(feature.objects[child] for child in children if child in feature.objects),
+    ]
     solids = [solids_of(own), *(solids_of(read_geometries(child)) for child in family[1:])]
     level = max((level_of_detail(solid) for own in solids for solid in own), default=0.0)
-    surfaces = [surface for own in solids for surface in surfaces_at(own, level, len(feature.vertices))]
+    surfaces = [
+        surface for own in solids for surface in surfaces_at(own, level, len(feature.vertices))
+    ]
     attributes = plain_attributes(city_object.get("attributes"))
-    part_types = {part_of(s): str(s.semantics[PART_TYPE]) for s in surfaces if PART_TYPE in s.semantics}
+    part_types = {
+        part_of(s): str(s.semantics[PART_TYPE]) for s in surfaces if PART_TYPE in s.semantics
+    }
     faces = tuple(Face(s.rings, s.kind, part_of(s) if s.kind == ROOF else -1) for s in surfaces)
     solid = compact(feature.vertices, faces) if faces else None
     model = BuildingModel(id, attributes, joined(solid, family) if solid is not None else None)
@@ -173,9 +182,14 @@ def surfaces_at(solids: list[dict[str, Any]], level: float, vertices: int) -> li
         return []
     semantics = solid.get("semantics") or {}
     values = list_of(semantics.get("values") or [None], "semantic values")[0]
-    outer = list_of(list_of(solid.get("boundaries"), "the boundaries of a solid")[0], "its outer shell")
+    outer = list_of(
+        list_of(solid.get("boundaries"), "the boundaries of a solid")[0], "its outer shell"
+    )
     if not outer or (values is not None and len(list_of(values, "semantic values")) != len(outer)):
-        raise ValueError(f"a solid of {len(outer)} faces" + (f", and semantics of {len(values)}" if values else ""))
+        raise ValueError(
+            f"a solid of {len(outer)} faces"
+            + (f", and semantics of {len(values)}" if values else "")
+        )
     return read_shell(outer, values, semantics.get("surfaces") or [], vertices)
 
 
@@ -207,6 +221,7 @@ def compact(vertices: np.ndarray, faces: tuple[Face, ...]) -> Solid:
         raise ValueError("coordinates of no place on Earth")
     place = {index: i for i, index in enumerate(used)}
     renumbered = (
-        Face(tuple(tuple(place[i] for i in ring) for ring in face.rings), face.kind, face.part) for face in faces
+        Face(tuple(tuple(place[i] for i in ring) for ring in face.rings), face.kind, face.part)
+        for face in faces
     )
     return Solid(vertices[used], tuple(renumbered))

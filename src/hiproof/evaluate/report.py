@@ -1,6 +1,8 @@
-"""One self-contained HTML page about a run: map, 3D view, distributions, the worst buildings, settings.
+"""One self-contained HTML page about a run: map, 3D view, distributions, the worst buildings,
+settings.
 
-The page opens from the file system and asks nothing of the network: styles, scripts and data are in it.
+The page opens from the file system and asks nothing of the network: styles, scripts and data are in
+it.
 """
 
 from __future__ import annotations
@@ -39,7 +41,9 @@ DISTRIBUTIONS = (
 TABLE = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline_iou")
 
 
-def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> None:
+def write_report(
+    path: Path, run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN
+) -> None:
     """Write the page to `path`. Raises OutputError when the file cannot be written."""
     from ..write.files import atomic_file
 
@@ -49,11 +53,15 @@ def write_report(path: Path, run: EvaluatedRun, title: str = "hiproof", most_sho
 
 
 def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOST_SHOWN) -> str:
-    """The page as text. Tables and distributions count every building; of more than `most_shown`, map and 3D view show
-    the worst and an even selection of the others."""
+    """The page as text.
+
+    Tables and distributions count every building; of more than `most_shown`, map and 3D view show
+    the worst and an even selection of the others.
+    """
     worst = worst_indices(run)
     shown = shown_indices(run, worst, most_shown)
     places = run.only(shown)
+    record = json.dumps(masked_values(run.record), indent=1, ensure_ascii=False)
     sections = {
         "title": escape(title),
         "style": asset("report.css"),
@@ -63,7 +71,7 @@ def report_html(run: EvaluatedRun, title: str = "hiproof", most_shown: int = MOS
         "figures": figure_table(run),
         "distributions": distributions(run),
         "worst": worst_buildings(run, worst, shown),
-        "record": f"<pre>{escape(json.dumps(masked_values(run.record), indent=1, ensure_ascii=False))}</pre>",
+        "record": f"<pre>{escape(record)}</pre>",
         "data": embedded(report_data(places, places_on_map(places))),
         "script": asset("viewer.js") + asset("report.js"),
     }
@@ -88,17 +96,23 @@ def lead(run: EvaluatedRun, shown: int) -> str:
     modelled = sum(model.solid is not None for model in run.models)
     points = sum(map(len, run.points))
     measured = (
-        f"measured against {counted(points, 'point')}" if points else "no points given: residuals are those of the run"
+        f"measured against {counted(points, 'point')}"
+        if points
+        else "no points given: residuals are those of the run"
     )
     part = f" Map and 3D view show {shown:,} of them." if shown < len(run.models) else ""
     made = f"Made by hiproof {escape(str(version))}."
-    return f"{counted(len(run.models), 'building')}, {modelled:,} with a model, {measured}.{part} {made}"
+    return (
+        f"{counted(len(run.models), 'building')}, {modelled:,} with a model, {measured}.{part} "
+        f"{made}"
+    )
 
 
 def status_table(run: EvaluatedRun) -> str:
     counts = Counter(model.status for model in run.models)
     rows = "".join(
-        f"<tr><td>{count}</td><td>{escape(sentence(code))}</td></tr>" for code, count in counts.most_common()
+        f"<tr><td>{count}</td><td>{escape(sentence(code))}</td></tr>"
+        for code, count in counts.most_common()
     )
     return f"<table><tr><th>buildings</th><th>outcome</th></tr>{rows}</table>"
 
@@ -124,20 +138,33 @@ def figure_table(run: EvaluatedRun) -> str:
     head = "".join(f"<th>{name.replace('_', ' ')}</th>" for name in TABLE)
     rows = ""
     for kind, figures in summarise(run.figures).items():
-        cells = "".join(f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>" for name in TABLE)
+        cells = "".join(
+            f"<td>{figures[name]['mean']:.3f}</td>" if name in figures else "<td></td>"
+            for name in TABLE
+        )
         rows += f"<tr><td>{escape(kind)}</td><td>{figures['buildings']}</td>{cells}</tr>"
     return f"<table><tr><th>type</th><th>buildings</th>{head}</tr>{rows}</table>"
 
 
 def distributions(run: EvaluatedRun) -> str:
     rows = [figures.row() for figures in run.figures]
-    return "".join(histogram(np.array([row[name] for row in rows]), title, unit) for name, title, unit in DISTRIBUTIONS)
+    return "".join(
+        histogram(np.array([row[name] for row in rows]), title, unit)
+        for name, title, unit in DISTRIBUTIONS
+    )
 
 
 def worst_indices(run: EvaluatedRun) -> list[int]:
-    """Twenty models, the poor ones first, then those that explain the least of their points (of equals the larger RMSE first)."""
+    """Twenty models, the poor ones first, then those that explain the least of their points (of
+    equals the larger RMSE first).
+    """
     worst_first = [grade.code for grade in reversed(Grade)]
-    grades = np.array([worst_first.index(m.grade) if m.grade in worst_first else len(worst_first) for m in run.models])
+    grades = np.array(
+        [
+            worst_first.index(m.grade) if m.grade in worst_first else len(worst_first)
+            for m in run.models
+        ]
+    )
     rmse = np.array([figures.quality.rmse for figures in run.figures], float)
     share = np.array([figures.quality.share_within_20cm for figures in run.figures], float)
     return [int(i) for i in np.lexsort((-rmse, share, grades)) if np.isfinite(rmse[i])][:WORST]
@@ -168,7 +195,12 @@ def worst_card(run: EvaluatedRun, index: int, place: int) -> str:
         model.solid.moved(-origin), points - origin, psd(model.solid, points), model.part_types
     )
     text = (
-        f"<b>{escape(model.id)}</b> {escape(model.grade)} {escape(model.roof_type)}, {100 * quality.share_within_20cm:.0f} % of the points "
-        f"inside the outline within 0.2 m of the roof; RMSE of all, facades included, {quality.rmse:.2f} m"
+        f"<b>{escape(model.id)}</b> {escape(model.grade)} {escape(model.roof_type)}, "
+        f"{100 * quality.share_within_20cm:.0f} % of the points "
+        "inside the outline within 0.2 m of the roof; RMSE of all, facades included, "
+        f"{quality.rmse:.2f} m"
     )
-    return f'<figure class="worst" data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'
+    return (
+        '<figure class="worst" '
+        f'data-select="{place}">{pictures}<figcaption>{text}</figcaption></figure>'
+    )

@@ -28,10 +28,15 @@ STATUS_COLOURS = {
 
 
 def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> dict[str, Any]:
-    """JSON-ready content of the page. `outlines` are plan polygons (world), None where nothing is known of the place."""
+    """JSON-ready content of the page.
+
+    `outlines` are plan polygons (world), None where nothing is known of the place.
+    """
     origin = scene_origin(run, outlines)
     buildings = [building_data(run, i, outlines[i], origin) for i in range(len(run.models))]
-    types = sorted({name for model in run.models for name in (model.roof_type, *model.part_types.values())})
+    types = sorted(
+        {name for model in run.models for name in (model.roof_type, *model.part_types.values())}
+    )
     statuses = sorted({model.status for model in run.models})
     return {
         "buildings": buildings,
@@ -50,7 +55,9 @@ def report_data(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) 
 def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None]) -> np.ndarray:
     """Whole-metre corner (3,) below everything, so that float32 keeps millimetres over a city."""
     corners = [model.solid.vertices.min(axis=0) for model in run.models if model.solid is not None]
-    corners += [np.array([*outline.bounds[:2], np.inf]) for outline in outlines if outline is not None]
+    corners += [
+        np.array([*outline.bounds[:2], np.inf]) for outline in outlines if outline is not None
+    ]
     low = np.min(corners, axis=0) if corners else np.zeros(3)
     return np.where(np.isfinite(low), np.floor(low), 0.0)
 
@@ -58,7 +65,9 @@ def scene_origin(run: EvaluatedRun, outlines: Sequence[shapely.Geometry | None])
 def building_data(
     run: EvaluatedRun, index: int, outline: shapely.Geometry | None, origin: np.ndarray
 ) -> dict[str, Any]:
-    """What the map and the panel show of one building; the residual is from the points given, else as the model says."""
+    """What the map and the panel show of one building; the residual is from the points given, else
+    as the model says.
+    """
     model, figures = run.models[index], run.figures[index]
     status = Status.__members__.get(model.status.upper())
     residual: Any = figures.quality.psd_mean
@@ -72,14 +81,20 @@ def building_data(
         "quality": model.grade,
         "outcome": status.value if status else model.status,
         "residual": finite(residual),
-        "measured": {name: finite(value) for name, value in measured.items() if finite(value) is not None},
-        "attributes": {name: finite(value) for name, value in model.attributes.items() if value is not None},
+        "measured": {
+            name: finite(value) for name, value in measured.items() if finite(value) is not None
+        },
+        "attributes": {
+            name: finite(value) for name, value in model.attributes.items() if value is not None
+        },
         "rings": outline_rings(outline, origin),
     }
 
 
 def finite(value: Any) -> Any:
-    """`value` as JSON can hold it: rounded numbers, None for NaN, text for what is neither number nor text."""
+    """`value` as JSON can hold it: rounded numbers, None for NaN, text for what is neither number
+    nor text.
+    """
     if isinstance(value, (bool, str, int)) or value is None:
         return value
     if isinstance(value, (float, np.floating)):
@@ -88,46 +103,79 @@ def finite(value: Any) -> Any:
 
 
 def outline_rings(outline: shapely.Geometry | None, origin: np.ndarray) -> list[list[float]]:
-    """Rings of a polygon or multipolygon as flat x, y lists in centimetres' precision about the origin."""
+    """Rings of a polygon or multipolygon as flat x, y lists in centimetres' precision about the
+    origin.
+    """
     if outline is None:
         return []
-    rings = [ring for polygon in shapely.get_parts(outline) for ring in (polygon.exterior, *polygon.interiors)]
-    return [np.round(shapely.get_coordinates(ring) - origin[:2], 2).ravel().tolist() for ring in rings]
+    rings = [
+        ring
+        for polygon in shapely.get_parts(outline)
+        for ring in (polygon.exterior, *polygon.interiors)
+    ]
+    return [
+        np.round(shapely.get_coordinates(ring) - origin[:2], 2).ravel().tolist() for ring in rings
+    ]
 
 
 def mesh_data(run: EvaluatedRun, types: list[str], origin: np.ndarray) -> dict[str, str]:
-    """Triangles of roofs and walls: corners (t, 3, 3), building (t,), `roof_places` (t,); roof edges (e, 2, 3)."""
-    solids = [(index, model.solid) for index, model in enumerate(run.models) if model.solid is not None]
+    """Triangles of roofs and walls: corners (t, 3, 3), building (t,), `roof_places` (t,); roof
+    edges (e, 2, 3).
+    """
+    solids = [
+        (index, model.solid) for index, model in enumerate(run.models) if model.solid is not None
+    ]
     meshes = [solid_mesh(solid.moved(-origin)) for _, solid in solids]
-    owners = [np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)]
-    roofs = [roof_places(run.models[index], mesh.part, types) for (index, _), mesh in zip(solids, meshes, strict=True)]
+    owners = [
+        np.full(len(mesh.part), index) for (index, _), mesh in zip(solids, meshes, strict=True)
+    ]
+    roofs = [
+        roof_places(run.models[index], mesh.part, types)
+        for (index, _), mesh in zip(solids, meshes, strict=True)
+    ]
     return {
-        "corners": packed(np.concatenate([np.empty((0, 3, 3)), *(mesh.corners for mesh in meshes)]), "<f4"),
+        "corners": packed(
+            np.concatenate([np.empty((0, 3, 3)), *(mesh.corners for mesh in meshes)]), "<f4"
+        ),
         "owner": packed(np.concatenate([np.empty(0), *owners]), "<u4"),
         "roof": packed(np.concatenate([np.empty(0), *roofs]), "u1"),
-        "edges": packed(np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"),
+        "edges": packed(
+            np.concatenate([np.empty((0, 2, 3)), *(mesh.edges for mesh in meshes)]), "<f4"
+        ),
     }
 
 
 def roof_places(model: BuildingModel, part: np.ndarray, types: list[str]) -> list[int]:
-    """The place among `types`, from 1 on, of the roof type of triangles by their `part` (t,); 0 of walls."""
-    return [0 if k < 0 else 1 + types.index(model.part_types.get(k, model.roof_type)) for k in part.tolist()]
+    """The place among `types`, from 1 on, of the roof type of triangles by their `part` (t,);
+
+    0 of walls.
+    """
+    return [
+        0 if k < 0 else 1 + types.index(model.part_types.get(k, model.roof_type))
+        for k in part.tolist()
+    ]
 
 
 def point_data(run: EvaluatedRun, origin: np.ndarray) -> dict[str, str]:
-    """Points (n, 3) thinned to every k-th of each building, with their distances to the roof in metres (n,)."""
+    """Points (n, 3) thinned to every k-th of each building, with their distances to the roof in
+    metres (n,).
+    """
     most = max(1, min(POINTS_PER_BUILDING, MOST_POINTS // max(len(run.models), 1)))
     places, distances = [np.empty((0, 3))], [np.empty(0)]
     for model, points in zip(run.models, run.points, strict=True):
         points = points[:: max(1, -(-len(points) // most))]
         places.append(points - origin)
-        distances.append(psd(model.solid, points) if model.solid is not None else np.full(len(points), np.inf))
+        distances.append(
+            psd(model.solid, points) if model.solid is not None else np.full(len(points), np.inf)
+        )
     nearness = np.nan_to_num(np.concatenate(distances), posinf=9.0)
     return {"places": packed(np.concatenate(places), "<f4"), "distances": packed(nearness, "<f4")}
 
 
 def places_on_map(run: EvaluatedRun) -> list[shapely.Geometry | None]:
-    """The plan outline of every model; of a building without a model its footprint, None where it has neither."""
+    """The plan outline of every model; of a building without a model its footprint, None where it
+    has neither.
+    """
     footprints = run.footprints or (None,) * len(run.models)
     return [
         plan_outline(model.solid) if model.solid is not None else footprint

@@ -11,13 +11,22 @@ from ..geometry.rings import ring_normal
 from ..model import GROUND, ROOF, Solid
 from ..write.meshes.viewed import look_of
 
-RESIDUAL_STOPS = ((0.0, "#2c7bb6"), (0.05, "#7fc4a5"), (0.1, "#d9e68b"), (0.2, "#fdae61"), (0.4, "#d7191c"))
-"""Colour from each distance in metres upwards, blue near and red far; the same on map, models and points."""
+RESIDUAL_STOPS = (
+    (0.0, "#2c7bb6"),
+    (0.05, "#7fc4a5"),
+    (0.1, "#d9e68b"),
+    (0.2, "#fdae61"),
+    (0.4, "#d7191c"),
+)
+"""Colour from each distance in metres upwards, blue near and red far; the same on map, models and
+points.
+"""
 
 MOST_POINTS = 400  # dots in a small picture; more would cover the model
 WIDTH, HEIGHT = 300, 210  # pixels; three pictures stand side by side on a laptop
 
-NARROWEST = 1e-3  # of all quantities shown, below what they are known by: values so near each other are one
+# of all quantities shown, below what they are known by: values so near each other are one
+NARROWEST = 1e-3
 
 
 def residual_bins(distances: np.ndarray) -> np.ndarray:
@@ -33,14 +42,18 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     if not len(values):
         return f"<figure><figcaption>{escape(heading)}: no figures</figcaption></figure>"
     if np.ptp(values) < NARROWEST:
-        return f"<figure><figcaption>{escape(heading)}: {short(values.mean())} for all</figcaption></figure>"
+        return (
+            f"<figure><figcaption>{escape(heading)}: {short(values.mean())} for "
+            "all</figcaption></figure>"
+        )
     low, high = float(values.min()), float(np.percentile(values, 98))
     high = max(high, low + NARROWEST)
     counts, edges = np.histogram(np.clip(values, low, high), bins=bins, range=(low, high))
     step, top = WIDTH / bins, HEIGHT - 40
     bars = "".join(
         f'<rect x="{i * step:.1f}" y="{top - top * n / counts.max():.1f}" width="{step - 1:.1f}" '
-        f'height="{top * n / counts.max():.1f}"><title>{edges[i]:.3f} to {edges[i + 1]:.3f}: {n}</title></rect>'
+        f'height="{top * n / counts.max():.1f}"><title>{edges[i]:.3f} to {edges[i + 1]:.3f}: '
+        f"{n}</title></rect>"
         for i, n in enumerate(counts)
         if n
     )
@@ -48,9 +61,11 @@ def histogram(values: np.ndarray, title: str, unit: str, bins: int = 30) -> str:
     x = WIDTH * (np.clip(middle, low, high) - low) / (high - low)
     axis = (
         f'<text x="0" y="{top + 16}">{short(low)}</text>'
-        f'<text x="{WIDTH}" y="{top + 16}" text-anchor="end">{short(high)}{" and more" if values.max() > high else ""}</text>'
+        f'<text x="{WIDTH}" y="{top + 16}" '
+        f'text-anchor="end">{short(high)}{" and more" if values.max() > high else ""}</text>'
         f'<line x1="{x:.1f}" x2="{x:.1f}" y1="0" y2="{top}" class="median"/>'
-        f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, mean {short(values.mean())}</text>'
+        f'<text x="{WIDTH / 2}" y="{top + 34}" text-anchor="middle">median {short(middle)}, mean '
+        f"{short(values.mean())}</text>"
     )
     body = f'<svg viewBox="0 -4 {WIDTH} {HEIGHT}" class="histogram" role="img">{bars}{axis}</svg>'
     return f"<figure>{body}<figcaption>{escape(heading)}</figcaption></figure>"
@@ -60,11 +75,14 @@ def short(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, part_types: Mapping[int, str]) -> str:
-    """The model with its points (n, 3), coloured by their distances (n,): from above at an angle, and from the side.
+def building_pictures(
+    solid: Solid, points: np.ndarray, distances: np.ndarray, part_types: Mapping[int, str]
+) -> str:
+    """The model with its points (n, 3), coloured by their distances (n,): from above at an angle,
+    and from the side.
 
-    The side view looks along the level direction of the largest roof face, so that slopes show as lines. Roofs have the colour of
-    their part's type, by number in `part_types`.
+    The side view looks along the level direction of the largest roof face, so that slopes show as
+    lines. Roofs have the colour of their part's type, by number in `part_types`.
     """
     if len(points) > MOST_POINTS:
         keep = np.linspace(0, len(points) - 1, MOST_POINTS).astype(int)
@@ -72,14 +90,21 @@ def building_pictures(solid: Solid, points: np.ndarray, distances: np.ndarray, p
     across = slope_direction(solid)
     along = np.array([-across[1], across[0], 0.0])
     colours = [look_of(face, part_types).colour for face in solid.faces]
-    above = (0.8 * across + 0.6 * along, 0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)])
+    above = (
+        0.8 * across + 0.6 * along,
+        0.5 * (0.8 * along - 0.6 * across) + [0.0, 0.0, np.sqrt(0.75)],
+    )
     side = (across, np.array([0.0, 0.0, 1.0]))
     return "".join(projection(solid, colours, points, distances, *view) for view in (above, side))
 
 
 def slope_direction(solid: Solid) -> np.ndarray:
-    """Level unit vector (3,) in which the largest sloped roof face falls; east where all are level."""
-    normals = np.array([ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.of_kind(ROOF)])
+    """Level unit vector (3,) in which the largest sloped roof face falls; east where all
+    are level.
+    """
+    normals = np.array(
+        [ring_normal(solid.vertices[list(face.rings[0])]) for face in solid.of_kind(ROOF)]
+    )
     if not len(normals):
         return np.array([1.0, 0.0, 0.0])
     level = normals * [1.0, 1.0, 0.0]
@@ -89,34 +114,58 @@ def slope_direction(solid: Solid) -> np.ndarray:
 
 
 def projection(
-    solid: Solid, colours: list[str], points: np.ndarray, distances: np.ndarray, right: np.ndarray, up: np.ndarray
+    solid: Solid,
+    colours: list[str],
+    points: np.ndarray,
+    distances: np.ndarray,
+    right: np.ndarray,
+    up: np.ndarray,
 ) -> str:
-    """An SVG of faces, each in its colour, and points seen along one direction, `right` and `up` (3,) being the picture's axes."""
+    """An SVG of faces, each in its colour, and points seen along one direction, `right` and `up`
+    (3,) being the picture's axes.
+    """
     axes = np.column_stack([right, -up])
     corners, dots = solid.vertices @ axes, points @ axes
     everything = np.concatenate([corners, dots])
     low, high = everything.min(axis=0), everything.max(axis=0)
-    scale = min((WIDTH - 16) / max(high[0] - low[0], 1e-6), (HEIGHT - 16) / max(high[1] - low[1], 1e-6))
+    scale = min(
+        (WIDTH - 16) / max(high[0] - low[0], 1e-6), (HEIGHT - 16) / max(high[1] - low[1], 1e-6)
+    )
 
     def place(xy: np.ndarray) -> np.ndarray:
         return (xy - (low + high) / 2) * scale + [WIDTH / 2, HEIGHT / 2]
 
     towards = np.cross(right, up)
     faces = sorted(
-        ((face, colour) for face, colour in zip(solid.faces, colours, strict=True) if face.kind != GROUND),
+        (
+            (face, colour)
+            for face, colour in zip(solid.faces, colours, strict=True)
+            if face.kind != GROUND
+        ),
         key=lambda drawn: float((solid.vertices[list(drawn[0].rings[0])] @ towards).mean()),
     )
-    shapes = "".join(f'<path d="{ring_paths(place(corners), face.rings)}" fill="{colour}"/>' for face, colour in faces)
+    shapes = "".join(
+        f'<path d="{ring_paths(place(corners), face.rings)}" fill="{colour}"/>'
+        for face, colour in faces
+    )
     cloud = "".join(
-        f'<path d="{"".join(f"M{x:.1f} {y:.1f}h0" for x, y in place(dots[residual_bins(distances) == i]))}" stroke="{stop}"/>'
+        f'<path d="{dot_paths(place(dots[residual_bins(distances) == i]))}" stroke="{stop}"/>'
         for i, (_, stop) in enumerate(RESIDUAL_STOPS)
     )
     return (
-        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" class="model" role="img"><g class="faces">{shapes}</g>'
+        f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" class="model" role="img"><g '
+        f'class="faces">{shapes}</g>'
         f'<g class="dots">{cloud}</g></svg>'
     )
 
 
+def dot_paths(xy: np.ndarray) -> str:
+    """Draw a dot at each of the points (n, 2), as the data of an SVG path."""
+    return "".join(f"M{x:.1f} {y:.1f}h0" for x, y in xy)
+
+
 def ring_paths(xy: np.ndarray, rings: Sequence[Sequence[int]]) -> str:
     """SVG path data of a face."""
-    return "".join("M" + "L".join(f"{xy[i, 0]:.1f} {xy[i, 1]:.1f}" for i in ring) + "Z" for ring in rings)
+    return "".join(
+        "M" + "L".join(f"{xy[i, 0]:.1f} {xy[i, 1]:.1f}" for i in ring) + "Z" for ring in rings
+    )

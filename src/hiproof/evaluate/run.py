@@ -19,7 +19,12 @@ from ..read.crs import parse_crs, units_of
 from ..read.damage import Damaged, excerpt, refuse
 from ..settings import Settings
 from ..write.naming import FileUnits
-from .evaluation import BuildingFigures, evaluate_building, match_by_id_or_overlap, points_by_outline
+from .evaluation import (
+    BuildingFigures,
+    evaluate_building,
+    match_by_id_or_overlap,
+    points_by_outline,
+)
 from .inputs import found_inputs
 from .metrics import plan_outline
 from .models import BuildingModel, read_models, run_models
@@ -68,7 +73,10 @@ class EvaluatedRun:
     def only(self, indices: Sequence[int]) -> EvaluatedRun:
         """The same run with only these buildings."""
         models = tuple(self.models[i] for i in indices)
-        points, figures = tuple(self.points[i] for i in indices), tuple(self.figures[i] for i in indices)
+        points, figures = (
+            tuple(self.points[i] for i in indices),
+            tuple(self.figures[i] for i in indices),
+        )
         footprints = tuple(self.footprints[i] for i in indices)
         return EvaluatedRun(models, points, figures, self.record, footprints, self.clouds)
 
@@ -95,22 +103,35 @@ def evaluate_run(
     known = found_inputs(record)
     if not clouds and known.gone:
         left = "measured against the others alone" if known.files else "nothing to measure against"
-        warnings.warn(f"{folder}: {known.told_gone}, {left}; name them after the folder", InputWarning)
+        warnings.warn(
+            f"{folder}: {known.told_gone}, {left}; name them after the folder", InputWarning
+        )
     clouds = clouds or known.files
     asked: dict[str, Any] = {}
     if footprints is None:
         footprints, layer = known.footprint_file, layer or known.layer
         asked = {"id_attribute": known.id_attribute, "where": known.where, "bbox": known.bbox}
-    models = tuple(read_models(run_models(folder), run_units(record), way_to_models(record), damaged, must_be_valid))
+    models = tuple(
+        read_models(
+            run_models(folder), run_units(record), way_to_models(record), damaged, must_be_valid
+        )
+    )
     outlines = footprint_of_each(models, footprints, layer, record, asked)
-    areas = [outline if outline is not None else own_outline(m) for m, outline in zip(models, outlines, strict=True)]
+    areas = [
+        outline if outline is not None else own_outline(m)
+        for m, outline in zip(models, outlines, strict=True)
+    ]
     if clouds and any(area is not None for area in areas):
         points = points_by_outline(building_points(clouds, record, areas), areas)
     else:
         points = [np.empty((0, 3))] * len(models)
     references = reference_of_each(models, reference)
-    figures = [evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)]
-    return EvaluatedRun(models, tuple(points), tuple(figures), record, tuple(outlines), tuple(clouds))
+    figures = [
+        evaluate_building(*row) for row in zip(models, points, outlines, references, strict=True)
+    ]
+    return EvaluatedRun(
+        models, tuple(points), tuple(figures), record, tuple(outlines), tuple(clouds)
+    )
 
 
 def run_record(folder: Path) -> dict[str, Any]:
@@ -124,7 +145,9 @@ def run_record(folder: Path) -> dict[str, Any]:
         run_crs(record)
         parse_crs(run_out_crs(record))
     except (InputError, SettingsError) as error:
-        raise InputError(f"{path}: {error!s:.400}; mend it there, or run `hiproof reconstruct` again") from error
+        raise InputError(
+            f"{path}: {error!s:.400}; mend it there, or run `hiproof reconstruct` again"
+        ) from error
     return record
 
 
@@ -136,7 +159,9 @@ def refuse_other_kinds(record: dict[str, Any]) -> None:
             value = value.get(name) if value is not None else None
         is_odd = isinstance(value, bool) or (isinstance(value, float) and not math.isfinite(value))
         if value is not None and (is_odd or not isinstance(value, kind)):
-            raise InputError(f"expected {words_of(kind)} as {'.'.join(names)}, got {excerpt(value)}")
+            raise InputError(
+                f"expected {words_of(kind)} as {'.'.join(names)}, got {excerpt(value)}"
+            )
     bbox = (record.get("inputs") or {}).get("bbox")
     if bbox and (len(bbox) != 4 or not all(type(side) in NUMBER for side in bbox)):
         raise InputError(f"expected four numbers as inputs.bbox, got {excerpt(bbox)}")
@@ -159,7 +184,9 @@ def run_crs(record: dict[str, Any]) -> Any:
     return parse_crs(record.get("crs"))
 
 
-def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]) -> np.ndarray:
+def building_points(
+    clouds: Sequence[str], record: dict[str, Any], areas: Sequence[Any]
+) -> np.ndarray:
     """Points (n, 3) of the building classes around `areas`; all points of clouds without
     classes."""
     from ..read.pointcloud import expand_paths, read_points, refuse_other_crs
@@ -169,7 +196,9 @@ def building_points(clouds: Sequence[str], record: dict[str, Any], areas: Sequen
         refuse_other_crs(expand_paths(tuple(clouds)), run_crs(record), "the run")
         settings = settings.replace({"read": {"crs": record.get("crs") or ""}})
     box = shapely.total_bounds(np.array([area for area in areas if area is not None], dtype=object))
-    cloud = read_points(*clouds, settings=settings, box=tuple(box) if np.isfinite(box).all() else None)
+    cloud = read_points(
+        *clouds, settings=settings, box=tuple(box) if np.isfinite(box).all() else None
+    )
     if cloud.classification is None or not cloud.classification.any():
         return cloud.xyz
     return cloud.xyz[np.isin(cloud.classification, settings.read.building_classes)]
@@ -188,7 +217,9 @@ def footprint_of_each(
         return [None] * len(models)
     from ..read.footprints import read_footprints
 
-    footprints = read_footprints(path, layer, target_crs=run_crs(record), settings=run_settings(record), **asked)
+    footprints = read_footprints(
+        path, layer, target_crs=run_crs(record), settings=run_settings(record), **asked
+    )
     areas = [(f.id, shapely.make_valid(f.polygon)) for f in footprints]
     matches = match_by_id_or_overlap(models, areas)
     return [None if match is None else areas[match][1] for match in matches]
@@ -212,15 +243,24 @@ def run_out_crs(record: dict[str, Any]) -> str:
     return ((record.get("settings") or {}).get("write") or {}).get("out_crs") or ""
 
 
-def reference_of_each(models: Sequence[BuildingModel], path: str | None) -> list[BuildingModel | None]:
+def reference_of_each(
+    models: Sequence[BuildingModel], path: str | None
+) -> list[BuildingModel | None]:
     """The building of the reference file that stands for each model; one line where none does for
     any."""
     if path is None:
         return [None] * len(models)
-    others = [(model, outline) for model in read_models(path) if (outline := own_outline(model)) is not None]
+    others = [
+        (model, outline)
+        for model in read_models(path)
+        if (outline := own_outline(model)) is not None
+    ]
     matches = match_by_id_or_overlap(models, [(other.id, outline) for other, outline in others])
     if models and not any(match is not None for match in matches):
-        warnings.warn(f"{path}: no building of it stands where one of the run does; check its CRS", InputWarning)
+        warnings.warn(
+            f"{path}: no building of it stands where one of the run does; check its CRS",
+            InputWarning,
+        )
     return [None if match is None else others[match][0] for match in matches]
 
 

@@ -67,8 +67,9 @@ class Cluster(NamedTuple):
 
 
 class Evidence(NamedTuple):
-    """What the points say of a model: the number of roof points, shares of these and of the outline,
-    clusters, and the area of parts on few points."""
+    """What the points say of a model: the number of roof points, shares of these and of the
+    outline, clusters, and the area of parts on few points.
+    """
 
     points: int
     near: float
@@ -119,7 +120,12 @@ def share_findings(evidence: Evidence) -> list[Finding]:
         found.append((True, "all its points lie on its walls, none on its roof"))
     elif evidence.near < LEAST_NEAR:
         share = math.floor(100 * evidence.near)
-        found.append((evidence.near < POOR_NEAR, f"only {share} % of its points lie within 0.2 m of the roof"))
+        found.append(
+            (
+                evidence.near < POOR_NEAR,
+                f"only {share} % of its points lie within 0.2 m of the roof",
+            )
+        )
     if evidence.unseen > MOST_UNSEEN:
         share = round(100 * evidence.unseen)
         words = f"{share} % {Doubt.PLACES_WITHOUT_POINTS.value}; the roof there is a guess"
@@ -133,7 +139,8 @@ def cluster_findings(evidence: Evidence) -> list[Finding]:
     return [
         (
             cluster.area_m2 > POOR_CLUSTER * evidence.area_m2,
-            f"{counted(cluster.points, 'point')} up to {cluster.height_m:.{0 if cluster.height_m >= 10 else 1}f} m"
+            f"{counted(cluster.points, 'point')} up to "
+            f"{cluster.height_m:.{0 if cluster.height_m >= 10 else 1}f} m"
             f" {doubt.value}",
         )
         for cluster, doubt in sides
@@ -144,7 +151,11 @@ def cluster_findings(evidence: Evidence) -> list[Finding]:
 def part_findings(evidence: Evidence) -> list[Finding]:
     """Parts of the roof on hardly any point."""
     area, share = evidence.unsupported_m2, evidence.unsupported_m2 / evidence.area_m2
-    return [(share > POOR_UNSUPPORTED, f"{area:.0f} m² of its roof {Doubt.UNSUPPORTED.value}")] if area else []
+    return (
+        [(share > POOR_UNSUPPORTED, f"{area:.0f} m² of its roof {Doubt.UNSUPPORTED.value}")]
+        if area
+        else []
+    )
 
 
 def evidence_of(model: Model, points: np.ndarray, unused: np.ndarray) -> Evidence:
@@ -184,7 +195,8 @@ def wall_rings(model: Model) -> list[list[np.ndarray]]:
 
 
 def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) -> Cluster:
-    """The largest cluster, tall or a level, of points (n, 3) so far off a roof (n,); empty if there is none.
+    """The largest cluster, tall or a level, of points (n, 3) so far off a roof (n,); empty if there
+    is none.
 
     Tall and lower points are apart, so that a bird over a chimney makes no tower of it.
     """
@@ -192,7 +204,9 @@ def largest_cluster(points: np.ndarray, height_m: np.ndarray, spacing_m: float) 
     for band, least_m2 in ((is_tall, 0.0), (~is_tall, LEVEL_M2)):
         heights = height_m[band]
         for members in clusters_in_plan(points[band], max(LINK_SPACINGS * spacing_m, LINK_M)):
-            cluster = Cluster(len(members), float(heights[members].max()), len(members) * spacing_m**2)
+            cluster = Cluster(
+                len(members), float(heights[members].max()), len(members) * spacing_m**2
+            )
             if cluster.points >= FEWEST_IN_CLUSTER and cluster.area_m2 >= least_m2:
                 found = max(found, cluster)
     return found

@@ -1,7 +1,8 @@
 """From the points of one building to the parameters of its roof.
 
 single         `fit_roof`: one primitive by all points, the door to both objectives
-likelihood     the default objective: starts, annealing, the choice of type, what is known of the result
+likelihood     the default objective: starts, annealing, the choice of type, what is known of the
+               result
 direction      plan directions before any fit
 walls          which points lie on walls
 tables         the catalogue as arrays

@@ -1,10 +1,12 @@
 """How far a footprint lies beside the roof that it stands for, and how sure that is.
 
-First the footprint is slid to where it holds most points: its area is the same everywhere, so that is where an outline of its
-shape is most likely. Then each side that has free ground before it is put where the points across it put it
-(outline/settle.py), and all together tell the shift, and how far the roof reaches beyond the footprint on every side. A side
-that a neighbour's roof goes on beyond tells nothing, so a house in a row is not moved along the row. A roof much larger
-than its footprint leaves no free ground before its walls: where the sides do not agree, the footprint is grown all around.
+First the footprint is slid to where it holds most points: its area is the same everywhere, so that
+is where an outline of its shape is most likely. Then each side that has free ground before it is
+put where the points across it put it (outline/settle.py), and all together tell the shift, and how
+far the roof reaches beyond the footprint on every side. A side that a neighbour's roof goes on
+beyond tells nothing, so a house in a row is not moved along the row. A roof much larger than its
+footprint leaves no free ground before its walls: where the sides do not agree, the footprint is
+grown all around.
 """
 
 from __future__ import annotations
@@ -28,21 +30,29 @@ FARTHEST_M = 3.0  # a footprint is moved at most
 AROUND_M = 4.0  # of points that are asked for around it
 # m between the shifts tried first, and after that; m of half a cell of the raster of costs
 COARSE_M, FINE_M, PITCH_M = 0.5, 0.1, 0.1
-SLID_POINTS = 600  # that are slid over the footprint: a bound on time, for all that comes after looks at every point
-# m over which a side is soft, as in fit/outline; density outside over that inside: points of walls and neighbours
+# that are slid over the footprint: a bound on time, for all that comes after looks at every point
+SLID_POINTS = 600
+# m over which a side is soft, as in fit/outline; density outside over that inside: points of walls
+# and neighbours
 BLUR_M, STRAY = 0.25, math.exp(-4.0)
 STRAY_FROM_M = 4.0 * BLUR_M  # outside, from where on all points cost the same
-OVERHANGS_M = (0.0, 0.5, 1.0)  # that are tried all around the footprint; eaves reach no farther over walls
-LEAST_POINTS, LEAST_SIDE_M = 20, 1.5  # points; with fewer every shift holds as many; m: shorter sides tell no offset
-FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25  # before a side there may be so many points of those behind it
+# that are tried all around the footprint; eaves reach no farther over walls
+OVERHANGS_M = (0.0, 0.5, 1.0)
+# points; with fewer every shift holds as many; m: shorter sides tell no offset
+LEAST_POINTS, LEAST_SIDE_M = 20, 1.5
+# before a side there may be so many points of those behind it
+FREE_FROM_M, FREE_TO_M, FREE_SHARE = 0.4, 1.0, 0.25
 SIDE_M, SIDE_LENGTH_M = 0.08, 4.0  # standard deviation of a side of this length
 REACH_SIGMA_M = 0.5  # how far roofs usually reach beyond footprints, or stay behind
 PRIOR = np.diag([1.0 / FARTHEST_M**2] * 2 + [1.0 / REACH_SIGMA_M**2])
-ROUNDS, NEAR_M = 3, 0.2  # of putting each side where its points are, from the last shift; m that counts as no shift
+# of putting each side where its points are, from the last shift; m that counts as no shift
+ROUNDS, NEAR_M = 3, 0.2
 # m; standard deviations; m that sides may disagree by; share of the border that must be free
 LEAST_SHIFT_M, SIGMAS, MOST_DISAGREEMENT_M, LEAST_FREE = 0.3, 4.0, 0.25, 0.5
-LEAST_FREE_OVERHUNG = 0.85  # share where an overhang all around is assumed: else it takes in the roofs of neighbours
-# free sides: two directions and one to check them; share of the points outside, below which the footprint fits
+# share where an overhang all around is assumed: else it takes in the roofs of neighbours
+LEAST_FREE_OVERHUNG = 0.85
+# free sides: two directions and one to check them; share of the points outside, below which the
+# footprint fits
 LEAST_SIDES, LEAST_OUTSIDE = 3, 0.01
 FEW = 10  # one point in so many is asked first whether points lie outside
 LEAST_BEYOND_M = 0.3  # m that the roof's sides must lie off the footprint's to be told
@@ -50,9 +60,11 @@ LEAST_BEYOND_M = 0.3  # m that the roof's sides must lie off the footprint's to 
 
 @dataclass(frozen=True)
 class Shift:
-    """Where a footprint's roof lies: `xy` (2,) m from it with standard deviations `sigma` (2,), infinite along which nothing is
-    known; `beyond` (m) how far the roof reaches over the moved footprint, negative where it stays behind, and its `beyond_sigma`;
-    `disagreement` (m) of the sides."""
+    """Where a footprint's roof lies: `xy` (2,) m from it with standard deviations `sigma` (2,),
+    infinite along which nothing is known; `beyond` (m) how far the roof reaches over the moved
+    footprint, negative where it stays behind, and its `beyond_sigma`; `disagreement` (m) of the
+    sides.
+    """
 
     xy: np.ndarray = field(default_factory=lambda: np.zeros(2))
     sigma: np.ndarray = field(default_factory=lambda: np.full(2, math.inf))
@@ -85,9 +97,11 @@ class Shift:
 
 
 def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
-    """The shift of `footprint` onto roof points `xy` (n, 2) in and AROUND_M around it, both in one local frame in metres.
+    """The shift of `footprint` onto roof points `xy` (n, 2) in and AROUND_M around it, both in one
+    local frame in metres.
 
-    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8, 0.4)))
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.2, 12, 0.4), np.arange(0.2, 8,
+    ...     0.4)))
     >>> shift = find_shift(np.column_stack([x, y]), shapely.box(1.0, -0.5, 13.0, 7.5))
     >>> shift.is_clear, bool(np.abs(shift.xy - [-1.0, 0.5]).max() < 0.1)
     (True, True)
@@ -112,15 +126,27 @@ def find_shift(xy: np.ndarray, footprint: shapely.Polygon) -> Shift:
 
 
 def is_alone(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
-    """Whether points cover no more square metres than the roof over the footprint may with the largest overhang."""
+    """Whether points cover no more square metres than the roof over the footprint may with the
+    largest overhang.
+    """
     covered = len(np.unique(np.floor(xy), axis=0))
-    return bool(covered <= shapely.area(shapely.buffer(footprint, OVERHANGS_M[-1] + 0.5, join_style="mitre")))
+    return bool(
+        covered
+        <= shapely.area(shapely.buffer(footprint, OVERHANGS_M[-1] + 0.5, join_style="mitre"))
+    )
 
 
 def settled_shift(
-    xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, density: float, footprint: shapely.Polygon, overhang: float
+    xy: np.ndarray,
+    ring: np.ndarray,
+    lines: np.ndarray,
+    density: float,
+    footprint: shapely.Polygon,
+    overhang: float,
 ) -> Shift:
-    """The shift by the sides of a footprint that is grown by `overhang` (m), from where it holds most points on."""
+    """The shift by the sides of a footprint that is grown by `overhang` (m), from where it holds
+    most points on.
+    """
     shift = Shift(most_points(xy, footprint, overhang))
     for _ in range(ROUNDS):
         found = by_sides(xy, ring, lines, shift.xy, overhang, density)
@@ -134,7 +160,9 @@ def settled_shift(
 
 
 def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
-    """Whether points were cut off at the footprint, which looks like a roof that ends there; mostly a few of them say no."""
+    """Whether points were cut off at the footprint, which looks like a roof that ends there; mostly
+    a few of them say no.
+    """
     shapely.prepare(footprint)
     for some in (xy[::FEW], xy):
         outside = ~shapely.contains_xy(footprint, some[:, 0], some[:, 1])
@@ -144,12 +172,18 @@ def are_cut_off(xy: np.ndarray, footprint: shapely.Polygon) -> bool:
 
 
 def most_points(xy: np.ndarray, footprint: shapely.Polygon, overhang: float) -> np.ndarray:
-    """The shift (2,) at which the footprint, grown by `overhang` (m), holds most of `xy`, the least of those that hold as
-    many: coarse, then fine."""
+    """The shift (2,) at which the footprint, grown by `overhang` (m), holds most of `xy`, the least
+    of those that hold as many: coarse, then fine.
+    """
     low = np.array(footprint.bounds[:2]) - STRAY_FROM_M - overhang
-    count = np.ceil((np.array(footprint.bounds[2:]) + STRAY_FROM_M + overhang - low) / (2 * PITCH_M)).astype(int)
+    count = np.ceil(
+        (np.array(footprint.bounds[2:]) + STRAY_FROM_M + overhang - low) / (2 * PITCH_M)
+    ).astype(int)
     x, y = (start + 2 * PITCH_M * np.arange(nodes) for start, nodes in zip(low, count, strict=True))
-    depth = signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint)) + overhang
+    depth = (
+        signed_depth(np.repeat(x, count[1]), np.tile(y, count[0]), *ring_edges(footprint))
+        + overhang
+    )
     costs = costs_at(depth / BLUR_M).reshape(count)
     few = np.ascontiguousarray(xy[:: max(1, len(xy) // SLID_POINTS)])
     best = np.zeros(2)
@@ -179,11 +213,14 @@ def costs_at(depth):
 
 @compiled
 def slid_costs(xy, costs, low, pitch, moves):
-    """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first node lies at `low`."""
+    """What points `xy` (n, 2) cost under each of `moves` (m, 2) of the raster `costs`, whose first
+    node lies at `low`.
+    """
     found, nodes_a_metre = np.zeros(len(moves)), 1.0 / pitch
     (rows, columns), flat = costs.shape, costs.ravel()
     east, north, place = moves[:, 0].copy(), moves[:, 1].copy(), np.empty(len(moves), np.int64)
-    for k in range(len(xy)):  # all moves of a point at once: four times as fast as all points of a move
+    # all moves of a point at once: four times as fast as all points of a move
+    for k in range(len(xy)):
         x, y = xy[k]
         for m in range(len(moves)):
             i = int((x - east[m] - low[0]) * nodes_a_metre + 0.5)
@@ -195,10 +232,16 @@ def slid_costs(xy, costs, low, pitch, moves):
 
 
 def by_sides(
-    xy: np.ndarray, ring: np.ndarray, lines: np.ndarray, start: np.ndarray, overhang: float, density: float
+    xy: np.ndarray,
+    ring: np.ndarray,
+    lines: np.ndarray,
+    start: np.ndarray,
+    overhang: float,
+    density: float,
 ) -> Shift | None:
-    """The shift and the reach beyond that all free sides of the footprint, slid by `start` and grown by `overhang` (m),
-    agree on best; None of too few."""
+    """The shift and the reach beyond that all free sides of the footprint, slid by `start` and
+    grown by `overhang` (m), agree on best; None of too few.
+    """
     ends = np.stack([ring, np.roll(ring, -1, axis=0)], axis=1)
     length = np.hypot(*(ends[:, 1] - ends[:, 0]).T)
     normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
@@ -223,7 +266,9 @@ def by_sides(
 
 @compiled
 def free_sides(xy, normals, distances, ends):
-    """Which of the footprint's sides (m,) have points behind them and hardly any before, where roofs of neighbours would go on."""
+    """Which of the footprint's sides (m,) have points behind them and hardly any before, where
+    roofs of neighbours would go on.
+    """
     before, behind = np.zeros(len(normals)), np.zeros(len(normals))
     for m in range(len(normals)):
         x, y = normals[m]

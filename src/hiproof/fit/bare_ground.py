@@ -1,9 +1,11 @@
-"""Bare ground inside a footprint: a yard that is no hole, a wing pulled down, the roof of a garage below ground.
+"""Bare ground inside a footprint: a yard that is no hole, a wing pulled down, the roof of a garage
+below ground.
 
-Where ground points lie densely and roof points do not, nothing stands. What is cut out are right-angled pieces along the
-footprint's main direction: of all rectangles the one that holds most bare ground for the roof and the unseen places in it
-(Kadane's maximum sum in two dimensions), its sides put where the roof points begin, then the next. Tall walls hide a strip
-of the ground beside them from a scanner that looks aslant, so a side runs on over places without any points.
+Where ground points lie densely and roof points do not, nothing stands. What is cut out are
+right-angled pieces along the footprint's main direction: of all rectangles the one that holds most
+bare ground for the roof and the unseen places in it (Kadane's maximum sum in two dimensions), its
+sides put where the roof points begin, then the next. Tall walls hide a strip of the ground beside
+them from a scanner that looks aslant, so a side runs on over places without any points.
 """
 
 from __future__ import annotations
@@ -19,71 +21,107 @@ from scipy.spatial import cKDTree
 from .direction import main_direction
 
 NODE_M, MOST_NODES = 0.5, 200
-"""Distance (m) between the places that are classified, and places along a side at most: the time grows with their cube."""
+"""Distance (m) between the places that are classified, and places along a side at most: the time
+grows with their cube.
+"""
 
 GROUND_REACH_M = 0.9
-"""Distance (m) to ground points within which ground is seen: city runs know one in a square metre."""
+"""Distance (m) to ground points within which ground is seen: city runs know one in a
+square metre.
+"""
 
 NEAREST_ROOF_M, FARTHEST_ROOF_M = 0.35, 1.0
-"""Bounds (m) of the distance to roof points within which a place is roof: about the distance between them."""
+"""Bounds (m) of the distance to roof points within which a place is roof: about the distance
+between them.
+"""
 
 ROOF_COST, UNSEEN_COST = 2.0, 0.25
-"""What a place that is roof, or has no points, takes off one of bare ground: a yard holds no roof, but unseen strips."""
+"""What a place that is roof, or has no points, takes off one of bare ground: a yard holds no roof,
+but unseen strips.
+"""
 
 NEEDLESS_M = 0.2
-"""Distance (m) within which corners of an outline do not matter where only places far from it are asked for."""
+"""Distance (m) within which corners of an outline do not matter where only places far from it are
+asked for.
+"""
 
 LEAST_AREA_M2, LEAST_WIDTH_M = 8.0, 2.0
-"""Bare ground below which nothing is said: footprints lie beside their walls by half a metre, and lightwells are built over."""
+"""Bare ground below which nothing is said: footprints lie beside their walls by half a metre, and
+lightwells are built over.
+"""
 
 MOST_ROOF, LEAST_SEEN = 0.12, 0.5
 """Shares of a rectangle's places that may be roof, and that must be bare ground."""
 
 RUN_ON_M = 2.5
-"""Distance (m) that a side is moved at most over places without points: a wall 6 m high hides as much from 23 degrees off."""
+"""Distance (m) that a side is moved at most over places without points: a wall 6 m high hides as
+much from 23 degrees off.
+"""
 
 DENSE, BEYOND_M = 0.4, 1.0
-"""Share of the points of a full row with which a roof begins, and how far (m) a cut ends out of the outline."""
+"""Share of the points of a full row with which a roof begins, and how far (m) a cut ends out of the
+outline.
+"""
 
 MOST_PIECES = 6
 """Rectangles that are looked for; a yard of more corners is cut roughly."""
 
 THIN_M = 0.6
-"""Width (m) of what is left between a cut and the outline below which it is cut off, too: half a metre is not to be told."""
+"""Width (m) of what is left between a cut and the outline below which it is cut off, too: half a
+metre is not to be told.
+"""
 
 MOST_CUT = 0.75
-"""Share of the footprint above which nothing is cut: rather the building is gone, or the footprint is not its own."""
+"""Share of the footprint above which nothing is cut: rather the building is gone, or the footprint
+is not its own.
+"""
 
 
 @dataclass(frozen=True)
 class BareGround:
-    """The `outline` without its bare ground, and the area (m2) that was cut off; the outline is None where what is left
-    is no one building."""
+    """The `outline` without its bare ground, and the area (m2) that was cut off; the outline is
+    None where what is left is no one building.
+    """
 
     outline: shapely.Polygon | None
     area_m2: float
 
 
-def find_bare_ground(outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray) -> BareGround | None:
+def find_bare_ground(
+    outline: shapely.Polygon, roof: np.ndarray, ground: np.ndarray
+) -> BareGround | None:
     """The bare ground inside `outline`, None where there is little.
 
-    roof: (n, 2 or more) points of roofs, trees and whatever else stands high; ground: (m, 2 or more) points of the ground;
-    all in one frame in metres.
+    roof: (n, 2 or more) points of roofs, trees and whatever else stands high; ground: (m, 2 or
+    more) points of the ground; all in one frame in metres.
     """
     inner = shapely.buffer(shapely.simplify(outline, NEEDLESS_M), -LEAST_WIDTH_M / 2)
-    seen = shapely.intersects_xy(inner, ground[:, 0], ground[:, 1]) if len(ground) else np.zeros(0, bool)
-    if len(np.unique(np.floor(ground[seen, :2]), axis=0)) < LEAST_SEEN * LEAST_AREA_M2 / 2 or len(roof) == 0:
+    seen = (
+        shapely.intersects_xy(inner, ground[:, 0], ground[:, 1])
+        if len(ground)
+        else np.zeros(0, bool)
+    )
+    if (
+        len(np.unique(np.floor(ground[seen, :2]), axis=0)) < LEAST_SEEN * LEAST_AREA_M2 / 2
+        or len(roof) == 0
+    ):
         return None
     angle = main_direction(outline)
     turn = np.array([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
-    scene = Scene.of(shapely.transform(outline, lambda xy: xy @ turn), roof[:, :2] @ turn, ground[:, :2] @ turn)
+    scene = Scene.of(
+        shapely.transform(outline, lambda xy: xy @ turn), roof[:, :2] @ turn, ground[:, :2] @ turn
+    )
     pieces = list(scene.pieces())
     if not pieces:
         return None
     left = without(scene.outline, pieces)
     area = scene.outline.area - left.area
     parts = sorted(shapely.get_parts(left), key=shapely.area, reverse=True)
-    is_one = bool(parts) and parts[0].area > 0.9 * left.area and parts[0].area > (1 - MOST_CUT) * scene.outline.area
+    is_one = (
+        bool(parts)
+        and parts[0].area > 0.9 * left.area
+        and parts[0].area > (1 - MOST_CUT) * scene.outline.area
+    )
     if not is_one:
         return BareGround(None, area)
     back = shapely.transform(parts[0], lambda xy: xy @ turn.T)
@@ -104,8 +142,9 @@ def without(outline: shapely.Polygon, pieces: list[shapely.Polygon]) -> shapely.
 
 @dataclass
 class Scene:
-    """Places in the footprint's main directions, `node` (m) apart: `value` (rows, columns) 1 for bare ground, negative for
-    roof and unseen places, 0 outside; `x`, `y` their coordinates."""
+    """Places in the footprint's main directions, `node` (m) apart: `value` (rows, columns) 1 for
+    bare ground, negative for roof and unseen places, 0 outside; `x`, `y` their coordinates.
+    """
 
     outline: shapely.Polygon
     roof: np.ndarray
@@ -142,7 +181,10 @@ class Scene:
             inside = block != 0
             if total * self.node**2 < LEAST_AREA_M2 * LEAST_SEEN or not inside.any():
                 return
-            seen, roof = (block == 1.0).sum() / inside.sum(), (block == -ROOF_COST).sum() / inside.sum()
+            seen, roof = (
+                (block == 1.0).sum() / inside.sum(),
+                (block == -ROOF_COST).sum() / inside.sum(),
+            )
             self.value[top:bottom, left:right] = np.where(inside, -ROOF_COST, 0.0)
             corners = self.x[left], self.y[top], self.x[right - 1], self.y[bottom - 1]
             if seen < LEAST_SEEN or roof > MOST_ROOF:
@@ -155,14 +197,18 @@ class Scene:
                 yield piece
 
     def side(self, box: np.ndarray, k: int) -> float:
-        """Where side `k` of `box` (xmin, ymin, xmax, ymax) belongs: before the roof that begins beside it, out of the outline
-        where none does up to its end, else where it is."""
+        """Where side `k` of `box` (xmin, ymin, xmax, ymax) belongs: before the roof that begins
+        beside it, out of the outline where none does up to its end, else where it is.
+        """
         axis, sign = k % 2, -1.0 if k < 2 else 1.0
         low, high = box[1 - axis] + 0.25 * self.spacing, box[3 - axis] - 0.25 * self.spacing
         across = self.roof[:, 1 - axis]
-        along = sign * (self.roof[(across > low) & (across < high), axis] - box[k])  # positive outwards
+        # positive outwards
+        along = sign * (self.roof[(across > low) & (across < high), axis] - box[k])
         near = np.sort(along[(along > -RUN_ON_M / 2) & (along < RUN_ON_M + self.spacing)])
-        begins = first_dense(near, self.spacing, DENSE * (box[3 - axis] - box[1 - axis]) / self.spacing)
+        begins = first_dense(
+            near, self.spacing, DENSE * (box[3 - axis] - box[1 - axis]) / self.spacing
+        )
         to_end = sign * (self.outline.bounds[k] - box[k])
         if begins is not None:
             return float(box[k] + sign * min(begins - 0.5 * self.spacing, to_end + BEYOND_M))
@@ -170,7 +216,10 @@ class Scene:
 
 
 def first_dense(sorted_along: np.ndarray, spacing: float, fewest: float) -> float | None:
-    """Where, from inside out, points begin to lie as densely as a roof's; None where they do not."""
+    """Where, from inside out, points begin to lie as densely as a roof's;
+
+    None where they do not.
+    """
     fewest = max(2, math.ceil(fewest))
     if len(sorted_along) < fewest:
         return None
@@ -186,12 +235,16 @@ def typical_spacing(roof: np.ndarray) -> float:
 
 
 def largest_sum(value: np.ndarray) -> tuple[int, int, int, int, float]:
-    """Rows [top, bottom) and columns [left, right) of the rectangle with the largest sum, and that."""
+    """Rows [top, bottom) and columns [left, right) of the rectangle with the largest sum,
+    and that.
+    """
     sums = np.vstack([np.zeros(value.shape[1]), np.cumsum(value, axis=0)])
     best = (0, 0, 0, 0, 0.0)
     for top in range(len(value)):
         strips = np.cumsum(sums[top + 1 :] - sums[top], axis=1)
-        lowest = np.minimum.accumulate(np.hstack([np.zeros((len(strips), 1)), strips[:, :-1]]), axis=1)
+        lowest = np.minimum.accumulate(
+            np.hstack([np.zeros((len(strips), 1)), strips[:, :-1]]), axis=1
+        )
         gain = strips - lowest
         row, column = np.unravel_index(np.argmax(gain), gain.shape)
         if gain[row, column] > best[4] + 1e-9:

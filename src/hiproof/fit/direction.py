@@ -1,4 +1,6 @@
-"""Plan directions of a roof before any fit: of its slopes, of its smallest rectangle, of a given outline. Compiled."""
+"""Plan directions of a roof before any fit: of its slopes, of its smallest rectangle, of a given
+outline. Compiled.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,9 @@ PEAK_RAD, NEAR_PEAK_RAD = math.radians(3.0), math.radians(5.0)
 
 @compiled
 def nearest(points, i, indices, distances):
-    """Indices of the points nearest to point `i`, itself included; returns how many were found. `points` ascend in x.
+    """Indices of the points nearest to point `i`, itself included; returns how many were found.
+
+    `points` ascend in x.
 
     Searches outwards on both sides of `i` and ends a side where x alone is too far.
     """
@@ -23,7 +27,11 @@ def nearest(points, i, indices, distances):
     for direction in (-1, 1):
         j = i + direction
         while 0 <= j < len(points):
-            dx, dy, dz = points[j, 0] - points[i, 0], points[j, 1] - points[i, 1], points[j, 2] - points[i, 2]
+            dx, dy, dz = (
+                points[j, 0] - points[i, 0],
+                points[j, 1] - points[i, 1],
+                points[j, 2] - points[i, 2],
+            )
             if dx * dx >= farthest:
                 break
             squared = dx * dx + dy * dy + dz * dz
@@ -43,7 +51,10 @@ def nearest(points, i, indices, distances):
 
 @compiled
 def local_slope(points, indices):
-    """(a, b, mean squared residual) of the least-squares plane through `points[indices]`; NaN where they are a line."""
+    """(a, b, mean squared residual) of the least-squares plane through `points[indices]`;
+
+    NaN where they are a line.
+    """
     centre = np.zeros(3)
     for j in indices:
         centre += points[j, :3] / len(indices)
@@ -65,9 +76,11 @@ def local_slope(points, indices):
 
 @compiled
 def slope_direction(points, queries, neighbours):
-    """(kappa, confidence 0..1) of the four-fold harmonic of the azimuths of local slopes at about `queries` points.
+    """(kappa, confidence 0..1) of the four-fold harmonic of the azimuths of local slopes at about
+    `queries` points.
 
-    Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak. `points` (n, 3 or more) ascend in x.
+    Steep and well-fitted neighbourhoods count more; twice re-weighted towards the peak. `points`
+    (n, 3 or more) ascend in x.
     """
     stride = max(1, len(points) // queries)
     azimuths, weights = np.empty(len(points)), np.empty(len(points))
@@ -78,7 +91,10 @@ def slope_direction(points, queries, neighbours):
         a, b, squared = local_slope(points, indices[:found])
         slope = math.hypot(a, b)
         if 0.08 < slope < 2.5:
-            azimuths[count], weights[count] = math.atan2(b, a), min(slope, 1.0) / (1.0 + squared / 0.0064)
+            azimuths[count], weights[count] = (
+                math.atan2(b, a),
+                min(slope, 1.0) / (1.0 + squared / 0.0064),
+            )
             count += 1
     kappa, sharpness, confidence = 0.0, 0.0, 0.0
     for _ in range(3):
@@ -97,7 +113,9 @@ def slope_direction(points, queries, neighbours):
 
 @compiled
 def rectangle_direction(points, trim, angles):
-    """Direction in 0..pi/2, out of `angles`, of the smallest rectangle that holds all but `trim` of the points per side."""
+    """Direction in 0..pi/2, out of `angles`, of the smallest rectangle that holds all but `trim` of
+    the points per side.
+    """
     extents = np.empty(2 * angles)
     across = np.empty(len(points))
     for k in range(2 * angles):
@@ -120,23 +138,33 @@ def trimmed_range(values, trim):
 
 @compiled
 def rectangle_in_direction(points, kappa, trim):
-    """Plan (5,) cx, cy, kappa, V, U of the trimmed rectangle of the points in the direction `kappa`."""
+    """Plan (5,) cx, cy, kappa, V, U of the trimmed rectangle of the points in the direction
+    `kappa`.
+    """
     c, s = math.cos(kappa), math.sin(kappa)
     low_u, high_u = trimmed_range(c * points[:, 0] + s * points[:, 1], trim)
     low_v, high_v = trimmed_range(c * points[:, 1] - s * points[:, 0], trim)
     u, v = 0.5 * (low_u + high_u), 0.5 * (low_v + high_v)
-    return np.array([c * u - s * v, s * u + c * v, kappa, 0.5 * (high_v - low_v), 0.5 * (high_u - low_u)])
+    return np.array(
+        [c * u - s * v, s * u + c * v, kappa, 0.5 * (high_v - low_v), 0.5 * (high_u - low_u)]
+    )
 
 
 def quarter_gap(angle):
-    """How far each `angle` (rad) is from the nearest quarter turn, in [-45, 45) degrees: of arrays, or compiled, of one."""
+    """How far each `angle` (rad) is from the nearest quarter turn, in [-45, 45) degrees: of arrays,
+    or compiled, of one.
+    """
     return angle - np.floor(angle / (0.5 * math.pi) + 0.5) * (0.5 * math.pi)
 
 
-def support_of(tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float) -> np.ndarray:
-    """Weight (k,) of those of the directions `angle` (n,) that lie near each one `tried` (k,), all modulo 90 degrees.
+def support_of(
+    tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_rad: float
+) -> np.ndarray:
+    """Weight (k,) of those of the directions `angle` (n,) that lie near each one `tried` (k,), all
+    modulo 90 degrees.
 
-    >>> support_of(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0, 3.0, 1.0]), 0.01)
+    >>> support_of(np.array([0.0, 0.5]), np.array([0.0, 0.5 * math.pi, 0.5]), np.array([2.0, 3.0,
+    ...     1.0]), 0.01)
     array([5., 1.])
     """
     gaps = quarter_gap(angle[None, :] - tried[:, None])
@@ -144,7 +172,8 @@ def support_of(tried: np.ndarray, angle: np.ndarray, weight: np.ndarray, spread_
 
 
 def main_direction(outline: shapely.Polygon) -> float:
-    """Angle (rad) of the outline's main direction modulo 90 degrees: the peak of its edges' lengths, then their mean.
+    """Angle (rad) of the outline's main direction modulo 90 degrees: the peak of its edges'
+    lengths, then their mean.
 
     >>> round(math.degrees(main_direction(shapely.box(0, 0, 4, 3))) % 90, 6)
     0.0
@@ -161,5 +190,7 @@ def main_direction(outline: shapely.Polygon) -> float:
 
 
 def outline_rectangle(outline: shapely.Polygon, kappa: float) -> np.ndarray:
-    """Plan (5,) cx, cy, kappa, V, U of the outline's bounding rectangle in the direction `kappa`."""
+    """Plan (5,) cx, cy, kappa, V, U of the outline's bounding rectangle in the direction
+    `kappa`.
+    """
     return rectangle_in_direction(np.asarray(outline.exterior.coords)[:, :2], kappa, 0.0)

@@ -1,14 +1,17 @@
-"""The compiled core: one likelihood of one roof, its gradient and Hessian, and its minimisation, for every primitive alike.
+"""The compiled core: one likelihood of one roof, its gradient and Hessian, and its minimisation,
+for every primitive alike.
 
-Each point is drawn from a mixture: inside the plan rectangle with soft sides, normal about the roof's height, or an outlier
-anywhere in the cloud's volume,
+Each point is drawn from a mixture: inside the plan rectangle with soft sides, normal about the
+roof's height, or an outlier anywhere in the cloud's volume,
 
-    p_i = w_i (1 - eps) S(mu_u / tau) S(mu_v / tau) / (4 U V) N(z_i; roof, sigma) + (1 - w_i (1 - eps)) / volume
+    p_i = w_i (1 - eps) S(mu_u / tau) S(mu_v / tau) / (4 U V) N(z_i; roof, sigma) + (1 - w_i (1 -
+    eps)) / volume
 
-with mu_u = U - |u|, mu_v = V - |v| the margins to the sides, S the logistic function, w_i the given probability that the
-point is roof. The roof at (u, v) is the lowest plane (or the plane of the strip, for a saw-tooth). A point enters the
-gradient and the Gauss-Newton Hessian through its active plane only, so sums of moments of (u, v, 1) by plane, and five by
-side, suffice; a small Jacobian of planes by parameters (from the term table) takes them to theta.
+with mu_u = U - |u|, mu_v = V - |v| the margins to the sides, S the logistic function, w_i the given
+probability that the point is roof. The roof at (u, v) is the lowest plane (or the plane of the
+strip, for a saw-tooth). A point enters the gradient and the Gauss-Newton Hessian through its active
+plane only, so sums of moments of (u, v, 1) by plane, and five by side, suffice; a small Jacobian of
+planes by parameters (from the term table) takes them to theta.
 
 Units are metres and radians, points are (n, 4): x, y, z, w.
 """
@@ -34,7 +37,9 @@ SQRT_2PI = math.sqrt(2 * math.pi)
 
 
 class Tables(NamedTuple):
-    """Primitives as data, one row a variant (T of them); terms of variant t are first_term[t]:first_term[t + 1]."""
+    """Primitives as data, one row a variant (T of them); terms of variant t are
+    first_term[t]:first_term[t + 1].
+    """
 
     size: np.ndarray  # (T,) used entries of theta
     planes: np.ndarray  # (T,) number of planes
@@ -52,7 +57,8 @@ class Problem(NamedTuple):
     """The points of one roof and what is known before fitting."""
 
     points: np.ndarray  # (n, 4) x, y, z and the probability of being roof
-    log_background: float  # log density of an outlier, per m3 (per m of height where the plan is given)
+    # log density of an outlier, per m3 (per m of height where the plan is given)
+    log_background: float
     plan_is_free: bool  # whether the sides are fitted; a given outline has no plan likelihood
 
 
@@ -118,10 +124,14 @@ def jacobian_from_terms(tables, kind, theta, planes, jacobian):
         for k in range(6):
             exponent = tables.power[m, k]
             if exponent != 0:
-                derivative = tables.factor[m] * exponent * integer_power(theta[HALF_WIDTH + k], exponent - 1)
+                derivative = (
+                    tables.factor[m] * exponent * integer_power(theta[HALF_WIDTH + k], exponent - 1)
+                )
                 for other in range(6):
                     if other != k and tables.power[m, other] != 0:
-                        derivative *= integer_power(theta[HALF_WIDTH + other], tables.power[m, other])
+                        derivative *= integer_power(
+                            theta[HALF_WIDTH + other], tables.power[m, other]
+                        )
                 jacobian[plane, coefficient, HALF_WIDTH + k] += derivative
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     for j in range(count):
@@ -178,8 +188,14 @@ def sum_moments(problem, tables, kind, theta, noise, space):
         if problem.plan_is_free:
             margin_u, margin_v = (half_length - abs(u)) * per_tau, (half_width - abs(v)) * per_tau
         is_far = residual * residual > FAR_SQUARED or margin_u < -25.0 or margin_v < -25.0
-        inside_u, inside_v = (0.0, 0.0) if is_far else (share_inside(margin_u), share_inside(margin_v))
-        inlier = 0.0 if is_far else prior * scale * inside_u * inside_v * math.exp(-0.5 * residual * residual)
+        inside_u, inside_v = (
+            (0.0, 0.0) if is_far else (share_inside(margin_u), share_inside(margin_v))
+        )
+        inlier = (
+            0.0
+            if is_far
+            else prior * scale * inside_u * inside_v * math.exp(-0.5 * residual * residual)
+        )
         product *= inlier + outlier
         if product < 1e-250 or product > 1e250:
             value -= math.log(product)
@@ -191,9 +207,13 @@ def sum_moments(problem, tables, kind, theta, noise, space):
         squares += w * residual * residual
         add_moments(moments[j], w * per_sigma * per_sigma, w * residual * per_sigma, u, v)
         if margin_u < SOFT:
-            add_side(sides[0 if u > 0 else 1], w * (1.0 - inside_u) * per_tau, inside_u * per_tau, v)
+            add_side(
+                sides[0 if u > 0 else 1], w * (1.0 - inside_u) * per_tau, inside_u * per_tau, v
+            )
         if margin_v < SOFT:
-            add_side(sides[2 if v > 0 else 3], w * (1.0 - inside_v) * per_tau, inside_v * per_tau, u)
+            add_side(
+                sides[2 if v > 0 else 3], w * (1.0 - inside_v) * per_tau, inside_v * per_tau, u
+            )
     return value - math.log(product), inliers, squares
 
 
@@ -229,7 +249,9 @@ def add_side(side, push, stiffness, along):
 
 @compiled
 def add_height_terms(tables, kind, theta, space, gradient, hessian):
-    """Add the part of the residuals to `gradient` (9,) and the lower triangle of `hessian` (9, 9)."""
+    """Add the part of the residuals to `gradient` (9,) and the lower triangle of `hessian`
+    (9, 9).
+    """
     jacobian_from_terms(tables, kind, theta, space.planes, space.jacobian)
     for j in range(tables.planes[kind]):
         m, d = space.moments[j], space.jacobian[j]
@@ -248,7 +270,9 @@ def add_height_terms(tables, kind, theta, space, gradient, hessian):
 
 @compiled
 def add_side_terms(space, theta, inliers, gradient, hessian):
-    """Add the part of the soft sides and of the area: margin = half extent - |u|, alpha + beta * (position along the side)."""
+    """Add the part of the soft sides and of the area: margin = half extent - |u|, alpha + beta *
+    (position along the side).
+    """
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     gradient[HALF_WIDTH] += inliers / theta[HALF_WIDTH]
     gradient[HALF_LENGTH] += inliers / theta[HALF_LENGTH]
@@ -268,12 +292,15 @@ def add_side_terms(space, theta, inliers, gradient, hessian):
             gradient[a] -= side[0] * alpha[a] + side[1] * beta[a]
             for b in range(a + 1):
                 mixed = alpha[a] * beta[b] + beta[a] * alpha[b]
-                hessian[a, b] += side[2] * alpha[a] * alpha[b] + side[3] * mixed + side[4] * beta[a] * beta[b]
+                hessian[a, b] += (
+                    side[2] * alpha[a] * alpha[b] + side[3] * mixed + side[4] * beta[a] * beta[b]
+                )
 
 
 @compiled
 def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
-    """Minus the log likelihood with its `gradient` (9,) and Gauss-Newton `hessian` (9, 9) at `theta` (9,).
+    """Minus the log likelihood with its `gradient` (9,) and Gauss-Newton `hessian` (9, 9) at
+    `theta` (9,).
 
     Returns (value, sum of inlier probabilities, sum of them times squared normalised residuals).
     """
@@ -291,7 +318,10 @@ def evaluate(problem, tables, kind, theta, noise, space, gradient, hessian):
 
 @compiled
 def solve_damped(hessian, gradient, damping, size, step, factor):
-    """Step of (H + damping diag H) step = -gradient by Cholesky; False where that is not positive definite."""
+    """Step of (H + damping diag H) step = -gradient by Cholesky;
+
+    False where that is not positive definite.
+    """
     for i in range(size):
         for j in range(i + 1):
             total = hessian[i, j]
@@ -322,7 +352,9 @@ def solve_damped(hessian, gradient, damping, size, step, factor):
 def freeze_at_bounds(theta, low, high, size, gradient, hessian):
     """Take the parameters whose bound stops them out of the step: the active set."""
     for k in range(size):
-        if (theta[k] <= low[k] and gradient[k] >= 0.0) or (theta[k] >= high[k] and gradient[k] <= 0.0):
+        if (theta[k] <= low[k] and gradient[k] >= 0.0) or (
+            theta[k] >= high[k] and gradient[k] <= 0.0
+        ):
             gradient[k] = 0.0
             hessian[k, :] = 0.0
             hessian[:, k] = 0.0
@@ -346,8 +378,9 @@ def take_step(theta, step, low, high, size, moved):
 def minimise(problem, tables, kind, theta, low, high, noise, iterations, tolerance):
     """Levenberg-Marquardt within the box [low, high]; `theta` (9,) is moved in place.
 
-    A parameter with low = high is fixed. Ends after `iterations` or when a step gains less than `tolerance` (nats).
-    Returns (value, inliers, squares, number of evaluations), the middle two as `evaluate`.
+    A parameter with low = high is fixed. Ends after `iterations` or when a step gains less than
+    `tolerance` (nats). Returns (value, inliers, squares, number of evaluations), the middle two as
+    `evaluate`.
     """
     size = tables.size[kind]
     space = new_space()
@@ -355,7 +388,9 @@ def minimise(problem, tables, kind, theta, low, high, noise, iterations, toleran
     gradient_new, hessian_new = np.zeros(SIZE), np.zeros((SIZE, SIZE))
     step, factor, moved = np.zeros(SIZE), np.zeros((SIZE, SIZE)), theta.copy()
     take_step(theta, step, low, high, size, theta)
-    value, inliers, squares = evaluate(problem, tables, kind, theta, noise, space, gradient, hessian)
+    value, inliers, squares = evaluate(
+        problem, tables, kind, theta, noise, space, gradient, hessian
+    )
     evaluations, damping = 1, 1e-3
     for _ in range(iterations):
         freeze_at_bounds(theta, low, high, size, gradient, hessian)
@@ -387,7 +422,10 @@ def minimise(problem, tables, kind, theta, low, high, noise, iterations, toleran
 
 @compiled
 def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations, tolerance):
-    """`minimise` from every row of `thetas` (m, 9), in place. Returns (values (m,), evaluations)."""
+    """`minimise` from every row of `thetas` (m, 9), in place.
+
+    Returns (values (m,), evaluations).
+    """
     values = np.empty(len(kinds))
     total = 0
     for i in range(len(kinds)):
@@ -400,7 +438,8 @@ def minimise_each(problem, tables, kinds, thetas, lows, highs, noise, iterations
 
 @compiled
 def learn_noise(points_count, inliers, squares, noise, prior):
-    """EM step: `noise` with sigma and eps that maximise the expected likelihood under the prior on sigma.
+    """EM step: `noise` with sigma and eps that maximise the expected likelihood under the prior on
+    sigma.
 
     `prior` is (sigma, its worth in points, smallest, largest).
     """
@@ -411,7 +450,8 @@ def learn_noise(points_count, inliers, squares, noise, prior):
 
 @compiled
 def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, rounds):
-    """Fit theta and noise in turns from every row of `thetas` (m, 9) and `noises` (m, 3), both in place.
+    """Fit theta and noise in turns from every row of `thetas` (m, 9) and `noises` (m, 3), both in
+    place.
 
     Returns (values (m,), evaluations).
     """
@@ -441,7 +481,9 @@ def estimate_each(problem, tables, kinds, thetas, lows, highs, noises, prior, ro
 
 @compiled
 def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
-    """Re-fit with harder and harder sides, keeping the best; `theta` in place. Returns (value, noise, evaluations).
+    """Re-fit with harder and harder sides, keeping the best;
+
+    `theta` in place. Returns (value, noise, evaluations).
 
     Ends when two steps of `taus` in a row did not better the likelihood.
     """
@@ -449,7 +491,9 @@ def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
     worse = total = 0
     for tau in taus:
         noise = Noise(noise.sigma, tau, noise.eps)
-        _, inliers, squares, first = minimise(problem, tables, kind, moved, low, high, noise, 10, 0.01)
+        _, inliers, squares, first = minimise(
+            problem, tables, kind, moved, low, high, noise, 10, 0.01
+        )
         noise = learn_noise(len(problem.points), inliers, squares, noise, prior)
         value, _, _, second = minimise(problem, tables, kind, moved, low, high, noise, 6, 0.01)
         total += first + second
@@ -465,12 +509,16 @@ def sharpen_sides(problem, tables, kind, theta, low, high, noise, prior, taus):
 
 @compiled
 def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
-    """Log likelihood ratio (4, k) of moving each side (+u, -u, +v, -v) outward by `shifts` (2, k), along u and along v."""
+    """Log likelihood ratio (4, k) of moving each side (+u, -u, +v, -v) outward by `shifts` (2, k),
+    along u and along v.
+    """
     points, planes = problem.points, space.planes
     count = planes_from_terms(tables, kind, theta, planes)
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     background = math.exp(problem.log_background)
-    scale = (1.0 - noise.eps) / (4.0 * theta[HALF_WIDTH] * theta[HALF_LENGTH] * noise.sigma * SQRT_2PI)
+    scale = (1.0 - noise.eps) / (
+        4.0 * theta[HALF_WIDTH] * theta[HALF_LENGTH] * noise.sigma * SQRT_2PI
+    )
     table = np.zeros((4, shifts.shape[1]))
     for i in range(len(points)):
         dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
@@ -498,9 +546,11 @@ def tabulate_sides(problem, tables, kind, theta, noise, shifts, space):
 
 @compiled
 def side_posterior(plus, minus, shifts, half_extent, inliers, centre_precision):
-    """Posterior (mean shift of the centre, of the half extent, and their variances) of an axis on the grid of `shifts`.
+    """Posterior (mean shift of the centre, of the half extent, and their variances) of an axis on
+    the grid of `shifts`.
 
-    `plus` and `minus` (k,) are the sides' log likelihood ratios; the heights hold the centre with `centre_precision`.
+    `plus` and `minus` (k,) are the sides' log likelihood ratios; the heights hold the centre with
+    `centre_precision`.
     """
     count = len(shifts)
     logs = np.empty((count, count))
@@ -567,7 +617,10 @@ def mean_sides(problem, tables, kind, theta, noise, centre_precision, inliers, g
 
 @compiled
 def mode(values, bin_m, counts):
-    """(count, position) of the fullest pair of neighbouring bins of `values`; `counts` is working space."""
+    """(count, position) of the fullest pair of neighbouring bins of `values`;
+
+    `counts` is working space.
+    """
     low, high = values.min(), values.max()
     bins = min(int((high - low) / bin_m) + 2, len(counts))
     counts[:bins] = 0
@@ -584,14 +637,21 @@ def mode(values, bin_m, counts):
 
 @compiled
 def vote(problem, tables, kind, theta, space, heights, counts):
-    """Best slope and height of `kind` in the plan of `theta` (in place): a small Hough transform. Returns the votes."""
+    """Best slope and height of `kind` in the plan of `theta` (in place): a small Hough transform.
+
+    Returns the votes.
+    """
     points = problem.points
     best, best_slope, best_shift, best_z = -1, 0.0, 0.0, 0.0
     c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
     theta[Q0:] = 0.0
     for shift in tables.shifts[kind]:
         for slope in tables.slopes[kind]:
-            if math.isnan(shift) or math.isnan(slope) or (shift != 0.0 and not problem.plan_is_free):
+            if (
+                math.isnan(shift)
+                or math.isnan(slope)
+                or (shift != 0.0 and not problem.plan_is_free)
+            ):
                 continue
             for k in range(Q0 + 1, tables.size[kind]):
                 theta[k] = slope
@@ -599,7 +659,9 @@ def vote(problem, tables, kind, theta, space, heights, counts):
             for i in range(len(points)):
                 dx, dy = points[i, 0] - theta[CENTRE_X], points[i, 1] - theta[CENTRE_Y]
                 u, v = c * dx + s * dy, c * dy - s * dx - shift * theta[HALF_WIDTH]
-                _, roof = active_plane(space.planes, count, tables.strips[kind], theta[HALF_WIDTH], u, v)
+                _, roof = active_plane(
+                    space.planes, count, tables.strips[kind], theta[HALF_WIDTH], u, v
+                )
                 heights[i] = points[i, 2] - roof
             votes, z = mode(heights, 0.2, counts)
             if votes > best:
@@ -614,7 +676,8 @@ def vote(problem, tables, kind, theta, space, heights, counts):
 
 @compiled
 def vote_each(problem, tables, rectangles):
-    """Starts of every voting variant in every plan of `rectangles` (d, 5): cx, cy, kappa, V, U, and in its quarter turns.
+    """Starts of every voting variant in every plan of `rectangles` (d, 5): cx, cy, kappa, V, U, and
+    in its quarter turns.
 
     Returns (kinds (m,), thetas (m, 9), votes (m,)).
     """
@@ -629,7 +692,10 @@ def vote_each(problem, tables, rectangles):
                 theta[:Q0] = rectangle
                 theta[KAPPA] += turn * math.pi / 2
                 if turn % 2 == 1:
-                    theta[HALF_WIDTH], theta[HALF_LENGTH] = rectangle[HALF_LENGTH], rectangle[HALF_WIDTH]
+                    theta[HALF_WIDTH], theta[HALF_LENGTH] = (
+                        rectangle[HALF_LENGTH],
+                        rectangle[HALF_WIDTH],
+                    )
                 kinds[found] = kind
                 votes[found] = vote(problem, tables, kind, theta, space, heights, counts)
                 found += 1

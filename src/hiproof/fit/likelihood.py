@@ -1,9 +1,12 @@
-"""The default objective: from points to the best roof of every type, the choice among them, and what is known of it.
+"""The default objective: from points to the best roof of every type, the choice among them, and
+what is known of it.
 
-    points -> starts by vote -> annealed fits -> derived types -> noise by EM -> choice by evidence -> sides -> covariance
+    points -> starts by vote -> annealed fits -> derived types -> noise by EM -> choice by evidence
+    -> sides -> covariance
 
-The cloud is coarse at first (120 points, sigma and tau half a metre) and fine at last; types far behind the best are dropped
-early. Everything compiled is in kernel.py and direction.py; here is the schedule.
+The cloud is coarse at first (120 points, sigma and tau half a metre) and fine at last; types far
+behind the best are dropped early. Everything compiled is in kernel.py and direction.py; here is the
+schedule.
 """
 
 from __future__ import annotations
@@ -28,26 +31,34 @@ from .kernel import Noise, Problem, Tables
 from .tables import bounds, tables, variants
 
 COARSE_POINTS = 120  # points that starts are judged on: a bound on time
-# noise from which on a fit is tried again on more points: twice that of a flight, or ten times its outliers
+# noise from which on a fit is tried again on more points: twice that of a flight, or ten times its
+# outliers
 DOUBTFUL = Noise(0.2, np.inf, 0.1)
 MORE_POINTS = 4  # times as many: on the few the right start of a saw-tooth is lost once in 300 fits
 OUTLIERS_AT_FIRST = 0.1  # share of the points; what is found replaces it in the first round of EM
 OUTLIER_REACH_M = 4.0  # outliers may lie anywhere in the points' extent and this far around
-COARSE, MIDDLE, FINE = (Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in ((0.5, 0.5), (0.25, 0.3), (0.15, 0.15)))
+COARSE, MIDDLE, FINE = (
+    Noise(size, soft, OUTLIERS_AT_FIRST) for size, soft in ((0.5, 0.5), (0.25, 0.3), (0.15, 0.15))
+)
 SIGMA_PRIOR = (0.07, 6.0, 0.02, 0.30)  # metres, worth in points, smallest, largest
 SIDE_TAU_M = 0.1  # softness of the sides while types are compared
-SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04  # types further behind the best after annealing are dropped
-ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15  # the same after the rough fit to the thinned points
-LEAST_GAIN_NATS = 0.2  # of the fine fit, that a type must have over the one it derives from to be considered
+# types further behind the best after annealing are dropped
+SLACK_NATS, SLACK_NATS_A_POINT = 15.0, 0.04
+# the same after the rough fit to the thinned points
+ROUGH_SLACK_NATS, ROUGH_SLACK_NATS_A_POINT = 15.0, 0.15
+# of the fine fit, that a type must have over the one it derives from to be considered
+LEAST_GAIN_NATS = 0.2
 SIDE_GRID = 28  # cells a side over which its posterior mean is summed
 PLAN = [0, 1, HALF_WIDTH, HALF_LENGTH]  # theta's centre and half extents
 
 
 @dataclass(frozen=True)
 class Estimate:
-    """The chosen roof: `theta` (9,) of `primitive`, its `covariance` (9, 9), the `noise` learnt and how each type fared.
+    """The chosen roof: `theta` (9,) of `primitive`, its `covariance` (9, 9), the `noise` learnt and
+    how each type fared.
 
-    `value` is minus the log likelihood, `bics` by type (lower is better), both of the chosen type's optimum.
+    `value` is minus the log likelihood, `bics` by type (lower is better), both of the chosen type's
+    optimum.
     """
 
     primitive: Primitive
@@ -61,7 +72,9 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Candidates:
-    """Roofs under test: row `kinds` (m,) of the tables, `thetas` (m, 9), minus log likelihoods `values` (m,)."""
+    """Roofs under test: row `kinds` (m,) of the tables, `thetas` (m, 9), minus log likelihoods
+    `values` (m,).
+    """
 
     kinds: np.ndarray
     thetas: np.ndarray
@@ -92,7 +105,8 @@ class Search:
     thinned: Problem
     tables: Tables
     shapes: tuple[Primitive, ...]
-    family: np.ndarray  # (T,) the number of the type with its parameters, the same for all tooth counts
+    # (T,) the number of the type with its parameters, the same for all tooth counts
+    family: np.ndarray
     low: np.ndarray  # (T, 9)
     high: np.ndarray
 
@@ -104,30 +118,50 @@ class Search:
         return low, high
 
     def minimised(
-        self, problem: Problem, candidates: Candidates, noise: Noise, iterations: int, tolerance: float
+        self,
+        problem: Problem,
+        candidates: Candidates,
+        noise: Noise,
+        iterations: int,
+        tolerance: float,
     ) -> Candidates:
         """Every candidate after some Levenberg-Marquardt steps on `problem`."""
         thetas = candidates.thetas.copy()
         values, evaluations = kernel.minimise_each(
-            problem, self.tables, candidates.kinds, thetas, *self.box(candidates), noise, iterations, tolerance
+            problem,
+            self.tables,
+            candidates.kinds,
+            thetas,
+            *self.box(candidates),
+            noise,
+            iterations,
+            tolerance,
         )
         return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations)
 
     def coarsely_fitted(self, candidates: Candidates) -> Candidates:
         """The best two of each type after coarse steps on the thinned points."""
-        return self.best_of_type(self.minimised(self.thinned, candidates, COARSE, 4, 0.5), 2, self.slack)
+        return self.best_of_type(
+            self.minimised(self.thinned, candidates, COARSE, 4, 0.5), 2, self.slack
+        )
 
     def roughly_fitted(self, candidates: Candidates) -> Candidates:
         """The best two of each type after medium steps on the thinned points."""
-        return self.best_of_type(self.minimised(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack)
+        return self.best_of_type(
+            self.minimised(self.thinned, candidates, MIDDLE, 5, 0.3), 2, self.slack
+        )
 
     @property
     def slack(self) -> float:
-        """How far behind its type's best (nats, on the thinned points) a second candidate is still worth its time."""
+        """How far behind its type's best (nats, on the thinned points) a second candidate is still
+        worth its time.
+        """
         return 3.0 + 0.05 * len(self.thinned.points)
 
     def best_of_type(self, candidates: Candidates, count: int, slack: float = np.inf) -> Candidates:
-        """The `count` best of each type that are within `slack` nats of its best, types in the tables' order."""
+        """The `count` best of each type that are within `slack` nats of its best, types in the
+        tables' order.
+        """
         families, values = self.family[candidates.kinds].tolist(), candidates.values.tolist()
         ranked = sorted(zip(families, values, range(len(values)), strict=True))
         kept: list[int] = []
@@ -142,11 +176,19 @@ class Search:
     def that_gain(self, candidates: Candidates) -> Candidates:
         """Those but for types that explain no more than one that they derive from.
 
-        A gable is also a hip whose ends stand upright; learning the noise of every such type would take most of the time.
+        A gable is also a hip whose ends stand upright; learning the noise of every such type would
+        take most of the time.
         """
         shapes = [self.shapes[kind] for kind in candidates.kinds]
-        own = {shape.name: value for shape, value in zip(shapes, candidates.values, strict=True) if shape.vote}
-        simpler = [min([own.get(start.source, np.inf) for start in shape.starts], default=np.inf) for shape in shapes]
+        own = {
+            shape.name: value
+            for shape, value in zip(shapes, candidates.values, strict=True)
+            if shape.vote
+        }
+        simpler = [
+            min([own.get(start.source, np.inf) for start in shape.starts], default=np.inf)
+            for shape in shapes
+        ]
         return candidates.chosen(candidates.values < np.array(simpler) - LEAST_GAIN_NATS)
 
 
@@ -157,10 +199,12 @@ def fit_likelihood(
     side_taus: tuple[float, ...] = (),
     log_prior: dict[str, float] | None = None,
 ) -> Estimate:
-    """The most evident roof of `types` for `points` (n, 4): x, y, z about their centre, and the probability of being roof.
+    """The most evident roof of `types` for `points` (n, 4): x, y, z about their centre, and the
+    probability of being roof.
 
-    With an `outline` the plan is its rectangle in the roof's direction and only heights are fitted. `side_taus` are the
-    softnesses (m) tried at last on the sides; `log_prior` by type is added to the evidence (nats).
+    With an `outline` the plan is its rectangle in the roof's direction and only heights are fitted.
+    `side_taus` are the softnesses (m) tried at last on the sides; `log_prior` by type is added to
+    the evidence (nats).
     """
 
     def estimate(coarse_points: int) -> Estimate:
@@ -182,26 +226,40 @@ def searched(
 ) -> Estimate:
     """The most evident roof of `types` from the starts that the thinned points vote for."""
     basic = search.roughly_fitted(vote_starts(search, outline))
-    candidates = basic.joined(search.roughly_fitted(search.coarsely_fitted(derived_starts(search, basic))))
-    candidates = candidates.chosen(np.array([search.shapes[kind].name in types for kind in candidates.kinds]))
-    candidates = candidates.within(ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points))
+    candidates = basic.joined(
+        search.roughly_fitted(search.coarsely_fitted(derived_starts(search, basic)))
+    )
+    candidates = candidates.chosen(
+        np.array([search.shapes[kind].name in types for kind in candidates.kinds])
+    )
+    candidates = candidates.within(
+        ROUGH_SLACK_NATS + ROUGH_SLACK_NATS_A_POINT * len(search.thinned.points)
+    )
     candidates = search.best_of_type(search.minimised(search.whole, candidates, FINE, 6, 0.3), 1)
-    candidates = search.that_gain(candidates).within(SLACK_NATS + SLACK_NATS_A_POINT * len(search.whole.points))
+    candidates = search.that_gain(candidates).within(
+        SLACK_NATS + SLACK_NATS_A_POINT * len(search.whole.points)
+    )
     candidates, noises = learn(search, candidates)
     winner, bics = choose(search, candidates, log_prior or {})
-    return finish(search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus)
+    return finish(
+        search, candidates.chosen(np.array([winner])), Noise(*noises[winner]), bics, side_taus
+    )
 
 
 @cache
 def needed_for(types: tuple[str, ...]) -> tuple[tuple[str, ...], np.ndarray]:
-    """(`types` and those their starts derive from, the number of its type for each of their variants)."""
+    """(`types` and those their starts derive from, the number of its type for each of their
+    variants).
+    """
     needed = set(types) | {start.source for name in types for start in CATALOGUE[name].starts}
     names = tuple(name for name in CATALOGUE if name in needed)
     families = [(shape.name, shape.theta_size) for shape in variants(names)]
     return names, np.array([list(dict.fromkeys(families)).index(family) for family in families])
 
 
-def new_search(points: np.ndarray, types: tuple[str, ...], plan_is_free: bool, coarse_points: int) -> Search:
+def new_search(
+    points: np.ndarray, types: tuple[str, ...], plan_is_free: bool, coarse_points: int
+) -> Search:
     """The problem of `points` (n, 4), thinned to about `coarse_points`, and all shapes needed."""
     names, family = needed_for(types)
     z_low, z_high = height_range(points[:, 2])
@@ -222,7 +280,9 @@ def height_range(z: np.ndarray) -> tuple[float, float]:
 
 
 def plan_extents(xy: np.ndarray) -> np.ndarray:
-    """Sides (2,), shorter first, of the rectangle whose uniform points would scatter like `xy` (n, 2)."""
+    """Sides (2,), shorter first, of the rectangle whose uniform points would scatter like `xy` (n,
+    2).
+    """
     x, y = xy[:, 0] - xy[:, 0].mean(), xy[:, 1] - xy[:, 1].mean()
     xx, yy, xy_ = x @ x / len(x), y @ y / len(x), x @ y / len(x)
     half_sum, half_gap = 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy_)
@@ -230,9 +290,11 @@ def plan_extents(xy: np.ndarray) -> np.ndarray:
 
 
 def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
-    """Starts of the voting types in the likely directions, after a few coarse steps: the best two of each type.
+    """Starts of the voting types in the likely directions, after a few coarse steps: the best two
+    of each type.
 
-    Up to eight a type are stepped, for a saw-tooth has many counts and turns, but only those with nearly as many votes.
+    Up to eight a type are stepped, for a saw-tooth has many counts and turns, but only those with
+    nearly as many votes.
     """
     rectangles = np.array(
         [
@@ -249,7 +311,8 @@ def vote_starts(search: Search, outline: shapely.Polygon | None) -> Candidates:
 
 
 def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
-    """Likely directions (rad, modulo a quarter turn): of the slopes, and of the plan where that is another one.
+    """Likely directions (rad, modulo a quarter turn): of the slopes, and of the plan where that is
+    another one.
 
     A given outline's own direction stands for both where they are close.
     """
@@ -269,7 +332,10 @@ def directions(search: Search, outline: shapely.Polygon | None) -> list[float]:
 def derived_starts(search: Search, basic: Candidates) -> Candidates:
     """Starts of the types that derive from simpler ones, from the best `basic` fit of each."""
     basic = search.best_of_type(basic, 1)
-    theta_of = {search.shapes[kind].name: theta for kind, theta in zip(basic.kinds, basic.thetas, strict=True)}
+    theta_of = {
+        search.shapes[kind].name: theta
+        for kind, theta in zip(basic.kinds, basic.thetas, strict=True)
+    }
     starts = [
         (t, start.theta(theta_of[start.source]))
         for t, shape in enumerate(search.shapes)
@@ -277,7 +343,9 @@ def derived_starts(search: Search, basic: Candidates) -> Candidates:
         if start.source in theta_of
     ]
     kinds = np.array([t for t, _ in starts], np.int64)
-    return Candidates(kinds, np.reshape([theta for _, theta in starts], (-1, 9)), np.zeros(len(starts)))
+    return Candidates(
+        kinds, np.reshape([theta for _, theta in starts], (-1, 9)), np.zeros(len(starts))
+    )
 
 
 def learn(search: Search, candidates: Candidates) -> tuple[Candidates, np.ndarray]:
@@ -285,13 +353,27 @@ def learn(search: Search, candidates: Candidates) -> tuple[Candidates, np.ndarra
     noises = np.tile([0.1, SIDE_TAU_M, OUTLIERS_AT_FIRST], (len(candidates.kinds), 1))
     thetas = candidates.thetas.copy()
     values, evaluations = kernel.estimate_each(
-        search.whole, search.tables, candidates.kinds, thetas, *search.box(candidates), noises, SIGMA_PRIOR, 3
+        search.whole,
+        search.tables,
+        candidates.kinds,
+        thetas,
+        *search.box(candidates),
+        noises,
+        SIGMA_PRIOR,
+        3,
     )
-    return Candidates(candidates.kinds, thetas, values, candidates.evaluations + evaluations), noises
+    return Candidates(
+        candidates.kinds, thetas, values, candidates.evaluations + evaluations
+    ), noises
 
 
-def choose(search: Search, candidates: Candidates, log_prior: dict[str, float]) -> tuple[int, dict[str, float]]:
-    """(row of the most evident proper roof, BIC by type). The penalty is twice the textbook's: it is safest there."""
+def choose(
+    search: Search, candidates: Candidates, log_prior: dict[str, float]
+) -> tuple[int, dict[str, float]]:
+    """(row of the most evident proper roof, BIC by type).
+
+    The penalty is twice the textbook's: it is safest there.
+    """
     shapes = [search.shapes[kind] for kind in candidates.kinds]
     sizes = np.array([shape.theta_size + 1 for shape in shapes])
     evidence = candidates.values + sizes * np.log(len(search.whole.points))
@@ -307,9 +389,15 @@ def choose(search: Search, candidates: Candidates, log_prior: dict[str, float]) 
 
 
 def finish(
-    search: Search, winner: Candidates, noise: Noise, bics: dict[str, float], side_taus: tuple[float, ...]
+    search: Search,
+    winner: Candidates,
+    noise: Noise,
+    bics: dict[str, float],
+    side_taus: tuple[float, ...],
 ) -> Estimate:
-    """The winner with its sides sharpened and averaged, its heights fitted again, and its covariance."""
+    """The winner with its sides sharpened and averaged, its heights fitted again, and its
+    covariance.
+    """
     kind, theta, value = int(winner.kinds[0]), winner.thetas[0].copy(), float(winner.values[0])
     (low,), (high,) = search.box(winner)
     evaluations = winner.evaluations
@@ -317,21 +405,32 @@ def finish(
     if search.whole.plan_is_free:
         if side_taus:
             value, noise, more = kernel.sharpen_sides(
-                search.whole, search.tables, kind, theta, low, high, noise, SIGMA_PRIOR, np.array(side_taus)
+                search.whole,
+                search.tables,
+                kind,
+                theta,
+                low,
+                high,
+                noise,
+                SIGMA_PRIOR,
+                np.array(side_taus),
             )
             evaluations += more
         variances, more = settle_sides(search, kind, theta, low, high, noise)
         evaluations += more
     shape = search.shapes[kind]
     canonical = shape.canonical_theta(theta)
-    if abs(np.sin(canonical[KAPPA] - theta[KAPPA])) > 0.5:  # the axes are exchanged, and their variances with them
+    # the axes are exchanged, and their variances with them
+    if abs(np.sin(canonical[KAPPA] - theta[KAPPA])) > 0.5:
         variances = variances[[1, 0, 3, 2]]
     covariance = covariance_of(search, kind, canonical, noise, variances)
     return Estimate(shape, canonical, covariance, noise, value, bics, evaluations)
 
 
 def settle_sides(search, kind, theta, low, high, noise) -> tuple[np.ndarray, int]:
-    """Posterior means of the four sides, then heights, slopes and direction with them held; `theta` in place.
+    """Posterior means of the four sides, then heights, slopes and direction with them held;
+
+    `theta` in place.
 
     Returns (variances (4,) of centre u, centre v, V, U, evaluations).
     """
@@ -343,15 +442,23 @@ def settle_sides(search, kind, theta, low, high, noise) -> tuple[np.ndarray, int
     turned[:2, :2] = [[c, -s], [s, c]]
     information = (turned.T @ hessian @ turned)[np.ix_(free, free)] + 1e-4 * np.eye(len(free))
     centre_precision = 1 / np.diag(np.linalg.inv(information))[:2]
-    variances = kernel.mean_sides(search.whole, search.tables, kind, theta, noise, centre_precision, inliers, SIDE_GRID)
+    variances = kernel.mean_sides(
+        search.whole, search.tables, kind, theta, noise, centre_precision, inliers, SIDE_GRID
+    )
     low, high = low.copy(), high.copy()
     low[PLAN] = high[PLAN] = theta[PLAN]
-    _, _, _, evaluations = kernel.minimise(search.whole, search.tables, kind, theta, low, high, noise, 4, 1e-3)
+    _, _, _, evaluations = kernel.minimise(
+        search.whole, search.tables, kind, theta, low, high, noise, 4, 1e-3
+    )
     return variances, evaluations
 
 
-def covariance_of(search: Search, kind: int, theta: np.ndarray, noise: Noise, variances: np.ndarray) -> np.ndarray:
-    """Covariance (9, 9) of theta: the sides' own `variances` carried through the heights' inverse Hessian."""
+def covariance_of(
+    search: Search, kind: int, theta: np.ndarray, noise: Noise, variances: np.ndarray
+) -> np.ndarray:
+    """Covariance (9, 9) of theta: the sides' own `variances` carried through the heights' inverse
+    Hessian.
+    """
     hessian, _ = kernel.height_hessian(search.whole, search.tables, kind, theta, noise)
     c, s = np.cos(theta[KAPPA]), np.sin(theta[KAPPA])
     turn = np.eye(4)

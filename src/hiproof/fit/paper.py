@@ -1,10 +1,12 @@
-"""The objective of Li, Zhang and Shan (2020), as published: the reference that the likelihood is measured against.
+"""The objective of Li, Zhang and Shan (2020), as published: the reference that the likelihood is
+measured against.
 
-J = J1 + beta J2, with J1 the mean distance of the points to the nearest plane of the primitive, and J2 = 1 - IoU of its
-plan outline with the alpha shape of the points. The planes come from an SVD of each surface's centred vertices, the
-start from the minimum bounding box, the minimum from SciPy's L-BFGS-B with its numeric gradient. Nothing is added to
-make it faster or more robust. Where the paper is silent: the box is tried with either side as the width (the lower J at
-the start is taken), and of several roof types that with the smallest J is chosen.
+J = J1 + beta J2, with J1 the mean distance of the points to the nearest plane of the primitive, and
+J2 = 1 - IoU of its plan outline with the alpha shape of the points. The planes come from an SVD of
+each surface's centred vertices, the start from the minimum bounding box, the minimum from SciPy's
+L-BFGS-B with its numeric gradient. Nothing is added to make it faster or more robust. Where the
+paper is silent: the box is tried with either side as the width (the lower J at the start is taken),
+and of several roof types that with the smallest J is chosen.
 """
 
 from __future__ import annotations
@@ -25,12 +27,16 @@ from ..settings import Settings
 
 BETA = 0.1  # weight of the outline in the objective, the paper's own
 ALPHA_SPACINGS = 4.0
-"""Radius of the alpha shape in point spacings, which the paper does not give: of 1.5, 2.5 and 4 this comes closest to its figures."""
+"""Radius of the alpha shape in point spacings, which the paper does not give: of 1.5, 2.5 and 4
+this comes closest to its figures.
+"""
 SMALLEST_M = 0.1  # m; no length of a roof is smaller
 TYPES = ("flat", "monopitch", "gable", "hip", "half_hip", "pyramid", "mansard", "shed")
 """Those that the paper names, tried where none are asked for."""
 IMPROPER = 1.0
-"""Added to J where the vertices form no roof (a ridge longer than the eaves): larger than any difference of J2."""
+"""Added to J where the vertices form no roof (a ridge longer than the eaves): larger than any
+difference of J2.
+"""
 
 
 def fit_paper(
@@ -39,10 +45,12 @@ def fit_paper(
     outline: shapely.Polygon | None = None,
     settings: Settings | None = None,
 ) -> Fit:
-    """Fit one of `types` (default: those of the settings, else the paper's) to `points` (n, 3) metres, any frame.
+    """Fit one of `types` (default: those of the settings, else the paper's) to `points` (n, 3)
+    metres, any frame.
 
-    `outline` (same frame) takes the place of the alpha shape. In the outcome `value` is J; `bics` hold J by type, which
-    plays BIC's role here, and there are no standard deviations. Raises FitError when the points span no area.
+    `outline` (same frame) takes the place of the alpha shape. In the outcome `value` is J; `bics`
+    hold J by type, which plays BIC's role here, and there are no standard deviations. Raises
+    FitError when the points span no area.
     """
     points = np.asarray(points, float)
     points = points[np.isfinite(points).all(axis=1)]
@@ -50,7 +58,11 @@ def fit_paper(
         raise FitError(f"expected at least 4 finite points to fit a roof to, got {len(points)}")
     frame = LocalFrame.around(points)
     xyz = frame.to_local(points)
-    boundary = observed_outline(xyz[:, :2]) if outline is None else shapely.transform(outline, frame.to_local)
+    boundary = (
+        observed_outline(xyz[:, :2])
+        if outline is None
+        else shapely.transform(outline, frame.to_local)
+    )
     names = types or (settings or Settings()).fit.types or TYPES
     tried = [best_variant(get(name), xyz, boundary) for name in names]
     values = {fitted.shape.name: fitted.value for fitted in tried}
@@ -58,7 +70,10 @@ def fit_paper(
 
 
 def observed_outline(xy: np.ndarray) -> shapely.Polygon:
-    """The paper's B: the alpha shape of `xy` (n, 2). Raises FitError for points that span no area."""
+    """The paper's B: the alpha shape of `xy` (n, 2).
+
+    Raises FitError for points that span no area.
+    """
     return alpha_shape(xy, default_radius(xy) * ALPHA_SPACINGS / SPACINGS)
 
 
@@ -74,7 +89,9 @@ class PaperFit:
         self.value = math.inf
 
     def box_starts(self) -> list[np.ndarray]:
-        """theta of the minimum bounding box with its sides in every role: two, or four where a half turn matters."""
+        """theta of the minimum bounding box with its sides in every role: two, or four where a half
+        turn matters.
+        """
         corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(self.boundary))[:4]
         low, high = np.percentile(self.xyz[:, 2], (0, 100))
         side = corners[1] - corners[0]
@@ -84,7 +101,9 @@ class PaperFit:
             length, width = float(lengths[quarter % 2]), float(lengths[1 - quarter % 2])
             theta_p = self.shape.typical(width, length, max(high - low, SMALLEST_M))
             kappa = math.atan2(side[1], side[0]) + quarter * math.pi / 2
-            starts.append(np.array([*(theta_p[n] for n in self.names), kappa, *corners.mean(axis=0), low]))
+            starts.append(
+                np.array([*(theta_p[n] for n in self.names), kappa, *corners.mean(axis=0), low])
+            )
         return starts
 
     def bounds(self) -> list[tuple[float | None, float | None]]:
@@ -109,13 +128,17 @@ class PaperFit:
         return float(j1 + BETA * outline_misfit(vertices, self.boundary) + improper)
 
     def is_roof(self, theta: np.ndarray) -> bool:
-        """Whether the slopes and fractions that follow from theta_p lie within the primitive's bounds."""
+        """Whether the slopes and fractions that follow from theta_p lie within the primitive's
+        bounds.
+        """
         with np.errstate(divide="ignore", invalid="ignore"):
             try:
                 shape = self.shape.to_theta(self.theta_p(theta))[6:]
             except ZeroDivisionError:
                 return False
-        return all(low <= q <= high for q, (low, high) in zip(shape, self.shape.bounds, strict=False))
+        return all(
+            low <= q <= high for q, (low, high) in zip(shape, self.shape.bounds, strict=False)
+        )
 
     def minimise(self) -> PaperFit:
         """From the start to the nearest minimum."""
@@ -126,9 +149,14 @@ class PaperFit:
         return self
 
     def outcome(self, xyz: np.ndarray, frame: LocalFrame, values: dict[str, float]) -> Fit:
-        """The fit with its parameters in their one canonical form, in the frame of the points given."""
+        """The fit with its parameters in their one canonical form, in the frame of the points
+        given.
+        """
         if not self.is_roof(self.theta):
-            raise FitError(f"expected points of a {self.shape.name} roof, got no such roof from them; try other types")
+            raise FitError(
+                f"expected points of a {self.shape.name} roof, got no such roof from them; try "
+                "other types"
+            )
         theta = self.shape.canonical_theta(
             self.shape.to_theta(self.theta_p(self.theta), self.theta[-4], self.theta[-3:])
         )
@@ -162,8 +190,12 @@ def best_variant(shape: Primitive, xyz: np.ndarray, boundary: shapely.Polygon) -
     return min(fits, key=lambda fitted: fitted.value)
 
 
-def plane_distances(xyz: np.ndarray, vertices: np.ndarray, faces: Sequence[Sequence[int]]) -> np.ndarray:
-    """Signed distances (faces, n) of points to the plane of each face, by SVD of its centred vertices."""
+def plane_distances(
+    xyz: np.ndarray, vertices: np.ndarray, faces: Sequence[Sequence[int]]
+) -> np.ndarray:
+    """Signed distances (faces, n) of points to the plane of each face, by SVD of its centred
+    vertices.
+    """
     distances = np.empty((len(faces), len(xyz)))
     for row, face in zip(distances, faces, strict=True):
         corners = vertices[list(face)]
@@ -175,7 +207,9 @@ def plane_distances(xyz: np.ndarray, vertices: np.ndarray, faces: Sequence[Seque
 
 
 def outline_misfit(vertices: np.ndarray, boundary: shapely.Polygon) -> float:
-    """J2 = 1 - IoU of `boundary` and the plan outline of the vertices (all primitives are convex in plan)."""
+    """J2 = 1 - IoU of `boundary` and the plan outline of the vertices (all primitives are convex in
+    plan).
+    """
     outline = shapely.convex_hull(shapely.multipoints(vertices[:, :2]))
     common = shapely.intersection(outline, boundary).area
     return 1.0 - common / (outline.area + boundary.area - common)

@@ -1,12 +1,14 @@
-"""The common shift between all footprints of a data set and the roofs in its clouds, with its uncertainty.
+"""The common shift between all footprints of a data set and the roofs in its clouds, with its
+uncertainty.
 
-A missing datum grid, or another epoch, moves all footprints alike. So all of them vote at once: for each shift the cost of
-the roof points is summed, where a point costs little inside the footprints and more outside, with a soft edge. Costs are
-summed by fixed squares of the world and then over all squares, in a fixed order. Neither work tiles nor the order of
-files or points changes the result. The scatter between squares gives the standard deviation.
+A missing datum grid, or another epoch, moves all footprints alike. So all of them vote at once: for
+each shift the cost of the roof points is summed, where a point costs little inside the footprints
+and more outside, with a soft edge. Costs are summed by fixed squares of the world and then over all
+squares, in a fixed order. Neither work tiles nor the order of files or points changes the result.
+The scatter between squares gives the standard deviation.
 
-Point density, overhangs and single wrong footprints change the depth of the minimum, not its place: an overhang on
-opposite sides cancels, and a point far outside costs no more than one just outside.
+Point density, overhangs and single wrong footprints change the depth of the minimum, not its place:
+an overhang on opposite sides cancels, and a point far outside costs no more than one just outside.
 """
 
 from __future__ import annotations
@@ -20,19 +22,27 @@ import numpy as np
 import shapely
 
 FARTHEST_M = 4.8
-"""Longest common shift (m) that is looked for. Missing grids move things by 0.5 to 4 m; farther off, houses of a row
-match the footprints of their neighbours."""
+"""Longest common shift (m) that is looked for.
+
+Missing grids move things by 0.5 to 4 m; farther off, houses of a row match the footprints of their
+neighbours.
+"""
 
 LEAST_M, SIGMAS, MOST_SIGMA_M = 0.3, 4.0, 0.15
-"""A common shift is applied from this length (m) on, if it is so many standard deviations long and these are no larger.
-Outlines of surveys lie 0.1 to 0.2 m from their roofs without any error of the datum."""
+"""A common shift is applied from this length (m) on, if it is so many standard deviations long and
+these are no larger. Outlines of surveys lie 0.1 to 0.2 m from their roofs without any error of the
+datum.
+"""
 
 LEAST_SQUARES, LEAST_FOOTPRINTS = 15, 5
-"""Squares with roof points, and footprints, below which the scatter between squares says too little."""
+"""Squares with roof points, and footprints, below which the scatter between squares says too
+little.
+"""
 
 LEAST_AGREEMENT, OTHER_M = 1.0, 1.0
-"""Gain (standard deviations) that the shift must have over every one farther than OTHER_M (m) from it: rows of equal
-houses fit each other's footprints nearly as well."""
+"""Gain (standard deviations) that the shift must have over every one farther than OTHER_M (m) from
+it: rows of equal houses fit each other's footprints nearly as well.
+"""
 
 PITCH_M = 0.2
 """Pitch (m) of the raster on which footprints are shifted, and step of the fine search."""
@@ -58,10 +68,11 @@ MOST_POINTS = 30_000
 
 @dataclass(frozen=True)
 class Registration:
-    """The common shift `xy` (m, east and north) of the footprints onto the roofs, and its standard deviations `sigma` (m).
+    """The common shift `xy` (m, east and north) of the footprints onto the roofs, and its standard
+    deviations `sigma` (m).
 
-    `squares` had roof points; `agreement` is how much better the shift is than any other one that is far from it, in
-    standard deviations of the sum over the squares.
+    `squares` had roof points; `agreement` is how much better the shift is than any other one that
+    is far from it, in standard deviations of the sum over the squares.
     """
 
     xy: tuple[float, float] = (0.0, 0.0)
@@ -77,14 +88,24 @@ class Registration:
     @property
     def is_clear(self) -> bool:
         """Whether the footprints should be moved."""
-        if self.squares < LEAST_SQUARES or self.footprints < LEAST_FOOTPRINTS or not self.length >= LEAST_M:
+        if (
+            self.squares < LEAST_SQUARES
+            or self.footprints < LEAST_FOOTPRINTS
+            or not self.length >= LEAST_M
+        ):
             return False
         sigma = max(self.sigma)
-        return sigma <= MOST_SIGMA_M and self.length > SIGMAS * sigma and self.agreement > LEAST_AGREEMENT
+        return (
+            sigma <= MOST_SIGMA_M
+            and self.length > SIGMAS * sigma
+            and self.agreement > LEAST_AGREEMENT
+        )
 
     @property
     def shift(self) -> tuple[float, float]:
-        """What the footprints are moved by (m): the common shift where it is clear, else nothing."""
+        """What the footprints are moved by (m): the common shift where it is clear, else
+        nothing.
+        """
         return self.xy if self.is_clear else (0.0, 0.0)
 
     def to_dict(self) -> dict[str, Any]:
@@ -103,15 +124,21 @@ class Registration:
     def from_dict(values: dict[str, Any]) -> Registration:
         sigma = values["sigma_m"] or (math.inf, math.inf)
         return Registration(
-            tuple(values["shift_m"]), tuple(sigma), values["footprints"], values["squares"], values["agreement"]
+            tuple(values["shift_m"]),
+            tuple(sigma),
+            values["footprints"],
+            values["squares"],
+            values["agreement"],
         )
 
 
 @dataclass(frozen=True)
 class Cell:
-    """Roof points of a part of the world on a raster, sorted: the `squares` (n,) and `nodes` (n,) that they lie in.
+    """Roof points of a part of the world on a raster, sorted: the `squares` (n,) and `nodes` (n,)
+    that they lie in.
 
-    `costs` (k,) are those of a point at each node, `row` the nodes of a row, and `low` the place of the first node.
+    `costs` (k,) are those of a point at each node, `row` the nodes of a row, and `low` the place of
+    the first node.
     """
 
     low: tuple[float, float]
@@ -121,26 +148,36 @@ class Cell:
     row: int
 
     def sums(self, shifts: np.ndarray, every: int = 1) -> np.ndarray:
-        """Costs (squares, m) of the points, one in `every`, summed by square, where footprints move by `shifts` (m, 2) pitches."""
+        """Costs (squares, m) of the points, one in `every`, summed by square, where footprints move
+        by `shifts` (m, 2) pitches.
+        """
         squares, nodes = self.squares[::every], self.nodes[::every]
         moves = (shifts @ [self.row, 1]).tolist()
-        return np.column_stack([np.bincount(squares, weights=self.costs[nodes - move]) for move in moves])
+        return np.column_stack(
+            [np.bincount(squares, weights=self.costs[nodes - move]) for move in moves]
+        )
 
 
 def register(cells: Iterable[tuple[np.ndarray, list[shapely.Polygon]]]) -> Registration:
-    """Estimate the common shift from the `cells` of a data set: roof points (n, 2) and the footprints around them.
+    """Estimate the common shift from the `cells` of a data set: roof points (n, 2) and the
+    footprints around them.
 
-    Coordinates are world metres. The cells must not overlap; their order does not matter, nor that of the points.
+    Coordinates are world metres. The cells must not overlap; their order does not matter, nor that
+    of the points.
 
-    >>> houses = [shapely.box(x, y, x + 12, y + 8) for x in range(0, 200, 40) for y in range(0, 200, 40)]
-    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0, 200, 0.5), np.arange(0, 200, 0.5)))
+    >>> houses = [shapely.box(x, y, x + 12, y + 8) for x in range(0, 200, 40) for y in range(0,
+    ...     200, 40)]
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0, 200, 0.5), np.arange(0, 200,
+    ...     0.5)))
     >>> on_roof = (x % 40 < 12) & (y % 40 < 8)
     >>> moved = [shapely.transform(house, lambda xy: xy - [1.2, -0.8]) for house in houses]
     >>> found = register([(np.column_stack([x, y])[on_roof] + 0.25, moved)])
     >>> found.is_clear, bool(np.abs(np.subtract(found.xy, [1.2, -0.8])).max() < 0.3)
     (True, True)
     """
-    pairs = [(cell_of(xy, polygons), len(polygons)) for xy, polygons in cells if len(xy) and polygons]
+    pairs = [
+        (cell_of(xy, polygons), len(polygons)) for xy, polygons in cells if len(xy) and polygons
+    ]
     if not pairs:
         return Registration()
     pairs.sort(key=lambda pair: pair[0].low)
@@ -150,20 +187,28 @@ def register(cells: Iterable[tuple[np.ndarray, list[shapely.Polygon]]]) -> Regis
     best = coarse[int(np.argmin(by_square.sum(axis=0)))]
     fine = best + grid_of(1, COARSE * PITCH_M)
     best = fine[int(np.argmin(sums_of(found, fine).sum(axis=0)))]
-    gains = by_square[:, PITCH_M * np.hypot(*(coarse - best).T) > OTHER_M] - sums_of(found, best[None], EVERY)
+    gains = by_square[:, PITCH_M * np.hypot(*(coarse - best).T) > OTHER_M] - sums_of(
+        found, best[None], EVERY
+    )
     xy, sigma = settle(found, best)
     return Registration(xy, sigma, footprints, len(gains), agreement(gains))
 
 
 def agreement(gains: np.ndarray) -> float:
-    """The smallest of the gains (squares, others) summed over squares, in standard deviations of that sum."""
+    """The smallest of the gains (squares, others) summed over squares, in standard deviations of
+    that sum.
+    """
     scatter = np.sqrt(((gains - gains.mean(axis=0)) ** 2).sum(axis=0))
     return round(float(np.min(gains.sum(axis=0) / np.maximum(scatter, 1e-9))), 3)
 
 
 def settle(cells: list[Cell], best: np.ndarray) -> tuple[tuple[float, float], tuple[float, float]]:
-    """The minimum (m) beside `best` by a parabola through its surroundings, with deviations by the scatter between squares."""
-    around = np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]])
+    """The minimum (m) beside `best` by a parabola through its surroundings, with deviations by the
+    scatter between squares.
+    """
+    around = np.array(
+        [[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1], [1, -1], [-1, 1]]
+    )
     costs = sums_of(cells, best + around)
     at, plus_x, minus_x, plus_y, minus_y, both, neither, one, other = costs.sum(axis=0)
     slopes = np.column_stack([costs[:, 1] - costs[:, 2], costs[:, 3] - costs[:, 4]]) / 2
@@ -206,15 +251,26 @@ def cell_of(xy: np.ndarray, polygons: list[shapely.Polygon]) -> Cell:
     xy = np.column_stack([places.real, places.imag])
     low = np.floor(xy.min(axis=0) / PITCH_M) - MARGIN
     shape = (np.ceil(xy.max(axis=0) / PITCH_M) + MARGIN - low).astype(int) + 1
-    inside = ndimage.gaussian_filter(rasterise(polygons, low, shape), BLUR_M / PITCH_M, truncate=3.0)
+    inside = ndimage.gaussian_filter(
+        rasterise(polygons, low, shape), BLUR_M / PITCH_M, truncate=3.0
+    )
     i, j = (np.rint(xy / PITCH_M) - low).astype(int).T
     _, squares = np.unique(np.floor(xy / SQUARE_M), axis=0, return_inverse=True)
     costs = -np.log(STRAY + (1.0 - STRAY) * inside)
-    return Cell((float(low[0]), float(low[1])), squares.ravel(), i * shape[1] + j, costs.ravel(), int(shape[1]))
+    return Cell(
+        (float(low[0]), float(low[1])),
+        squares.ravel(),
+        i * shape[1] + j,
+        costs.ravel(),
+        int(shape[1]),
+    )
 
 
 def rasterise(polygons: list[shapely.Polygon], low: np.ndarray, shape: np.ndarray) -> np.ndarray:
-    """1 at the nodes (columns, rows) of a raster that any of the polygons holds, else 0; `low` (2,) are the first node's pitches."""
+    """1 at the nodes (columns, rows) of a raster that any of the polygons holds, else 0;
+
+    `low` (2,) are the first node's pitches.
+    """
     inside = np.zeros(shape, np.float32)
     for polygon in polygons:
         box = np.reshape(polygon.bounds, (2, 2)) / PITCH_M - low

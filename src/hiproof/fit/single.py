@@ -31,17 +31,21 @@ def fit_roof(
 ) -> Fit:
     """The roof primitive that stands best for `points`.
 
-    points          (n, 3) metres in any frame; points that are not finite, or not on Earth, are dropped, and their order does not matter
-    outline         a given plan, in the frame of `points`: the roof covers its rectangle in the roof's own direction, and
+    points          (n, 3) metres in any frame; points that are not finite, or not on Earth, are
+                    dropped, and their order does not matter
+    outline         a given plan, in the frame of `points`: the roof covers its rectangle in the
+                    roof's own direction, and
                     only heights, slopes and ridge are fitted, to the points inside it
-    settings        `fit.types` are the names of the catalogue to choose among, all by default; `fit.objective` is the likelihood
+    settings        `fit.types` are the names of the catalogue to choose among, all by default;
+                    `fit.objective` is the likelihood
                     (fit/likelihood.py) or "paper" (fit/paper.py, the published method)
     weights         (n,) probability of each point of being roof, 1 by default
-    type_log_prior  natural logarithm of each type's probability before its points are seen, 0 by default
+    type_log_prior  natural logarithm of each type's probability before its points are seen, 0 by
+                    default
 
-    Raises FitError where no roof can be determined: no or fewer than four such points that may be roof, all in one place or on a
-    line, an outline that is no polygon.
-    SettingsError for types that the catalogue does not hold.
+    Raises FitError where no roof can be determined: no or fewer than four such points that may be
+    roof, all in one place or on a line, an outline that is no polygon. SettingsError for types that
+    the catalogue does not hold.
 
     >>> import numpy as np
     >>> x, y = np.meshgrid(np.linspace(-6, 6, 25), np.linspace(-4, 4, 17))
@@ -62,7 +66,9 @@ def fit_roof(
     frame = LocalFrame.around(cloud)
     local = np.column_stack([frame.to_local(cloud[:, :3]), cloud[:, 3]])
     outline_local = None if outline is None else shapely.transform(outline, frame.to_local)
-    estimate = fit_likelihood(local, names, outline_local, settings.fit.side_softness_m, type_log_prior)
+    estimate = fit_likelihood(
+        local, names, outline_local, settings.fit.side_softness_m, type_log_prior
+    )
     return as_fit(estimate, frame, len(local))
 
 
@@ -73,16 +79,29 @@ def checked_types(types: tuple[str, ...]) -> tuple[str, ...]:
     return tuple(name for name in CATALOGUE if not types or name in types)
 
 
-def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shapely.Polygon | None) -> np.ndarray:
-    """Finite points inside the outline as (n, 4) x, y, z, weight, in lexicographic order. Raises FitError for too few."""
+def usable_points(
+    points: np.ndarray, weights: np.ndarray | None, outline: shapely.Polygon | None
+) -> np.ndarray:
+    """Finite points inside the outline as (n, 4) x, y, z, weight, in lexicographic order.
+
+    Raises FitError for too few.
+    """
     points = np.asarray(points, float)
     if points.ndim != 2 or points.shape[1] < 3:
-        raise FitError(f"expected points of shape (n, 3), got {points.shape}; give x, y and z in metres")
+        raise FitError(
+            f"expected points of shape (n, 3), got {points.shape}; give x, y and z in metres"
+        )
     if outline is not None and not isinstance(outline, shapely.Polygon):
-        raise FitError(f"expected a polygon of shapely as outline, got {type(outline).__name__}; give one polygon")
+        raise FitError(
+            f"expected a polygon of shapely as outline, got {type(outline).__name__}; give one "
+            "polygon"
+        )
     weights = np.ones(len(points)) if weights is None else np.asarray(weights, float)
     if weights.shape != (len(points),) or not np.all((weights >= 0) & (weights <= 1)):
-        raise FitError(f"expected {len(points)} weights between 0 and 1, got shape {weights.shape}; give one a point")
+        raise FitError(
+            f"expected {len(points)} weights between 0 and 1, got shape {weights.shape}; give one "
+            "a point"
+        )
     finite = is_plausible(points[:, :3])
     cloud = np.column_stack([points[finite, :3], weights[finite]])
     where = "finite points"
@@ -92,7 +111,8 @@ def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shape
     count = np.count_nonzero(cloud[:, 3])
     if count < FEWEST_POINTS:
         raise FitError(
-            f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {count} of {len(points)} given; "
+            f"expected at least {FEWEST_POINTS} {where} to fit a roof, got {count} of "
+            f"{len(points)} given; "
             "a flat roof at their median height is all that can be said"
         )
     cloud = in_order(cloud)
@@ -100,13 +120,16 @@ def usable_points(points: np.ndarray, weights: np.ndarray | None, outline: shape
     if narrow <= max(THINNEST * wide, 1e-6):
         shape = "in one place" if wide < 1e-6 else "on one line in plan"
         raise FitError(
-            f"expected points spread over a roof, got {counted(len(cloud), 'point')} {shape}; add points beside it"
+            f"expected points spread over a roof, got {counted(len(cloud), 'point')} {shape}; add "
+            "points beside it"
         )
     return cloud
 
 
 def in_order(cloud: np.ndarray) -> np.ndarray:
-    """Rows (n, k) in lexicographic order; those of a building come so already, and looking is cheaper than sorting."""
+    """Rows (n, k) in lexicographic order; those of a building come so already, and looking is
+    cheaper than sorting.
+    """
     step = np.zeros(len(cloud) - 1)
     for column in cloud.T:
         step = np.where(step == 0.0, np.diff(column), step)
@@ -114,7 +137,9 @@ def in_order(cloud: np.ndarray) -> np.ndarray:
 
 
 def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
-    """The estimate in the words of the paper: theta_p, kappa, T_L, T_G, standard deviations, vertices and faces."""
+    """The estimate in the words of the paper: theta_p, kappa, T_L, T_G, standard deviations,
+    vertices and faces.
+    """
     shape = estimate.primitive
     theta_p, kappa, translation = shape.from_theta(estimate.theta)
     sigma = standard_deviations(estimate)
@@ -141,9 +166,11 @@ def as_fit(estimate: Estimate, frame: LocalFrame, points_used: int) -> Fit:
 
 
 def standard_deviations(estimate: Estimate) -> dict[str, float]:
-    """Standard deviation by name, by the delta method: gradients of the named formulas through theta's covariance.
+    """Standard deviation by name, by the delta method: gradients of the named formulas through
+    theta's covariance.
 
-    What the points do not tell has none, as in a fit of several parts; what a given outline tells is exact, 0.
+    What the points do not tell has none, as in a fit of several parts; what a given outline tells
+    is exact, 0.
     """
     shape, covariance = estimate.primitive, estimate.covariance
     values = estimate.theta[HALF_WIDTH:]
@@ -152,7 +179,9 @@ def standard_deviations(estimate: Estimate) -> dict[str, float]:
     for row, measure in zip(gradients, named.values(), strict=True):
         row[HALF_WIDTH:] = measure.gradient(values)
     variances = np.einsum("ij,jk,ik->i", gradients, covariance, gradients)
-    sigma = {name: math.sqrt(max(variance, 0.0)) for name, variance in zip(named, variances, strict=True)}
+    sigma = {
+        name: math.sqrt(max(variance, 0.0)) for name, variance in zip(named, variances, strict=True)
+    }
     for name, k in (("kappa", KAPPA), ("t_x", 0), ("t_y", 1)):
         sigma[name] = math.sqrt(max(covariance[k, k], 0.0))
     return {name: deviation for name, deviation in sigma.items() if deviation < UNTOLD}

@@ -1,4 +1,6 @@
-"""A building's footprint against the ground: what is bare is cut out, and where nothing stands that is said."""
+"""A building's footprint against the ground: what is bare is cut out, and where nothing stands that
+is said.
+"""
 
 from __future__ import annotations
 
@@ -15,17 +17,22 @@ from .bare_ground import find_bare_ground
 from .standing import FEWEST_PLACES, LEAST_LOW, cover, ground_plane, what_stands
 
 DECK_M = 1.0
-"""Height over the ground around from which on points of the ground lie on a deck, which is part of the building."""
+"""Height over the ground around from which on points of the ground lie on a deck, which is part of
+the building.
+"""
 
 ROOFED = 0.85
-"""Share of the plan beside bare ground that points above the ground cover at least where a building stands around a yard:
-cleared sites with heaps and trees on them reach 0.72 (benchmarks/bare_ground.py)."""
+"""Share of the plan beside bare ground that points above the ground cover at least where a building
+stands around a yard: cleared sites with heaps and trees on them reach 0.72
+(benchmarks/bare_ground.py).
+"""
 
 
 @dataclass(frozen=True)
 class Site:
-    """What the ground says of a building before it is fitted: the points and the outline that remain, whether nothing
-    stands there, and a remark."""
+    """What the ground says of a building before it is fitted: the points and the outline that
+    remain, whether nothing stands there, and a remark.
+    """
 
     points: np.ndarray
     outline: shapely.Polygon | None
@@ -41,8 +48,9 @@ def look_at_ground(
     terrain: Terrain | None,
     settings: Settings,
 ) -> Site:
-    """What remains of the building's points (n, 3) and outline by the points `ground` (m, 3), all in the local `frame`, and by
-    the terrain around."""
+    """What remains of the building's points (n, 3) and outline by the points `ground` (m, 3), all
+    in the local `frame`, and by the terrain around.
+    """
     ground = ground.compress(shapely.intersects_xy(outline, ground[:, 0], ground[:, 1]), axis=0)
     plane = None if terrain is None else plane_around(outline, frame, terrain)
     if plane is None:
@@ -53,18 +61,26 @@ def look_at_ground(
     if found.is_empty and not has_roofed_rest(both, found.is_low, outline):
         share = f"{100 * found.low_share:.0f} % of its points lie on the ground"
         if settings.reconstruct.empty_footprints == "skip":
-            return Site(points, outline, f"no model: nothing stands on the footprint, {share}", is_empty=True)
+            return Site(
+                points,
+                outline,
+                f"no model: nothing stands on the footprint, {share}",
+                is_empty=True,
+            )
         return Site(points, outline, f"perhaps nothing stands there: {share}")
     low = found.is_low[: len(points)]
     kept = (
         points[~low] if low.mean() >= LEAST_LOW else points
     )  # so many are the cloud's ground, fewer the feet of walls
-    return cut_bare_ground(kept, outline, np.concatenate([ground, points[low]]), settings, points[~low])
+    return cut_bare_ground(
+        kept, outline, np.concatenate([ground, points[low]]), settings, points[~low]
+    )
 
 
 def has_roofed_rest(all_points: np.ndarray, is_low: np.ndarray, outline: shapely.Polygon) -> bool:
-    """Whether what is left of the outline without its bare ground is all but covered by points above the ground: a block
-    around a wide yard, and no heaps and trees on a cleared site."""
+    """Whether what is left of the outline without its bare ground is all but covered by points
+    above the ground: a block around a wide yard, and no heaps and trees on a cleared site.
+    """
     if is_low.all():
         return False
     found = find_bare_ground(outline, all_points[~is_low], all_points[is_low])
@@ -74,22 +90,35 @@ def has_roofed_rest(all_points: np.ndarray, is_low: np.ndarray, outline: shapely
     return bool(left.any()) and cover(all_points[left], ~is_low[left]) >= ROOFED
 
 
-def plane_around(outline: shapely.Polygon, frame: LocalFrame, terrain: Terrain) -> np.ndarray | None:
-    """The plane of the ground around the outline in the local frame, by what the terrain knows, guesses left out."""
+def plane_around(
+    outline: shapely.Polygon, frame: LocalFrame, terrain: Terrain
+) -> np.ndarray | None:
+    """The plane of the ground around the outline in the local frame, by what the terrain knows,
+    guesses left out.
+    """
 
     def height_at(xy: np.ndarray) -> np.ndarray:
         xy = frame.to_world(xy)
-        known = terrain.known_heights(xy, FEWEST_PLACES) if isinstance(terrain, TerrainChain) else terrain.height_at(xy)
+        known = (
+            terrain.known_heights(xy, FEWEST_PLACES)
+            if isinstance(terrain, TerrainChain)
+            else terrain.height_at(xy)
+        )
         return known - frame.origin[2]
 
     return ground_plane(outline, height_at)
 
 
 def cut_bare_ground(
-    points: np.ndarray, outline: shapely.Polygon, ground: np.ndarray, settings: Settings, high: np.ndarray
+    points: np.ndarray,
+    outline: shapely.Polygon,
+    ground: np.ndarray,
+    settings: Settings,
+    high: np.ndarray,
 ) -> Site:
-    """Points and outline without the bare ground among `ground` (m, 3), or with a remark where it is roofed over; `high` (k, 3)
-    are the points that lie above it."""
+    """Points and outline without the bare ground among `ground` (m, 3), or with a remark where it
+    is roofed over; `high` (k, 3) are the points that lie above it.
+    """
     found = find_bare_ground(outline, high, ground) if len(ground) else None
     if found is None:
         return Site(points, outline)

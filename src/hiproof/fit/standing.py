@@ -1,7 +1,8 @@
 """Does anything stand on a footprint? Its roof points against the plane of the ground around it.
 
-Buildings that were pulled down leave ground, rubble and bushes where their footprint still is. Of the points on them a
-quarter or more lies on the ground, of those on standing buildings an eighth at most: the feet of walls.
+Buildings that were pulled down leave ground, rubble and bushes where their footprint still is. Of
+the points on them a quarter or more lies on the ground, of those on standing buildings an eighth at
+most: the feet of walls.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ import numpy as np
 import shapely
 
 RINGS_M = (1.5, 4.0, 7.0)
-"""Distances (m) from the outline at which the ground around it is asked for; city runs know it up to 10 m."""
+"""Distances (m) from the outline at which the ground around it is asked for; city runs know it up
+to 10 m.
+"""
 
 NEEDLESS_M = 0.2
 """Distance (m) within which corners of the outline do not matter for these rings."""
@@ -25,23 +28,35 @@ FEWEST_PLACES = 8
 """Places with a known ground below which no plane is fitted."""
 
 ROUNDS, FAR_M = 3, 0.4
-"""Rounds of fitting the plane, each without the places farther (m) from the last: kerbs, terraces, cars taken for ground."""
+"""Rounds of fitting the plane, each without the places farther (m) from the last: kerbs, terraces,
+cars taken for ground.
+"""
 
 MOST_ROUGH_M = 0.6
-"""Median distance (m) of places from the plane above which the ground is no plane, and nothing is said by it."""
+"""Median distance (m) of places from the plane above which the ground is no plane, and nothing is
+said by it.
+"""
 
 DEEPEST_M = 4.0
-"""Depth (m) below that plane to which points lie on the ground: the pit of a cellar. Others have heights of another kind."""
+"""Depth (m) below that plane to which points lie on the ground: the pit of a cellar.
+
+Others have heights of another kind.
+"""
 
 CLEAR_M = 0.5
-"""Height (m) over that plane below which a point lies on the ground; the lowest roofs of sheds are 1.8 m high."""
+"""Height (m) over that plane below which a point lies on the ground; the lowest roofs of sheds are
+1.8 m high.
+"""
 
 LEAST_LOW = 0.25
-"""Share of the points on the ground from which on a building may be gone (benchmarks/bare_ground.py)."""
+"""Share of the points on the ground from which on a building may be gone
+(benchmarks/bare_ground.py).
+"""
 
 LEAST_COVER = 0.4
-"""Share of the plan that has more points above the ground than on it, from which on something stands all the same: a house
-with a yard, or a carport with ground seen below its roof."""
+"""Share of the plan that has more points above the ground than on it, from which on something
+stands all the same: a house with a yard, or a carport with ground seen below its roof.
+"""
 
 CELL_POINTS = 6.0
 """Points in a cell of the plan in the mean, by which that share is told."""
@@ -49,8 +64,9 @@ CELL_POINTS = 6.0
 
 @dataclass(frozen=True)
 class Standing:
-    """What the points of a footprint say: whether each (n,) lies on the ground, the share that does, and whether they say that
-    nothing stands there."""
+    """What the points of a footprint say: whether each (n,) lies on the ground, the share that
+    does, and whether they say that nothing stands there.
+    """
 
     is_low: np.ndarray
     low_share: float
@@ -75,13 +91,19 @@ def cover(points: np.ndarray, is_high: np.ndarray) -> float:
     return float((2 * np.bincount(index.ravel(), is_high) >= counts).mean())
 
 
-def ground_plane(outline: shapely.Polygon, height_at: Callable[[np.ndarray], np.ndarray]) -> np.ndarray | None:
-    """The plane (3,) a, b, c of z = a x + b y + c through the ground around `outline`, None where it is not known or no plane.
+def ground_plane(
+    outline: shapely.Polygon, height_at: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray | None:
+    """The plane (3,) a, b, c of z = a x + b y + c through the ground around `outline`, None where
+    it is not known or no plane.
 
-    `height_at` gives the ground's height (n,) at places (n, 2) in the outline's frame, NaN where it is unknown.
+    `height_at` gives the ground's height (n,) at places (n, 2) in the outline's frame, NaN where it
+    is unknown.
     """
     outline = shapely.simplify(outline, NEEDLESS_M)
-    places = np.concatenate([places_along(shapely.buffer(outline, reach, quad_segs=2)) for reach in RINGS_M])
+    places = np.concatenate(
+        [places_along(shapely.buffer(outline, reach, quad_segs=2)) for reach in RINGS_M]
+    )
     heights = height_at(places)
     known = np.isfinite(heights)
     if known.sum() < FEWEST_PLACES:
@@ -100,5 +122,6 @@ def places_along(area: shapely.Geometry) -> np.ndarray:
     """Places (n, 2) along the outer ring of `area`."""
     rings = [part.exterior for part in shapely.get_parts(area) if part.geom_type == "Polygon"]
     return np.concatenate(
-        [shapely.get_coordinates(shapely.segmentize(ring, PLACE_M))[:-1] for ring in rings] or [np.zeros((0, 2))]
+        [shapely.get_coordinates(shapely.segmentize(ring, PLACE_M))[:-1] for ring in rings]
+        or [np.zeros((0, 2))]
     )

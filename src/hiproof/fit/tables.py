@@ -1,4 +1,6 @@
-"""The catalogue as arrays for the compiled core: one row a variant, the planes' formulas as a list of terms."""
+"""The catalogue as arrays for the compiled core: one row a variant, the planes' formulas as a list
+of terms.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +24,19 @@ def variants(names: tuple[str, ...] = tuple(CATALOGUE)) -> tuple[Primitive, ...]
 
 @cache
 def tables(names: tuple[str, ...] = tuple(CATALOGUE)) -> Tables:
-    """The term table of the variants of `names`. Raises ValueError for a shape with more planes than the core holds."""
+    """The term table of the variants of `names`.
+
+    Raises ValueError for a shape with more planes than the core holds.
+    """
     return tabulate(variants(names))
 
 
 def tabulate(shapes: tuple[Primitive, ...]) -> Tables:
     """The term table of `shapes`, one row each."""
     if any(len(shape.planes) > MAX_PLANES for shape in shapes):
-        raise ValueError(f"expected at most {MAX_PLANES} planes a primitive; raise kernel.MAX_PLANES for more")
+        raise ValueError(
+            f"expected at most {MAX_PLANES} planes a primitive; raise kernel.MAX_PLANES for more"
+        )
     factors, targets, powers, first_term = [], [], [], [0]
     for shape in shapes:
         for j, plane in enumerate(shape.planes):

@@ -1,4 +1,7 @@
-"""Which points lie on walls: beside them, nearer than any roof is steep, stand points much higher. Compiled."""
+"""Which points lie on walls: beside them, nearer than any roof is steep, stand points much higher.
+
+Compiled.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +15,8 @@ STEEPEST = 2.0  # slope of a roof: 63 degrees
 
 @compiled
 def on_walls(points, others, spacing):
-    """Which of `points` (n, 3) lie on a wall of the roof that `others` (m, 3) are of, about `spacing` (m) apart in plan.
+    """Which of `points` (n, 3) lie on a wall of the roof that `others` (m, 3) are of, about
+    `spacing` (m) apart in plan.
 
     >>> roof = np.array([[0.0, 0.0, 5.0], [0.4, 0.0, 5.0], [0.8, 0.0, 5.0]])
     >>> on_walls(np.array([[-0.05, 0.0, 2.0], [-0.05, 0.0, 4.8]]), roof, 0.5)

@@ -1,7 +1,9 @@
-"""The 2D alpha shape: the outline of a set of points, concave where the points leave a bay wider than the radius.
+"""The 2D alpha shape: the outline of a set of points, concave where the points leave a bay wider
+than the radius.
 
-Edelsbrunner, Kirkpatrick and Seidel (1983): the triangles of the Delaunay triangulation whose circumradius is below
-alpha. Its boundary lies inside the true outline by about half the spacing of the points.
+Edelsbrunner, Kirkpatrick and Seidel (1983): the triangles of the Delaunay triangulation whose
+circumradius is below alpha. Its boundary lies inside the true outline by about half the spacing of
+the points.
 """
 
 from __future__ import annotations
@@ -12,18 +14,25 @@ import shapely
 from ..errors import FitError
 
 SPACINGS = 2.5
-"""Default radius in point spacings: below 2 the shapes of sparse uniform points fall apart, above 3 bays fill up."""
+"""Default radius in point spacings: below 2 the shapes of sparse uniform points fall apart, above 3
+bays fill up.
+"""
 
 
 def default_radius(xy: np.ndarray) -> float:
-    """Radius in metres for `xy` (n, 2): 2.5 spacings, those of the points spread evenly over their hull."""
+    """Radius in metres for `xy` (n, 2): 2.5 spacings, those of the points spread evenly over their
+    hull.
+    """
     # one line through all: many points would be as many geometries
     hull_area = shapely.convex_hull(shapely.linestrings(xy)).area if len(xy) > 2 else 0.0
     return SPACINGS * float(np.sqrt(hull_area / max(len(xy), 1)))
 
 
-def alpha_shape(xy: np.ndarray, radius: float | None = None, holes: bool = False) -> shapely.Polygon:
-    """Outline of `xy` (n, 2): the largest component of the alpha shape of `radius` metres, its holes filled or kept.
+def alpha_shape(
+    xy: np.ndarray, radius: float | None = None, holes: bool = False
+) -> shapely.Polygon:
+    """Outline of `xy` (n, 2): the largest component of the alpha shape of `radius` metres, its
+    holes filled or kept.
 
     Raises FitError for points that span no area.
 
@@ -39,22 +48,35 @@ def alpha_shape(xy: np.ndarray, radius: float | None = None, holes: bool = False
     try:
         mesh = Delaunay(xy)
     except (QhullError, ValueError) as error:
-        raise FitError(f"expected points that span an area, got {len(xy)} in one place or on one line") from error
+        raise FitError(
+            f"expected points that span an area, got {len(xy)} in one place or on one line"
+        ) from error
     radius = default_radius(xy) if radius is None else radius
     kept = circumradii(xy[mesh.simplices]) < radius
     if not kept.any():
-        raise FitError(f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger one")
+        raise FitError(
+            f"expected a radius that joins neighbouring points, got {radius:.3g} m; try a larger "
+            "one"
+        )
     outside = np.where(mesh.neighbors < 0, True, ~kept[mesh.neighbors])
     triangle, opposite = np.nonzero(kept[:, None] & outside)
-    sides = xy[mesh.simplices[triangle[:, None], np.stack([(opposite + 1) % 3, (opposite + 2) % 3], axis=1)]]
+    sides = xy[
+        mesh.simplices[
+            triangle[:, None], np.stack([(opposite + 1) % 3, (opposite + 2) % 3], axis=1)
+        ]
+    ]
     shape = shapely.build_area(shapely.multilinestrings(sides))
     largest = max(shapely.get_parts(shape), key=lambda polygon: polygon.area)
-    return shapely.transform(largest if holes else shapely.Polygon(largest.exterior), lambda corners: corners + origin)
+    return shapely.transform(
+        largest if holes else shapely.Polygon(largest.exterior), lambda corners: corners + origin
+    )
 
 
 def circumradii(triangles: np.ndarray) -> np.ndarray:
     """The radii (n,) of the circles through the corners of `triangles` (n, 3, 2)."""
-    a, b, c = (np.hypot(*(triangles[:, i] - triangles[:, j]).T) for i, j in ((1, 2), (0, 2), (0, 1)))
+    a, b, c = (
+        np.hypot(*(triangles[:, i] - triangles[:, j]).T) for i, j in ((1, 2), (0, 2), (0, 1))
+    )
     half = (a + b + c) / 2
     area = np.sqrt(np.maximum(half * (half - a) * (half - b) * (half - c), 1e-18))
     return a * b * c / (4 * area)

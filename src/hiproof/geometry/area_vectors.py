@@ -19,7 +19,9 @@ def dot(a, b):
 
 @compiled
 def newell(vertices, index, low, high):
-    """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the normal."""
+    """Area vector (3,) of the ring index[low:high]: half its length is the area, its direction the
+    normal.
+    """
     total = np.zeros(3)
     origin = vertices[index[low]]
     for k in range(low, high):

@@ -7,8 +7,10 @@ from ..compiled import compiled
 
 @compiled
 def flips(x0, y0, x1, y1, x, y):
-    """Whether the edge from (x0, y0) to (x1, y1) lies between (x, y) and all that is far away towards larger x.
+    """Whether the edge from (x0, y0) to (x1, y1) lies between (x, y) and all that is far away
+    towards larger x.
 
-    A point is inside those rings of whose edges an odd number do; on a shared edge it is on one side only.
+    A point is inside those rings of whose edges an odd number do; on a shared edge it is on one
+    side only.
     """
     return (y0 > y) != (y1 > y) and x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)

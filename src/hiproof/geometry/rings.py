@@ -1,4 +1,6 @@
-"""Rings: the grid on which those of polygons are united, what they enclose, which way those in space face, and how large they are."""
+"""Rings: the grid on which those of polygons are united, what they enclose, which way those in
+space face, and how large they are.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +10,14 @@ from typing import Any
 import numpy as np
 import shapely
 
-# of coordinates (m) where polygons are overlaid: on a grid no overlay fails, nor loses a polygon whose sides all but lie on a
-# neighbour's, as GEOS 3.14 does without one
+# of coordinates (m) where polygons are overlaid: on a grid no overlay fails, nor loses a polygon
+# whose sides all but lie on a neighbour's, as GEOS 3.14 does without one
 GRID_M = 1e-6
 
 
 def enclosed(polygons: Any) -> Any:
-    """What the rings of a polygon, or of each of several, enclose: crossing and touching ones made valid, a spike of no width none.
+    """What the rings of a polygon, or of each of several, enclose: crossing and touching ones made
+    valid, a spike of no width none.
 
     >>> enclosed(shapely.Polygon([(0, 0), (2, 0), (2, 1), (3, 1), (2, 1), (2, 2), (0, 2)])).area
     4.0
@@ -32,7 +35,8 @@ def clockwise(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def counterclockwise(ring: shapely.LinearRing) -> np.ndarray:
-    """Coordinates (n + 1, 2) of a ring in plan, its first corner last again, with what it encloses to the left.
+    """Coordinates (n + 1, 2) of a ring in plan, its first corner last again, with what it encloses
+    to the left.
 
     >>> counterclockwise(shapely.LinearRing([(0, 0), (0, 1), (1, 1)])).tolist()
     [[0.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]]
@@ -50,9 +54,11 @@ def ring_edges(outline: shapely.Polygon) -> tuple[np.ndarray, np.ndarray]:
 
 
 def with_area(geometry: shapely.Geometry) -> shapely.Geometry:
-    """What of a geometry has an area: areas that only touch have lines and points in common, with which nothing more can be intersected.
+    """What of a geometry has an area: areas that only touch have lines and points in common, with
+    which nothing more can be intersected.
 
-    >>> one, other = shapely.box(0, 0, 2, 2), shapely.Polygon([(1, 0), (3, 0), (3, 4), (2, 4), (2, 1), (1, 1)])
+    >>> one, other = shapely.box(0, 0, 2, 2), shapely.Polygon([(1, 0), (3, 0), (3, 4), (2, 4), (2,
+    ...     1), (1, 1)])
     >>> shapely.intersection(one, other).geom_type, with_area(shapely.intersection(one, other)).area
     ('GeometryCollection', 1.0)
     """
@@ -75,4 +81,6 @@ def ring_normals(rings: Sequence[np.ndarray]) -> np.ndarray:
     centre = np.add.reduceat(vertices, first) / sizes[:, None]
     x, y, z = (vertices - np.repeat(centre, sizes, axis=0)).T
     u, v, w = x[following], y[following], z[following]
-    return np.add.reduceat(np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1), first) / 2
+    return (
+        np.add.reduceat(np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1), first) / 2
+    )

@@ -1,4 +1,5 @@
-"""Training of the network that recognises roofs (extra `train`): network, data sets, training, export.
+"""Training of the network that recognises roofs (extra `train`): network, data sets, training,
+export.
 
     sample     a labelled cloud, and what a source of them is
     houses     houses made up for training, with annexes
@@ -23,7 +24,10 @@ __all__ = ["TrainSettings", "train"]
 
 
 def __getattr__(name: str):
-    """`train` and `TrainSettings`, imported when used. Raises InputError where what training takes is missing."""
+    """`train` and `TrainSettings`, imported when used.
+
+    Raises InputError where what training takes is missing.
+    """
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     for package in ("torch", "onnx", "matplotlib"):

@@ -1,4 +1,6 @@
-"""PointNeXt's recipe on the data's side: random scaling, dropping and jittering, and the free symmetries of a roof."""
+"""PointNeXt's recipe on the data's side: random scaling, dropping and jittering, and the free
+symmetries of a roof.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +10,16 @@ import numpy as np
 
 FEWEST_KEPT = 30  # points that dropping leaves of a cloud; fewer show no roof
 ALONG, ACROSS = (0, 3, 8), (1, 4, 9)
-"""Columns of the features that change sign when a building is mirrored along or across its own first axis."""
+"""Columns of the features that change sign when a building is mirrored along or across its own
+first axis.
+"""
 
 
 @dataclass(frozen=True)
 class AugmentSettings:
-    """Bounds of the random changes: `scale` relative, `jitter_m` the largest standard deviation, `drop` a share."""
+    """Bounds of the random changes: `scale` relative, `jitter_m` the largest standard deviation,
+    `drop` a share.
+    """
 
     scale: float = 0.12
     stretch: float = 0.08
@@ -21,8 +27,12 @@ class AugmentSettings:
     drop: float = 0.4
 
 
-def varied(xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settings: AugmentSettings):
-    """A cloud (n, 3) and its labels (n,), scaled, stretched in height, thinned and jittered at random."""
+def varied(
+    xyz: np.ndarray, labels: np.ndarray, rng: np.random.Generator, settings: AugmentSettings
+):
+    """A cloud (n, 3) and its labels (n,), scaled, stretched in height, thinned and jittered at
+    random.
+    """
     kept = rng.random(len(xyz)) >= settings.drop * rng.random() ** 2
     if kept.sum() >= FEWEST_KEPT:
         xyz, labels = xyz[kept], labels[kept]

@@ -10,7 +10,9 @@ from ..segment.inference import stacked
 
 
 def network_inputs(arrangements: list[Arrangement], layout: Layout) -> tuple[torch.Tensor, ...]:
-    """The network's nine inputs for a batch of buildings, in the order of `segment.inference.INPUT_NAMES`."""
+    """The network's nine inputs for a batch of buildings, in the order of
+    `segment.inference.INPUT_NAMES`.
+    """
     return tuple(torch.from_numpy(array) for array in stacked(arrangements, layout).values())
 
 

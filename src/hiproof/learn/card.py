@@ -1,4 +1,6 @@
-"""What a training run leaves beside its weights: the curve as a picture and the model card as JSON and Markdown."""
+"""What a training run leaves beside its weights: the curve as a picture and the model card as JSON
+and Markdown.
+"""
 
 from __future__ import annotations
 
@@ -17,20 +19,31 @@ def write_curve(history: list[dict], path: Path) -> None:
     FigureCanvasAgg(figure)
     epochs = [record["epoch"] for record in history]
     left = figure.add_subplot()
-    left.plot(epochs, [record["loss"] for record in history], color="tab:grey", label="training loss")
+    left.plot(
+        epochs, [record["loss"] for record in history], color="tab:grey", label="training loss"
+    )
     left.set(xlabel="epoch", ylabel="loss")
     right = left.twinx()
     for name, colour in (("balanced_accuracy", "tab:blue"), ("mean_iou", "tab:orange")):
-        right.plot(epochs, [record[name] for record in history], color=colour, label=name.replace("_", " "))
+        right.plot(
+            epochs, [record[name] for record in history], color=colour, label=name.replace("_", " ")
+        )
     right.set(ylim=(0, 1), ylabel="validation")
     figure.legend(loc="outside upper center", ncols=3)
     figure.savefig(path, dpi=110)
 
 
 def write_card(
-    folder: Path, description: str, settings: dict, history: list[dict], best_epoch: int, made_by: dict
+    folder: Path,
+    description: str,
+    settings: dict,
+    history: list[dict],
+    best_epoch: int,
+    made_by: dict,
 ) -> None:
-    """`model_card.json` and `model_card.md`: data, settings, figures of the best epoch, and what trained it."""
+    """`model_card.json` and `model_card.md`: data, settings, figures of the best epoch, and what
+    trained it.
+    """
     best = next(record for record in history if record["epoch"] == best_epoch)
     card = {
         "hiproof": __version__,
@@ -48,20 +61,25 @@ def write_card(
 def card_text(card: dict) -> str:
     """The model card as Markdown."""
     validation = card["validation"]
-    recalls = "\n".join(f"| {name} | {value:.3f} |" for name, value in validation["recalls"].items())
+    recalls = "\n".join(
+        f"| {name} | {value:.3f} |" for name, value in validation["recalls"].items()
+    )
     settings = "\n".join(f"| {name} | {value} |" for name, value in card["settings"].items())
     return f"""# Model card: roof types
 
-PointNet++ (four set abstractions, two feature propagations) that labels every point of a building's airborne LiDAR
-cloud with a roof type or not-roof, and names the building's type.
+PointNet++ (four set abstractions, two feature propagations) that labels every point of a building's
+airborne LiDAR cloud with a roof type or not-roof, and names the building's type.
 
 - **Data**: {card["data"]}
-- **Trained on**: {card["trained_on"]["device"]}, {card["trained_on"]["hours"]} hours, {card["clouds_shown"]} clouds shown
+- **Trained on**: {card["trained_on"]["device"]}, {card["trained_on"]["hours"]} hours,
+  {card["clouds_shown"]} clouds shown
 - **Best epoch by validation**: {card["best_epoch"]}
-- **Validation**: balanced accuracy {validation["balanced_accuracy"]:.3f}, point mean IoU {validation["mean_iou"]:.3f}
-- **Meant for**: clouds of one building, 10 points or more, about 1-20 points/m2, in metres, Z up. Its probabilities are
-  the prior of the choice of type, never the last word.
-- **Not meant for**: whole towns in one cloud, indoor or terrestrial scans, roofs that are none of the types.
+- **Validation**: balanced accuracy {validation["balanced_accuracy"]:.3f}, point mean IoU
+  {validation["mean_iou"]:.3f}
+- **Meant for**: clouds of one building, 10 points or more, about 1-20 points/m2, in metres, Z up.
+  Its probabilities are the prior of the choice of type, never the last word.
+- **Not meant for**: whole towns in one cloud, indoor or terrestrial scans, roofs that are none of
+  the types.
 
 | type | recall in validation |
 | --- | --- |

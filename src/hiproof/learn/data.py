@@ -1,4 +1,6 @@
-"""Where training clouds come from: the simulator, The Hague's real shapes scanned by it, or RoofN3D's real clouds."""
+"""Where training clouds come from: the simulator, The Hague's real shapes scanned by it, or
+RoofN3D's real clouds.
+"""
 
 from __future__ import annotations
 
@@ -18,9 +20,11 @@ from .sample import TRAINING, Sample, Source
 from .shapes import Shape, read_shapes
 
 DENSITY = (1.0, 20.0)  # points/m2, from the sparsest to the densest of national surveys
-POINTS = (60, 1500)  # points of a training cloud: fewer show no roof, more are thinned away by the network anyway
+# points of a training cloud: fewer show no roof, more are thinned away by the network anyway
+POINTS = (60, 1500)
 ANNEX_SHARE = 0.35  # of the simulated buildings have an annex
-FIRST_SOURCE_SHARE = 0.7  # of a mixture's clouds: the main source teaches most, the others what it lacks
+# of a mixture's clouds: the main source teaches most, the others what it lacks
+FIRST_SOURCE_SHARE = 0.7
 
 
 @dataclass(frozen=True)
@@ -43,16 +47,20 @@ class Simulated:
         type = int(rng.integers(len(self.types)))
         while True:
             building = training_house(rng, self.types[type], self.annex_share)
-            cloud = scan(building, rng, random_settings(rng, building.outline.area, DENSITY, POINTS, None))
+            cloud = scan(
+                building, rng, random_settings(rng, building.outline.area, DENSITY, POINTS, None)
+            )
             if usable(cloud):
                 return as_sample(cloud, self.types, type, rng)
 
 
 @dataclass(frozen=True)
 class Scanned:
-    """Solids of a CityJSON file with a roofType under the same scanner; types are drawn evenly, then their shapes.
+    """Solids of a CityJSON file with a roofType under the same scanner; types are drawn evenly,
+    then their shapes.
 
-    Training never sees the buildings held out for validation and test (a share by the hash of the building's id).
+    Training never sees the buildings held out for validation and test (a share by the hash of the
+    building's id).
     """
 
     types: tuple[str, ...]
@@ -64,7 +72,8 @@ class Scanned:
     def description(self) -> str:
         held_out = sum(shape.held_out for shape in self.shapes)
         return (
-            f"{len(self.shapes) - held_out} real shapes of {self.path.name} under the simulated scanner "
+            f"{len(self.shapes) - held_out} real shapes of {self.path.name} under the simulated "
+            "scanner "
             f"({held_out} held out by building), seed {self.seed}"
         )
 
@@ -113,7 +122,9 @@ def usable(cloud: Scan) -> bool:
 
 
 def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Generator) -> Sample:
-    """A scan with its labels counted in `types`, thinned to the most points a training cloud may have."""
+    """A scan with its labels counted in `types`, thinned to the most points a training cloud may
+    have.
+    """
     if len(cloud) > POINTS[1]:
         cloud = cloud.chosen(np.sort(rng.choice(len(cloud), POINTS[1], replace=False)))
     index = np.full(len(ROOF_TYPES) + 1, NOT_ROOF)
@@ -123,19 +134,27 @@ def as_sample(cloud: Scan, types: tuple[str, ...], type: int, rng: np.random.Gen
 
 
 def open_source(data: str | list[str], types: tuple[str, ...] = (), seed: int = 1) -> Source:
-    """The source(s) that `data` names: "simulated", "denhaag:FILE" or "roofn3d:DIR"; `types` empty means all of them.
+    """The source(s) that `data` names: "simulated", "denhaag:FILE" or "roofn3d:DIR";
+
+    `types` empty means all of them.
 
     Raises InputError for names, types or files that cannot be used.
     """
     unknown = [name for name in types if name not in ROOF_TYPES]
     if unknown:
-        raise InputError(f"expected roof types among {', '.join(ROOF_TYPES)}, got {', '.join(unknown)}")
+        raise InputError(
+            f"expected roof types among {', '.join(ROOF_TYPES)}, got {', '.join(unknown)}"
+        )
     names = [data] if isinstance(data, str) else list(data)
     if not names:
-        raise InputError("expected training data, got none; give simulated, denhaag:FILE or roofn3d:DIR")
+        raise InputError(
+            "expected training data, got none; give simulated, denhaag:FILE or roofn3d:DIR"
+        )
     sources = tuple(open_one(name, tuple(types), seed) for name in names)
     if any(source.types != sources[0].types for source in sources):
-        raise InputError("expected data of the same roof types to be mixed; name the types with --types")
+        raise InputError(
+            "expected data of the same roof types to be mixed; name the types with --types"
+        )
     return sources[0] if len(sources) == 1 else Mixture(sources, seed)
 
 
@@ -146,9 +165,16 @@ def open_one(name: str, types: tuple[str, ...], seed: int) -> Source:
     if kind == "denhaag" and path:
         types = types or ROOF_TYPES
         shapes = tuple(shape for shape in read_shapes(Path(path)) if shape.type in types)
-        if not {shape.type for shape in shapes if not shape.held_out} or all(not shape.held_out for shape in shapes):
-            raise InputError(f"expected solids with a known roofType in {path}, got too few to train and validate on")
+        if not {shape.type for shape in shapes if not shape.held_out} or all(
+            not shape.held_out for shape in shapes
+        ):
+            raise InputError(
+                f"expected solids with a known roofType in {path}, got too few to train and "
+                "validate on"
+            )
         return Scanned(types, seed, Path(path), shapes)
     if kind == "roofn3d" and path:
         return RoofN3D.open(Path(path), types, seed)
-    raise InputError(f"expected training data as simulated, denhaag:FILE or roofn3d:DIR, got {name!r}")
+    raise InputError(
+        f"expected training data as simulated, denhaag:FILE or roofn3d:DIR, got {name!r}"
+    )

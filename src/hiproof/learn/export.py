@@ -19,8 +19,8 @@ from .network import RoofNetwork
 def export(network: RoofNetwork, path: str | Path) -> Path:
     """Write `network` as ONNX to `path`, with its types and layout inside.
 
-    Weights keep their names, so that they can be read back from the file. The graph takes the arrays of
-    `segment.arrange.Arrangement`, flat over any number of buildings.
+    Weights keep their names, so that they can be read back from the file. The graph takes the
+    arrays of `segment.arrange.Arrangement`, flat over any number of buildings.
     """
     import onnx
 
@@ -31,9 +31,16 @@ def export(network: RoofNetwork, path: str | Path) -> Path:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         torch.onnx.export(
-            network, example_batch(network.settings.layout), str(path), dynamo=False, do_constant_folding=False, opset_version=17,
-            input_names=list(INPUT_NAMES), output_names=list(OUTPUT_NAMES), dynamic_axes=flat,
-        )  # fmt: skip
+            network,
+            example_batch(network.settings.layout),
+            str(path),
+            dynamo=False,
+            do_constant_folding=False,
+            opset_version=17,
+            input_names=list(INPUT_NAMES),
+            output_names=list(OUTPUT_NAMES),
+            dynamic_axes=flat,
+        )
     model = onnx.load(path)
     metadata = {
         "format": FORMAT,
@@ -55,13 +62,17 @@ def read_weights(network: RoofNetwork, path: str | Path) -> None:
 
     try:
         tensors = onnx.load(path).graph.initializer
-        stored = {tensor.name: torch.tensor(onnx.numpy_helper.to_array(tensor)) for tensor in tensors}
+        stored = {
+            tensor.name: torch.tensor(onnx.numpy_helper.to_array(tensor)) for tensor in tensors
+        }
         own = {name: stored.get(name, value) for name, value in network.state_dict().items()}
         if missing := [name for name, _ in network.named_parameters() if name not in stored]:
             raise ValueError(f"it has no {missing[0]}")
         network.load_state_dict(own)
     except Exception as error:
         raise InputError(
-            f"expected {path} to hold the weights of such a network, got: {str(error).splitlines()[0]}; "
-            "name a file that `hiproof train` wrote for the same types, or start from random weights"
+            f"expected {path} to hold the weights of such a network, got: "
+            f"{str(error).splitlines()[0]}; "
+            "name a file that `hiproof train` wrote for the same types, or start from random "
+            "weights"
         ) from error

@@ -1,5 +1,6 @@
-"""Houses for training, closer to real ones than the tests' clean types: annexes, rows, sheds, cut corners, one-sided
-hips."""
+"""Houses for training, closer to real ones than the tests' clean types: annexes, rows, sheds, cut
+corners, one-sided hips.
+"""
 
 from __future__ import annotations
 
@@ -22,8 +23,11 @@ OVERLAP_M = 0.05  # m that an annex reaches into the house, so that no gap opens
 
 
 def training_house(rng: np.random.Generator, type: str, annex_share: float) -> SimBuilding:
-    """A building of roof `type`: small, long, low and cut by a party wall as real ones are; `annex_share` of them have
-    one or two smaller parts (porch, extension, cross wing) at their sides. The type stays the main roof's."""
+    """A building of roof `type`: small, long, low and cut by a party wall as real ones are;
+
+    `annex_share` of them have one or two smaller parts (porch, extension, cross wing) at their
+    sides. The type stays the main roof's.
+    """
     building = random_building(rng, type)
     main = building.roof.parts[0]
     if type == "gable" and rng.random() < 0.1:
@@ -39,7 +43,9 @@ def training_house(rng: np.random.Generator, type: str, annex_share: float) -> S
     annexes = tuple(annex(rng, main) for _ in range(count))
     if type != "shed" and not annexes and rng.random() < 0.15:
         main = without_a_corner(rng, main)
-    return assemble((main, *annexes), "annexed" if annexes else "single", building.roof.frame.origin)
+    return assemble(
+        (main, *annexes), "annexed" if annexes else "single", building.roof.frame.origin
+    )
 
 
 def with_short_ridge(rng: np.random.Generator, hip: Part) -> Part:
@@ -58,7 +64,9 @@ def lengthened(rng: np.random.Generator, part: Part) -> Part:
 
 
 def resized(rng: np.random.Generator, part: Part) -> Part:
-    """A part down to two fifths of its size (a shed, a garage), and lower than that yet by up to a half."""
+    """A part down to two fifths of its size (a shed, a garage), and lower than that yet by up to a
+    half.
+    """
     size = rng.uniform(0.4, 1.0)
     lower = size * rng.uniform(0.5, 1.0)
     factors = dict.fromkeys(HEIGHTS, lower) | dict.fromkeys(COUNTS, 1.0)
@@ -69,21 +77,31 @@ def resized(rng: np.random.Generator, part: Part) -> Part:
 def without_a_corner(rng: np.random.Generator, part: Part) -> Part:
     """A part of one piece on a plot whose border, oblique to the roof, cuts off a corner."""
     angle = part.kappa + rng.integers(4) * math.pi / 2 + math.radians(rng.uniform(25.0, 65.0))
-    normal, along = np.array([math.cos(angle), math.sin(angle)]), np.array([-math.sin(angle), math.cos(angle)])
+    normal, along = (
+        np.array([math.cos(angle), math.sin(angle)]),
+        np.array([-math.sin(angle), math.cos(angle)]),
+    )
     piece = part.pieces[0]
     corners = np.asarray(piece.outline.exterior.coords) @ normal
     middle = np.array(piece.outline.centroid.coords[0])
     reach = corners.max() - middle @ normal
     border, far = middle + normal * reach * rng.uniform(0.55, 0.9), 100.0
     beyond = shapely.Polygon(
-        [border - far * along, border + far * (normal - along), border + far * (normal + along), border + far * along]
+        [
+            border - far * along,
+            border + far * (normal - along),
+            border + far * (normal + along),
+            border + far * along,
+        ]
     )
     return replace(part, pieces=(replace(piece, outline=piece.outline.difference(beyond)),))
 
 
 def hipped_at_one_end(rng: np.random.Generator, gable: Part) -> Part:
-    """A roof with a hip at one end and a gable wall at the other. It is called a gable: RoofN3D's hips are "two-sided",
-    and the catalogue has nothing nearer."""
+    """A roof with a hip at one end and a gable wall at the other.
+
+    It is called a gable: RoofN3D's hips are "two-sided", and the catalogue has nothing nearer.
+    """
     hip = make_part("hip", random_parameters(rng, "hip"), gable.kappa, gable.translation)
     piece = hip.pieces[0]
     rise_along_ridge = piece.planes[:, :2] @ (math.cos(hip.kappa), math.sin(hip.kappa))
@@ -92,7 +110,9 @@ def hipped_at_one_end(rng: np.random.Generator, gable: Part) -> Part:
 
 
 def annex(rng: np.random.Generator, main: Part) -> Part:
-    """One part against a random side of `main`: under its eave, or level with it and reaching under its roof."""
+    """One part against a random side of `main`: under its eave, or level with it and reaching under
+    its roof.
+    """
     length, width = main.parameters["length"], main.parameters["width"]
     quarters = int(rng.integers(4))
     reach, side = (length / 2, width) if quarters % 2 == 0 else (width / 2, length)
@@ -102,7 +122,9 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
     inside = reach * rng.uniform(0.3, 1.0) if level else OVERLAP_M
     eave = main.translation[2] - (0.0 if level else rng.uniform(0.3, 2.8))
     type = "gable" if level else str(rng.choice(ANNEX_TYPES))
-    parameters = annex_parameters(rng, type, depth + inside, across, main.parameters.get("height", 0.0))
+    parameters = annex_parameters(
+        rng, type, depth + inside, across, main.parameters.get("height", 0.0)
+    )
     along, aside = reach + (depth - inside) / 2, rng.uniform(-0.5, 0.5) * (side - across)
     angle = main.kappa + quarters * math.pi / 2
     x = math.cos(angle) * along - math.sin(angle) * aside
@@ -110,14 +132,18 @@ def annex(rng: np.random.Generator, main: Part) -> Part:
     turn = math.pi / 2 if type == "monopitch" else 0.0
     if turn:
         parameters["length"], parameters["width"] = parameters["width"], parameters["length"]
-    translation = np.array([main.translation[0] + x, main.translation[1] + y, max(eave, LOWEST_EAVE_M)])
+    translation = np.array(
+        [main.translation[0] + x, main.translation[1] + y, max(eave, LOWEST_EAVE_M)]
+    )
     return make_part(type, parameters, angle + turn, translation)
 
 
 def annex_parameters(
     rng: np.random.Generator, type: str, length: float, width: float, limit: float
 ) -> dict[str, float]:
-    """theta_p of an annex `length` (outwards) by `width`, a gable or hip no higher than `limit` unless that is low."""
+    """theta_p of an annex `length` (outwards) by `width`, a gable or hip no higher than `limit`
+    unless that is low.
+    """
     slope = math.tan(math.radians(rng.uniform(15.0, 45.0)))
     parameters = {"length": length, "width": width}
     if type in ("gable", "hip"):

@@ -1,12 +1,13 @@
-"""PointNet++ for roofs: four set abstractions, two feature propagations, a head for points and one for the building.
+"""PointNet++ for roofs: four set abstractions, two feature propagations, a head for points and one
+for the building.
 
-After Qi et al., "PointNet++" (2017), single-scale grouping, with the relative positions divided by the ball's radius as
-in Qian et al., "PointNeXt" (2022). Sampling and grouping happen outside (`segment.arrange`), in the building's own axes,
-so that the graph is a few gathers and products.
+After Qi et al., "PointNet++" (2017), single-scale grouping, with the relative positions divided by
+the ball's radius as in Qian et al., "PointNeXt" (2022). Sampling and grouping happen outside
+(`segment.arrange`), in the building's own axes, so that the graph is a few gathers and products.
 
-Tensors are flat over buildings: a batch of B clouds of N points is (B N, C), and group indices count rows of that flat
-tensor, so the same graph serves one building and many. All sizes but B are constants of the graph: reading them off the
-tensors would take more nodes than the arithmetic.
+Tensors are flat over buildings: a batch of B clouds of N points is (B N, C), and group indices
+count rows of that flat tensor, so the same graph serves one building and many. All sizes but B are
+constants of the graph: reading them off the tensors would take more nodes than the arithmetic.
 """
 
 from __future__ import annotations
@@ -22,7 +23,9 @@ from ..segment.sampling import FEATURES, POSITION_SCALE
 
 @dataclass(frozen=True)
 class NetworkSettings:
-    """Widths of the network: `widths` of the four set abstractions as (first layer, output) pairs, and of the heads."""
+    """Widths of the network: `widths` of the four set abstractions as (first layer, output) pairs,
+    and of the heads.
+    """
 
     types: tuple[str, ...] = ()
     layout: Layout = field(default_factory=Layout)
@@ -44,11 +47,13 @@ class Dense(nn.Module):
 
 
 class SetAbstraction(nn.Module):
-    """PointNet over each group: two layers on (features, relative position / radius), then the maximum.
+    """PointNet over each group: two layers on (features, relative position / radius), then the
+    maximum.
 
-    The first layer is linear in the neighbour's features and in the difference of positions, so it is evaluated once
-    a source and once a centre and subtracted after grouping: the same numbers for a tenth of the products. Its inputs
-    are normalised already, so only the second layer is, after the maximum, where the rows are few.
+    The first layer is linear in the neighbour's features and in the difference of positions, so it
+    is evaluated once a source and once a centre and subtracted after grouping: the same numbers for
+    a tenth of the products. Its inputs are normalised already, so only the second layer is, after
+    the maximum, where the rows are few.
     """
 
     def __init__(self, inputs: int, hidden: int, outputs: int):
@@ -59,7 +64,9 @@ class SetAbstraction(nn.Module):
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, x, position, centres, group):
-        """Features (rows, C) and positions over the radius (rows, 3) to the centres' features (S, outputs)."""
+        """Features (rows, C) and positions over the radius (rows, 3) to the centres' features (S,
+        outputs).
+        """
         source = self.features(x) + self.position(position)
         grouped = torch.relu(gathered(source, group) - self.position(centres).unsqueeze(1))
         return torch.relu(self.norm(self.second(grouped).max(dim=1)[0]))
@@ -68,17 +75,25 @@ class SetAbstraction(nn.Module):
 class FeaturePropagation(nn.Module):
     """Coarse features interpolated at finer points, joined with the fine ones, through a layer.
 
-    The layer's coarse half is applied before interpolation, with which it commutes and where the rows are few.
+    The layer's coarse half is applied before interpolation, with which it commutes and where the
+    rows are few.
     """
 
     def __init__(self, coarse: int, fine: int, outputs: int):
         super().__init__()
-        self.coarse, self.fine = nn.Linear(coarse, outputs, bias=False), nn.Linear(fine, outputs, bias=False)
+        self.coarse, self.fine = (
+            nn.Linear(coarse, outputs, bias=False),
+            nn.Linear(fine, outputs, bias=False),
+        )
         self.norm = nn.BatchNorm1d(outputs)
 
     def forward(self, coarse, fine, index, weight):
-        """Coarse (rows, C) and fine features (S, D), interpolation `index`, `weight` (S, 3): (S, outputs)."""
-        joined = (gathered(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(dim=1) + self.fine(fine)
+        """Coarse (rows, C) and fine features (S, D), interpolation `index`, `weight` (S, 3): (S,
+        outputs).
+        """
+        joined = (gathered(self.coarse(coarse), index) * weight.unsqueeze(-1)).sum(
+            dim=1
+        ) + self.fine(fine)
         return torch.relu(self.norm(joined))
 
 
@@ -96,7 +111,9 @@ class GlobalAbstraction(nn.Module):
 
 
 class RoofNetwork(nn.Module):
-    """Logits of every point (types, then not-roof last) and of the building's type from arranged clouds."""
+    """Logits of every point (types, then not-roof last) and of the building's type from arranged
+    clouds.
+    """
 
     def __init__(self, settings: NetworkSettings):
         super().__init__()
@@ -113,11 +130,17 @@ class RoofNetwork(nn.Module):
         )
         self.dropout = nn.Dropout(settings.dropout)
         self.point_head = nn.Linear(up[1], classes + 1)
-        self.type_head = nn.Sequential(Dense(inputs[4], 96), nn.Dropout(settings.dropout), nn.Linear(96, classes))
+        self.type_head = nn.Sequential(
+            Dense(inputs[4], 96), nn.Dropout(settings.dropout), nn.Linear(96, classes)
+        )
         self.register_buffer("metres", torch.tensor(POSITION_SCALE))
 
-    def forward(self, features, group1, group2, group3, radii, up_index1, up_index2, up_weight1, up_weight2):
-        """See `segment.arrange.Arrangement`; `features` (B N, 11), indices into flat rows, `radii` (B, 3).
+    def forward(
+        self, features, group1, group2, group3, radii, up_index1, up_index2, up_weight1, up_weight2
+    ):
+        """See `segment.arrange.Arrangement`;
+
+        `features` (B N, 11), indices into flat rows, `radii` (B, 3).
 
         Returns point logits (B N, types + 1) and type logits (B, types).
         """
@@ -130,7 +153,9 @@ class RoofNetwork(nn.Module):
             position = position.reshape(-1, sizes[i], 3)[:, : sizes[i + 1]].reshape(-1, 3)
         building = self.everything(levels[3], position / 10.0, sizes[3])
         around = building.unsqueeze(1).expand(-1, sizes[3], -1).reshape(-1, self.everything.outputs)
-        middle = self.up[0](torch.cat([levels[3], around], dim=-1), levels[1], up_index1, up_weight1)
+        middle = self.up[0](
+            torch.cat([levels[3], around], dim=-1), levels[1], up_index1, up_weight1
+        )
         fine = self.up[1](middle, levels[0], up_index2, up_weight2)
         return self.point_head(self.dropout(fine)), self.type_head(building)
 

@@ -22,8 +22,10 @@ FEWEST_POINTS = 10  # points; the least the network takes
 
 @dataclass(frozen=True)
 class RoofN3D:
-    """All usable buildings: `xyz` (n, 3) float32 and `on_surface` (n,) end to end, cut at `starts` (b + 1), each with
-    its `type_of` (b,) and `held_out` (b,). Training draws types evenly; held-out buildings come in the file's order."""
+    """All usable buildings: `xyz` (n, 3) float32 and `on_surface` (n,) end to end, cut at `starts`
+    (b + 1), each with its `type_of` (b,) and `held_out` (b,). Training draws types evenly; held-out
+    buildings come in the file's order.
+    """
 
     types: tuple[str, ...]
     seed: int
@@ -35,19 +37,28 @@ class RoofN3D:
 
     @property
     def description(self) -> str:
-        return f"RoofN3D, {(~self.held_out).sum()} buildings to train on and {self.held_out.sum()} held out by id"
+        return (
+            f"RoofN3D, {(~self.held_out).sum()} buildings to train on and {self.held_out.sum()} "
+            "held out by id"
+        )
 
     @classmethod
     def open(cls, folder: Path, types: tuple[str, ...] = (), seed: int = 1) -> RoofN3D:
-        """Read both csv files of `folder`. Raises InputError when they are missing, of another layout or too few."""
+        """Read both csv files of `folder`.
+
+        Raises InputError when they are missing, of another layout or too few.
+        """
         for name in (BUILDINGS, SURFACES):
             if not (folder / name).is_file():
                 raise InputError(
-                    f"expected RoofN3D's {name} in {folder}, found none; download it from roofn3d.gis.tu-berlin.de"
+                    f"expected RoofN3D's {name} in {folder}, found none; download it from "
+                    "roofn3d.gis.tu-berlin.de"
                 )
         types = types or TYPES
         clouds, surfaces, kinds, ids = [], [], [], []
-        for record, labels in read_roofn3d_labels(folder / SURFACES, read_roofn3d(folder / BUILDINGS)):
+        for record, labels in read_roofn3d_labels(
+            folder / SURFACES, read_roofn3d(folder / BUILDINGS)
+        ):
             if record.type in types and len(record.points) >= FEWEST_POINTS:
                 clouds.append((record.points - record.points.mean(axis=0)).astype(np.float32))
                 surfaces.append(labels >= 0)
@@ -55,23 +66,38 @@ class RoofN3D:
                 ids.append(record.id)
         held_out = np.array([is_held_out(id) for id in ids], bool)
         if held_out.all() or not held_out.any():
-            raise InputError(f"expected enough RoofN3D buildings in {folder} to train and validate on, got {len(ids)}")
+            raise InputError(
+                f"expected enough RoofN3D buildings in {folder} to train and validate on, got "
+                f"{len(ids)}"
+            )
         starts = np.cumsum([0] + [len(cloud) for cloud in clouds])
-        return cls(types, seed, np.concatenate(clouds), np.concatenate(surfaces), starts, np.array(kinds), held_out)
+        return cls(
+            types,
+            seed,
+            np.concatenate(clouds),
+            np.concatenate(surfaces),
+            starts,
+            np.array(kinds),
+            held_out,
+        )
 
     def sample(self, role: int, index: int) -> Sample:
         """Training cloud drawn by number, or held-out cloud number `index`."""
         if role == TRAINING:
             rng = np.random.default_rng([self.seed, 17, index])
             present = np.unique(self.type_of[~self.held_out])
-            of_type = np.flatnonzero(~self.held_out & (self.type_of == present[rng.integers(len(present))]))
+            of_type = np.flatnonzero(
+                ~self.held_out & (self.type_of == present[rng.integers(len(present))])
+            )
             building = of_type[rng.integers(len(of_type))]
         else:
             held_out = np.flatnonzero(self.held_out)
             building = held_out[index % len(held_out)]
         own = slice(self.starts[building], self.starts[building + 1])
         type = int(self.type_of[building])
-        return Sample(self.xyz[own].astype(float), np.where(self.on_surface[own], type, NOT_ROOF), type)
+        return Sample(
+            self.xyz[own].astype(float), np.where(self.on_surface[own], type, NOT_ROOF), type
+        )
 
 
 def is_held_out(id: str) -> bool:

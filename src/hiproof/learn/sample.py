@@ -12,7 +12,9 @@ TRAINING, VALIDATION, TEST = 1, 2, 3  # roles; their numbers seed what is drawn 
 
 @dataclass(frozen=True)
 class Sample:
-    """One labelled cloud: `xyz` (n, 3) metres, `labels` (n,) index of the roof type or -1 for not-roof, `type` index."""
+    """One labelled cloud: `xyz` (n, 3) metres, `labels` (n,) index of the roof type or -1 for
+    not-roof, `type` index.
+    """
 
     xyz: np.ndarray
     labels: np.ndarray
@@ -20,7 +22,9 @@ class Sample:
 
 
 class Source(Protocol):
-    """A supply of labelled clouds by role (TRAINING, VALIDATION, TEST) and number: the same whenever asked for."""
+    """A supply of labelled clouds by role (TRAINING, VALIDATION, TEST) and number: the same
+    whenever asked for.
+    """
 
     @property
     def types(self) -> tuple[str, ...]: ...

@@ -1,4 +1,6 @@
-"""Real building shapes to scan: the solids of a CityJSON file that carry a CityGML roofType code."""
+"""Real building shapes to scan: the solids of a CityJSON file that carry a CityGML
+roofType code.
+"""
 
 from __future__ import annotations
 
@@ -15,15 +17,20 @@ from ..primitives.catalogue import CATALOGUE
 from ..read.cityjson import features
 from ..read.solids import read_solids
 
-# Types that share a code (both gables) are read as the first, the commoner one; 1120 is a pyramidal broach.
-TYPE_OF_CODE = {CATALOGUE[name].citygml_code: name for name in reversed(CATALOGUE)} | {"1120": "pyramid"}
+# Types that share a code (both gables) are read as the first, the commoner one; 1120 is a pyramidal
+# broach.
+TYPE_OF_CODE = {CATALOGUE[name].citygml_code: name for name in reversed(CATALOGUE)} | {
+    "1120": "pyramid"
+}
 HELD_OUT_PERCENT = 40  # of the buildings: shapes are few, and a test on a fifth would tell little
 SMALLEST_AREA_M2 = 12.0  # m2 of ground; smaller are sheds, whose type is often wrong in the file
 
 
 @dataclass(frozen=True)
 class Shape:
-    """One solid in world coordinates with its roof type, plan `outline`, and whether training may not see it."""
+    """One solid in world coordinates with its roof type, plan `outline`, and whether training may
+    not see it.
+    """
 
     id: str
     type: str
@@ -45,10 +52,13 @@ def read_shapes(path: Path) -> list[Shape]:
         type = TYPE_OF_CODE.get(str(item.get("attributes", {}).get("roofType")))
         outline = ground_outline(solid)
         if type is not None and outline.area >= SMALLEST_AREA_M2:
-            shapes.append(Shape(name, type, solid, outline, is_held_out((item.get("parents") or [name])[0])))
+            shapes.append(
+                Shape(name, type, solid, outline, is_held_out((item.get("parents") or [name])[0]))
+            )
     if not shapes:
         raise InputError(
-            f"expected solids with a known roofType attribute in {path}, got none among {len(solids)} solids"
+            f"expected solids with a known roofType attribute in {path}, got none among "
+            f"{len(solids)} solids"
         )
     return shapes
 
@@ -62,5 +72,9 @@ def ground_outline(solid: Solid) -> shapely.Geometry:
     faces = solid.of_kind(GROUND) or solid.of_kind(ROOF)
     rings = [solid.vertices[list(face.rings[0])][:, :2] for face in faces]
     return shapely.union_all(
-        [shapely.make_valid(shapely.Polygon(ring)) for ring in rings if len(np.unique(ring, axis=0)) > 2]
+        [
+            shapely.make_valid(shapely.Polygon(ring))
+            for ring in rings
+            if len(np.unique(ring, axis=0)) > 2
+        ]
     )

@@ -1,7 +1,8 @@
-"""Training: PointNeXt's recipe (AdamW, cosine schedule, label smoothing), checkpoints, and the best by validation.
+"""Training: PointNeXt's recipe (AdamW, cosine schedule, label smoothing), checkpoints, and the best
+by validation.
 
-Every random draw is named by the seed and a sample's or an epoch's number, so that a run that was killed and resumed
-gives the weights of one that was not.
+Every random draw is named by the seed and a sample's or an epoch's number, so that a run that was
+killed and resumed gives the weights of one that was not.
 """
 
 from __future__ import annotations
@@ -31,11 +32,13 @@ from .sample import TRAINING, VALIDATION, Sample, Source
 
 @dataclass(frozen=True)
 class TrainSettings:
-    """How to train: `samples` clouds are shown in all, each made one `views` times, `epoch` between validations.
+    """How to train: `samples` clouds are shown in all, each made one `views` times, `epoch` between
+    validations.
 
-    A validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the share `warm_up` and
-    falls as a cosine; `average` is the running average's memory a step. `start` names an ONNX file of this kind whose
-    weights to begin with, such as the shipped one, instead of random ones.
+    A validation takes `validation` clouds. `rate` and `decay` are AdamW's, the rate rises over the
+    share `warm_up` and falls as a cosine; `average` is the running average's memory a step. `start`
+    names an ONNX file of this kind whose weights to begin with, such as the shipped one, instead of
+    random ones.
     """
 
     types: tuple[str, ...] = ()
@@ -57,18 +60,22 @@ class TrainSettings:
     augment: AugmentSettings = field(default_factory=AugmentSettings)
 
 
-def train(data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print) -> Path:
-    """Train the network on `data` and write weights, curve, model card and checkpoints to the folder `out`.
+def train(
+    data: str | list[str], out: str | Path, settings: TrainSettings | None = None, report=print
+) -> Path:
+    """Train the network on `data` and write weights, curve, model card and checkpoints to the
+    folder `out`.
 
-    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 70 %).
-    A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX file of the best epoch.
-    Raises InputError for data that cannot be used, OutputError for a folder that cannot be written, SettingsError for
-    a device that is not there or an epoch too short.
+    `data`: "simulated", "denhaag:FILE", "roofn3d:DIR", or a list of these (the first makes up 70
+    %). A checkpoint in `out` is resumed. `report` takes a line after every epoch. Returns the ONNX
+    file of the best epoch. Raises InputError for data that cannot be used, OutputError for a folder
+    that cannot be written, SettingsError for a device that is not there or an epoch too short.
     """
     settings = settings or TrainSettings()
     if settings.epoch < 2 * settings.views or settings.batch < 2:
         raise SettingsError(
-            f"expected an epoch of at least {2 * settings.views} clouds in batches of 2 or more, got {settings.epoch} "
+            f"expected an epoch of at least {2 * settings.views} clouds in batches of 2 or more, "
+            f"got {settings.epoch} "
             f"in batches of {settings.batch}"
         )
     source = open_source(data, settings.types, settings.seed)
@@ -86,7 +93,9 @@ def train(data: str | list[str], out: str | Path, settings: TrainSettings | None
 
 
 class Trainer:
-    """One training run: the network, its running average, optimiser, history, and where they are kept."""
+    """One training run: the network, its running average, optimiser, history, and where they are
+    kept.
+    """
 
     def __init__(self, source: Source, settings: TrainSettings, folder: Path):
         torch.manual_seed(settings.seed)
@@ -98,12 +107,15 @@ class Trainer:
             read_weights(self.network, settings.start)
         self.averaged = RoofNetwork(network).to(self.device).eval()
         self.averaged.load_state_dict(self.network.state_dict())
-        self.optimiser = torch.optim.AdamW(self.network.parameters(), settings.rate, weight_decay=settings.decay)
+        self.optimiser = torch.optim.AdamW(
+            self.network.parameters(), settings.rate, weight_decay=settings.decay
+        )
         self.epoch, self.seconds = 0, 0.0
         self.history: list[dict[str, Any]] = []
         self.best: dict[str, Any] = {"score": -math.inf}
         self.validation = [
-            arranged(source.sample(VALIDATION, index), settings.layout) for index in range(settings.validation)
+            arranged(source.sample(VALIDATION, index), settings.layout)
+            for index in range(settings.validation)
         ]
 
     def run_epoch(self):
@@ -113,7 +125,9 @@ class Trainer:
         self.network.train()
         losses = []
         for number, batch in enumerate(self.batches()):
-            self.set_rate((self.epoch * settings.epoch + number * settings.batch) / settings.samples)
+            self.set_rate(
+                (self.epoch * settings.epoch + number * settings.batch) / settings.samples
+            )
             losses.append(self.step(batch))
             self.update_average(self.epoch * settings.epoch // settings.batch + number)
         self.epoch += 1
@@ -121,7 +135,8 @@ class Trainer:
         self.history.append({"epoch": self.epoch, "loss": float(np.mean(losses))})
 
     def batches(self):
-        """Yield the epoch's batches: fresh clouds first, then the same again in another order and other symmetries.
+        """Yield the epoch's batches: fresh clouds first, then the same again in another order and
+        other symmetries.
 
         A last batch of a single cloud is left out: it has no statistics to normalise by.
         """
@@ -130,7 +145,8 @@ class Trainer:
         clouds = []
         for index in range(0, fresh - 1, settings.batch):
             batch = [
-                self.training_cloud(self.epoch * fresh + i) for i in range(index, min(index + settings.batch, fresh))
+                self.training_cloud(self.epoch * fresh + i)
+                for i in range(index, min(index + settings.batch, fresh))
             ]
             clouds += batch
             yield batch
@@ -141,7 +157,9 @@ class Trainer:
                 yield [turned(clouds[i], rng) for i in order[index : index + settings.batch]]
 
     def training_cloud(self, index: int):
-        """The arranged cloud number `index`, varied at random by that number, with its points' labels and its type."""
+        """The arranged cloud number `index`, varied at random by that number, with its points'
+        labels and its type.
+        """
         rng = np.random.default_rng([self.settings.seed, 7, index])
         sample = self.source.sample(TRAINING, index)
         xyz, labels = varied(sample.xyz, sample.labels, rng, self.settings.augment)
@@ -167,18 +185,28 @@ class Trainer:
         told = np.concatenate([cloud[1] for cloud in clouds])
         labels = torch.from_numpy(np.where(told < 0, len(self.source.types), told).astype(np.int64))
         types = torch.tensor([cloud[2] for cloud in clouds])
-        return tuple(array.to(self.device) for array in inputs), labels.to(self.device), types.to(self.device)
+        return (
+            tuple(array.to(self.device) for array in inputs),
+            labels.to(self.device),
+            types.to(self.device),
+        )
 
     def set_rate(self, progress: float):
         """Linear warm-up, then a cosine to zero."""
         warm = self.settings.warm_up
-        share = progress / warm if progress < warm else 0.5 * (1 + math.cos(math.pi * (progress - warm) / (1 - warm)))
+        share = (
+            progress / warm
+            if progress < warm
+            else 0.5 * (1 + math.cos(math.pi * (progress - warm) / (1 - warm)))
+        )
         for group in self.optimiser.param_groups:
             group["lr"] = self.settings.rate * max(share, 1e-3)
 
     @torch.no_grad()
     def update_average(self, steps: int):
-        """Exponential running average of weights and statistics, its memory short in the first of all `steps`."""
+        """Exponential running average of weights and statistics, its memory short in the first of
+        all `steps`.
+        """
         keep = min(self.settings.average, (1 + steps) / (10 + steps))
         state = self.network.state_dict()
         for name, value in self.averaged.state_dict().items():
@@ -192,7 +220,9 @@ class Trainer:
         """Score the averaged weights and keep them if they are the best so far."""
         told_points, true_points, told, true = [], [], [], []
         for start in range(0, len(self.validation), self.settings.batch):
-            inputs, labels, types = self.tensors(self.validation[start : start + self.settings.batch])
+            inputs, labels, types = self.tensors(
+                self.validation[start : start + self.settings.batch]
+            )
             point_logits, type_logits = self.averaged(*inputs)
             told_points.append(point_logits.argmax(1).cpu())
             told.append(type_logits.argmax(1).cpu())
@@ -200,9 +230,15 @@ class Trainer:
             true.append(types.cpu())
         names = self.source.types
         types = Scores.of(torch.cat(true).numpy(), torch.cat(told).numpy(), names)
-        points = Scores.of(torch.cat(true_points).numpy(), torch.cat(told_points).numpy(), (*names, "not roof"))
+        points = Scores.of(
+            torch.cat(true_points).numpy(), torch.cat(told_points).numpy(), (*names, "not roof")
+        )
         record = self.history[-1]
-        record |= {"balanced_accuracy": types.balanced_accuracy, "mean_iou": points.mean_iou, "recalls": types.recalls}
+        record |= {
+            "balanced_accuracy": types.balanced_accuracy,
+            "mean_iou": points.mean_iou,
+            "recalls": types.recalls,
+        }
         score = types.balanced_accuracy + points.mean_iou
         if score > self.best["score"]:
             weights = {name: value.clone() for name, value in self.averaged.state_dict().items()}
@@ -220,7 +256,10 @@ class Trainer:
         os.replace(partial, self.folder / "checkpoint.pt")
 
     def resume(self):
-        """Go on from the folder's checkpoint if there is one. Raises InputError if it is of another network."""
+        """Go on from the folder's checkpoint if there is one.
+
+        Raises InputError if it is of another network.
+        """
         path = self.folder / "checkpoint.pt"
         if not path.exists():
             return
@@ -233,7 +272,8 @@ class Trainer:
             self.optimiser.load_state_dict(state["optimiser"])
         except Exception as error:
             raise InputError(
-                f"expected {path} to be a checkpoint of this training, got: {str(error).splitlines()[0]}; "
+                f"expected {path} to be a checkpoint of this training, got: "
+                f"{str(error).splitlines()[0]}; "
                 "train into another folder or remove it"
             ) from error
         self.epoch, self.seconds = state["epoch"], state["seconds"]
@@ -258,8 +298,10 @@ class Trainer:
         """Progress in one line."""
         last, settings = self.history[-1], self.settings
         return (
-            f"epoch {self.epoch}/{math.ceil(settings.samples / settings.epoch)}  loss {last['loss']:.3f}  "
-            f"balanced accuracy {last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f}  "
+            f"epoch {self.epoch}/{math.ceil(settings.samples / settings.epoch)}  loss "
+            f"{last['loss']:.3f}  "
+            f"balanced accuracy {last['balanced_accuracy']:.3f}  point mIoU {last['mean_iou']:.3f} "
+            " "
             f"lowest recall {min(last['recalls'].values()):.3f}  {self.seconds / 60:.1f} min"
         )
 
@@ -277,10 +319,16 @@ def arranged(sample: Sample, layout: Layout):
 
 
 def chosen_device(name: str) -> torch.device:
-    """The device asked for; "auto" takes a GPU where there is one. Raises SettingsError when it is absent."""
+    """The device asked for;
+
+    "auto" takes a GPU where there is one. Raises SettingsError when it is absent.
+    """
     available = torch.cuda.is_available()
     if name == "cuda" and not available:
-        raise SettingsError("expected a CUDA GPU for --device cuda, but PyTorch finds none; use --device cpu or auto")
+        raise SettingsError(
+            "expected a CUDA GPU for --device cuda, but PyTorch finds none; use --device cpu or "
+            "auto"
+        )
     if name not in ("auto", "cpu", "cuda"):
         raise SettingsError(f"expected the device to be one of auto, cpu, cuda, got {name!r}")
     return torch.device("cuda" if name == "cuda" or (name == "auto" and available) else "cpu")

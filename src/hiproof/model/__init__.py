@@ -1,4 +1,6 @@
-"""The frozen values handed from stage to stage. Arrays are float64; plan geometry is shapely; frames are in the names.
+"""The frozen values handed from stage to stage.
+
+Arrays are float64; plan geometry is shapely; frames are in the names.
 
 inputs      point clouds and footprints
 roof        pieces, parts, roofs: a roof is a max of mins of planes

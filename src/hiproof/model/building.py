@@ -18,12 +18,17 @@ from .shown import shown_areas, shown_m2
 from .solid import Solid
 
 METHODS: dict[str, Callable[..., Any]] = {}
-"""Functions of the packages above that methods of a Building call. `hiproof/__init__.py` registers them by name."""
+"""Functions of the packages above that methods of a Building call.
+
+`hiproof/__init__.py` registers them by name.
+"""
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How well a model stands for its points; metres unless named otherwise, NaN where it cannot be told."""
+    """How well a model stands for its points; metres unless named otherwise, NaN where it cannot be
+    told.
+    """
 
     points: int = 0
     density: float = float("nan")
@@ -39,7 +44,8 @@ class Quality:
 
 @dataclass(frozen=True)
 class Model:
-    """What was built of a building: its `roof` in a local frame and the `solid` that it closes, in world coordinates.
+    """What was built of a building: its `roof` in a local frame and the `solid` that it closes, in
+    world coordinates.
 
     `compose` says how, None for the defaults: a changed building is composed as it was.
     """
@@ -55,19 +61,26 @@ class Model:
 
     @property
     def main(self) -> int:
-        """Index of the main part: the one that shows the largest area. Its type is the building's."""
+        """Index of the main part: the one that shows the largest area.
+
+        Its type is the building's.
+        """
         return self.shown_m2.index(max(self.shown_m2))
 
 
 @dataclass(frozen=True)
 class Building:
-    """Everything known of one building after reconstruction; `solid` and `terrain_intersection` in world coordinates.
+    """Everything known of one building after reconstruction;
 
-    `built` is its model, None when `status.is_model` is false; `model`, `roof` and `solid` are there without asking, or raise
-    NoModelError. `detail` is the sentence that explains the status for this building. `grade` says how good the model
-    is by its points, None where it was not measured. `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds (m, 3) closed
-    lines. `recognised` are the network's probabilities by roof type, `types` those after the fits, where a choice was made. `footprint` (world) and `attributes`
-    are the input's own; `shift` (m) is how far the footprint was moved onto its roof.
+    `solid` and `terrain_intersection` in world coordinates.
+
+    `built` is its model, None when `status.is_model` is false; `model`, `roof` and `solid` are
+    there without asking, or raise NoModelError. `detail` is the sentence that explains the status
+    for this building. `grade` says how good the model is by its points, None where it was not
+    measured. `ground_source` names where `z_ground` (world) came from; `terrain_intersection` holds
+    (m, 3) closed lines. `recognised` are the network's probabilities by roof type, `types` those
+    after the fits, where a choice was made. `footprint` (world) and `attributes` are the input's
+    own; `shift` (m) is how far the footprint was moved onto its roof.
     """
 
     id: str
@@ -91,14 +104,16 @@ class Building:
         """Roof and solid. Raises NoModelError, which says why, for a building that has none.
 
         >>> from hiproof.status import Status
-        >>> Building("shed", Status.NO_POINTS).model
-        Traceback (most recent call last):
-        hiproof.errors.NoModelError: expected a building with a model, got shed without one (no model: no usable points inside \
-the footprint; add a cloud that covers it); `built` is None there
+        >>> try:
+        ...     Building("shed", Status.NO_POINTS).model
+        ... except NoModelError as error:
+        ...     print(str(error)[:54])
+        expected a building with a model, got shed without one
         """
         if self.built is None:
             raise NoModelError(
-                f"expected a building with a model, got {self.id} without one ({self.detail or self.status.value}); "
+                f"expected a building with a model, got {self.id} without one "
+                f"({self.detail or self.status.value}); "
                 "`built` is None there"
             )
         return self.built
@@ -130,51 +145,65 @@ the footprint; add a cloud that covers it); `built` is None there
         >>> import hiproof
         >>> x, y = np.meshgrid(np.arange(0.25, 10, 0.5), np.arange(0.25, 6, 0.5))
         >>> box = shapely.box(0, 0, 10, 6)
-        >>> level = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), np.full(x.size, 5.0)]), box)
+        >>> level = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), np.full(x.size,
+        ...     5.0)]), box)
         >>> round(level.volume / (5.0 - level.z_ground))
         60
         """
         return self.solid.volume
 
     def shown_areas(self) -> list[shapely.Geometry]:
-        """Where each part shows, in world coordinates; empty where others hide all of it, none without a model.
+        """Where each part shows, in world coordinates; empty where others hide all of it, none
+        without a model.
 
         >>> from hiproof import build
         >>> ring = [[0, 0], [10, 0], [10, 6], [0, 6]]
         >>> flat = {"type": "flat", "parameters": {"width": 6, "length": 10}, "position": [5, 3, 4]}
         >>> hut = {"type": "flat", "parameters": {"width": 4, "length": 4}, "position": [9, 3, 6]}
-        >>> record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring], "parts": [flat, hut]}
+        >>> record = {"id": "a", "origin": [0, 0, 0], "z_ground": 0, "outline": [ring],
+        ...     "parts": [flat, hut]}
         >>> [area.area for area in build(record).shown_areas()]
         [48.0, 12.0]
         """
         return [] if self.built is None else shown_areas(self.roof, self.solid)
 
     def with_part(self, index: int, **change: Any) -> Building:
-        """The building with part `index` changed, or with one more part where `index` is the number of parts.
+        """The building with part `index` changed, or with one more part where `index` is the number
+        of parts.
 
-        A change names any of `type`, `ridge_height` and `eave_height` (world metres), `position` (x, y of the rectangle's
-        centre and z of the lowest eave, about `roof.frame.origin`), `rotation` (degrees, of the length from the x axis),
-        `outlines` (rings of the polygons that it roofs) and parameters of the type by name (metres, degrees). Another type
-        keeps rectangle, eave and rise; a part that is moved or resized roofs what its rectangle covers. Solids are composed as the
-        building's was; figures of the earlier model do not stay. Raises InputError for what makes no roof, CompositionError for what makes no solid.
+        A change names any of `type`, `ridge_height` and `eave_height` (world metres), `position`
+        (x, y of the rectangle's centre and z of the lowest eave, about `roof.frame.origin`),
+        `rotation` (degrees, of the length from the x axis), `outlines` (rings of the polygons that
+        it roofs) and parameters of the type by name (metres, degrees). Another type keeps
+        rectangle, eave and rise; a part that is moved or resized roofs what its rectangle covers.
+        Solids are composed as the building's was; figures of the earlier model do not stay. Raises
+        InputError for what makes no roof, CompositionError for what makes no solid.
 
         >>> import hiproof
         >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
-        >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)]))
+        >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(),
+        ...     5 - 0.5 * abs(y.ravel() - 2.75)]))
         >>> house.with_part(0, type="hip", ridge_height=6.0).type
         'hip'
         """
         return METHODS["with_part"](self, index, **change)
 
     def without_part(self, index: int) -> Building:
-        """The building without part `index`; what it roofed alone is roofed by the part beside it. Raises as `with_part`."""
+        """The building without part `index`; what it roofed alone is roofed by the part beside it.
+
+        Raises as `with_part`.
+        """
         return METHODS["without_part"](self, index)
 
-    def refit(self, points: np.ndarray, fixed: dict[int, tuple[str, ...]] | None = None) -> Building:
-        """The building with all heights, pitches and inner lengths of its parts fitted to `points` (n, 3) world metres.
+    def refit(
+        self, points: np.ndarray, fixed: dict[int, tuple[str, ...]] | None = None
+    ) -> Building:
+        """The building with all heights, pitches and inner lengths of its parts fitted to `points`
+        (n, 3) world metres.
 
-        Types, rectangles and what `fixed` names (parameters by part, "z" the position's height) stay as they are. The
-        quality and grade are measured on the points. Raises FitError for fewer than three points inside the outline.
+        Types, rectangles and what `fixed` names (parameters by part, "z" the position's height)
+        stay as they are. The quality and grade are measured on the points. Raises FitError for
+        fewer than three points inside the outline.
         """
         return METHODS["refit"](self, points, fixed)
 

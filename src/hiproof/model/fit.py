@@ -14,10 +14,11 @@ from .roof import Part, Roof
 class Fit:
     """One primitive fitted to points: the outcome of `fit_roof`.
 
-    `parameters` theta_p by name in metres, `kappa` rad, `translation` T_L (3,) relative to `global_translation`
-    T_G (3,), `sigma` standard deviations by name (parameters, "kappa", "t_x", "t_y", "t_z") where points tell them, `bic`
-    of the chosen type and `bics` of every type tried (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and
-    `faces` (vertex indices, counter-clockwise from above) are the roof surfaces in the frame of the points given.
+    `parameters` theta_p by name in metres, `kappa` rad, `translation` T_L (3,) relative to
+    `global_translation` T_G (3,), `sigma` standard deviations by name (parameters, "kappa", "t_x",
+    "t_y", "t_z") where points tell them, `bic` of the chosen type and `bics` of every type tried
+    (lower is better), `value` the objective at the optimum. `vertices` (n, 3) and `faces` (vertex
+    indices, counter-clockwise from above) are the roof surfaces in the frame of the points given.
     """
 
     type: str
@@ -39,7 +40,10 @@ class Fit:
     faces: tuple[tuple[int, ...], ...]
 
     def height_at(self, xy: np.ndarray) -> np.ndarray:
-        """Roof height (n,) at `xy` (n, 2), both in the frame of the points given; NaN outside the outline."""
+        """Roof height (n,) at `xy` (n, 2), both in the frame of the points given;
+
+        NaN outside the outline.
+        """
         frame = LocalFrame(self.global_translation)
         roof = Roof((self.part,), self.part.pieces[0].outline, frame)
         return roof.height_at(frame.to_local(np.asarray(xy, float))) + self.global_translation[2]

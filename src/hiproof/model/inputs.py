@@ -14,9 +14,11 @@ from ..frames import METRES, Units
 
 @dataclass(frozen=True)
 class PointCloud:
-    """Points of some files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a pyproj CRS or None.
+    """Points of some files: `xyz` (n, 3) world metres, `classification` (n,) or None, `crs` a
+    pyproj CRS or None.
 
-    World metres are the files' coordinates times their units, `units`: of a CRS in feet they are not its coordinates.
+    World metres are the files' coordinates times their units, `units`: of a CRS in feet they are
+    not its coordinates.
     """
 
     xyz: np.ndarray
@@ -35,25 +37,33 @@ class PointCloud:
 
 
 def as_xyz(points: Any) -> np.ndarray:
-    """Points as float64 (n, 3), none as (0, 3). Raises InputError for another shape: columns taken for rows make a roof of anything."""
+    """Points as float64 (n, 3), none as (0, 3).
+
+    Raises InputError for another shape: columns taken for rows make a roof of anything.
+    """
     try:
         xyz = np.asarray(points, float)
     except (TypeError, ValueError):
         raise InputError(
-            f"expected points of shape (n, 3), got {type(points).__name__}; pass x, y, z as columns of one array"
+            f"expected points of shape (n, 3), got {type(points).__name__}; pass x, y, z as "
+            "columns of one array"
         ) from None
     if xyz.size == 0:
         return np.zeros((0, 3))
     if xyz.ndim != 2 or xyz.shape[1] != 3:
-        raise InputError(f"expected points of shape (n, 3), got {xyz.shape}; pass x, y, z as columns")
+        raise InputError(
+            f"expected points of shape (n, 3), got {xyz.shape}; pass x, y, z as columns"
+        )
     return xyz
 
 
 @dataclass(frozen=True)
 class Footprint:
-    """One building asked for: a plan polygon in world coordinates (empty if unusable) and what the user knew of it.
+    """One building asked for: a plan polygon in world coordinates (empty if unusable) and what the
+    user knew of it.
 
-    `shift` (x, y in m) is how far it lies beside its roof where that is known; (0, 0) where it is not.
+    `shift` (x, y in m) is how far it lies beside its roof where that is known; (0, 0) where it is
+    not.
     """
 
     id: str

@@ -1,6 +1,7 @@
 """A roof is a max of mins of planes. Over the plan,
 
-z(x, y) = max over pieces whose outline holds (x, y)  of  min over that piece's planes of  a x + b y + c
+z(x, y) = max over pieces whose outline holds (x, y) of min over that piece's planes of a x + b y +
+c
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from ..frames import LocalFrame
 
 @dataclass(frozen=True)
 class Piece:
-    """Where `outline` covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the outline's frame."""
+    """Where `outline` covers, the lower envelope of `planes` (k, 3): z = a x + b y + c, in the
+    outline's frame.
+    """
 
     outline: shapely.Polygon
     planes: np.ndarray
@@ -33,10 +36,12 @@ class Piece:
 
 @dataclass(frozen=True)
 class Part:
-    """One primitive of a roof: its type (a name of the catalogue, or "free"), parameters and the pieces it covers.
+    """One primitive of a roof: its type (a name of the catalogue, or "free"), parameters and the
+    pieces it covers.
 
-    `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L (3,) in the roof's
-    local frame, `sigma` the standard deviation by parameter name. A saw-tooth has a piece a tooth; all others have one.
+    `parameters` are theta_p by name (metres), `kappa` the rotation about Z (rad), `translation` T_L
+    (3,) in the roof's local frame, `sigma` the standard deviation by parameter name. A saw-tooth
+    has a piece a tooth; all others have one.
     """
 
     type: str
@@ -51,7 +56,9 @@ class Part:
         return float(sum(piece.outline.area for piece in self.pieces))
 
     def height_at(self, xy_local: np.ndarray) -> np.ndarray:
-        """Height (n,) at `xy_local` (n, 2) in the roof's frame; minus infinity beside the part, for roofs are the max of these."""
+        """Height (n,) at `xy_local` (n, 2) in the roof's frame; minus infinity beside the part, for
+        roofs are the max of these.
+        """
         z = np.full(len(xy_local), -np.inf)
         for piece in self.pieces:
             inside = shapely.intersects_xy(piece.outline, xy_local[:, 0], xy_local[:, 1])
@@ -62,7 +69,9 @@ class Part:
 
 @dataclass(frozen=True)
 class Roof:
-    """All parts of one building's roof in the local `frame`, over the plan `outline` (may have holes)."""
+    """All parts of one building's roof in the local `frame`, over the plan `outline` (may have
+    holes).
+    """
 
     parts: tuple[Part, ...]
     outline: shapely.Polygon

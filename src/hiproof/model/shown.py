@@ -1,6 +1,8 @@
-"""Where each part of a roof shows from above: the plan of its surfaces, so that parts share no area and together are the outline.
+"""Where each part of a roof shows from above: the plan of its surfaces, so that parts share no area
+and together are the outline.
 
-A surface that several parts have in common, for they lie in one plane, names one of them: it is cut along their outlines.
+A surface that several parts have in common, for they lie in one plane, names one of them: it is cut
+along their outlines.
 """
 
 from __future__ import annotations
@@ -15,21 +17,28 @@ from ..geometry.rings import enclosed, with_area
 from .roof import Part, Roof
 from .solid import ROOF, Face, Solid
 
-SAME_PLANE_M = 0.005  # equal planes differ by micrometres, and composing moves a vertex by a millimetre
+# equal planes differ by micrometres, and composing moves a vertex by a millimetre
+SAME_PLANE_M = 0.005
 GRID_M = 1e-4  # on which solids are composed, so that areas have no corners of their own
 AREA_DIGITS = 4  # of areas in square metres, as the tables of parts round them
-LEAST_M2 = 0.05  # of what one part has of a common surface; less is a sliver between outlines that miss one another
+# of what one part has of a common surface; less is a sliver between outlines that miss one another
+LEAST_M2 = 0.05
 
 
 def shown_areas(roof: Roof, solid: Solid) -> list[shapely.Geometry]:
     """Where each part shows, in world coordinates; empty where others hide all of it."""
-    united = [with_area(shapely.union_all(areas, grid_size=GRID_M)) for areas in shown_pieces(roof, solid)]
+    united = [
+        with_area(shapely.union_all(areas, grid_size=GRID_M)) for areas in shown_pieces(roof, solid)
+    ]
     return shapely.transform(np.array(united, object), roof.frame.to_world).tolist()
 
 
 def shown_m2(roof: Roof, solid: Solid) -> tuple[float, ...]:
     """Plan area that each part shows, rounded, so that parts which show the same are equal."""
-    return tuple(round(float(shapely.area(pieces).sum()), AREA_DIGITS) for pieces in shown_pieces(roof, solid))
+    return tuple(
+        round(float(shapely.area(pieces).sum()), AREA_DIGITS)
+        for pieces in shown_pieces(roof, solid)
+    )
 
 
 def shown_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
@@ -37,10 +46,14 @@ def shown_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
     local = solid.moved(-roof.frame.origin)
     shown: list[list[shapely.Geometry]] = [[] for _ in roof.parts]
     faces = local.of_kind(ROOF)
-    for face, others in zip(faces, parts_in_plane(faces, local.vertices, planes_of(roof)), strict=True):
+    for face, others in zip(
+        faces, parts_in_plane(faces, local.vertices, planes_of(roof)), strict=True
+    ):
         left = local.plan_of(face)
         for other in others:
-            left, others_own = shared_out(left, drawn(roof.parts[face.part]), drawn(roof.parts[other]))
+            left, others_own = shared_out(
+                left, drawn(roof.parts[face.part]), drawn(roof.parts[other])
+            )
             shown[other].append(others_own)
         shown[face.part].append(left)
     return shown
@@ -49,25 +62,40 @@ def shown_pieces(roof: Roof, solid: Solid) -> list[list[shapely.Geometry]]:
 def planes_of(roof: Roof) -> np.ndarray:
     """All planes of a roof (k, 4): the number of the part, then z = a x + b y + c."""
     parts = enumerate(roof.parts)
-    return np.array([(number, *plane) for number, part in parts for piece in part.pieces for plane in piece.planes])
+    return np.array(
+        [
+            (number, *plane)
+            for number, part in parts
+            for piece in part.pieces
+            for plane in piece.planes
+        ]
+    )
 
 
-def parts_in_plane(faces: Sequence[Face], vertices: np.ndarray, planes: np.ndarray) -> list[list[int]]:
-    """Of each of the faces over `vertices` (n, 3) the parts, other than its own, that have a plane in which it lies."""
+def parts_in_plane(
+    faces: Sequence[Face], vertices: np.ndarray, planes: np.ndarray
+) -> list[list[int]]:
+    """Of each of the faces over `vertices` (n, 3) the parts, other than its own, that have a plane
+    in which it lies.
+    """
     if not faces or len(set(planes[:, 0].tolist())) < 2:
         return [[] for _ in faces]
     of_faces = [[vertex for ring in face.rings for vertex in ring] for face in faces]
     corners = vertices[list(chain.from_iterable(of_faces))]
     off = np.abs(corners[:, :2] @ planes[:, 1:3].T + planes[:, 3] - corners[:, 2:])
     lies_in = np.maximum.reduceat(off, [0, *accumulate(map(len, of_faces[:-1]))]) < SAME_PLANE_M
-    return [sorted(set(planes[own, 0].astype(int).tolist()) - {f.part}) for f, own in zip(faces, lies_in, strict=True)]
+    return [
+        sorted(set(planes[own, 0].astype(int).tolist()) - {f.part})
+        for f, own in zip(faces, lies_in, strict=True)
+    ]
 
 
 def shared_out(
     area: shapely.Geometry, own: shapely.Geometry, other: shapely.Geometry
 ) -> tuple[shapely.Geometry, shapely.Geometry]:
-    """What is left of `area` to the part drawn as `own`, and what goes to the one drawn as `other`: where that one alone is
-    drawn, and slivers beside it."""
+    """What is left of `area` to the part drawn as `own`, and what goes to the one drawn as `other`:
+    where that one alone is drawn, and slivers beside it.
+    """
     beyond = without_slivers(shapely.difference(area, own, grid_size=GRID_M))
     others_own = without_slivers(shapely.intersection(beyond, other, grid_size=GRID_M))
     if others_own.is_empty:
@@ -77,12 +105,16 @@ def shared_out(
 
 
 def without_slivers(area: shapely.Geometry, least_m2: float = LEAST_M2) -> shapely.Geometry:
-    """Those polygons of an area that are large enough, without the lines to which others shrank on the grid."""
+    """Those polygons of an area that are large enough, without the lines to which others shrank on
+    the grid.
+    """
     pieces = shapely.get_parts(area)
     polygons = shapely.get_dimensions(pieces) == 2
     return shapely.multipolygons(pieces[polygons & (shapely.area(pieces) >= least_m2)])
 
 
 def drawn(part: Part) -> shapely.Geometry:
-    """The outlines of a part as one area; rounded, an outline may touch itself, and a spike of no width is none."""
+    """The outlines of a part as one area; rounded, an outline may touch itself, and a spike of no
+    width is none.
+    """
     return shapely.union_all(enclosed([piece.outline for piece in part.pieces]))

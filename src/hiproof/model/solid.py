@@ -12,9 +12,11 @@ ROOF, WALL, GROUND = "RoofSurface", "WallSurface", "GroundSurface"
 
 @dataclass(frozen=True)
 class Face:
-    """A planar polygon of a solid: `rings` of vertex indices (outer ring first, counter-clockwise seen from outside).
+    """A planar polygon of a solid: `rings` of vertex indices (outer ring first, counter-clockwise
+    seen from outside).
 
-    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part of a RoofSurface, else -1.
+    `kind` is RoofSurface, WallSurface or GroundSurface; `part` the index of the roof part of a
+    RoofSurface, else -1.
     """
 
     rings: tuple[tuple[int, ...], ...]
@@ -24,9 +26,11 @@ class Face:
 
 @dataclass(frozen=True)
 class Solid:
-    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented outwards.
+    """A closed shell: `vertices` (n, 3), in world coordinates within a Building, `faces` oriented
+    outwards.
 
-    `defects` are (ISO 19107 code, face) of a shell read from a file that its vertices cannot show, such as an open ring.
+    `defects` are (ISO 19107 code, face) of a shell read from a file that its vertices cannot show,
+    such as an open ring.
     """
 
     vertices: np.ndarray
@@ -39,12 +43,17 @@ class Solid:
     @property
     def volume(self) -> float:
         """Volume [m3] by the divergence theorem; positive when the faces point outwards."""
-        from ..geometry.area_vectors import enclosed_volume  # compiled: who needs no volume does without
+        # compiled: who needs no volume does without
+        from ..geometry.area_vectors import enclosed_volume
 
-        return round(enclosed_volume(self.vertices - self.vertices.mean(axis=0), *self.flattened()), 9)
+        return round(
+            enclosed_volume(self.vertices - self.vertices.mean(axis=0), *self.flattened()), 9
+        )
 
     def flattened(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Vertex indices of all rings one after the other, the start of each ring, and of each face among the rings."""
+        """Vertex indices of all rings one after the other, the start of each ring, and of each face
+        among the rings.
+        """
         rings = [ring for face in self.faces for ring in face.rings]
         index = np.array([vertex for ring in rings for vertex in ring], np.int64)
         ring_start = np.cumsum([0, *map(len, rings)], dtype=np.int64)

@@ -13,15 +13,17 @@ from .record import building_of, mapping
 
 
 def build(parameters: Mapping[str, Any], compose: ComposeSettings | None = None) -> Building:
-    """The building of `parameters`, an object of a parameters.jsonl (`read_parameters` reads them); the run's own give the run's own.
+    """The building of `parameters`, an object of a parameters.jsonl (`read_parameters` reads them);
+    the run's own give the run's own.
 
-    compose: how solids are composed, as the file's head says. Raises InputError for parameters that make no roof and
-    CompositionError for a roof that makes no valid solid; each is one sentence.
+    compose: how solids are composed, as the file's head says. Raises InputError for parameters that
+    make no roof and CompositionError for a roof that makes no valid solid; each is one sentence.
 
     >>> house = {"width": 8, "length": 12, "height": 3}
     >>> ring = [[-6, -4], [6, -4], [6, 4], [-6, 4], [-6, -4]]
     >>> part = {"type": "gable", "parameters": house, "position": [0, 0, 5], "rotation": 0}
-    >>> build({"id": "a", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0, "parts": [part]}).type
+    >>> build({"id": "a", "origin": [0, 0, 0], "outline": [ring], "z_ground": 0,
+    ...     "parts": [part]}).type
     'gable'
     """
     if "id" not in mapping(parameters, "the building"):

@@ -1,7 +1,9 @@
-"""One part changed: another type of the same size, a ridge or an eave at a height, sides moved. Parts are JSON objects here.
+"""One part changed: another type of the same size, a ridge or an eave at a height, sides moved.
 
-An edit is an edit of what is written (`write.parameters.part_record`), so whatever a hand may do to the file a program may do, and
-the same checks hold.
+Parts are JSON objects here.
+
+An edit is an edit of what is written (`write.parameters.part_record`), so whatever a hand may do to
+the file a program may do, and the same checks hold.
 """
 
 from __future__ import annotations
@@ -25,11 +27,13 @@ STEEPEST = math.tan(math.radians(85.0))  # rise over run; a steeper plane is a w
 
 
 def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) -> dict[str, Any]:
-    """The part after a change: `type`, `position` (x, y, z about the origin), `rotation` (degrees), `ridge_height` and
-    `eave_height` (world metres, the origin at `z_origin`), `outlines`, and any parameter by name.
+    """The part after a change: `type`, `position` (x, y, z about the origin), `rotation` (degrees),
+    `ridge_height` and `eave_height` (world metres, the origin at `z_origin`), `outlines`, and any
+    parameter by name.
 
-    Another type keeps the rectangle, the lowest eave and the ridge's height. A part that moves or whose sides do roofs what
-    its rectangle covers, its own outlines left out. Raises InputError for what contradicts itself.
+    Another type keeps the rectangle, the lowest eave and the ridge's height. A part that moves or
+    whose sides do roofs what its rectangle covers, its own outlines left out. Raises InputError for
+    what contradicts itself.
     """
     change = {name: value for name, value in change.items() if value is not None}
     part = {key: value for key, value in part.items() if key != "sigma"}
@@ -37,9 +41,12 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
     if kind != part["type"]:
         part = of_type(with_sizes(part), kind, sizes_of(change))
     ridge, eave = (
-        measure(change.pop(name), name) if name in change else None for name in ("ridge_height", "eave_height")
+        measure(change.pop(name), name) if name in change else None
+        for name in ("ridge_height", "eave_height")
     )
-    placed: dict[str, Any] = {name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change}
+    placed: dict[str, Any] = {
+        name: change.pop(name) for name in ("position", "rotation", "outlines") if name in change
+    }
     if SIDED & change.keys():
         part = side_by_side(part)
     moves = placed.keys() & {"position", "rotation"} or change.keys() & set(PLAN)
@@ -52,7 +59,9 @@ def changed_part(part: dict[str, Any], change: dict[str, Any], z_origin: float) 
 
 
 def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
-    """The part with its position at its lowest eave, where sides have their own: all its heights count from there."""
+    """The part with its position at its lowest eave, where sides have their own: all its heights
+    count from there.
+    """
     parameters = part["parameters"]
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
     low = min((measure(parameters[name], name) for name in eaves), default=0.0)
@@ -64,7 +73,9 @@ def from_lowest_eave(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
-    """The part with a width and a length; one that has none gets those of the smallest rectangle around its outlines."""
+    """The part with a width and a length; one that has none gets those of the smallest rectangle
+    around its outlines.
+    """
     if all(name in part["parameters"] for name in PLAN):
         return part
     outlines = shapely.union_all([polygon_of(outline) for outline in part["outlines"]])
@@ -84,18 +95,24 @@ def with_sizes(part: dict[str, Any]) -> dict[str, Any]:
 
 
 def polygon_of(rings: list) -> shapely.Geometry:
-    """The area of a part's outline, rings of (x, y), the outer first; a spike of no width is none."""
+    """The area of a part's outline, rings of (x, y), the outer first; a spike of no width
+    is none.
+    """
     return enclosed(shapely.Polygon(rings[0], rings[1:]))
 
 
 def sizes_of(change: dict[str, Any]) -> dict[str, float]:
-    """The width and length that a change gives, those that make no rectangle left to be refused with the whole part."""
+    """The width and length that a change gives, those that make no rectangle left to be refused
+    with the whole part.
+    """
     sizes = {name: measure(change[name], name) for name in PLAN if name in change}
     return {name: size for name, size in sizes.items() if size > 0.0}
 
 
 def of_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[str, Any]:
-    """The part as another roof type over the same rectangle, or one of other `sizes`, with the same lowest eave and the same rise."""
+    """The part as another roof type over the same rectangle, or one of other `sizes`, with the same
+    lowest eave and the same rise.
+    """
     if not isinstance(kind, str) or kind not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {kind!r}; choose one")
     width, length = (sizes.get(name, part["parameters"][name]) for name in PLAN)
@@ -104,15 +121,22 @@ def of_type(part: dict[str, Any], kind: str, sizes: dict[str, float]) -> dict[st
 
 
 def side_by_side(part: dict[str, Any]) -> dict[str, Any]:
-    """The part with each side's own pitch and eave in place of the catalogue's parameters. Raises InputError where it has none."""
+    """The part with each side's own pitch and eave in place of the catalogue's parameters.
+
+    Raises InputError where it has none.
+    """
     parameters = part["parameters"]
     if SIDED & parameters.keys():
         return part
     if not CATALOGUE[part["type"]].is_of_family or part["type"] == "flat":
         raise InputError(
-            f"expected a roof with pitches of its own sides, got a {part['type']} roof; change its type first"
+            f"expected a roof with pitches of its own sides, got a {part['type']} roof; change its "
+            "type first"
         )
-    return {**part, "parameters": member_of(part["type"], parameters, 0.0, np.zeros(3)).side_by_side()[0]}
+    return {
+        **part,
+        "parameters": member_of(part["type"], parameters, 0.0, np.zeros(3)).side_by_side()[0],
+    }
 
 
 def rise_of(part: dict[str, Any]) -> float:
@@ -125,13 +149,21 @@ def rise_of(part: dict[str, Any]) -> float:
 
 
 def rise_of_member(member: Member) -> float:
-    """Height of a member's highest place over its base, within its rectangle, skews and cants left aside."""
+    """Height of a member's highest place over its base, within its rectangle, skews and cants left
+    aside.
+    """
     reach = []
     for axis in (0, 1):
         sides = [side for side in (2 * axis, 2 * axis + 1) if member.has[side]]
         if len(sides) == 2:
-            reach.append(member.apex(axis) if member.slopes[sides].any() else member.eaves[sides].min())
-        reach += [member.eaves[s] + 2.0 * member.slopes[s] * member.half[axis] for s in sides if len(sides) == 1]
+            reach.append(
+                member.apex(axis) if member.slopes[sides].any() else member.eaves[sides].min()
+            )
+        reach += [
+            member.eaves[s] + 2.0 * member.slopes[s] * member.half[axis]
+            for s in sides
+            if len(sides) == 1
+        ]
     return float(min(*reach, member.top, math.inf) - member.base)
 
 
@@ -144,11 +176,14 @@ def with_ridge(part: dict[str, Any], z_ridge: float) -> dict[str, Any]:
     parameters, rise = part["parameters"], z_ridge - part["position"][2]
     if not rise > 0.0:
         raise InputError(
-            f"expected a ridge above the eave, got one {-rise:.2f} m below it; lower the eave too (eave_height)"
+            f"expected a ridge above the eave, got one {-rise:.2f} m below it; lower the eave too "
+            "(eave_height)"
         )
     if not SIDED & parameters.keys():
         scale = rise / rise_of(part)
-        heights = {n: scale * h for n, h in parameters.items() if n.endswith("height") or n == "eave_step"}
+        heights = {
+            n: scale * h for n, h in parameters.items() if n.endswith("height") or n == "eave_step"
+        }
         return {**part, "parameters": {**parameters, **heights}}
     if "height" not in parameters:
         return {**part, "parameters": parameters | pitches_for(parameters, part["type"], rise)}
@@ -163,7 +198,9 @@ def steeper_by(factor: float, pitch_deg: float) -> float:
 
 
 def pitches_for(parameters: dict[str, float], kind: str, rise: float) -> dict[str, float]:
-    """Pitches, all slopes changed by one factor, with which the ridge comes to `rise` over the lowest eave."""
+    """Pitches, all slopes changed by one factor, with which the ridge comes to `rise` over the
+    lowest eave.
+    """
     given = {name: value for name, value in parameters.items() if name.startswith("pitch_")}
 
     def pitches(factor: float) -> dict[str, float]:

@@ -19,11 +19,15 @@ BY_HAND = "changed by hand"
 
 
 def with_part(building: Building, index: int, **change: Any) -> Building:
-    """The building with part `index` changed, or with one more where `index` is their number; see `Building.with_part`."""
+    """The building with part `index` changed, or with one more where `index` is their number; see
+    `Building.with_part`.
+    """
     z_origin, record = float(building.roof.frame.origin[2]), building_record(building)
     parts, change = record["parts"], {name: as_written(value) for name, value in change.items()}
     if not 0 <= index <= len(parts):
-        raise InputError(f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one")
+        raise InputError(
+            f"expected a part from 0 to {len(parts)} (the last adds one), got {index}; choose one"
+        )
     if index == len(parts):
         parts = [*parts, new_part(change, z_origin)]
     else:
@@ -32,7 +36,8 @@ def with_part(building: Building, index: int, **change: Any) -> Building:
 
 
 def as_written(value: Any) -> Any:
-    """A value as a file of parameters holds it: arrays and tuples as lists, NumPy's numbers as Python's.
+    """A value as a file of parameters holds it: arrays and tuples as lists, NumPy's numbers as
+    Python's.
 
     >>> as_written((np.int64(1), np.array([2.5, 3.0])))
     [1, [2.5, 3.0]]
@@ -47,7 +52,8 @@ def new_part(change: dict[str, Any], z_origin: float) -> dict[str, Any]:
     missing = [name for name in ("type", "position", "width", "length") if change.get(name) is None]
     if missing:
         raise InputError(
-            f"expected type, position, width and length of a new part, got none for {', '.join(missing)}; give them too"
+            "expected type, position, width and length of a new part, got none for "
+            f"{', '.join(missing)}; give them too"
         )
     sizes = {name: change[name] for name in ("width", "length")}
     flat = {"type": "flat", "parameters": sizes, "position": change["position"], "rotation": 0.0}
@@ -58,15 +64,21 @@ def without_part(building: Building, index: int) -> Building:
     """The building without part `index`; what it roofed alone is roofed by the part beside it."""
     count, record = len(building.roof.parts), building_record(building)
     if count < 2 or not 0 <= index < count:
-        raise InputError(f"expected one of two or more parts to leave out, got {index} of {count}; keep one at least")
+        raise InputError(
+            f"expected one of two or more parts to leave out, got {index} of {count}; keep one at "
+            "least"
+        )
     parts = record["parts"]
     return built(building, {**record, "parts": [*parts[:index], *parts[index + 1 :]]})
 
 
 def built(building: Building, record: dict[str, Any]) -> Building:
-    """The building of a changed record, composed as `building` was: no figure of the earlier model stays."""
+    """The building of a changed record, composed as `building` was: no figure of the earlier model
+    stays.
+    """
     found = build(
-        {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND}, building.model.compose
+        {**record, "status": Status.MODELLED.code, "quality": None, "detail": BY_HAND},
+        building.model.compose,
     )
     return dataclasses.replace(
         found,

@@ -52,11 +52,14 @@ def opened_parameters(
     except (OSError, UnicodeDecodeError) as error:
         found = "none" if isinstance(error, FileNotFoundError) else f"something else: {error}"
         raise InputError(
-            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got {found}; check the path"
+            f"expected a parameters.jsonl that hiproof wrote at {os.fspath(path)}, got {found}; "
+            "check the path"
         ) from error
 
 
-def objects(file: Any, path: str | os.PathLike, damaged: Damaged = refuse) -> Iterator[tuple[int, Any]]:
+def objects(
+    file: Any, path: str | os.PathLike, damaged: Damaged = refuse
+) -> Iterator[tuple[int, Any]]:
     """(line, JSON value) of every line that is not blank; DAMAGED in place of one that is told to
     `damaged`."""
     for number, line in enumerate(file, 1):
@@ -81,7 +84,9 @@ def object_of(line: str, place: str) -> Any:
             + ("an object stands on one line" if is_cut else "mend it there")
         ) from error
     except (ValueError, RecursionError) as error:  # a number of 5,000 digits, nested without end
-        raise InputError(f"expected a JSON object in {place}, got one that cannot be read: {error}") from error
+        raise InputError(
+            f"expected a JSON object in {place}, got one that cannot be read: {error}"
+        ) from error
     return readable(value) if ESCAPED.search(line) else value
 
 
@@ -95,34 +100,48 @@ def head_of(first: tuple[int, Any] | None, path: str | os.PathLike) -> FileHead:
     record = first[1] if first else None
     if not isinstance(record, dict) or HEAD not in record:
         raise InputError(
-            f'expected {{"{HEAD}": {VERSION}, ...}} in the first line of {where}, got something else; '
+            f'expected {{"{HEAD}": {VERSION}, ...}} in the first line of {where}, got something '
+            "else; "
             "is it a parameters.jsonl that hiproof wrote?"
         )
     if record[HEAD] != VERSION:
         raise InputError(
-            f"expected parameters of version {VERSION} in {where}, got version {excerpt(record[HEAD])}; "
+            f"expected parameters of version {VERSION} in {where}, got version "
+            f"{excerpt(record[HEAD])}; "
             "use the hiproof that wrote them, or reconstruct again"
         )
     unit, offset = record.get("unit", "auto"), record.get("cityjson_offset")
     if not isinstance(unit, str) or unit not in NAMED_UNITS:
         raise InputError(
-            f"expected a unit ({', '.join(NAMED_UNITS)}) in the head of {where}, got {excerpt(unit)}; choose one"
+            f"expected a unit ({', '.join(NAMED_UNITS)}) in the head of {where}, got "
+            f"{excerpt(unit)}; choose one"
         )
     if offset is not None and not is_place(offset):
         raise InputError(
-            f"expected three numbers as cityjson_offset of {where}, got {excerpt(offset)}; write null for none"
+            f"expected three numbers as cityjson_offset of {where}, got {excerpt(offset)}; write "
+            "null for none"
         )
     try:
-        settings = Settings.from_dict({name: record.get(name) or {} for name in ("compose", "write")})
+        settings = Settings.from_dict(
+            {name: record.get(name) or {} for name in ("compose", "write")}
+        )
         crs = parse_crs(record.get("crs"))
     except (InputError, SettingsError) as error:
         raise InputError(f"{where}, in its head: {error!s:.400}") from error
-    return FileHead(crs, unit, None if offset is None else np.array(offset, float), settings.compose, settings.write)
+    return FileHead(
+        crs,
+        unit,
+        None if offset is None else np.array(offset, float),
+        settings.compose,
+        settings.write,
+    )
 
 
 def is_place(value: Any) -> bool:
     """Whether a value is three numbers that can be coordinates."""
-    is_three = isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
+    is_three = (
+        isinstance(value, list) and len(value) == 3 and all(type(v) in (int, float) for v in value)
+    )
     return is_three and all(abs(v) <= MOST_PLAN for v in value)
 
 
@@ -131,10 +150,13 @@ def records(
 ) -> Iterator[dict[str, Any]]:
     """The buildings after the head."""
     for number, record in lines:
-        if record is not DAMAGED and not (isinstance(record, dict) and isinstance(record.get("id"), str)):
+        if record is not DAMAGED and not (
+            isinstance(record, dict) and isinstance(record.get("id"), str)
+        ):
             damaged(
                 InputError(
-                    f"expected a JSON object with an id in line {number} of {os.fspath(path)}, got {excerpt(record)}; "
+                    f"expected a JSON object with an id in line {number} of {os.fspath(path)}, got "
+                    f"{excerpt(record)}; "
                     "is it a parameters.jsonl that hiproof wrote?"
                 )
             )

@@ -1,9 +1,11 @@
-"""What a person says of one building, obeyed by the fit: the points determine the rest, and what they contradict is said, not refused.
+"""What a person says of one building, obeyed by the fit: the points determine the rest, and what
+they contradict is said, not refused.
 
 An override is an object with the building's `id` and any of
 
     type, types       the type of the part that shows the largest area; types that parts may have
-    parts             how many parts at most, or the parts themselves as in parameters.jsonl (with `origin`, perhaps `outline`)
+    parts             how many parts at most, or the parts themselves as in parameters.jsonl (with
+                      `origin`, perhaps `outline`)
     ridge_height, eave_height     of that part, world metres
     fixed             further parameters of that part by name
     z_ground          height of the ground, world metres
@@ -41,17 +43,31 @@ from .refit import measured
 
 SHAPING = ("type", "types", "ridge_height", "eave_height", "fixed")
 TOLD = ("note", "who", "when")
-KEYS = ("id", *SHAPING, "parts", "origin", "outline", "z_ground", "block_height", "leave_out", *TOLD)
+KEYS = (
+    "id",
+    *SHAPING,
+    "parts",
+    "origin",
+    "outline",
+    "z_ground",
+    "block_height",
+    "leave_out",
+    *TOLD,
+)
 
 FAR_GROUND_M = 5.0
-"""Difference (m) between a ground given and the terrain from which on it is remarked: a code for "unknown", or another
-height system. Ground levels of registers differ less from the lowest terrain along the walls."""
+"""Difference (m) between a ground given and the terrain from which on it is remarked: a code for
+"unknown", or another height system. Ground levels of registers differ less from the lowest terrain
+along the walls.
+"""
 
 HIGHEST_M = 1000.0
 """Highest building (m above its ground): the Burj Khalifa has 828."""
 
 RANGES = {
-    **dict.fromkeys(("z_ground", "ridge_height", "eave_height"), (LOWEST_LAND_M, HIGHEST_LAND_M + HIGHEST_M)),
+    **dict.fromkeys(
+        ("z_ground", "ridge_height", "eave_height"), (LOWEST_LAND_M, HIGHEST_LAND_M + HIGHEST_M)
+    ),
     "block_height": (0.1, HIGHEST_M),
     "parts": (1.0, float(MOST_PARTS)),
 }
@@ -60,7 +76,10 @@ RANGES = {
 
 @dataclass(frozen=True)
 class Override:
-    """An override checked; None or empty where it says nothing. `fixed` holds ridge_height and eave_height too."""
+    """An override checked;
+
+    None or empty where it says nothing. `fixed` holds ridge_height and eave_height too.
+    """
 
     id: str
     type: str | None = None
@@ -77,7 +96,9 @@ class Override:
 
 
 def override_of(record: Mapping[str, Any]) -> Override:
-    """The override that an object tells of. Raises InputError, one sentence, where it cannot be or contradicts itself.
+    """The override that an object tells of.
+
+    Raises InputError, one sentence, where it cannot be or contradicts itself.
 
     >>> override_of({"id": "a", "type": "hip", "ridge_height": 12.4}).fixed
     {'ridge_height': 12.4}
@@ -88,19 +109,31 @@ def override_of(record: Mapping[str, Any]) -> Override:
     if not id:
         raise InputError("expected the id of a building in every override, got none; give one")
     has_list = isinstance(record.get("parts"), list)
-    if has_list:  # a line of parameters.jsonl is an override; its type and types are what came of the fit
-        ignored = {attribute.name for attribute in PARAMETERS} - {"id", "parts", "origin", "outline", "z_ground"}
+    # a line of parameters.jsonl is an override; its type and types are what came of the fit
+    if has_list:
+        ignored = {attribute.name for attribute in PARAMETERS} - {
+            "id",
+            "parts",
+            "origin",
+            "outline",
+            "z_ground",
+        }
         record = {key: value for key, value in record.items() if key not in ignored}
     other = [name for name in record if name not in KEYS]
     if other:
-        raise InputError(f"expected {', '.join(KEYS)} in {where}, got also {', '.join(other[:8])}; remove it")
+        raise InputError(
+            f"expected {', '.join(KEYS)} in {where}, got also {', '.join(other[:8])}; remove it"
+        )
     refuse_contradictions(record, has_list, where)
     fixed = numbers_by_name(record.get("fixed", {}), f"fixed of {where}")
     heights = {name: possible(record, name, where) for name in ("ridge_height", "eave_height")}
     fixed |= {name: height for name, height in heights.items() if height is not None}
     count = None if has_list else possible(record, "parts", where)
     if count is not None and count != int(count):
-        raise InputError(f"expected a whole number of parts from 1 in {where}, got {count:g}; or give a list of parts")
+        raise InputError(
+            f"expected a whole number of parts from 1 in {where}, got {count:g}; or give a list of "
+            "parts"
+        )
     types = types_of(record, where)
     return Override(
         id=id,
@@ -126,22 +159,29 @@ def possible_range(key: str) -> tuple[float, float] | None:
 
 
 def possible(record: Mapping[str, Any], key: str, where: str) -> float | None:
-    """The number that `record` has of `key`, None without one. Raises InputError for one that no building can have."""
+    """The number that `record` has of `key`, None without one.
+
+    Raises InputError for one that no building can have.
+    """
     if key not in record:
         return None
     value, (low, high) = number(record[key], f"{key} of {where}"), RANGES[key]
     if not low <= value <= high:
         raise InputError(
-            f"expected {key} from {low:g} to {high:g} in {where}, got {value:g}; leave it out where unknown"
+            f"expected {key} from {low:g} to {high:g} in {where}, got {value:g}; leave it out "
+            "where unknown"
         )
     return value
 
 
 def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str) -> None:
-    """Raise InputError where two things are said of which only one can be, or neither yes nor no."""
+    """Raise InputError where two things are said of which only one can be, or neither yes
+    nor no.
+    """
     if record.get("leave_out", False) not in (True, False):
         raise InputError(
-            f"expected true or false as leave_out of {where}, got {excerpt(record['leave_out'])}; say which"
+            f"expected true or false as leave_out of {where}, got {excerpt(record['leave_out'])}; "
+            "say which"
         )
     alone = {
         "leave_out": (bool(record.get("leave_out")), (*SHAPING, "parts", "block_height")),
@@ -151,32 +191,52 @@ def refuse_contradictions(record: Mapping[str, Any], has_list: bool, where: str)
     for name, (said, others) in alone.items():
         against = [key for key in others if key in record]
         if said and against:
-            raise InputError(f"expected {name} without {', '.join(others)} in {where}, got also {against[0]}; keep one")
+            raise InputError(
+                f"expected {name} without {', '.join(others)} in {where}, got also {against[0]}; "
+                "keep one"
+            )
     if has_list and "origin" not in record:
-        raise InputError(f"expected the origin of its parts in {where}, got none; copy that of parameters.jsonl")
+        raise InputError(
+            f"expected the origin of its parts in {where}, got none; copy that of parameters.jsonl"
+        )
 
 
 def types_of(record: Mapping[str, Any], where: str) -> tuple[str, ...]:
-    """Types that parts may have, none where nothing is said of them; a text names several by commas."""
+    """Types that parts may have, none where nothing is said of them; a text names several by
+    commas.
+    """
     told = record.get("types")
     names = told.split(",") if isinstance(told, str) else told
     if names is not None and not (isinstance(names, (list, tuple)) and names):
-        raise InputError(f"expected a list of roof types as types of {where}, got {excerpt(told)}; name one at least")
+        raise InputError(
+            f"expected a list of roof types as types of {where}, got {excerpt(told)}; name one at "
+            "least"
+        )
     types = tuple(name.strip() if isinstance(name, str) else name for name in names or ())
     for name in (*types, record.get("type", "flat")):
         if not isinstance(name, str) or name not in CATALOGUE:
             raise InputError(
-                f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {excerpt(name)}; choose among these"
+                f"expected roof types ({', '.join(CATALOGUE)}) in {where}, got {excerpt(name)}; "
+                "choose among these"
             )
     if types and record.get("type", types[0]) not in types:
-        raise InputError(f"expected the type among the types in {where}, got {record['type']!r}; keep one of them")
+        raise InputError(
+            f"expected the type among the types in {where}, got {record['type']!r}; keep one of "
+            "them"
+        )
     return types
 
 
 def told_of(record: Mapping[str, Any], has_list: bool) -> str:
     """The override in words, for the building's detail."""
-    said = [f"{name} {record[name]}" for name in (*SHAPING, "z_ground", "block_height") if name in record]
-    said += ["parts given"] if has_list else [f"parts {record['parts']}"] if "parts" in record else []
+    said = [
+        f"{name} {record[name]}"
+        for name in (*SHAPING, "z_ground", "block_height")
+        if name in record
+    ]
+    said += (
+        ["parts given"] if has_list else [f"parts {record['parts']}"] if "parts" in record else []
+    )
     note = ", ".join(str(record[name])[:200] for name in TOLD if name in record)
     return (
         "overridden: "
@@ -194,7 +254,9 @@ def overridden(
     id: str = "building",
     ground: np.ndarray | None = None,
 ) -> Building:
-    """The building reconstructed as its override says; arguments and outcome as of `hiproof.reconstruct`."""
+    """The building reconstructed as its override says; arguments and outcome as of
+    `hiproof.reconstruct`.
+    """
     points, settings = as_xyz(points), settings or Settings()
     building = stages.asked_for(footprint, id)
     if override.leave_out:
@@ -213,45 +275,78 @@ def overridden(
 
 
 def lies_under(building: Building, z_ground: float | None) -> bool:
-    """Whether walls had to begin below the ground given: composing puts it under the lowest eave."""
+    """Whether walls had to begin below the ground given: composing puts it under the lowest
+    eave.
+    """
     if z_ground is None or building.built is None:
         return False
     return bool(building.solid.vertices[:, 2].min() < z_ground - 1e-3)
 
 
 def unlike_ground(building: Building, z_ground: float | None, terrain: Any) -> str:
-    """A remark where the ground given lies far from what the terrain says under the building's outline. Empty otherwise."""
+    """A remark where the ground given lies far from what the terrain says under the building's
+    outline. Empty otherwise.
+    """
     if z_ground is None or terrain is None or building.built is None:
         return ""
     heights, source = stages.asked(
         terrain, building.roof.frame.to_world(shapely.get_coordinates(building.roof.outline))
     )
-    if not np.isfinite(heights).any() or abs(apart := z_ground - float(np.nanmin(heights))) < FAR_GROUND_M:
+    if (
+        not np.isfinite(heights).any()
+        or abs(apart := z_ground - float(np.nanmin(heights))) < FAR_GROUND_M
+    ):
         return ""
-    return f"{Doubt.GROUND_GIVEN_ELSEWHERE.value} {abs(apart):.1f} m {'above' if apart > 0 else 'below'} the {source}"
+    return (
+        f"{Doubt.GROUND_GIVEN_ELSEWHERE.value} {abs(apart):.1f} m "
+        f"{'above' if apart > 0 else 'below'} the {source}"
+    )
 
 
-def as_given(override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings) -> Building:
-    """The building of the parts or the block given, measured on its points where there are any; its footprint is moved as a run does."""
+def as_given(
+    override: Override, points: np.ndarray, building: Building, terrain: Any, settings: Settings
+) -> Building:
+    """The building of the parts or the block given, measured on its points where there are any; its
+    footprint is moved as a run does.
+    """
     building, footprint, of_footprint = stages.aligned(building, points, settings)
     points, outline, status = stages.usable(points, footprint)
     if status is Status.BAD_FOOTPRINT and override.outline is None:
         return dataclasses.replace(building, status=status, detail=status.value)
-    frame = LocalFrame(override.origin) if override.origin is not None else frame_of(points, outline)
+    frame = (
+        LocalFrame(override.origin) if override.origin is not None else frame_of(points, outline)
+    )
     local = frame.to_local(points)
     rings = override.outline or outline_record(stages.to_local(outline, frame))
     if rings is None:
         raise InputError(
-            "expected an outline, or a footprint, of a building whose parts are given, got neither; give one"
+            "expected an outline, or a footprint, of a building whose parts are given, got "
+            "neither; give one"
         )
     area = polygon(rings, "outline")
     ground = given_ground(override, area, local, frame, terrain)
     parts = override.parts
     if parts is None and override.block_height is not None:
         level = [0.0, 0.0, ground.z + override.block_height - frame.origin[2]]
-        parts = [{"type": "flat", "parameters": {}, "position": level, "rotation": 0.0, "outlines": [rings]}]
-    place = {"origin": frame.origin.tolist(), "outline": rings, "z_ground": ground.z, "ground_source": ground.source}
-    made = build({"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts}, settings.compose)
+        parts = [
+            {
+                "type": "flat",
+                "parameters": {},
+                "position": level,
+                "rotation": 0.0,
+                "outlines": [rings],
+            }
+        ]
+    place = {
+        "origin": frame.origin.tolist(),
+        "outline": rings,
+        "z_ground": ground.z,
+        "ground_source": ground.source,
+    }
+    made = build(
+        {"id": building.id, "status": Status.MODELLED.code, **place, "parts": parts},
+        settings.compose,
+    )
     made = dataclasses.replace(
         made,
         detail="as given",
@@ -275,15 +370,22 @@ def frame_of(points: np.ndarray, outline: shapely.Polygon | None) -> LocalFrame:
 
 
 def given_ground(
-    override: Override, outline: shapely.Polygon, points: np.ndarray, frame: LocalFrame, terrain: Any
+    override: Override,
+    outline: shapely.Polygon,
+    points: np.ndarray,
+    frame: LocalFrame,
+    terrain: Any,
 ) -> stages.Ground:
     """The ground: as given, else as the terrain says."""
-    ground = stages.find_ground(outline, points if len(points) else np.zeros((1, 3)), frame, terrain)
+    ground = stages.find_ground(
+        outline, points if len(points) else np.zeros((1, 3)), frame, terrain
+    )
     if override.z_ground is not None:
         return dataclasses.replace(ground, z=override.z_ground, source="override")
     if not len(points) and ground.source.startswith("assumed"):
         raise InputError(
-            "expected the height of the ground (z_ground) where neither points nor terrain tell it, got none; give it"
+            "expected the height of the ground (z_ground) where neither points nor terrain tell "
+            "it, got none; give it"
         )
     return ground
 
@@ -321,7 +423,10 @@ def fitted_within(
         held = {main: (*building.parts[main].parameters, "z")}
         building = refitted(building, points, held)
     if override.z_ground is not None:
-        record = building_record(building) | {"z_ground": override.z_ground, "ground_source": "override"}
+        record = building_record(building) | {
+            "z_ground": override.z_ground,
+            "ground_source": "override",
+        }
         again = built(building, record)
         detail = stages.without_doubt(building.detail, Doubt.GROUND_ABOVE_EAVES)
         again = dataclasses.replace(again, quality=building.quality, grade=building.grade)

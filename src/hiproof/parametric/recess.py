@@ -1,7 +1,10 @@
-"""A recess: a level part lower than what it lies in, whose parts leave its place to it. Parts are JSON objects here, as in change.py.
+"""A recess: a level part lower than what it lies in, whose parts leave its place to it.
 
-A roof is its highest part, so a light well, a roof terrace or a lower corner shows only where the parts around it do not roof it:
-their outlines leave it out. Where a recess is moved or resized, they take back its old place and leave out the new one.
+Parts are JSON objects here, as in change.py.
+
+A roof is its highest part, so a light well, a roof terrace or a lower corner shows only where the
+parts around it do not roof it: their outlines leave it out. Where a recess is moved or resized,
+they take back its old place and leave out the new one.
 """
 
 from __future__ import annotations
@@ -23,13 +26,16 @@ CLEAR = 0.02  # of what they share: a part that roofs no more of it leaves it to
 
 
 def with_recess(parts: list, roof: Roof, index: int, at: tuple[float, float] | None = None) -> list:
-    """The parts with a recess at `at` (x, y about the roof's origin), else in the middle of part `index`, turned as that part is.
+    """The parts with a recess at `at` (x, y about the roof's origin), else in the middle of part
+    `index`, turned as that part is.
 
     Raises InputError for a part of which nothing is left.
     """
     around = with_sizes(parts[index])
     x, y = around["position"][:2] if at is None else at
-    height = max(float(piece.height_at(np.array([[x, y]]))[0]) for piece in roof.parts[index].pieces)
+    height = max(
+        float(piece.height_at(np.array([[x, y]]))[0]) for piece in roof.parts[index].pieces
+    )
     recess = {
         "type": "flat",
         "parameters": {"width": BLOCK_M, "length": BLOCK_M},
@@ -40,14 +46,18 @@ def with_recess(parts: list, roof: Roof, index: int, at: tuple[float, float] | N
 
 
 def placed(parts: list, index: int, changed: dict[str, Any]) -> list:
-    """The parts with `changed` in place of part `index`; those that left out its old place leave out its new one instead."""
+    """The parts with `changed` in place of part `index`; those that left out its old place leave
+    out its new one instead.
+    """
     old = roofed_by(parts[index])
     own = covered(changed) if "outlines" not in changed else roofed_by(changed)
     others = [part if k == index else moved_along(part, old, own) for k, part in enumerate(parts)]
     return [*others[:index], changed, *others[index + 1 :]]
 
 
-def moved_along(part: dict[str, Any], old: shapely.Geometry, new: shapely.Geometry) -> dict[str, Any]:
+def moved_along(
+    part: dict[str, Any], old: shapely.Geometry, new: shapely.Geometry
+) -> dict[str, Any]:
     """The part, which leaves out `new` in place of `old` if it left that out."""
     if "outlines" not in part or old.equals(new):
         return part
@@ -64,7 +74,10 @@ def leaving_out(part: dict[str, Any], area: shapely.Geometry) -> dict[str, Any]:
         return part
     left = rings_of(shapely.difference(roofed_by(part), area, grid_size=GRID_M))
     if not left:
-        raise InputError("expected a recess smaller than the part it lies in, got one that covers it; delete the part")
+        raise InputError(
+            "expected a recess smaller than the part it lies in, got one that covers it; delete "
+            "the part"
+        )
     return {**part, "outlines": left}
 
 

@@ -1,4 +1,7 @@
-"""The JSON object of one building checked, and its parts made. Whatever is wrong becomes one sentence that says where."""
+"""The JSON object of one building checked, and its parts made.
+
+Whatever is wrong becomes one sentence that says where.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,15 @@ import numpy as np
 import shapely
 
 from ..compose.readable import refuse_many, refuse_wrong_parts
-from ..compose.settle import DIGITS, PLAN_DIGITS, pieces_of, rounded_outline, settled, settled_outline, settled_sigma
+from ..compose.settle import (
+    DIGITS,
+    PLAN_DIGITS,
+    pieces_of,
+    rounded_outline,
+    settled,
+    settled_outline,
+    settled_sigma,
+)
 from ..errors import InputError
 from ..frames import LocalFrame
 from ..geometry.rings import enclosed
@@ -22,7 +33,8 @@ from ..status import Grade, Status
 from ..write.attribute_list import PARAMETERS, PART
 
 WIDEST_M = 1e5  # of any number of a part, and of heights
-FARTHEST_M = 1e8  # coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
+# coordinate, m; Gauss-Kruger zones reach 6e7, and a tenth of a millimetre fits float64 up to 1e11
+FARTHEST_M = 1e8
 MOST = 1e15  # of any number
 FAR_M, SLACK_M = 1e4, 0.01  # how far a saw-tooth's outline may reach into the next tooth
 PART_KEYS = tuple(attribute.name for attribute in PART)
@@ -31,7 +43,8 @@ RESIDUALS = ("psd_mean", "psd_std", "rmse", "p95", "share_within_20cm", "outline
 
 
 def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
-    """The building that a JSON object tells of, without a model yet, and the roof made of its parts, None where it has none.
+    """The building that a JSON object tells of, without a model yet, and the roof made of its
+    parts, None where it has none.
 
     Raises InputError, one sentence, for an object that makes none.
     """
@@ -42,7 +55,9 @@ def building_of(record: Mapping[str, Any]) -> tuple[Building, Roof | None]:
     status = status_of(record, bool(parts))
     roof = roof_of(parts, outline, origin) if parts else None
     world = outline if roof is None else shapely.transform(roof.outline, roof.frame.to_world)
-    ground = figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
+    ground = (
+        figure(record, "z_ground") if roof is None else measure(record.get("z_ground"), "z_ground")
+    )
     building = Building(
         id=str(record["id"]),
         status=status,
@@ -67,16 +82,24 @@ def status_of(record: Mapping[str, Any], has_parts: bool) -> Status:
     code = record.get("status", Status.MODELLED.code if has_parts else Status.NO_POINTS.code)
     known = {status.code: status for status in Status}
     if not isinstance(code, str) or code not in known:
-        raise InputError(f"expected a status ({', '.join(known)}), got {excerpt(code)}; leave it as the run wrote it")
+        raise InputError(
+            f"expected a status ({', '.join(known)}), got {excerpt(code)}; leave it as the run "
+            "wrote it"
+        )
     if has_parts and not known[code].is_model:
         return Status.MODELLED
     if not has_parts and known[code].is_model:
-        raise InputError(f"expected parts of a building whose status is {code}, got none; give one part at least")
+        raise InputError(
+            f"expected parts of a building whose status is {code}, got none; give one part at least"
+        )
     return known[code]
 
 
 def outline_of(record: Mapping[str, Any]) -> shapely.Polygon | None:
-    """The outline, in world coordinates, of the roof that a building's object tells of; None where it tells of none."""
+    """The outline, in world coordinates, of the roof that a building's object tells of;
+
+    None where it tells of none.
+    """
     if not record.get("parts") or record.get("outline") is None or record.get("origin") is None:
         return None
     frame = LocalFrame(rounded(place(record["origin"], "origin"), DIGITS))
@@ -89,13 +112,17 @@ def on_grid(outline: shapely.Polygon) -> shapely.Polygon:
         return settled_outline(outline)
     except shapely.GEOSException as error:
         reason = shapely.is_valid_reason(outline)
-        raise InputError(f"expected an outline that does not cross itself, got one with {reason}; mend it") from error
+        raise InputError(
+            f"expected an outline that does not cross itself, got one with {reason}; mend it"
+        ) from error
 
 
 def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | None) -> Roof:
     """The roof of a building's parts over its outline, about its origin."""
     if outline is None or origin is None:
-        raise InputError("expected an outline and an origin of a building with parts, got null; give both")
+        raise InputError(
+            "expected an outline and an origin of a building with parts, got null; give both"
+        )
     refuse_many(parts)
     outline = on_grid(outline)
     made = [part_of(part, outline, f"part {index}") for index, part in enumerate(parts)]
@@ -105,7 +132,9 @@ def roof_of(parts: list, outline: shapely.Polygon | None, origin: np.ndarray | N
 
 
 def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
-    """A part with its planes; without outlines of its own it roofs what its rectangle covers of the building's."""
+    """A part with its planes; without outlines of its own it roofs what its rectangle covers of the
+    building's.
+    """
     refuse_other_keys(mapping(record, where), PART_KEYS, where)
     kind = text_at(record, "type")
     parameters = numbers_by_name(record.get("parameters") or {}, f"the parameters of {where}")
@@ -119,7 +148,10 @@ def part_of(record: Any, outline: shapely.Polygon, where: str) -> Part:
     outlines = [rounded_outline(o) for o in outlines]
     pieces = pieces_of(kind, parameters, kappa, position, outlines)
     sigma = numbers_by_name(record.get("sigma") or {}, f"the standard deviations of {where}")
-    sigma = {("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s) for n, s in sigma.items()}
+    sigma = {
+        ("kappa" if n == "rotation" else n): (math.radians(s) if n == "rotation" else s)
+        for n, s in sigma.items()
+    }
     return Part(kind, pieces, parameters, kappa, position, settled_sigma(sigma))
 
 
@@ -131,27 +163,40 @@ def outlines_of(
     outline: shapely.Polygon,
     where: str,
 ) -> list[shapely.Polygon]:
-    """Where a part roofs the building: the outlines given, else its rectangle's share of the building's outline."""
+    """Where a part roofs the building: the outlines given, else its rectangle's share of the
+    building's outline.
+    """
     if record.get("outlines") is None:
         return rectangle_within(parameters, position, kappa, outline, where)
     return [polygon(rings, f"an outline of {where}") for rings in list_at(record, "outlines")]
 
 
 def rectangle_within(
-    parameters: Mapping[str, float], position: np.ndarray, kappa: float, outline: shapely.Polygon, where: str
+    parameters: Mapping[str, float],
+    position: np.ndarray,
+    kappa: float,
+    outline: shapely.Polygon,
+    where: str,
 ) -> list[shapely.Polygon]:
     """The polygons that the rectangle of a part covers of the outline."""
     if "width" not in parameters or "length" not in parameters:
-        raise InputError(f"expected width and length, or outlines, of {where}, got neither; give the rectangle")
+        raise InputError(
+            f"expected width and length, or outlines, of {where}, got neither; give the rectangle"
+        )
     u, v = 0.5 * parameters["length"], 0.5 * parameters["width"]
     c, s = math.cos(kappa), math.sin(kappa)
-    corners = np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
+    corners = (
+        np.array([(-u, -v), (u, -v), (u, v), (-u, v)]) @ np.array([[c, s], [-s, c]]) + position[:2]
+    )
     covered = shapely.intersection(shapely.Polygon(corners), enclosed(outline), grid_size=1e-4)
     return [g for g in shapely.get_parts(covered) if g.geom_type == "Polygon"]
 
 
 def by_teeth(
-    outlines: list[shapely.Polygon], parameters: Mapping[str, float], position: np.ndarray, kappa: float
+    outlines: list[shapely.Polygon],
+    parameters: Mapping[str, float],
+    position: np.ndarray,
+    kappa: float,
 ) -> list[shapely.Polygon]:
     """The outlines of a saw-tooth, those that reach over several teeth cut between them."""
     teeth, width = round(parameters["teeth"]), parameters["width"]
@@ -161,14 +206,27 @@ def by_teeth(
     cut = []
     for outline in outlines:
         v = (shapely.get_coordinates(outline) - position[:2]) @ (-s, c)
-        own = [k for k in range(teeth) if v.max() > edges[k] + SLACK_M and v.min() < edges[k + 1] - SLACK_M]
+        own = [
+            k
+            for k in range(teeth)
+            if v.max() > edges[k] + SLACK_M and v.min() < edges[k + 1] - SLACK_M
+        ]
         if len(own) < 2:
             cut.append(outline)
             continue
         for k in own:
-            uv = np.array([(-FAR_M, edges[k]), (FAR_M, edges[k]), (FAR_M, edges[k + 1]), (-FAR_M, edges[k + 1])])
+            uv = np.array(
+                [
+                    (-FAR_M, edges[k]),
+                    (FAR_M, edges[k]),
+                    (FAR_M, edges[k + 1]),
+                    (-FAR_M, edges[k + 1]),
+                ]
+            )
             strip = shapely.Polygon(uv @ np.array([[c, s], [-s, c]]) + position[:2])
-            found = shapely.get_parts(shapely.intersection(strip, enclosed(outline), grid_size=1e-4))
+            found = shapely.get_parts(
+                shapely.intersection(strip, enclosed(outline), grid_size=1e-4)
+            )
             cut += [g for g in found if g.geom_type == "Polygon"]
     return cut
 
@@ -176,7 +234,12 @@ def by_teeth(
 def lines_of(record: Mapping[str, Any]) -> list[np.ndarray]:
     """The terrain's lines (m, 3) along the outline."""
     lines = [
-        np.array([place(xyz, "a point of terrain_line") for xyz in as_list(line, "a line of terrain_line")])
+        np.array(
+            [
+                place(xyz, "a point of terrain_line")
+                for xyz in as_list(line, "a line of terrain_line")
+            ]
+        )
         for line in as_list(record.get("terrain_line") or [], "terrain_line")
     ]
     return [rounded(line, PLAN_DIGITS) for line in lines if len(line)]
@@ -186,20 +249,27 @@ def grade_of(record: Mapping[str, Any]) -> Grade | None:
     """The verdict told, None where there is none."""
     code, known = text_at(record, "quality"), {grade.code: grade for grade in Grade}
     if code and code not in known:
-        raise InputError(f"expected a quality ({', '.join(known)}), got {code!r:.40}; leave it as the run wrote it")
+        raise InputError(
+            f"expected a quality ({', '.join(known)}), got {code!r:.40}; leave it as the run wrote "
+            "it"
+        )
     return known.get(code)
 
 
 def quality_of(record: Mapping[str, Any]) -> Quality:
     """The figures that were measured when the building was reconstructed."""
     residuals = mapping(record.get("residuals") or {}, "residuals")
-    figures = {name: figure(residuals, name) for name in RESIDUALS} | {name: figure(record, name) for name in FIGURES}
+    figures = {name: figure(residuals, name) for name in RESIDUALS} | {
+        name: figure(record, name) for name in FIGURES
+    }
     points = number(record.get("points", 0), "points")
     return Quality(points=int(points), **figures)
 
 
 def refuse_other_kinds(record: Mapping[str, Any]) -> None:
-    """Raise InputError where a value of a building's object is of another kind than a run writes; no geometry is made."""
+    """Raise InputError where a value of a building's object is of another kind than a run writes;
+    no geometry is made.
+    """
     parts = [mapping(part, f"part {index}") for index, part in enumerate(list_at(record, "parts"))]
     status_of(record, bool(parts))
     for name in ("detail", "type", "ground_source"):
@@ -220,7 +290,10 @@ def refuse_other_kinds(record: Mapping[str, Any]) -> None:
 def refuse_other_kinds_of_part(part: Mapping[str, Any], where: str) -> None:
     """Raise InputError where a value of a part is of another kind than a run writes."""
     if text_at(part, "type") not in CATALOGUE:
-        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got {excerpt(part.get('type'))}")
+        raise InputError(
+            f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got "
+            f"{excerpt(part.get('type'))}"
+        )
     place(part.get("position"), f"position of {where}", measure)
     number(part.get("rotation", 0.0), f"rotation of {where}")
     for name in ("parameters", "sigma"):
@@ -231,7 +304,8 @@ def refuse_other_keys(record: Mapping[str, Any], known: Any, where: str) -> None
     other = [str(key)[:40] for key in record if key not in known]
     if other:
         raise InputError(
-            f"expected the keys {', '.join(known)} of {where}, got also {', '.join(other[:8])}; remove them"
+            f"expected the keys {', '.join(known)} of {where}, got also {', '.join(other[:8])}; "
+            "remove them"
         )
 
 
@@ -262,7 +336,10 @@ def number(value: Any, where: str) -> float:
     """A finite number that a building can have."""
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     if not is_number or not abs(value) < MOST:
-        raise InputError(f"expected a number as {where}, got {excerpt(value)}; give metres, or degrees for angles")
+        raise InputError(
+            f"expected a number as {where}, got {excerpt(value)}; give metres, or degrees for "
+            "angles"
+        )
     return float(value)
 
 
@@ -284,7 +361,8 @@ def coordinate(value: Any, where: str) -> float:
     found = number(value, where)
     if abs(found) > FARTHEST_M:
         raise InputError(
-            f"expected {where} on Earth, within {FARTHEST_M:g} m of its CRS's origin, got {found:g}; check its unit"
+            f"expected {where} on Earth, within {FARTHEST_M:g} m of its CRS's origin, got "
+            f"{found:g}; check its unit"
         )
     return found
 
@@ -299,7 +377,10 @@ def figure(record: Mapping[str, Any], name: str) -> float:
 
 
 def numbers_by_name(values: Any, where: str) -> dict[str, float]:
-    return {str(name): measure(value, f"{name} in {where}") for name, value in mapping(values, where).items()}
+    return {
+        str(name): measure(value, f"{name} in {where}")
+        for name, value in mapping(values, where).items()
+    }
 
 
 def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
@@ -313,7 +394,9 @@ def shift_of(record: Mapping[str, Any]) -> tuple[float, float]:
 def place(value: Any, where: str, read: Callable[[Any, str], float] = number) -> np.ndarray:
     """Three numbers (3,), each read by `read`."""
     if not isinstance(value, list) or len(value) != 3:
-        raise InputError(f"expected three numbers [x, y, z] as {where}, got {excerpt(value)}; give metres")
+        raise InputError(
+            f"expected three numbers [x, y, z] as {where}, got {excerpt(value)}; give metres"
+        )
     return np.array([read(v, where) for v in value])
 
 
@@ -323,8 +406,13 @@ def polygon(rings: Any, where: str) -> shapely.Polygon:
     for ring in as_list(rings, where):
         corners = as_list(ring, where)
         if len(corners) < 3 or not all(isinstance(xy, list) and len(xy) == 2 for xy in corners):
-            raise InputError(f"expected rings of three or more [x, y] as {where}, got {excerpt(ring)}; close the ring")
+            raise InputError(
+                f"expected rings of three or more [x, y] as {where}, got {excerpt(ring)}; close "
+                "the ring"
+            )
         found.append([(coordinate(x, where), coordinate(y, where)) for x, y in corners])
     if not found:
-        raise InputError(f"expected rings, the outer first, as {where}, got none; write null for no outline")
+        raise InputError(
+            f"expected rings, the outer first, as {where}, got none; write null for no outline"
+        )
     return shapely.Polygon(found[0], found[1:])

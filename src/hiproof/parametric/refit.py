@@ -1,8 +1,10 @@
-"""The parameters of given parts fitted to points: types, rectangles and what is held stay, the points determine the rest.
+"""The parameters of given parts fitted to points: types, rectangles and what is held stay, the
+points determine the rest.
 
-One robust least squares over all parts at once (Levenberg and Marquardt, re-weighted by Tukey's biweight from coarse to fine): the
-residual of a point is its height over the roof, which is the highest part there. Each part's planes follow from its own
-parameters, so a column of the Jacobian asks one part again. The result is never further from the points than the start.
+One robust least squares over all parts at once (Levenberg and Marquardt, re-weighted by Tukey's
+biweight from coarse to fine): the residual of a point is its height over the roof, which is the
+highest part there. Each part's planes follow from its own parameters, so a column of the Jacobian
+asks one part again. The result is never further from the points than the start.
 """
 
 from __future__ import annotations
@@ -21,13 +23,16 @@ from ..primitives.parameters import SIDED
 from ..write.parameters import building_record
 from .edit import built
 
-HELD = ("width", "length", "teeth", "skew", "facing", "distance")  # parameters, or beginnings of their names
+# parameters, or beginnings of their names
+HELD = ("width", "length", "teeth", "skew", "facing", "distance")
 STEP = 1e-4  # of a parameter, metres or degrees, for the Jacobian
 SCALES_M = (3.0, 0.8, 0.25)  # residuals beyond are outliers, from coarse to fine
 ROUNDS = 6  # at each scale
 MOST_POINTS = 2000  # an even selection of more
-WELL = 0.3  # of a point's whole cost: a start that comes so near is no further searched for from afar
-FACADE_M, ENOUGH = 0.3, 30  # points so near the outline may be returns of walls; left out where enough others are
+# of a point's whole cost: a start that comes so near is no further searched for from afar
+WELL = 0.3
+# points so near the outline may be returns of walls; left out where enough others are
+FACADE_M, ENOUGH = 0.3, 30
 FEWEST_POINTS = 3  # points; fewer span no plane
 # m, degrees: bounds in which heights and pitches stay, short of level and of upright
 LEAST_HEIGHT_M, PITCHES_DEG = 0.01, (0.5, 85.0)
@@ -37,7 +42,9 @@ FAR_M = 100.0  # m; larger than any length of a roof: as good as no bound
 
 @dataclasses.dataclass(frozen=True)
 class Unknowns:
-    """Which numbers are fitted: `names` (part, parameter or "z"), their start values and bounds (p,)."""
+    """Which numbers are fitted: `names` (part, parameter or "z"), their start values and bounds
+    (p,).
+    """
 
     names: tuple[tuple[int, str], ...]
     start: np.ndarray
@@ -62,22 +69,36 @@ def fitted_again(building: Building) -> Building:
 
 
 def within(roof: Roof, points: np.ndarray) -> np.ndarray:
-    """Those of the world `points` (n, 3) that are finite and lie inside the outline, about the origin of the roof."""
+    """Those of the world `points` (n, 3) that are finite and lie inside the outline, about the
+    origin of the roof.
+    """
     local = roof.frame.to_local(as_xyz(points))
     local = local[np.isfinite(local).all(axis=1)]
     return local[shapely.intersects_xy(roof.outline, local[:, 0], local[:, 1])]
 
 
-def refitted_parts(roof: Roof, parts: list, points: np.ndarray, fixed: Mapping[int, Collection[str]]) -> list:
-    """The objects `parts` that `roof` was made of, fitted to `points` (n, 3) about its origin. Raises FitError for fewer than three."""
+def refitted_parts(
+    roof: Roof, parts: list, points: np.ndarray, fixed: Mapping[int, Collection[str]]
+) -> list:
+    """The objects `parts` that `roof` was made of, fitted to `points` (n, 3) about its origin.
+
+    Raises FitError for fewer than three.
+    """
     unknowns = unknowns_of(roof.parts, fixed)
     if len(points) < FEWEST_POINTS:
-        raise FitError(f"expected {FEWEST_POINTS} points or more inside the outline, got {len(points)}; add a cloud")
+        raise FitError(
+            f"expected {FEWEST_POINTS} points or more inside the outline, got {len(points)}; add a "
+            "cloud"
+        )
     if not unknowns.names:
         return parts
     values, sigma = fitted(roof.parts, off_the_walls(points, roof.outline), unknowns)
     return [
-        with_values(part, {n: v for (i, n), v in zip(unknowns.names, values, strict=True) if i == index}, sigma[index])
+        with_values(
+            part,
+            {n: v for (i, n), v in zip(unknowns.names, values, strict=True) if i == index},
+            sigma[index],
+        )
         for index, part in enumerate(parts)
     ]
 
@@ -90,7 +111,9 @@ def off_the_walls(points: np.ndarray, outline: shapely.Polygon) -> np.ndarray:
 
 
 def unknowns_of(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -> Unknowns:
-    """All parameters of all parts but their rectangles, where their planes face and those `fixed` by part; the position's z is "z"."""
+    """All parameters of all parts but their rectangles, where their planes face and those `fixed`
+    by part; the position's z is "z".
+    """
     rows = []
     for index, part in enumerate(parts):
         held = set(fixed.get(index, ()))
@@ -100,7 +123,8 @@ def unknowns_of(parts: tuple[Part, ...], fixed: Mapping[int, Collection[str]]) -
                 f"expected parameters of part {index} ({', '.join(sorted(known))}) to hold, got "
                 f"{', '.join(sorted(held - known))}; choose among these"
             )
-        if Z not in held and not SIDED & part.parameters.keys():  # a member's eaves are free one by one
+        # a member's eaves are free one by one
+        if Z not in held and not SIDED & part.parameters.keys():
             rows.append((index, Z, float(part.translation[2]), -np.inf, np.inf))
         for name, value in part.parameters.items():
             if name not in held and name.split("_")[0] not in HELD:
@@ -132,8 +156,9 @@ def bounds_of(name: str, parameters: Mapping[str, float]) -> tuple[float, float]
 
 @dataclasses.dataclass(frozen=True)
 class Surface:
-    """The roof over the points: their heights (n,) above it, the part (n,) that it is there and the row (n,) among that part's planes,
-    and all planes (k, 3) of every part."""
+    """The roof over the points: their heights (n,) above it, the part (n,) that it is there and the
+    row (n,) among that part's planes, and all planes (k, 3) of every part.
+    """
 
     gaps: np.ndarray
     part: np.ndarray
@@ -146,18 +171,27 @@ class Heights:
 
     def __init__(self, parts: tuple[Part, ...], points: np.ndarray, unknowns: Unknowns) -> None:
         self.parts, self.z, self.unknowns = parts, points[:, 2], unknowns
-        self.terms = np.column_stack([points[:, :2], np.ones(len(points))])  # a plane's height is their product with it
-        self.columns = [[k for k, (i, _) in enumerate(unknowns.names) if i == index] for index in range(len(parts))]
+        # a plane's height is their product with it
+        self.terms = np.column_stack([points[:, :2], np.ones(len(points))])
+        self.columns = [
+            [k for k, (i, _) in enumerate(unknowns.names) if i == index]
+            for index in range(len(parts))
+        ]
         self.outlines = [[piece.outline for piece in part.pieces] for part in parts]
         self.inside = [
-            [np.flatnonzero(shapely.intersects_xy(outline, points[:, 0], points[:, 1])) for outline in outlines]
+            [
+                np.flatnonzero(shapely.intersects_xy(outline, points[:, 0], points[:, 1]))
+                for outline in outlines
+            ]
             for outlines in self.outlines
         ]
 
     def planes(self, index: int, x: np.ndarray) -> list[np.ndarray] | None:
         """The planes (k, 3) of each piece of a part; None where its parameters make none."""
         part = self.parts[index]
-        values = {self.unknowns.names[column][1]: float(x[column]) for column in self.columns[index]}
+        values = {
+            self.unknowns.names[column][1]: float(x[column]) for column in self.columns[index]
+        }
         parameters = {name: values.get(name, value) for name, value in part.parameters.items()}
         translation = np.array([*part.translation[:2], values.get(Z, part.translation[2])])
         try:
@@ -181,7 +215,11 @@ class Heights:
                 height = heights[np.arange(len(own)), lowest]
                 higher = height > top[own]
                 chosen = own[higher]
-                top[chosen], part[chosen], row[chosen] = height[higher], index, first + lowest[higher]
+                top[chosen], part[chosen], row[chosen] = (
+                    height[higher],
+                    index,
+                    first + lowest[higher],
+                )
                 first += len(own_planes)
             found.append(np.concatenate(planes))
         return Surface(np.clip(self.z - top, -FAR_M, FAR_M), part, row, found)
@@ -194,7 +232,10 @@ class Heights:
             own = np.flatnonzero(covered & (surface.part == index))
             terms, row = self.terms[own], surface.row[own]
             for column in columns if len(own) else ():
-                moved, step = x.copy(), STEP if x[column] + STEP < self.unknowns.high[column] else -STEP
+                moved, step = (
+                    x.copy(),
+                    STEP if x[column] + STEP < self.unknowns.high[column] else -STEP,
+                )
                 moved[column] += step
                 planes = self.planes(index, moved)
                 if planes is not None:
@@ -219,7 +260,9 @@ def fitted(
         if misfit(found.gaps, finest) < misfit(surface.gaps, finest):
             x, surface = coarse, found
     near = np.abs(surface.gaps) < finest
-    deviations = np.sqrt(np.diag(covariance(heights.jacobian(x, surface)[near], surface.gaps[near])))
+    deviations = np.sqrt(
+        np.diag(covariance(heights.jacobian(x, surface)[near], surface.gaps[near]))
+    )
     sigma: list[dict[str, float]] = [{} for _ in parts]
     for (index, name), deviation in zip(unknowns.names, deviations, strict=True):
         if 0.0 < deviation < FAR_M:
@@ -228,7 +271,9 @@ def fitted(
 
 
 def descended(heights: Heights, x: np.ndarray, scale: float) -> np.ndarray:
-    """The unknowns at the foot of the hill: damped steps that each lessen the misfit at this scale."""
+    """The unknowns at the foot of the hill: damped steps that each lessen the misfit at
+    this scale.
+    """
     unknowns, damping = heights.unknowns, 1e-3
     surface = heights.at(x)
     cost, slopes = misfit(surface.gaps, scale), None
@@ -257,13 +302,17 @@ def misfit(gaps: np.ndarray, scale: float) -> float:
 
 
 def covariance(jacobian: np.ndarray, gaps: np.ndarray) -> np.ndarray:
-    """Covariance (p, p) of the unknowns from the points near the roof; zero where they say nothing."""
+    """Covariance (p, p) of the unknowns from the points near the roof; zero where they say
+    nothing.
+    """
     if not len(gaps):
         return np.zeros((jacobian.shape[1],) * 2)
     return np.linalg.pinv(jacobian.T @ jacobian, rcond=1e-10) * float(np.mean(gaps**2))
 
 
-def with_values(part: dict[str, Any], values: Mapping[str, float], sigma: dict[str, float]) -> dict[str, Any]:
+def with_values(
+    part: dict[str, Any], values: Mapping[str, float], sigma: dict[str, float]
+) -> dict[str, Any]:
     """The part's object with fitted values; its position's z is that of its lowest eave again."""
     parameters = {name: values.get(name, value) for name, value in part["parameters"].items()}
     x, y, z = part["position"]
@@ -271,7 +320,9 @@ def with_values(part: dict[str, Any], values: Mapping[str, float], sigma: dict[s
     eaves = [name for name in parameters if name in SIDED and name.startswith("eave_")]
     if eaves:
         low = min(parameters[name] for name in eaves)
-        parameters |= {name: parameters[name] - low for name in (*eaves, "height") if name in parameters}
+        parameters |= {
+            name: parameters[name] - low for name in (*eaves, "height") if name in parameters
+        }
         z += low
     return {**part, "parameters": parameters, "position": [x, y, z], "sigma": sigma}
 

@@ -1,4 +1,6 @@
-"""`hiproof build`: a file of parameters into the files of a run, one building in memory at a time."""
+"""`hiproof build`: a file of parameters into the files of a run, one building in memory
+at a time.
+"""
 
 from __future__ import annotations
 
@@ -36,13 +38,15 @@ from ..write.values import plain_text
 from .building import build
 from .file import opened_parameters
 
-MOST_TOLD = 1000  # sentences kept of buildings that could not be built; a wrong file may have millions
+# sentences kept of buildings that could not be built; a wrong file may have millions
+MOST_TOLD = 1000
 
 
 @dataclass
 class Built:
-    """What came of a file: where the models are, buildings by status, and (id, sentence) of those that could not be built, the first
-    MOST_TOLD."""
+    """What came of a file: where the models are, buildings by status, and (id, sentence) of those
+    that could not be built, the first MOST_TOLD.
+    """
 
     models: list[Path] = field(default_factory=list)
     by_status: Counter = field(default_factory=Counter)
@@ -67,7 +71,10 @@ class Built:
             self.by_quality[building.grade.code] += 1
         if building.type:
             self.by_type[building.type] += 1
-        if building.status in (Status.NOT_BUILT, Status.INTERNAL_ERROR) and len(self.not_built) < MOST_TOLD:
+        if (
+            building.status in (Status.NOT_BUILT, Status.INTERNAL_ERROR)
+            and len(self.not_built) < MOST_TOLD
+        ):
             self.not_built.append((building.id, building.detail))
 
 
@@ -79,8 +86,10 @@ def build_file(
 ) -> Built:
     """Write the files of a run into the folder `out` from the parameters.jsonl at `path`.
 
-    What is written is as the file's head says, but for `changes` of the settings [write]. A building that cannot be built is written without a model, with a sentence, and keeps its parameters. Raises InputError
-    for a file that cannot be read and OutputError for a folder that cannot be written; then nothing is written.
+    What is written is as the file's head says, but for `changes` of the settings [write]. A
+    building that cannot be built is written without a model, with a sentence, and keeps its
+    parameters. Raises InputError for a file that cannot be read and OutputError for a folder that
+    cannot be written; then nothing is written.
     """
     path, out, built = Path(path), Path(out), Built()
     refuse_folder_of_a_run(out)
@@ -92,16 +101,21 @@ def build_file(
         first = next(records, None)
         records = iter(()) if first is None else chained(first, records)
         maker.settle_offset(first)
-        join_fragments(asked_files(settings, out), made(maker, records, built, progress), maker.head)
+        join_fragments(
+            asked_files(settings, out), made(maker, records, built, progress), maker.head
+        )
     write_record(path, out, maker.head, built)
     return built
 
 
 def refuse_folder_of_a_run(out: Path) -> None:
-    """Raise OutputError for the folder of `hiproof reconstruct`, which would make all its files again."""
+    """Raise OutputError for the folder of `hiproof reconstruct`, which would make all its files
+    again.
+    """
     if (out / ".hiproof").exists():
         raise OutputError(
-            f"expected a folder for what is built, got {out}, which holds a run of `hiproof reconstruct`; "
+            f"expected a folder for what is built, got {out}, which holds a run of `hiproof "
+            "reconstruct`; "
             "choose another --out"
         )
 
@@ -111,7 +125,9 @@ def chained(first: dict, rest: Iterator[dict]) -> Iterator[dict]:
     yield from rest
 
 
-def made(maker: Maker, records: Iterator[dict], built: Built, progress: Callable[[int], None]) -> Iterator[Fragments]:
+def made(
+    maker: Maker, records: Iterator[dict], built: Built, progress: Callable[[int], None]
+) -> Iterator[Fragments]:
     """The texts of every building, counted."""
     for number, record in enumerate(records, 1):
         building, texts = maker.make(record)
@@ -133,12 +149,16 @@ class Maker:
             self.head = dataclasses.replace(self.head, offset=offset_by(first, self.head.units))
 
     def make(self, record: dict[str, Any]) -> tuple[Building, Fragments]:
-        """The building of an object and its texts; where it cannot be built, without a model and with its parameters kept."""
+        """The building of an object and its texts; where it cannot be built, without a model and
+        with its parameters kept.
+        """
         id = record["id"]
         names = self.names[0].take(plain_text(id)), self.names[1].take(gml_name(id))
         try:
             if names[0] != plain_text(id):
-                raise InputError(f"expected buildings of different ids, got {id!r} again; give this one another")
+                raise InputError(
+                    f"expected buildings of different ids, got {id!r} again; give this one another"
+                )
             return fragments(build(record, self.head.compose), names, self.head)
         except HiproofError as error:
             why, status = str(error), Status.NOT_BUILT
@@ -170,7 +190,9 @@ def offset_by(record: Mapping[str, Any] | None, units: FileUnits) -> np.ndarray:
 
 
 def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
-    """run.json: what was built of which file, and the clouds and footprints of the run that the file came from."""
+    """run.json: what was built of which file, and the clouds and footprints of the run that the
+    file came from.
+    """
     record = {
         "hiproof": __version__,
         **earlier_record(path.parent, head),
@@ -183,17 +205,25 @@ def write_record(path: Path, out: Path, head: FileHead, built: Built) -> None:
         "not_built": [list(pair) for pair in built.not_built],
     }
     with atomic(out / "run.json") as beside:
-        Path(beside).write_text(json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8")
+        Path(beside).write_text(
+            json.dumps(masked_values(record), indent=1) + "\n", encoding="utf-8"
+        )
 
 
 def earlier_record(folder: Path, head: FileHead) -> dict[str, Any]:
-    """Settings and inputs of the run whose record lies in `folder`, as far as there is one; how and in which units coordinates are written
-    is as `head` says, with which whoever reads the models finds their place."""
+    """Settings and inputs of the run whose record lies in `folder`, as far as there is one; how and
+    in which units coordinates are written is as `head` says, with which whoever reads the models
+    finds their place.
+    """
     try:
         record = run_record(folder)
     except InputError as error:
         LOGGER.warning("built without the settings and inputs of the run: %s", error)
         record = {}
     known = {name: record[name] for name in ("settings", "inputs") if record.get(name)}
-    told = {"read": {"unit": head.unit}, **known.get("settings", {}), "write": dataclasses.asdict(head.write)}
+    told = {
+        "read": {"unit": head.unit},
+        **known.get("settings", {}),
+        "write": dataclasses.asdict(head.write),
+    }
     return {**known, "settings": told, "units": head.units.told()}

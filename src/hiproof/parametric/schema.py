@@ -1,4 +1,6 @@
-"""The JSON schema (draft 2020-12) of parameters.jsonl: its first line is a `head`, every other a `building`."""
+"""The JSON schema (draft 2020-12) of parameters.jsonl: its first line is a `head`, every other a
+`building`.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +19,11 @@ NUMBER_OR_NULL, TEXT_OR_NULL = {"type": ["number", "null"]}, {"type": ["string",
 NUMBERS = {"type": "object", "additionalProperties": NUMBER}
 SHARES = {"type": "object", "additionalProperties": NUMBER_OR_NULL}
 PLACE = {"type": "array", "items": NUMBER, "minItems": 3, "maxItems": 3}
-RING = {"type": "array", "minItems": 3, "items": {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2}}
+RING = {
+    "type": "array",
+    "minItems": 3,
+    "items": {"type": "array", "items": NUMBER, "minItems": 2, "maxItems": 2},
+}
 POLYGON = {"type": "array", "items": RING, "minItems": 1}
 LENGTH = {"type": "number", "exclusiveMinimum": 0}
 
@@ -67,7 +73,9 @@ def schema() -> dict[str, Any]:
         "head": described(HEAD, HEAD_KINDS, required=("hiproof_parameters",)),
         "building": described(PARAMETERS, BUILDING_KINDS, required=("id",)),
         "part": described(
-            PART, {"type": {"enum": list(CATALOGUE)}, **PART_KINDS}, required=("type", "parameters", "position")
+            PART,
+            {"type": {"enum": list(CATALOGUE)}, **PART_KINDS},
+            required=("type", "parameters", "position"),
         )
         | {"allOf": parameters_by_type()},
     }
@@ -81,10 +89,17 @@ def schema() -> dict[str, Any]:
     }
 
 
-def described(attributes: tuple[Attribute, ...], kinds: dict[str, Any], required: tuple[str, ...]) -> dict[str, Any]:
-    """An object with `attributes`, each with its meaning and unit; those of no other kind are numbers or null."""
+def described(
+    attributes: tuple[Attribute, ...], kinds: dict[str, Any], required: tuple[str, ...]
+) -> dict[str, Any]:
+    """An object with `attributes`, each with its meaning and unit; those of no other kind are
+    numbers or null.
+    """
     properties = {
-        a.name: {"description": f"{a.meaning} [{a.unit}]" if a.unit else a.meaning, **kinds.get(a.name, NUMBER_OR_NULL)}
+        a.name: {
+            "description": f"{a.meaning} [{a.unit}]" if a.unit else a.meaning,
+            **kinds.get(a.name, NUMBER_OR_NULL),
+        }
         for a in attributes
     }
     closed = {"additionalProperties": False} if attributes is not HEAD else {}
@@ -93,16 +108,24 @@ def described(attributes: tuple[Attribute, ...], kinds: dict[str, Any], required
 
 def parameters_by_type() -> list[dict[str, Any]]:
     """What the parameters of a part of each type must hold, unless they are given side by side."""
-    sides, cants = "(pitch|eave|skew)_(left|right|front|back)", f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]"
+    sides, cants = (
+        "(pitch|eave|skew)_(left|right|front|back)",
+        f"({'|'.join(MEASURES)})_cant[1-{MOST_CANTS}]",
+    )
     side_by_side = {"propertyNames": {"pattern": f"^(width|length|height|{sides}|{cants})$"}}
     rules = []
     for kind, shape in CATALOGUE.items():
         own = [
-            {"required": [] if kind == "flat" else list(names), "propertyNames": {"enum": list(names)}}
+            {
+                "required": [] if kind == "flat" else list(names),
+                "propertyNames": {"enum": list(names)},
+            }
             for names in dict.fromkeys(variant.parameters for variant in shape.variants)
         ]
         is_kind = {"properties": {"type": {"const": kind}}}
-        rules.append({"if": is_kind, "then": {"properties": {"parameters": {"anyOf": [*own, side_by_side]}}}})
+        rules.append(
+            {"if": is_kind, "then": {"properties": {"parameters": {"anyOf": [*own, side_by_side]}}}}
+        )
     return rules
 
 

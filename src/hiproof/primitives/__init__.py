@@ -1,4 +1,6 @@
-"""Roof shapes: the contract (contract.py), one shape a file, halves of others (halves.py), the catalogue."""
+"""Roof shapes: the contract (contract.py), one shape a file, halves of others (halves.py), the
+catalogue.
+"""
 
 from .catalogue import CATALOGUE, get
 from .contract import Primitive

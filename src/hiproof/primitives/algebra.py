@@ -1,8 +1,9 @@
-"""Sums of monomials in a primitive's shape parameters: a roof's planes written as formulas, usable as data.
+"""Sums of monomials in a primitive's shape parameters: a roof's planes written as formulas, usable
+as data.
 
-`q0 - q1 * V + q2 * U` builds a `Formula`, a sum of terms factor * V^a U^b q0^c q1^d q2^e q3^f with integer
-(also negative) exponents. The compiled fit reads the terms, so that one kernel evaluates the planes of every primitive,
-and their exact derivatives, without knowing any of them.
+`q0 - q1 * V + q2 * U` builds a `Formula`, a sum of terms factor * V^a U^b q0^c q1^d q2^e q3^f with
+integer (also negative) exponents. The compiled fit reads the terms, so that one kernel evaluates
+the planes of every primitive, and their exact derivatives, without knowing any of them.
 """
 
 from __future__ import annotations
@@ -44,7 +45,10 @@ class Formula:
     @cached_property
     def sparse(self) -> tuple[tuple[float, tuple[tuple[int, int], ...]], ...]:
         """The terms with only the exponents that are not zero."""
-        return tuple((f, tuple((k, power) for k, power in enumerate(powers) if power)) for f, powers in self.terms)
+        return tuple(
+            (f, tuple((k, power) for k, power in enumerate(powers) if power))
+            for f, powers in self.terms
+        )
 
     def gradient(self, shape: Sequence[float] | np.ndarray) -> np.ndarray:
         """Derivatives (6,) with respect to SYMBOLS at `shape` (6,)."""
@@ -88,7 +92,9 @@ class Formula:
         return product
 
     def __truediv__(self, other: Formula | float) -> Formula:
-        """Division by one monomial; a sum in the denominator has no finite form and raises ValueError."""
+        """Division by one monomial; a sum in the denominator has no finite form and raises
+        ValueError.
+        """
         (term,) = formula(other).terms
         return self * Formula(((1 / term[0], tuple(-power for power in term[1])),))
 
@@ -112,4 +118,6 @@ def formula(value: Formula | float) -> Formula:
     return Formula(((float(value), (0,) * len(SYMBOLS)),) if value else ())
 
 
-V, U, q0, q1, q2, q3 = (Formula(((1.0, tuple(int(i == k) for i in range(len(SYMBOLS)))),)) for k in range(len(SYMBOLS)))
+V, U, q0, q1, q2, q3 = (
+    Formula(((1.0, tuple(int(i == k) for i in range(len(SYMBOLS)))),)) for k in range(len(SYMBOLS))
+)

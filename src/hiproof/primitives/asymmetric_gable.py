@@ -1,11 +1,25 @@
-"""Asymmetric gable (saltbox): two planes of different slope from a ridge that need not lie in the middle."""
+"""Asymmetric gable (saltbox): two planes of different slope from a ridge that need not lie in the
+middle.
+"""
 
 from collections.abc import Mapping
 
 import numpy as np
 
 from .algebra import U, V, q0, q1, q2, q3
-from .contract import BACK, FRONT, HALF_WIDTH, KAPPA, Q1, Q2, Q3, SLOPE_MAX, DerivedStart, Primitive, Sides
+from .contract import (
+    BACK,
+    FRONT,
+    HALF_WIDTH,
+    KAPPA,
+    Q1,
+    Q2,
+    Q3,
+    SLOPE_MAX,
+    DerivedStart,
+    Primitive,
+    Sides,
+)
 from .drawing import drawn_plan, drawn_slope
 from .gable import FACES
 
@@ -20,14 +34,23 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """As the gable's v1..v6, with the ridge v3 v4 moved by the offset and the eave v5 v6 raised by the step."""
-    u, v, h, offset, step = p["length"] / 2, p["width"] / 2, p["height"], p["ridge_offset"], p["eave_step"]
+    """As the gable's v1..v6, with the ridge v3 v4 moved by the offset and the eave v5 v6 raised by
+    the step.
+    """
+    u, v, h, offset, step = (
+        p["length"] / 2,
+        p["width"] / 2,
+        p["height"],
+        p["ridge_offset"],
+        p["eave_step"],
+    )
     return [(u, -v, 0), (-u, -v, 0), (-u, offset, h), (u, offset, h), (u, v, step), (-u, v, step)]
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
     """The lower eave lies at -v, of equal ones that of the steeper slope."""
-    higher = theta[HALF_WIDTH] * (theta[Q1] * (1 + theta[Q3]) - theta[Q2] * (1 - theta[Q3]))  # the eave at +v
+    # the eave at +v
+    higher = theta[HALF_WIDTH] * (theta[Q1] * (1 + theta[Q3]) - theta[Q2] * (1 - theta[Q3]))
     if higher > SAME_M or (higher > -SAME_M and theta[Q3] <= 0):
         return theta
     turned = theta.copy()
@@ -54,7 +77,11 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     if rng.random() < 0.4:
         # One slope on both sides and eaves at different heights: a catslide roof.
         step = height * (1 - (width / 2 - offset) / (width / 2 + offset))
-    return drawn_plan(rng, width, 0.9) | {"height": height, "ridge_offset": offset, "eave_step": step}
+    return drawn_plan(rng, width, 0.9) | {
+        "height": height,
+        "ridge_offset": offset,
+        "eave_step": step,
+    }
 
 
 def of_member(member: Sides) -> tuple[float, ...]:

@@ -1,4 +1,5 @@
-"""Cants: further planes of a member, over walls that cut a corner of its rectangle off, as those of a bay or of an eight-sided tower.
+"""Cants: further planes of a member, over walls that cut a corner of its rectangle off, as those of
+a bay or of an eight-sided tower.
 
 Each rises square from its own wall:
 
@@ -7,7 +8,8 @@ Each rises square from its own wall:
     eave_cantK       the height of its eave above T_L (m)
     pitch_cantK      its slope (degrees)
 
-As an array they are (4, c), of several members alike (4, c, m): facing (rad), distance (m), height of the eave (m), slope.
+As an array they are (4, c), of several members alike (4, c, m): facing (rad), distance (m), height
+of the eave (m), slope.
 """
 
 from __future__ import annotations
@@ -59,16 +61,23 @@ def words_of_cants(cants: np.ndarray, base: Any) -> dict[str, Any]:
 
 
 def cants_of_words(parameters: Mapping[str, float], base: float) -> np.ndarray:
-    """The cants (4, c) that parameters tell of, with T_L at the height `base`. Raises KeyError where one is missing."""
+    """The cants (4, c) that parameters tell of, with T_L at the height `base`.
+
+    Raises KeyError where one is missing.
+    """
     told = [[parameters[f"{what}_{cant}"] for what in MEASURES] for cant in cants_named(parameters)]
     facing, distance, eave, pitch = np.array(told, float).reshape(-1, len(MEASURES)).T
     return np.array([np.radians(facing), distance, base + eave, np.tan(np.radians(pitch))])
 
 
-def cants_left_in_place(parameters: Mapping[str, float], along: float, across: float) -> dict[str, float]:
-    """The parameters of a part whose rectangle's middle went so far along and across it while its walls stayed.
+def cants_left_in_place(
+    parameters: Mapping[str, float], along: float, across: float
+) -> dict[str, float]:
+    """The parameters of a part whose rectangle's middle went so far along and across it while its
+    walls stayed.
 
-    >>> cants_left_in_place({"facing_cant1": 90.0, "distance_cant1": 5.0}, 2.0, 1.0)["distance_cant1"]
+    >>> cants_left_in_place({"facing_cant1": 90.0, "distance_cant1": 5.0}, 2.0,
+    ...     1.0)["distance_cant1"]
     4.0
     """
     left = dict(parameters)

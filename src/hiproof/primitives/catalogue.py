@@ -1,4 +1,7 @@
-"""All roof shapes by name. A new shape is one file with its `PRIMITIVE` and its name here; every test covers it."""
+"""All roof shapes by name.
+
+A new shape is one file with its `PRIMITIVE` and its name here; every test covers it.
+"""
 
 from ..errors import SettingsError
 from . import (
@@ -18,7 +21,8 @@ from . import (
 )
 from .contract import Primitive
 
-# Types are tried and listed in this order. Of several with planes on the same sides the first is the general one.
+# Types are tried and listed in this order. Of several with planes on the same sides the first is
+# the general one.
 SHAPES = (
     flat.PRIMITIVE,
     monopitch.PRIMITIVE,
@@ -48,5 +52,7 @@ def get(name: str) -> Primitive:
     ('width', 'length', 'height')
     """
     if name not in CATALOGUE:
-        raise SettingsError(f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; see `hiproof settings`")
+        raise SettingsError(
+            f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; see `hiproof settings`"
+        )
     return CATALOGUE[name]

@@ -2,13 +2,19 @@
 
 Two descriptions of the same surface meet here:
 
-* the paper's: S = f(theta_p) with theta_p in metres (width, length, height, ...), vertices and faces in the primitive
-  frame: plan centre at the origin, u along the ridge (length), v across (width), lowest eave at z = 0;
-* the fit's: theta = [cx, cy, kappa, V, U, q0, q1, q2, q3] with V, U the half extents across and along and q the
-  heights, slopes and fractions of the planes z = a u + b v + c; a, b, c are formulas (algebra.py) of V, U and q. Every
-  bound is a plain interval, and the roof is the minimum of its planes over the rectangle |u| <= U, |v| <= V.
+* the paper's: S = f(theta_p) with theta_p in metres (width, length, height, ...), vertices and
+  faces in the primitive
+  frame: plan centre at the origin, u along the ridge (length), v across (width), lowest eave at z =
+  0;
+* the fit's: theta = [cx, cy, kappa, V, U, q0, q1, q2, q3] with V, U the half extents across and
+  along and q the
+  heights, slopes and fractions of the planes z = a u + b v + c; a, b, c are formulas (algebra.py)
+  of V, U and q. Every
+  bound is a plain interval, and the roof is the minimum of its planes over the rectangle |u| <= U,
+  |v| <= V.
 
-x = cx + u cos(kappa) - v sin(kappa), y = cy + u sin(kappa) + v cos(kappa); T_L = (cx, cy, eave height).
+x = cx + u cos(kappa) - v sin(kappa), y = cy + u sin(kappa) + v cos(kappa); T_L = (cx, cy, eave
+height).
 """
 
 from __future__ import annotations
@@ -41,7 +47,9 @@ Corners = Sequence[tuple[float, float, float]] | np.ndarray  # (n, 3)
 
 
 class Sides(Protocol):
-    """What a member of the family (family.py) tells of its planes: by side their eaves (m) and slopes, a level top (m)."""
+    """What a member of the family (family.py) tells of its planes: by side their eaves (m) and
+    slopes, a level top (m).
+    """
 
     @property
     def half(self) -> np.ndarray: ...
@@ -57,8 +65,9 @@ class Sides(Protocol):
 
 @dataclass(frozen=True)
 class DerivedStart:
-    """Start values from the fit of a simpler type: `q` are formulas of the `source`'s V, U and q, in axes that are turned
-    by so many quarters from its own."""
+    """Start values from the fit of a simpler type: `q` are formulas of the `source`'s V, U and q,
+    in axes that are turned by so many quarters from its own.
+    """
 
     source: str
     q: tuple[Formula | float, ...]
@@ -69,7 +78,9 @@ class DerivedStart:
         theta, shape = source_theta.copy(), source_theta[HALF_WIDTH:].tolist()
         for _ in range(self.quarters):
             theta = quarter_turned(theta)
-        theta[Q0 : Q0 + len(self.q)] = [q.at(shape) if isinstance(q, Formula) else q for q in self.q]
+        theta[Q0 : Q0 + len(self.q)] = [
+            q.at(shape) if isinstance(q, Formula) else q for q in self.q
+        ]
         return theta
 
 
@@ -82,7 +93,9 @@ def at_quarters(
 
 @dataclass(frozen=True)
 class Vote:
-    """Start values by a vote of the points: which quarter turns, slopes and shifts of the ridge (shares of V) are tried."""
+    """Start values by a vote of the points: which quarter turns, slopes and shifts of the ridge
+    (shares of V) are tried.
+    """
 
     turns: int = 2
     slopes: tuple[float, ...] = (0.08, 0.2, 0.32, 0.45, 0.58, 0.72, 0.86, 1.0, 1.2)
@@ -94,20 +107,25 @@ class Primitive:
     """One roof shape.
 
     planes       formulas (a, b, c) in the order of `faces`; the roof is their minimum
-    measures     theta_p by name in metres as formulas of V, U, q; all are positive but those in `signed`
+    measures     theta_p by name in metres as formulas of V, U, q; all are positive but those in
+                 `signed`
     eave         formula of the lowest eave's height
-    shape        theta_p -> (V, U, q0, q1, q2, q3) with the lowest eave at 0: the inverse of `measures`
+    shape        theta_p -> (V, U, q0, q1, q2, q3) with the lowest eave at 0: the inverse of
+                 `measures`
     corners      theta_p -> vertices (n, 3) in the primitive frame: the paper's S = f(theta_p)
     faces        vertex indices (from 0) of each roof surface, counter-clockwise from above
     typical      (width, length, height) -> theta_p of an ordinary roof of that size
-    draw         (generator, width) -> theta_p of one of the roofs that are built so, for simulations; typical ones without
+    draw         (generator, width) -> theta_p of one of the roofs that are built so, for
+                 simulations; typical ones without
     bounds       (low, high) of q1, q2, q3 as far as used
     vote         how the points vote for start values, or None for a type whose
     starts       derive from the fits of simpler types
     canonical    theta -> the one theta chosen among those of the same surface
-    strips       number of teeth: planes are then chosen by equal strips across instead of by the minimum
+    strips       number of teeth: planes are then chosen by equal strips across instead of by the
+                 minimum
     more         the same roof type with other strips or other parameters
-    of_member    a member of the family with planes on the same sides -> q of the shape with its front's and right's slopes
+    of_member    a member of the family with planes on the same sides -> q of the shape with its
+                 front's and right's slopes
     osm_shape    the nearest value of OpenStreetMap's roof:shape
     colour       of its roofs in pictures, #rrggbb
     """
@@ -154,32 +172,47 @@ class Primitive:
     def sides(self) -> tuple[int, ...]:
         """The side that each of `planes` rises from, LEVEL for a level one."""
         return tuple(
-            LEVEL if not (a.terms or b.terms) else (RIGHT, LEFT)[a.rises] if a.terms else (BACK, FRONT)[b.rises]
+            LEVEL
+            if not (a.terms or b.terms)
+            else (RIGHT, LEFT)[a.rises]
+            if a.terms
+            else (BACK, FRONT)[b.rises]
             for a, b, _ in self.plane_formulas
         )
 
     @property
     def is_of_family(self) -> bool:
-        """Whether it has at most one plane a side and a level one, so that a volume can have its shape."""
+        """Whether it has at most one plane a side and a level one, so that a volume can have its
+        shape.
+        """
         return self.strips == 1 and len(set(self.sides)) == len(self.sides)
 
     def variant(self, theta_p: Mapping[str, float]) -> Primitive:
-        """The variant with the tooth count or the parameters of `theta_p`; itself where these tell of no other."""
+        """The variant with the tooth count or the parameters of `theta_p`; itself where these tell
+        of no other.
+        """
         if self.strips == 1:
             told = [variant for variant in self.variants if set(variant.parameters) <= set(theta_p)]
             return max(told, key=lambda variant: len(variant.parameters), default=self)
         for variant in self.variants:
             if variant.strips == theta_p.get("teeth", self.strips):
                 return variant
-        raise FitError(f"expected 2 to 6 teeth for a {self.name} roof, got {theta_p['teeth']}; choose one of these")
+        raise FitError(
+            f"expected 2 to 6 teeth for a {self.name} roof, got {theta_p['teeth']}; choose one of "
+            "these"
+        )
 
     def vertices(self, theta_p: Mapping[str, float]) -> np.ndarray:
-        """The paper's S = f(theta_p): vertices (n, 3) in the primitive frame. Raises FitError where one is missing."""
+        """The paper's S = f(theta_p): vertices (n, 3) in the primitive frame.
+
+        Raises FitError where one is missing.
+        """
         shape = self.variant(theta_p)
         missing = [name for name in shape.parameters if name not in theta_p]
         if missing:
             raise FitError(
-                f"expected the parameters {', '.join(shape.parameters)} of a {self.name} roof, got none for "
+                f"expected the parameters {', '.join(shape.parameters)} of a {self.name} roof, got "
+                "none for "
                 f"{', '.join(missing)}; give every parameter in metres"
             )
         return np.asarray(shape.corners(theta_p), float)
@@ -188,12 +221,20 @@ class Primitive:
         """theta_p of a roof made up at random, `width` (m) wide."""
         if self.draw is not None:
             return self.draw(rng, width)
-        return self.typical(width, width * rng.uniform(1.05, 2.2), 0.5 * width * drawn_slope(rng, 20.0, 45.0))
+        return self.typical(
+            width, width * rng.uniform(1.05, 2.2), 0.5 * width * drawn_slope(rng, 20.0, 45.0)
+        )
 
     def from_member(self, member: Sides) -> tuple[float, ...]:
-        """q of the shape with the slopes of a member's front and right. Raises FitError for a shape that is of no family."""
+        """q of the shape with the slopes of a member's front and right.
+
+        Raises FitError for a shape that is of no family.
+        """
         if self.of_member is None:
-            raise FitError(f"expected a shape of at most one plane a side, got {self.name}; name its parameters")
+            raise FitError(
+                f"expected a shape of at most one plane a side, got {self.name}; name its "
+                "parameters"
+            )
         return self.of_member(member)
 
     def to_theta(
@@ -202,7 +243,9 @@ class Primitive:
         kappa: float = 0.0,
         translation: Sequence[float] | np.ndarray = (0.0, 0.0, 0.0),
     ) -> np.ndarray:
-        """theta (9,) of the roof with `theta_p`, turned by `kappa` and moved to `translation` T_L (3,)."""
+        """theta (9,) of the roof with `theta_p`, turned by `kappa` and moved to `translation` T_L
+        (3,).
+        """
         theta = np.zeros(9)
         theta[[CX, CY, KAPPA]] = translation[0], translation[1], kappa
         theta[HALF_WIDTH:] = self.variant(theta_p).shape(theta_p)
@@ -216,7 +259,9 @@ class Primitive:
         return theta_p, float(theta[KAPPA]), np.array([theta[CX], theta[CY], eave])
 
     def measures_at(self, shape: Sequence[Any]) -> list[Any]:
-        """theta_p in order and the lowest eave's height at a `shape` (V, U, q0..q3), or at several: arrays (m,)."""
+        """theta_p in order and the lowest eave's height at a `shape` (V, U, q0..q3), or at several:
+        arrays (m,).
+        """
         return [measure.at(shape) for measure in (*self.measures.values(), self.eave)]
 
     def is_proper(self, theta: np.ndarray) -> bool:
@@ -228,14 +273,20 @@ class Primitive:
         if any(value < LEAST_M for name, value in theta_p.items() if name not in self.signed):
             return False
         try:
-            again = self.shape({name: round(value, WRITTEN_DIGITS) for name, value in theta_p.items()})
+            again = self.shape(
+                {name: round(value, WRITTEN_DIGITS) for name, value in theta_p.items()}
+            )
         except ZeroDivisionError:
             return False
         slopes = zip(again[Q1 - HALF_WIDTH :], theta[Q1 : self.theta_size].tolist(), strict=False)
-        return all(abs(after - before) <= SLOPE_SHARE * (1.0 + abs(before)) for after, before in slopes)
+        return all(
+            abs(after - before) <= SLOPE_SHARE * (1.0 + abs(before)) for after, before in slopes
+        )
 
     def canonical_theta(self, theta: np.ndarray) -> np.ndarray:
-        """The same surface's one theta: axes in their fixed roles, kappa in (-pi/2, pi/2] or (-pi, pi]."""
+        """The same surface's one theta: axes in their fixed roles, kappa in (-pi/2, pi/2] or (-pi,
+        pi].
+        """
         theta = self.canonical(np.array(theta, float))
         period = math.pi if self.half_turn_symmetric else 2 * math.pi
         theta[KAPPA] -= period * math.ceil(theta[KAPPA] / period - 0.5)
@@ -244,7 +295,9 @@ class Primitive:
     def plane_values(self, theta: np.ndarray) -> np.ndarray:
         """Planes (k, 3), z = a u + b v + c, at `theta` (9,), in the order of `faces`."""
         shape = np.asarray(theta, float)[HALF_WIDTH:].tolist()
-        return np.array([[coefficient.at(shape) for coefficient in plane] for plane in self.plane_formulas])
+        return np.array(
+            [[coefficient.at(shape) for coefficient in plane] for plane in self.plane_formulas]
+        )
 
     @cached_property
     def plane_formulas(self) -> tuple[tuple[Formula, ...], ...]:
@@ -260,18 +313,24 @@ class Primitive:
         if self.strips == 1:
             return heights.min(axis=1)
         half_width = theta[HALF_WIDTH]
-        strip = np.clip(np.floor((v + half_width) * self.strips / (2 * half_width)), 0, self.strips - 1)
+        strip = np.clip(
+            np.floor((v + half_width) * self.strips / (2 * half_width)), 0, self.strips - 1
+        )
         return heights[np.arange(len(u)), strip.astype(int)]
 
     def planes_at(self, theta: np.ndarray) -> np.ndarray:
         """Planes (k, 3) over x, y in theta's own frame, in the order of `faces`."""
         c, s = math.cos(theta[KAPPA]), math.sin(theta[KAPPA])
-        planes = np.array([(a * c - b * s, a * s + b * c, z) for a, b, z in self.plane_values(theta).tolist()])
+        planes = np.array(
+            [(a * c - b * s, a * s + b * c, z) for a, b, z in self.plane_values(theta).tolist()]
+        )
         planes[:, 2] -= planes[:, :2] @ theta[[CX, CY]]
         return planes
 
     def part(self, theta: np.ndarray, sigma: Mapping[str, float] | None = None) -> Part:
-        """The roof part of `theta` (9,) in theta's own frame: plan rectangle (one a tooth) and planes over x, y."""
+        """The roof part of `theta` (9,) in theta's own frame: plan rectangle (one a tooth) and
+        planes over x, y.
+        """
         theta_p, kappa, translation = self.from_theta(theta)
         c, s = math.cos(kappa), math.sin(kappa)
         planes = self.planes_at(theta)
@@ -280,20 +339,29 @@ class Primitive:
         groups = [planes] if self.strips == 1 else [plane[None] for plane in planes]
         pieces = []
         for low, high, group in zip(breaks[:-1], breaks[1:], groups, strict=True):
-            uv = np.array([(-half_length, low), (half_length, low), (half_length, high), (-half_length, high)])
+            uv = np.array(
+                [(-half_length, low), (half_length, low), (half_length, high), (-half_length, high)]
+            )
             xy = translation[:2] + uv @ np.array([[c, s], [-s, c]])
             pieces.append(Piece(shapely.polygons(xy), group))
         return Part(self.name, tuple(pieces), theta_p, kappa, translation, dict(sigma or {}))
 
 
 def placed(vertices: np.ndarray, kappa: float, translation: np.ndarray) -> np.ndarray:
-    """Vertices (n, 3) turned by `kappa` about Z and moved by `translation` (3,): R V + T_L, eq. 9."""
+    """Vertices (n, 3) turned by `kappa` about Z and moved by `translation` (3,): R V + T_L, eq.
+
+    9.
+    """
     c, s = math.cos(kappa), math.sin(kappa)
     return vertices @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]) + translation
 
 
-def rectangle(theta_p: Mapping[str, float], low: float = 0.0, high: float = 0.0) -> list[tuple[float, float, float]]:
-    """Corners v1..v4 of the plan, clockwise from (+u, -v), at height `low` on the -v side and `high` on the +v side."""
+def rectangle(
+    theta_p: Mapping[str, float], low: float = 0.0, high: float = 0.0
+) -> list[tuple[float, float, float]]:
+    """Corners v1..v4 of the plan, clockwise from (+u, -v), at height `low` on the -v side and
+    `high` on the +v side.
+    """
     u, v = theta_p["length"] / 2, theta_p["width"] / 2
     return [(u, -v, low), (-u, -v, low), (-u, v, high), (u, v, high)]
 

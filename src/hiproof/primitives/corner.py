@@ -10,26 +10,47 @@ from .drawing import drawn_plan, drawn_slope
 
 
 def shape(p: Mapping[str, float]) -> tuple[float, ...]:
-    return p["width"] / 2, p["length"] / 2, 0.0, p["height"] / p["width"], p["end_height"] / p["length"], 0.0
+    return (
+        p["width"] / 2,
+        p["length"] / 2,
+        0.0,
+        p["height"] / p["width"],
+        p["end_height"] / p["length"],
+        0.0,
+    )
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
-    """The eaves' v1 (at +u and -v), v2, v3, the hip's upper end v4, and the far corner as the front has it, v5, and the end, v6.
+    """The eaves' v1 (at +u and -v), v2, v3, the hip's upper end v4, and the far corner as the front
+    has it, v5, and the end, v6.
 
-    The hip runs out at the back or, of a steeper front, at the left: then the far corner belongs to the end, and to the front
-    else; where it is not a slope's own, v4 stands for it.
+    The hip runs out at the back or, of a steeper front, at the left: then the far corner belongs to
+    the end, and to the front else; where it is not a slope's own, v4 stands for it.
     """
     u, v = p["length"] / 2, p["width"] / 2
-    share = p["height"] / p["end_height"]  # of the length that the hip takes until it is at the back
+    # of the length that the hip takes until it is at the back
+    share = p["height"] / p["end_height"]
     top = min(p["height"], p["end_height"])
     hip = (u - 2 * u * min(share, 1.0), -v + 2 * v / max(share, 1.0), top)
     far = (-u, v, top)
-    return [(u, -v, 0), (-u, -v, 0), (u, v, 0), hip, far if share < 1.0 else hip, hip if share < 1.0 else far]
+    return [
+        (u, -v, 0),
+        (-u, -v, 0),
+        (u, v, 0),
+        hip,
+        far if share < 1.0 else hip,
+        hip if share < 1.0 else far,
+    ]
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Equal slopes."""
-    return {"width": width, "length": length, "height": height, "end_height": height * length / width}
+    return {
+        "width": width,
+        "length": length,
+        "height": height,
+        "end_height": height * length / width,
+    }
 
 
 def draw(rng: np.random.Generator, width: float) -> dict[str, float]:

@@ -12,6 +12,8 @@ def drawn_slope(rng: np.random.Generator, low_deg: float, high_deg: float) -> fl
     return math.tan(math.radians(rng.uniform(low_deg, high_deg)))
 
 
-def drawn_plan(rng: np.random.Generator, width: float, low: float = 1.05, high: float = 2.2) -> dict[str, float]:
+def drawn_plan(
+    rng: np.random.Generator, width: float, low: float = 1.05, high: float = 2.2
+) -> dict[str, float]:
     """A plan of that width (m), `low` to `high` times as long."""
     return {"width": width, "length": width * float(rng.uniform(low, high))}

@@ -1,16 +1,20 @@
-"""One family of roof shapes: a rectangle, its direction, and at most five planes along its two axes.
+"""One family of roof shapes: a rectangle, its direction, and at most five planes along its two
+axes.
 
-A member has a plane rising from its eave on some of the four sides of its rectangle, and perhaps a level top:
+A member has a plane rising from its eave on some of the four sides of its rectangle, and perhaps a
+level top:
 
     front (from -v), back (from +v), left (from -u), right (from +u), top
 
-Which it has is its name; heights of the eaves, pitches and the top are its parameters. Where these are as regular as a shape of the
-catalogue (level eaves, equal pitches) its parameters are that shape's, else they are given side by side:
+Which it has is its name; heights of the eaves, pitches and the top are its parameters. Where these
+are as regular as a shape of the catalogue (level eaves, equal pitches) its parameters are that
+shape's, else they are given side by side:
 
     width, length   the rectangle across and along (m)
     height          of a level top above T_L (m)
     pitch_SIDE      the slope of the side's plane (degrees)
-    eave_SIDE       the height of that side's eave in its middle above T_L (m), which is the lowest eave
+    eave_SIDE       the height of that side's eave in its middle above T_L (m), which is the lowest
+                    eave
     skew_SIDE       how far the side's plane faces off its axis (degrees), where it does
 
 Where walls cut a corner of the rectangle off it may have planes over these, too (`cants`).
@@ -35,15 +39,22 @@ from .contract import BACK, FRONT, HALF_LENGTH, HALF_WIDTH, KAPPA, LEFT, LEVEL, 
 
 SIDES = ("left", "right", "front", "back")
 AXIS = np.array([0, 0, 1, 1])
-SIGN = np.array([1.0, -1.0, 1.0, -1.0])  # the plane from the left rises to +u, from the right to -u, ...
-# which side becomes left, right, front, back when the axes turn by 90, 180, 270 degrees, and the sign that their leans take then
-QUARTER_TURN, HALF_TURN, OTHER_TURN = [FRONT, BACK, RIGHT, LEFT], [RIGHT, LEFT, BACK, FRONT], [BACK, FRONT, LEFT, RIGHT]
+# the plane from the left rises to +u, from the right to -u, ...
+SIGN = np.array([1.0, -1.0, 1.0, -1.0])
+# which side becomes left, right, front, back when the axes turn by 90, 180, 270 degrees, and the
+# sign that their leans take then
+QUARTER_TURN, HALF_TURN, OTHER_TURN = (
+    [FRONT, BACK, RIGHT, LEFT],
+    [RIGHT, LEFT, BACK, FRONT],
+    [BACK, FRONT, LEFT, RIGHT],
+)
 LEANS_TURN = np.array([-1.0, -1.0, 1.0, 1.0])
 TURNS = {1: (QUARTER_TURN, LEANS_TURN), 2: (HALF_TURN, -np.ones(4)), 3: (OTHER_TURN, -LEANS_TURN)}
 SAME = 1e-9  # m; numerically equal
 ALONG = 0.7  # cosine of the angle within which a member is seen from the same side
 NEGLIGIBLE = 1e-18  # m2 or square degrees; numerically no variance
-HALF_HIP_SHARE = 0.15  # of the sides' rise: an end's eave so far above theirs makes the hip a half hip
+# of the sides' rise: an end's eave so far above theirs makes the hip a half hip
+HALF_HIP_SHARE = 0.15
 
 
 def has_of(shape: Primitive) -> tuple[bool, int, int]:
@@ -57,11 +68,13 @@ def eaves_of(shape: Primitive) -> tuple[int, ...]:
     return tuple(sorted(side for side in shape.sides if side != LEVEL))
 
 
-ALIKE: dict[tuple[bool, int, int], list[Primitive]] = {}  # shapes of the family with planes on as many sides
+# shapes of the family with planes on as many sides
+ALIKE: dict[tuple[bool, int, int], list[Primitive]] = {}
 for member in CATALOGUE.values():
     if member.is_of_family:
         ALIKE.setdefault(has_of(member), []).append(member)
-# The general one of each, by (has a top, planes along u, planes across v), and which sides have planes in its own direction.
+# The general one of each, by (has a top, planes along u, planes across v), and which sides have
+# planes in its own direction.
 SHAPES = {has: (shapes[0].name, eaves_of(shapes[0])) for has, shapes in ALIKE.items()}
 # Names told apart by eaves and pitches alone: one may be described as the other.
 KIN = tuple(tuple(shape.name for shape in shapes) for shapes in ALIKE.values() if len(shapes) > 1)
@@ -73,13 +86,15 @@ COMPONENTS = {
 
 @dataclass(frozen=True)
 class Member:
-    """A shape of the family: `kappa` (rad), `centre` (2,) and `half` (2,) extents along u and v, heights of the eaves (4,) at
-    their own sides, infinite where a side has no plane, `slopes` (4,), and the height of the level `top`, infinite without one.
-    `leans` (4,) are what the planes rise along their sides, as shares of their slopes, `cants` (4, c) further planes. Several of one
-    `kappa` that have planes on the same sides may be one `Member`: its arrays then have a further axis, and its `top` is an array, of
-    one place for each.
+    """A shape of the family: `kappa` (rad), `centre` (2,) and `half` (2,) extents along u and v,
+    heights of the eaves (4,) at their own sides, infinite where a side has no plane, `slopes` (4,),
+    and the height of the level `top`, infinite without one. `leans` (4,) are what the planes rise
+    along their sides, as shares of their slopes, `cants` (4, c) further planes. Several of one
+    `kappa` that have planes on the same sides may be one `Member`: its arrays then have a further
+    axis, and its `top` is an array, of one place for each.
 
-    >>> gable = Member(0.0, np.zeros(2), np.array([6.0, 4.0]), np.array([np.inf, np.inf, 5.0, 5.0]), np.array([0, 0, 0.5, 0.5]))
+    >>> gable = Member(0.0, np.zeros(2), np.array([6.0, 4.0]), np.array([np.inf, np.inf, 5.0,
+    ...     5.0]), np.array([0, 0, 0.5, 0.5]))
     >>> gable.name, gable.describe()[0]
     ('gable', {'width': 8.0, 'length': 12.0, 'height': 2.0})
     """
@@ -123,12 +138,18 @@ class Member:
 
     def those(self, which: int | list[int]) -> Member:
         """One or some of several."""
-        centre, half, eaves, slopes = (of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes))
+        centre, half, eaves, slopes = (
+            of[:, which] for of in (self.centre, self.half, self.eaves, self.slopes)
+        )
         cants = self.cants[..., which] if self.cants.shape[1] else no_cants()
-        return Member(self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which], cants)
+        return Member(
+            self.kappa, centre, half, eaves, slopes, self.top[which], self.leans[:, which], cants
+        )
 
     def own_planes(self) -> list[tuple[float, float, float]]:
-        """Planes a, b, c over u, v about the centre: those of the sides in order, of the cants, then the top."""
+        """Planes a, b, c over u, v about the centre: those of the sides in order, of the cants,
+        then the top.
+        """
         planes: list[tuple[float, float, float]] = []
         for side in self.sides:
             rise, along = SIGN[side] * self.slopes[side], self.leans[side] * self.slopes[side]
@@ -140,17 +161,27 @@ class Member:
     def planes(self) -> np.ndarray:
         """Planes (k, 3) over x, y of the frame that `kappa` and `centre` are given in."""
         c, s = math.cos(self.kappa), math.sin(self.kappa)
-        planes = np.array(self.own_planes()) @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+        planes = np.array(self.own_planes()) @ np.array(
+            [[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]
+        )
         planes[:, 2] -= planes[:, :2] @ self.centre
         return planes
 
     def apex(self, axis: int) -> Any:
-        """Height at which the planes of the two sides across `axis` meet, infinite where one is missing."""
+        """Height at which the planes of the two sides across `axis` meet, infinite where one is
+        missing.
+        """
         side = 2 * axis
         if not (self.has[side] and self.has[side + 1]):
             return math.inf
-        low, high, one, other = self.eaves[side], self.eaves[side + 1], self.slopes[side], self.slopes[side + 1]
-        run = (high - low + 2.0 * self.half[axis] * other) / (one + other)  # from the low side's eave to the ridge
+        low, high, one, other = (
+            self.eaves[side],
+            self.eaves[side + 1],
+            self.slopes[side],
+            self.slopes[side + 1],
+        )
+        # from the low side's eave to the ridge
+        run = (high - low + 2.0 * self.half[axis] * other) / (one + other)
         return low + one * run
 
     def over(self, half: np.ndarray) -> Member:
@@ -164,11 +195,26 @@ class Member:
         kappa = math.remainder(self.kappa + 0.5 * math.pi * quarters, 2.0 * math.pi)
         sides, leans_turn = TURNS[quarters]
         half = self.half[::-1].copy() if quarters % 2 else self.half
-        eaves, slopes, leans = self.eaves[sides], self.slopes[sides], (self.leans[sides].T * leans_turn).T
-        return Member(kappa, self.centre, half, eaves, slopes, self.top, leans, cants_turned(self.cants, quarters))
+        eaves, slopes, leans = (
+            self.eaves[sides],
+            self.slopes[sides],
+            (self.leans[sides].T * leans_turn).T,
+        )
+        return Member(
+            kappa,
+            self.centre,
+            half,
+            eaves,
+            slopes,
+            self.top,
+            leans,
+            cants_turned(self.cants, quarters),
+        )
 
     def canonical(self) -> Member:
-        """The same surface in the direction in which it is named: the ridge along u, planes on the sides that SHAPES says."""
+        """The same surface in the direction in which it is named: the ridge along u, planes on the
+        sides that SHAPES says.
+        """
         return self.turned(self.quarter_turns)
 
     @cached_property
@@ -184,8 +230,10 @@ class Member:
         return min(named, default=((), 0))[1]
 
     def order(self, turns: int, places: list[int]) -> tuple[float, ...]:
-        """Of members of the same surface the least comes first: steeper, then lower, in front and on the left. Of this one after so
-        many `turns`, which bring its sides `places` to the left, right, front and back."""
+        """Of members of the same surface the least comes first: steeper, then lower, in front and
+        on the left. Of this one after so many `turns`, which bring its sides `places` to the left,
+        right, front and back.
+        """
         slopes = [float(self.slopes[place]) for place in places]
         eaves = [float(self.eaves[place]) if self.has[place] else 0.0 for place in places]
         apart = (
@@ -194,11 +242,17 @@ class Member:
             slopes[RIGHT] - slopes[LEFT],
             eaves[LEFT] - eaves[RIGHT],
         )
-        ahead = -0.5 * math.pi < math.remainder(self.kappa + 0.5 * math.pi * turns, 2.0 * math.pi) <= 0.5 * math.pi
+        ahead = (
+            -0.5 * math.pi
+            < math.remainder(self.kappa + 0.5 * math.pi * turns, 2.0 * math.pi)
+            <= 0.5 * math.pi
+        )
         return (*(round(x, 6) for x in apart), not ahead)
 
     def lies_along(self, axis: int) -> bool:
-        """Whether `axis` is the longer way: along the ridge of the sides that meet lower, else of the rectangle."""
+        """Whether `axis` is the longer way: along the ridge of the sides that meet lower, else of
+        the rectangle.
+        """
         low, high = self.apex(1 - axis), self.apex(axis)
         if math.isfinite(low) and math.isfinite(high) and abs(low - high) > SAME:
             return low < high
@@ -213,7 +267,11 @@ class Member:
             return name
         member = self.canonical()
         if name == "gable":
-            return "gable" if abs(member.slopes[FRONT] - member.slopes[BACK]) < SAME else "asymmetric_gable"
+            return (
+                "gable"
+                if abs(member.slopes[FRONT] - member.slopes[BACK]) < SAME
+                else "asymmetric_gable"
+            )
         if name in ("hip", "side_hip"):
             ends = [side for side in (LEFT, RIGHT) if member.has[side]]
             sides = member.eaves[2:].max()
@@ -226,22 +284,33 @@ class Member:
 
     @cached_property
     def in_catalogue(self) -> tuple[Primitive, np.ndarray] | None:
-        """The catalogue's shape that is the same surface, and its canonical theta (9,), of a member in its canonical direction."""
+        """The catalogue's shape that is the same surface, and its canonical theta (9,), of a member
+        in its canonical direction.
+        """
         if self.leans.any() or self.cants.shape[1]:
             return None
         own = self.own_planes()
         for shape in get(self.name).variants:
             theta = self.theta(shape)
-            planes = [plane for _, plane in sorted(zip(shape.sides, shape.plane_values(theta).tolist(), strict=True))]
+            planes = [
+                plane
+                for _, plane in sorted(
+                    zip(shape.sides, shape.plane_values(theta).tolist(), strict=True)
+                )
+            ]
             apart = (
-                abs(x - y) for one, other in zip(planes, own, strict=True) for x, y in zip(one, other, strict=True)
+                abs(x - y)
+                for one, other in zip(planes, own, strict=True)
+                for x, y in zip(one, other, strict=True)
             )
             if max(apart) < SAME * 10.0 and shape.is_proper(theta):
                 return shape, shape.canonical_theta(theta)
         return None
 
     def theta(self, shape: Primitive) -> np.ndarray:
-        """theta (9,) of the catalogue's `shape`, by the front and the right side where the others are as these; (9, m) of several."""
+        """theta (9,) of the catalogue's `shape`, by the front and the right side where the others
+        are as these; (9, m) of several.
+        """
         theta = np.zeros((9, *self.eaves.shape[1:]))
         theta[:KAPPA], theta[KAPPA] = self.centre, self.kappa
         theta[HALF_WIDTH], theta[HALF_LENGTH] = self.half[1], self.half[0]
@@ -278,8 +347,10 @@ class Member:
         return parameters | words_of_cants(self.cants, base)
 
     def measures_of(self, shape: Primitive | None, kappa: float) -> list[Any]:
-        """The parameters and t_z that this member, or each of several, has as `shape`, side by side without one; seen from `kappa` or its
-        opposite, so that a small change does not turn it round."""
+        """The parameters and t_z that this member, or each of several, has as `shape`, side by side
+        without one; seen from `kappa` or its opposite, so that a small change does not turn it
+        round.
+        """
         if shape is None:
             return [*self.own_measures().values(), self.base]
         seen = self.turned(2) if math.cos(self.kappa - kappa) < 0.0 else self
@@ -295,10 +366,12 @@ class Member:
         changes: Member | None = None,
         untold: int = 0,
     ) -> Part:
-        """A part of this shape that roofs `outlines`, in the frame of `kappa` and `centre`; called `name` if that is its kin.
+        """A part of this shape that roofs `outlines`, in the frame of `kappa` and `centre`; called
+        `name` if that is its kin.
 
-        This member must be its canonical one; `changes` are, in the same direction, several: this one after independent changes of one
-        standard deviation each. The last of them, `untold`, are changes that nothing tells: parameters that these change have no deviation.
+        This member must be its canonical one; `changes` are, in the same direction, several: this
+        one after independent changes of one standard deviation each. The last of them, `untold`,
+        are changes that nothing tells: parameters that these change have no deviation.
         """
         as_catalogue = name in (None, self.name)
         words = self.in_words(as_catalogue)
@@ -308,19 +381,32 @@ class Member:
         return Part(name, tuple(Piece(o, planes) for o in outlines), *words, sigma)
 
     def sigma(
-        self, changes: Member, untold: int, as_catalogue: bool, words: tuple[dict[str, float], float, np.ndarray]
+        self,
+        changes: Member,
+        untold: int,
+        as_catalogue: bool,
+        words: tuple[dict[str, float], float, np.ndarray],
     ) -> dict[str, float]:
-        """Standard deviations by parameter (and t_z) of `part`, which describes this member in these `words`."""
+        """Standard deviations by parameter (and t_z) of `part`, which describes this member in
+        these `words`.
+        """
         parameters, kappa, translation = words
         shape = self.in_catalogue[0] if as_catalogue and self.in_catalogue is not None else None
         own = {**parameters, "t_z": float(translation[2])}
         squares = np.zeros((len(own), changes.eaves.shape[1]))
-        for k, (value, changed) in enumerate(zip(own.values(), changes.measures_of(shape, kappa), strict=True)):
+        for k, (value, changed) in enumerate(
+            zip(own.values(), changes.measures_of(shape, kappa), strict=True)
+        ):
             squares[k] = (changed - value) ** 2
         told = squares.shape[1] - untold
-        known, unknown = squares[:, :told].sum(axis=1).tolist(), squares[:, told:].sum(axis=1).tolist()
+        known, unknown = (
+            squares[:, :told].sum(axis=1).tolist(),
+            squares[:, told:].sum(axis=1).tolist(),
+        )
         each = zip(own, known, unknown, strict=True)
-        return {name: math.sqrt(v) for name, v, free in each if v > NEGLIGIBLE and not free > NEGLIGIBLE}
+        return {
+            name: math.sqrt(v) for name, v, free in each if v > NEGLIGIBLE and not free > NEGLIGIBLE
+        }
 
 
 def degrees(rise: Any) -> Any:
@@ -329,7 +415,9 @@ def degrees(rise: Any) -> Any:
 
 
 def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
-    """`name` or, where it is not `allowed`, that of its kin which is; None where none is. All are where `allowed` is empty.
+    """`name` or, where it is not `allowed`, that of its kin which is;
+
+    None where none is. All are where `allowed` is empty.
 
     >>> name_among("pyramid", ("gable", "hip")), name_among("corner", ("gable",))
     ('hip', None)
@@ -339,12 +427,16 @@ def name_among(name: str, allowed: tuple[str, ...]) -> str | None:
     return next((kin for kins in KIN if name in kins for kin in kins if kin in allowed), None)
 
 
-def planes_of(name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> np.ndarray:
-    """Planes (k, 3) over x, y of the roof type `name` with its parameters: the inverse of `Member.describe`.
+def planes_of(
+    name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
+) -> np.ndarray:
+    """Planes (k, 3) over x, y of the roof type `name` with its parameters: the inverse of
+    `Member.describe`.
 
     Raises FitError for a name that is no type or parameters that are not its own.
 
-    >>> planes_of("monopitch", {"width": 4.0, "length": 9.0, "height": 2.0}, 0.0, np.array([0.0, 0.0, 5.0])).tolist()
+    >>> planes_of("monopitch", {"width": 4.0, "length": 9.0, "height": 2.0}, 0.0, np.array([0.0,
+    ...     0.0, 5.0])).tolist()
     [[0.0, 0.5, 6.0]]
     """
     if name in CATALOGUE and not any(key.startswith("pitch_") for key in parameters):
@@ -353,10 +445,17 @@ def planes_of(name: str, parameters: Mapping[str, float], kappa: float, translat
     return member_of(name, parameters, kappa, translation).planes()
 
 
-def member_of(name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> Member:
-    """The member with these parameters, the catalogue's or each side's own. Raises FitError where one is missing."""
+def member_of(
+    name: str, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
+) -> Member:
+    """The member with these parameters, the catalogue's or each side's own.
+
+    Raises FitError where one is missing.
+    """
     if name not in CATALOGUE:
-        raise FitError(f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; choose one of these")
+        raise FitError(
+            f"expected a roof type ({', '.join(CATALOGUE)}), got {name!r}; choose one of these"
+        )
     if not any(key.startswith("pitch_") for key in parameters):
         return member_like(get(name).variant(parameters), parameters, kappa, translation)
     *sides, top = (side in get(name).sides for side in range(5))
@@ -371,12 +470,17 @@ def member_of(name: str, parameters: Mapping[str, float], kappa: float, translat
         half = 0.5 * np.array([parameters["length"], parameters["width"]])
     except KeyError as missing:
         raise FitError(
-            f"expected the parameter {missing.args[0]} of a {name} roof, got {', '.join(parameters)}; give every one"
+            f"expected the parameter {missing.args[0]} of a {name} roof, got "
+            f"{', '.join(parameters)}; give every one"
         ) from missing
-    return Member(kappa, np.asarray(translation[:2], float), half, eaves, slopes, height, leans, cants)
+    return Member(
+        kappa, np.asarray(translation[:2], float), half, eaves, slopes, height, leans, cants
+    )
 
 
-def member_like(shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray) -> Member:
+def member_like(
+    shape: Primitive, parameters: Mapping[str, float], kappa: float, translation: np.ndarray
+) -> Member:
     """The member that is the same surface as the catalogue's `shape` with its own parameters."""
     theta = shape.to_theta(parameters, kappa, translation)
     half = theta[[HALF_LENGTH, HALF_WIDTH]]

@@ -1,7 +1,7 @@
 """Gable (saddleback): two planes falling equally from a level ridge, the paper's Figure 3.
 
-Where the ridge lies off the middle, towards the back, `ridge_offset` says how far, and the back's eave is the higher one: a
-catslide is a gable too.
+Where the ridge lies off the middle, towards the back, `ridge_offset` says how far, and the back's
+eave is the higher one: a catslide is a gable too.
 """
 
 from collections.abc import Mapping
@@ -12,7 +12,8 @@ from .algebra import U, V, q0, q1, q2
 from .contract import BACK, FRONT, KAPPA, Q2, SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive, Vote
 from .drawing import drawn_plan, drawn_slope
 
-SLOPES = ((0, q1, q0), (0, -q1, q0))  # the planes on the -v and the +v side, shared by the shapes with a ridge
+# the planes on the -v and the +v side, shared by the shapes with a ridge
+SLOPES = ((0, q1, q0), (0, -q1, q0))
 FACES = ((3, 2, 1, 0), (2, 3, 4, 5))  # S1 {v4 v3 v2 v1}, S2 {v3 v4 v5 v6}
 
 
@@ -50,13 +51,20 @@ OFF_THE_MIDDLE = Primitive(
     name="gable",
     citygml_code="1030",
     adv_code="3100",
-    measures={"width": 2 * V, "length": 2 * U, "height": q1 * V + q1 * q2 * V, "ridge_offset": q2 * V},
+    measures={
+        "width": 2 * V,
+        "length": 2 * U,
+        "height": q1 * V + q1 * q2 * V,
+        "ridge_offset": q2 * V,
+    },
     eave=q0 - q1 * V - q1 * q2 * V,
     planes=((0, q1, q0 - q1 * q2 * V), (0, -q1, q0 + q1 * q2 * V)),
     shape=shape_off_the_middle,
     corners=corners,
     faces=FACES,
-    typical=lambda width, length, height: typical(width, length, height) | {"ridge_offset": 0.15 * width},
+    typical=lambda width, length, height: (
+        typical(width, length, height) | {"ridge_offset": 0.15 * width}
+    ),
     bounds=((SLOPE_MIN, SLOPE_MAX), (-0.85, 0.85)),
     starts=(DerivedStart("gable", (q0, q1, 0.0)),),
     canonical=ridge_at_the_back,
@@ -77,7 +85,14 @@ PRIMITIVE = Primitive(
     measures={"width": 2 * V, "length": 2 * U, "height": q1 * V},
     eave=q0 - q1 * V,
     planes=SLOPES,
-    shape=lambda p: (p["width"] / 2, p["length"] / 2, p["height"], 2 * p["height"] / p["width"], 0.0, 0.0),
+    shape=lambda p: (
+        p["width"] / 2,
+        p["length"] / 2,
+        p["height"],
+        2 * p["height"] / p["width"],
+        0.0,
+        0.0,
+    ),
     corners=corners,
     faces=FACES,
     typical=typical,

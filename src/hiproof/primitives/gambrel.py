@@ -9,7 +9,8 @@ from .contract import SLOPE_MAX, SLOPE_MIN, DerivedStart, Primitive
 from .drawing import drawn_plan, drawn_slope
 from .gable import SLOPES
 
-LOWER_SLOPE = q1 + q2  # q2 is how much steeper the lower part is, q3 the share of the half width above the break
+# q2 is how much steeper the lower part is, q3 the share of the half width above the break
+LOWER_SLOPE = q1 + q2
 BREAK_HEIGHT = LOWER_SLOPE * V * (1 - q3)
 HEIGHT = BREAK_HEIGHT + q1 * q3 * V
 LOWER_AT_RIDGE = q0 + q2 * q3 * V
@@ -19,7 +20,14 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
     half_break = p["break_width"] / 2
     upper = (p["height"] - p["break_height"]) / half_break
     lower = p["break_height"] / (p["width"] / 2 - half_break)
-    return p["width"] / 2, p["length"] / 2, p["height"], upper, lower - upper, p["break_width"] / p["width"]
+    return (
+        p["width"] / 2,
+        p["length"] / 2,
+        p["height"],
+        upper,
+        lower - upper,
+        p["break_width"] / p["width"],
+    )
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:

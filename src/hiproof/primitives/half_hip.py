@@ -1,4 +1,6 @@
-"""Half-hip (jerkinhead): a gable whose ends are cut by small hips that start part-way down the slopes."""
+"""Half-hip (jerkinhead): a gable whose ends are cut by small hips that start part-way down the
+slopes.
+"""
 
 from collections.abc import Mapping
 
@@ -16,7 +18,14 @@ HIP_EAVE = q0 - DROP
 def shape(p: Mapping[str, float]) -> tuple[float, ...]:
     slope_end = 2 * p["hip_height"] / (p["length"] - p["ridge_length"])
     slope_side = 2 * p["height"] / p["width"]
-    return p["width"] / 2, p["length"] / 2, p["height"], slope_side, slope_end, p["hip_height"] / p["height"]
+    return (
+        p["width"] / 2,
+        p["length"] / 2,
+        p["height"],
+        slope_side,
+        slope_end,
+        p["hip_height"] / p["height"],
+    )
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
@@ -30,7 +39,13 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Hips of 40 % of the height, as steep as the slopes where the length allows."""
     ridge = max(length - 0.4 * width, 0.2 * length)
-    return {"width": width, "length": length, "height": height, "ridge_length": ridge, "hip_height": 0.4 * height}
+    return {
+        "width": width,
+        "length": length,
+        "height": height,
+        "ridge_length": ridge,
+        "hip_height": 0.4 * height,
+    }
 
 
 def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
@@ -43,7 +58,12 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
 
 def of_member(member: Sides) -> tuple[float, ...]:
     slope, ridge = member.slopes[FRONT], member.apex(1)
-    return ridge, slope, member.slopes[RIGHT], (ridge - member.eaves[RIGHT]) / (slope * member.half[1])
+    return (
+        ridge,
+        slope,
+        member.slopes[RIGHT],
+        (ridge - member.eaves[RIGHT]) / (slope * member.half[1]),
+    )
 
 
 PRIMITIVE = Primitive(

@@ -1,7 +1,7 @@
 """Halves of other roofs, such as the roof of one of two houses under one hipped roof.
 
-A cut through the middle of the whole roof makes the half. Its planes keep their slopes and are given about the
-middle of the half. Lengths that the cut crosses are halved.
+A cut through the middle of the whole roof makes the half. Its planes keep their slopes and are
+given about the middle of the half. Lengths that the cut crosses are halved.
 """
 
 from __future__ import annotations
@@ -38,7 +38,11 @@ def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
 
     def shape(p: Mapping[str, float]) -> Shape:
         half_width, half_length, *q = whole.shape(doubled(p))
-        return (half_width, 0.5 * half_length, *q) if axis == ALONG else (0.5 * half_width, half_length, *q)
+        return (
+            (half_width, 0.5 * half_length, *q)
+            if axis == ALONG
+            else (0.5 * half_width, half_length, *q)
+        )
 
     def of_member(member: Sides) -> tuple[float, ...]:
         half = member.half.copy()
@@ -58,7 +62,9 @@ def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
         eave=whole.eave.with_multiple(symbol, 2.0),
         planes=tuple(seen_from_the_half(whole.plane_formulas[k], axis) for k in kept),
         shape=shape,
-        corners=lambda p: cut(np.array(whole.corners(doubled(p)), float)[used], axis, p[crossed[0]]),
+        corners=lambda p: cut(
+            np.array(whole.corners(doubled(p)), float)[used], axis, p[crossed[0]]
+        ),
         faces=tuple(tuple(used.index(corner) for corner in whole.faces[k]) for k in kept),
         typical=typical,
         draw=lambda rng, width: halved(whole.drawn(rng, doubled({"width": width})["width"])),
@@ -71,16 +77,20 @@ def half_of(whole: Primitive, axis: int, **own: Any) -> Primitive:
 
 
 def seen_from_the_half(plane: tuple[Formula, ...], axis: int) -> Plane:
-    """The plane over u, v about the half's middle, which lies half of its extent at +u, or -v, of the whole's."""
+    """The plane over u, v about the half's middle, which lies half of its extent at +u, or -v, of
+    the whole's.
+    """
     symbol, extent = EXTENT[axis]
     a, b, c = (formula(coefficient).with_multiple(symbol, 2.0) for coefficient in plane)
     return a, b, c + (a * extent if axis == ALONG else b * -extent)
 
 
 def cut(vertices: np.ndarray, axis: int, extent: float) -> np.ndarray:
-    """Vertices (n, 3) of the whole about the half's middle, those beyond the cut moved onto it, straight across.
+    """Vertices (n, 3) of the whole about the half's middle, those beyond the cut moved onto it,
+    straight across.
 
-    A face whose edges run across the cut is the half's face then; one that lies beyond is left without area.
+    A face whose edges run across the cut is the half's face then; one that lies beyond is left
+    without area.
     """
     sign = 1.0 if axis == ALONG else -1.0
     moved = vertices.copy()
@@ -94,7 +104,10 @@ SIDE_HIP = half_of(  # a gable of which one end slopes too
     name="side_hip",
     osm_shape="side_hipped",
     colour="#4fa3c7",
-    starts=(*at_quarters("gable", (q0, q1, 1.0), (0, 2)), *at_quarters("hip", (q0, q1, q2), (0, 2))),
+    starts=(
+        *at_quarters("gable", (q0, q1, 1.0), (0, 2)),
+        *at_quarters("hip", (q0, q1, q2), (0, 2)),
+    ),
 )
 SIDE_HALF_HIP = half_of(  # a gable of which a small hip cuts one end
     HALF_HIP,
@@ -110,7 +123,10 @@ HALF_MANSARD = half_of(  # one slope up to a level top
     name="half_mansard",
     osm_shape="saltbox",
     colour="#6fbf8f",
-    starts=(DerivedStart("monopitch", (q0 + 0.2 * q1 * V, q1, 0.6)), *at_quarters("flat", (q0, 1.0, 0.15))),
+    starts=(
+        DerivedStart("monopitch", (q0 + 0.2 * q1 * V, q1, 0.6)),
+        *at_quarters("flat", (q0, 1.0, 0.15)),
+    ),
 )
 SIDE_MANSARD = half_of(  # three slopes up to a level top that reaches to the fourth side
     MANSARD,
@@ -123,11 +139,15 @@ SIDE_MANSARD = half_of(  # three slopes up to a level top that reaches to the fo
         *at_quarters("flat", (q0, 1.0, 1.0, 0.25)),
     ),
 )
-CORNER_MANSARD = half_of(  # two adjacent slopes up to a level top that reaches to the other two sides
+# two adjacent slopes up to a level top that reaches to the other two sides
+CORNER_MANSARD = half_of(
     SIDE_MANSARD,
     ACROSS,
     name="corner_mansard",
     osm_shape="mansard",
     colour="#1e7a46",
-    starts=(DerivedStart("corner", (q0 + q1 * V, q1, q2, 0.5)), *at_quarters("flat", (q0, 1.0, 1.0, 0.15))),
+    starts=(
+        DerivedStart("corner", (q0 + q1 * V, q1, q2, 0.5)),
+        *at_quarters("flat", (q0, 1.0, 1.0, 0.15)),
+    ),
 )

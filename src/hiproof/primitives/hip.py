@@ -26,7 +26,14 @@ EAVE = q0 - q1 * V
 
 def shape(p: Mapping[str, float]) -> tuple[float, ...]:
     run = (p["length"] - p["ridge_length"]) / 2
-    return p["width"] / 2, p["length"] / 2, p["height"], 2 * p["height"] / p["width"], p["height"] / run, 0.0
+    return (
+        p["width"] / 2,
+        p["length"] / 2,
+        p["height"],
+        2 * p["height"] / p["width"],
+        p["height"] / run,
+        0.0,
+    )
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
@@ -36,8 +43,10 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
-    """The ridge runs along u. Where the ends meet below the sides' ridge, the lowest planes form a ridge along v
-    instead and theta's q0 is above the roof: the same surface with the axes exchanged.
+    """The ridge runs along u.
+
+    Where the ends meet below the sides' ridge, the lowest planes form a ridge along v instead and
+    theta's q0 is above the roof: the same surface with the axes exchanged.
     """
     rise_across, rise_along = theta[Q1] * theta[HALF_WIDTH], theta[Q2] * theta[HALF_LENGTH]
     if rise_across <= rise_along:
@@ -50,7 +59,12 @@ def canonical(theta: np.ndarray) -> np.ndarray:
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
     """Equal slopes all round where the length allows a ridge."""
-    return {"width": width, "length": length, "height": height, "ridge_length": max(length - width, 0.2 * length)}
+    return {
+        "width": width,
+        "length": length,
+        "height": height,
+        "ridge_length": max(length - width, 0.2 * length),
+    }
 
 
 def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
@@ -65,7 +79,12 @@ PRIMITIVE = Primitive(
     adv_code="3200",
     osm_shape="hipped",
     colour="#2e86ab",
-    measures={"width": 2 * V, "length": 2 * U, "height": q1 * V, "ridge_length": 2 * U - 2 * q1 * V / q2},
+    measures={
+        "width": 2 * V,
+        "length": 2 * U,
+        "height": q1 * V,
+        "ridge_length": 2 * U - 2 * q1 * V / q2,
+    },
     eave=EAVE,
     planes=(*SLOPES, (-q2, 0, EAVE + q2 * U), (q2, 0, EAVE + q2 * U)),
     shape=shape,

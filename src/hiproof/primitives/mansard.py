@@ -34,7 +34,10 @@ def shape(p: Mapping[str, float]) -> tuple[float, ...]:
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     """The plan's v1..v4, then the top's v5..v8 above them."""
-    return [*rectangle(p), *rectangle({"width": p["top_width"], "length": p["top_length"]}, p["height"], p["height"])]
+    return [
+        *rectangle(p),
+        *rectangle({"width": p["top_width"], "length": p["top_length"]}, p["height"], p["height"]),
+    ]
 
 
 def canonical(theta: np.ndarray) -> np.ndarray:
@@ -67,7 +70,12 @@ def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
 
 def of_member(member: Sides) -> tuple[float, ...]:
     slope = member.slopes[FRONT]
-    return member.top, slope, member.slopes[RIGHT], (member.top - member.eaves[FRONT]) / (slope * member.half[1])
+    return (
+        member.top,
+        slope,
+        member.slopes[RIGHT],
+        (member.top - member.eaves[FRONT]) / (slope * member.half[1]),
+    )
 
 
 PRIMITIVE = Primitive(

@@ -14,35 +14,49 @@ from .contract import LEVEL
 from .family import COMPONENTS, SIDES, eaves_of
 
 SIDED = CANTED | {f"{what}_{side}" for side in SIDES for what in ("pitch", "eave", "skew")}
-"""Parameters of a member's sides and cants; a part that has one gives all of its shape side by side."""
+"""Parameters of a member's sides and cants; a part that has one gives all of its shape side by
+side.
+"""
 
-STEEPEST_DEG = 89.0  # degrees; steeper is a wall, and its height at an edge is beyond any file's digits
+# degrees; steeper is a wall, and its height at an edge is beyond any file's digits
+STEEPEST_DEG = 89.0
 SHOWN = 8  # names in a sentence; more would hide what is said
 
 
 def refuse_no_shape(kind: str, parameters: Mapping[str, float], where: str) -> None:
-    """Raise InputError where `parameters` (finite numbers by name) make no shape of the type `kind`.
+    """Raise InputError where `parameters` (finite numbers by name) make no shape of the type
+    `kind`.
 
     >>> refuse_no_shape("gable", {"width": -8.0, "length": 12.0, "height": 3.0}, "part 0")
     Traceback (most recent call last):
     hiproof.errors.InputError: expected a positive width of part 0, got -8; give metres
     """
     if kind not in CATALOGUE:
-        raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got {kind!r}; choose one")
+        raise InputError(
+            f"expected a roof type ({', '.join(CATALOGUE)}) in {where}, got {kind!r}; choose one"
+        )
     for name in ("width", "length"):
         if name in parameters and not parameters[name] > 0.0:
-            raise InputError(f"expected a positive {name} of {where}, got {parameters[name]:g}; give metres")
+            raise InputError(
+                f"expected a positive {name} of {where}, got {parameters[name]:g}; give metres"
+            )
     if kind == "flat":
         refuse_other_names(kind, parameters, [], ["width", "length"], where)
     elif not SIDED & parameters.keys():
-        refuse_other_names(kind, parameters, CATALOGUE[kind].variant(parameters).parameters, [], where)
+        refuse_other_names(
+            kind, parameters, CATALOGUE[kind].variant(parameters).parameters, [], where
+        )
         refuse_falling(kind, parameters, where)
     else:
         refuse_no_member(kind, parameters, where)
 
 
 def refuse_other_names(
-    kind: str, parameters: Mapping[str, float], needed: Sequence[str], allowed: Sequence[str], where: str
+    kind: str,
+    parameters: Mapping[str, float],
+    needed: Sequence[str],
+    allowed: Sequence[str],
+    where: str,
 ) -> None:
     """Raise InputError where a parameter is missing or is none of the type's."""
     missing = [name for name in needed if name not in parameters]
@@ -50,13 +64,16 @@ def refuse_other_names(
     if missing or other:
         got = f"none for {', '.join(missing)}" if missing else f"also {', '.join(other[:SHOWN])}"
         raise InputError(
-            f"expected the parameters {', '.join(needed) or 'width, length'} of the type {kind} in {where}, got {got}; "
+            f"expected the parameters {', '.join(needed) or 'width, length'} of the type {kind} in "
+            f"{where}, got {got}; "
             "`hiproof build --shapes` lists those of every type"
         )
 
 
 def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> None:
-    """Raise InputError where a shape of the catalogue has a plane that falls from its eave or stands upright."""
+    """Raise InputError where a shape of the catalogue has a plane that falls from its eave or
+    stands upright.
+    """
     shape = CATALOGUE[kind]
     try:
         theta = shape.variant(parameters).to_theta(parameters)
@@ -71,7 +88,8 @@ def refuse_falling(kind: str, parameters: Mapping[str, float], where: str) -> No
     if not all(0.0 <= slope <= steepest for slope in slopes):
         told = ", ".join(f"{name} {value:g}" for name, value in parameters.items())
         raise InputError(
-            f"expected planes that rise from the eaves by less than {STEEPEST_DEG:g} degrees, got a {kind} roof of {told} "
+            f"expected planes that rise from the eaves by less than {STEEPEST_DEG:g} degrees, got "
+            f"a {kind} roof of {told} "
             f"in {where}; is one of its sizes negative, or too long?"
         )
 
@@ -88,7 +106,8 @@ def refuse_no_member(kind: str, parameters: Mapping[str, float], where: str) -> 
         low = 0.0 if name.startswith("pitch_") else -STEEPEST_DEG
         if name.startswith(("pitch_", "skew_")) and not low <= value <= STEEPEST_DEG:
             raise InputError(
-                f"expected {name} between {low:g} and {STEEPEST_DEG:g} degrees in {where}, got {value:g}; give degrees"
+                f"expected {name} between {low:g} and {STEEPEST_DEG:g} degrees in {where}, got "
+                f"{value:g}; give degrees"
             )
 
 
@@ -102,7 +121,9 @@ def names_of(kind: str) -> tuple[str, ...]:
 
 
 def side_by_side_names(kind: str) -> tuple[str, ...]:
-    """The parameters of a member of the family, each side's own; skews and cants, which are seldom there, left out."""
+    """The parameters of a member of the family, each side's own; skews and cants, which are seldom
+    there, left out.
+    """
     shape = CATALOGUE[kind]
     of_sides = [f"{what}_{SIDES[side]}" for side in eaves_of(shape) for what in ("pitch", "eave")]
     return ("width", "length", *(["height"] if LEVEL in shape.sides else []), *of_sides)

@@ -1,4 +1,6 @@
-"""Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches side by side, each rising towards +v to a vertical step."""
+"""Shed (saw-tooth, CityGML 1100): 2 to 6 equal monopitches side by side, each rising towards +v to
+a vertical step.
+"""
 
 from collections.abc import Mapping
 
@@ -8,7 +10,8 @@ from .algebra import U, V, formula, q0, q1
 from .contract import SLOPE_MAX, Primitive, Vote, rectangle
 from .drawing import drawn_slope
 
-TEETH = range(2, 7)  # of a saw-tooth that is one primitive; longer rows are put together from volumes
+# of a saw-tooth that is one primitive; longer rows are put together from volumes
+TEETH = range(2, 7)
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
@@ -16,13 +19,20 @@ def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     teeth = round(p["teeth"])
     tooth = {"width": p["width"] / teeth, "length": p["length"]}
     centres = [(2 * k + 1 - teeth) * tooth["width"] / 2 for k in range(teeth)]
-    return [(u, v + centre, z) for centre in centres for u, v, z in rectangle(tooth, high=p["height"])]
+    return [
+        (u, v + centre, z) for centre in centres for u, v, z in rectangle(tooth, high=p["height"])
+    ]
 
 
 def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     teeth, tooth = int(rng.integers(3, 7)), float(rng.uniform(3.5, 7.0))
     length = max(width, 7.0) * float(rng.uniform(1.0, 2.0))
-    return {"width": teeth * tooth, "length": length, "height": tooth * drawn_slope(rng, 14, 34), "teeth": float(teeth)}
+    return {
+        "width": teeth * tooth,
+        "length": length,
+        "height": tooth * drawn_slope(rng, 14, 34),
+        "teeth": float(teeth),
+    }
 
 
 def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
@@ -33,13 +43,30 @@ def saw_tooth(teeth: int, more: tuple[Primitive, ...] = ()) -> Primitive:
         adv_code="3800",
         osm_shape="sawtooth",
         colour="#c98bdb",
-        measures={"width": 2 * V, "length": 2 * U, "height": (2 / teeth) * q1 * V, "teeth": formula(teeth)},
+        measures={
+            "width": 2 * V,
+            "length": 2 * U,
+            "height": (2 / teeth) * q1 * V,
+            "teeth": formula(teeth),
+        },
         eave=q0,
         planes=tuple((0, q1, q0 + q1 * V * (1 - 2 * k / teeth)) for k in range(teeth)),
-        shape=lambda p: (p["width"] / 2, p["length"] / 2, 0.0, teeth * p["height"] / p["width"], 0.0, 0.0),
+        shape=lambda p: (
+            p["width"] / 2,
+            p["length"] / 2,
+            0.0,
+            teeth * p["height"] / p["width"],
+            0.0,
+            0.0,
+        ),
         corners=corners,
         faces=tuple((4 * k + 1, 4 * k, 4 * k + 3, 4 * k + 2) for k in range(teeth)),
-        typical=lambda width, length, height: {"width": width, "length": length, "height": height, "teeth": teeth},
+        typical=lambda width, length, height: {
+            "width": width,
+            "length": length,
+            "height": height,
+            "teeth": teeth,
+        },
         draw=draw,
         bounds=((0.08, SLOPE_MAX),),
         vote=Vote(turns=4, slopes=(0.2, 0.35, 0.5, 0.65, 0.8, 1.0)),

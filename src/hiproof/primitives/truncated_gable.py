@@ -14,13 +14,29 @@ EAVE = q0 - RISE
 
 def shape(p: Mapping[str, float]) -> tuple[float, ...]:
     run = (p["width"] - p["top_width"]) / 2
-    return p["width"] / 2, p["length"] / 2, p["height"], p["height"] / run, 2 * run / p["width"], 0.0
+    return (
+        p["width"] / 2,
+        p["length"] / 2,
+        p["height"],
+        p["height"] / run,
+        2 * run / p["width"],
+        0.0,
+    )
 
 
 def corners(p: Mapping[str, float]) -> list[tuple[float, float, float]]:
     """Pairs at +u and -u: the eave at -v, the top's two edges, the eave at +v."""
     u, v, t, h = p["length"] / 2, p["width"] / 2, p["top_width"] / 2, p["height"]
-    return [(u, -v, 0), (-u, -v, 0), (u, -t, h), (-u, -t, h), (u, t, h), (-u, t, h), (u, v, 0), (-u, v, 0)]
+    return [
+        (u, -v, 0),
+        (-u, -v, 0),
+        (u, -t, h),
+        (-u, -t, h),
+        (u, t, h),
+        (-u, t, h),
+        (u, v, 0),
+        (-u, v, 0),
+    ]
 
 
 def typical(width: float, length: float, height: float) -> dict[str, float]:
@@ -31,7 +47,10 @@ def typical(width: float, length: float, height: float) -> dict[str, float]:
 def draw(rng: np.random.Generator, width: float) -> dict[str, float]:
     inset = width * float(rng.uniform(0.15, 0.3))
     plan = drawn_plan(rng, width, 0.9)
-    return plan | {"height": inset * drawn_slope(rng, 35, 65), "top_width": plan["width"] - 2 * inset}
+    return plan | {
+        "height": inset * drawn_slope(rng, 35, 65),
+        "top_width": plan["width"] - 2 * inset,
+    }
 
 
 PRIMITIVE = Primitive(
@@ -53,5 +72,9 @@ PRIMITIVE = Primitive(
         DerivedStart("gable", (q0 - 0.4 * q1 * V, q1, 0.6)),
         *at_quarters("flat", (q0, 1.0, 0.25), (0, 1)),
     ),
-    of_member=lambda m: (m.top, m.slopes[FRONT], (m.top - m.eaves[FRONT]) / (m.slopes[FRONT] * m.half[1])),
+    of_member=lambda m: (
+        m.top,
+        m.slopes[FRONT],
+        (m.top - m.eaves[FRONT]) / (m.slopes[FRONT] * m.half[1]),
+    ),
 )

@@ -36,8 +36,9 @@ shells        shells of CityJSON, every number checked
 solids        solids of CityJSON and CityGML as they stand
 roofn3d       the RoofN3D data set
 
-Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is said by
-`errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a third of a second.
+Everything unreadable raises `errors.InputError` with one sentence; what was put right on the way is
+said by `errors.InputWarning`. The names below are imported when first used: GDAL and laspy cost a
+third of a second.
 """
 
 from importlib import import_module

@@ -1,4 +1,6 @@
-"""Which points belong to which footprint: points sorted once into grid cells, then looked up building by building."""
+"""Which points belong to which footprint: points sorted once into grid cells, then looked up
+building by building.
+"""
 
 from __future__ import annotations
 
@@ -12,12 +14,14 @@ from ..model import Footprint
 from .cell_kernel import cell_keys
 from .thin import cell_range
 
-MANY_VERTICES = 200  # of an outline; hardly a building has more corners, and growing it takes a quarter of a second
+# of an outline; hardly a building has more corners, and growing it takes a quarter of a second
+MANY_VERTICES = 200
 CELL_M = 4.0  # m; a house covers a few dozen cells, and a cell holds few points beside it
 
 
 class PointGrid:
-    """Plan points sorted into square cells, row by row, so that any box is a few slices of one sorted array.
+    """Plan points sorted into square cells, row by row, so that any box is a few slices of one
+    sorted array.
 
     >>> grid = PointGrid(np.array([[0.5, 0.5], [9.0, 9.0], [1.5, 0.5]]))
     >>> grid.inside(shapely.box(0, 0, 1, 1)).tolist()
@@ -27,9 +31,13 @@ class PointGrid:
     """
 
     def __init__(self, xy: np.ndarray, cell_m: float = CELL_M):
-        """Index `xy` (n, 2 or more; further columns are ignored), world or local metres, all finite."""
+        """Index `xy` (n, 2 or more; further columns are ignored), world or local metres, all
+        finite.
+        """
         self.xy, self.cell_m = np.ascontiguousarray(xy, float), float(cell_m)
-        self.origin, (self.columns, self.rows) = cell_range(self.xy, cell_m) if len(self.xy) else ((0, 0), (1, 1))
+        self.origin, (self.columns, self.rows) = (
+            cell_range(self.xy, cell_m) if len(self.xy) else ((0, 0), (1, 1))
+        )
         keys = cell_keys(self.xy, self.cell_m, *self.origin, self.columns)
         # sorted as 16 bits where they fit: numpy then counts instead of comparing
         keys = keys.astype(np.min_scalar_type(self.rows * self.columns))
@@ -44,15 +52,22 @@ class PointGrid:
 
     def candidates(self, bounds: Sequence[float] | np.ndarray) -> np.ndarray:
         """Indices of the points in the cells that the box (xmin, ymin, xmax, ymax) meets."""
-        first, last = self.cell_range(bounds[0], bounds[2], 0), self.cell_range(bounds[1], bounds[3], 1)
+        first, last = (
+            self.cell_range(bounds[0], bounds[2], 0),
+            self.cell_range(bounds[1], bounds[3], 1),
+        )
         rows = np.arange(max(last[0], 0), min(last[1], self.rows - 1) + 1)
         left, right = max(first[0], 0), min(first[1], self.columns - 1)
         if left > right or not len(rows):
             return np.empty(0, np.int64)
         # looked up as the keys' own type: NumPy would convert all keys otherwise
         starts = np.searchsorted(self.keys, (rows * self.columns + left).astype(self.keys.dtype))
-        stops = np.searchsorted(self.keys, (rows * self.columns + right).astype(self.keys.dtype), side="right")
-        return np.concatenate([self.order[start:stop] for start, stop in zip(starts, stops, strict=True)])
+        stops = np.searchsorted(
+            self.keys, (rows * self.columns + right).astype(self.keys.dtype), side="right"
+        )
+        return np.concatenate(
+            [self.order[start:stop] for start, stop in zip(starts, stops, strict=True)]
+        )
 
     def cell_range(self, low: float, high: float, axis: int) -> tuple[int, int]:
         start = self.origin[axis]
@@ -75,7 +90,8 @@ class PointGrid:
 
 
 def grown(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapely.Geometry:
-    """What lies at most `distance_m` from a polygon or inside it; of one with MANY_VERTICES to within a tenth of the distance.
+    """What lies at most `distance_m` from a polygon or inside it; of one with MANY_VERTICES to
+    within a tenth of the distance.
 
     Small teeth that grow by much take GEOS the square of their number.
     """
@@ -84,11 +100,14 @@ def grown(polygon: shapely.Polygon, distance_m: float, **options: int) -> shapel
     return shapely.buffer(polygon, distance_m, **options)
 
 
-def points_of_footprints(cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]) -> list[np.ndarray]:
-    """For each footprint the ascending indices into `cloud_xyz` (n, 2 or 3) of the points inside or on its border.
+def points_of_footprints(
+    cloud_xyz: np.ndarray, footprints: Iterable[Footprint | shapely.Polygon]
+) -> list[np.ndarray]:
+    """For each footprint the ascending indices into `cloud_xyz` (n, 2 or 3) of the points inside or
+    on its border.
 
-    Pass the building-class points only. A point in the overlap of two footprints belongs to both: what a building gets
-    never depends on its neighbours.
+    Pass the building-class points only. A point in the overlap of two footprints belongs to both:
+    what a building gets never depends on its neighbours.
     """
     grid = PointGrid(cloud_xyz)
     return [grid.inside(plan_of(footprint)) for footprint in footprints]

@@ -1,5 +1,7 @@
-"""Attributes of a vector file as its columns declare them: pyogrio makes decimals of whole numbers and of booleans where a feature
-has none, so that a year became 1950.0, a yes 1.0, and an id of 17 digits its neighbour's."""
+"""Attributes of a vector file as its columns declare them: pyogrio makes decimals of whole numbers
+and of booleans where a feature has none, so that a year became 1950.0, a yes 1.0, and an id of 17
+digits its neighbour's.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +13,22 @@ EXACT = 2.0**53  # whole numbers below it are themselves as decimals
 
 
 def as_declared(
-    names: Sequence[str], declared: Sequence[str], columns: list[np.ndarray], known_of: Callable[[str], np.ndarray]
+    names: Sequence[str],
+    declared: Sequence[str],
+    columns: list[np.ndarray],
+    known_of: Callable[[str], np.ndarray],
 ) -> list[np.ndarray]:
-    """The `columns` (n,), whole numbers and booleans again where they are `declared` so, None where a feature has none.
+    """The `columns` (n,), whole numbers and booleans again where they are `declared` so, None where
+    a feature has none.
 
-    `known_of` reads the values (k,) of one column again, of the features that have one and in their order, for numbers that decimals do not
-    hold.
+    `known_of` reads the values (k,) of one column again, of the features that have one and in their
+    order, for numbers that decimals do not hold.
     """
     whole = []
     for name, kind, column in zip(names, declared, columns, strict=True):
-        if not (kind.startswith(("int", "uint", "bool")) and np.issubdtype(column.dtype, np.floating)):
+        if not (
+            kind.startswith(("int", "uint", "bool")) and np.issubdtype(column.dtype, np.floating)
+        ):
             whole.append(shortest(column) if column.dtype == np.float32 else column)
             continue
         is_known = np.isfinite(column)
@@ -28,13 +36,16 @@ def as_declared(
         if (np.abs(known) >= EXACT).any() and len(again := known_of(name)) == len(known):
             known = again
         values = np.full(len(column), None, dtype=object)
-        values[is_known] = [bool(value) if kind == "bool" else int(value) for value in known.tolist()]
+        values[is_known] = [
+            bool(value) if kind == "bool" else int(value) for value in known.tolist()
+        ]
         whole.append(values)
     return whole
 
 
 def shortest(column: np.ndarray) -> np.ndarray:
-    """Single precision (n,) as the decimals that it is written by: 0.2, where doubling its digits makes 0.20000000298.
+    """Single precision (n,) as the decimals that it is written by: 0.2, where doubling its digits
+    makes 0.20000000298.
 
     >>> shortest(np.array([0.2, np.nan], np.float32)).tolist()
     [0.2, nan]

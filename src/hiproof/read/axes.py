@@ -1,7 +1,7 @@
 """The axes of a coordinate reference system: which way they run and in which unit they count.
 
-Models are built in x to the right, y upwards and heights above, all in units of length. A system whose axes
-cannot be used so is refused with an InputError.
+Models are built in x to the right, y upwards and heights above, all in units of length. A system
+whose axes cannot be used so is refused with an InputError.
 """
 
 from __future__ import annotations
@@ -12,14 +12,32 @@ from typing import Any
 from ..errors import InputError
 
 LEAST_UNIT_M, MOST_UNIT_M = 1e-3, 2000.0
-"""Shortest and longest unit (m) of a coordinate: EPSG's own linear units run from 0.001 m to 1,852 m."""
+"""Shortest and longest unit (m) of a coordinate: EPSG's own linear units run from 0.001 m to 1,852
+m.
+"""
 
 ANGLES = ("degree", "radian", "grad", "gon", "arc-second", "arc-minute")
 """Starts of the names of units that count angles. WKT 1 declares units without their kind."""
 
 COMPASS = (
-    *("north", "northNorthEast", "northEast", "eastNorthEast", "east", "eastSouthEast", "southEast"),
-    *("southSouthEast", "south", "southSouthWest", "southWest", "westSouthWest", "west", "westNorthWest"),
+    *(
+        "north",
+        "northNorthEast",
+        "northEast",
+        "eastNorthEast",
+        "east",
+        "eastSouthEast",
+        "southEast",
+    ),
+    *(
+        "southSouthEast",
+        "south",
+        "southSouthWest",
+        "southWest",
+        "westSouthWest",
+        "west",
+        "westNorthWest",
+    ),
     *("northWest", "northNorthWest"),
 )
 """Directions of axes clockwise from north, a sixteenth of a turn apart."""
@@ -28,36 +46,43 @@ COMPASS = (
 def check_plan_axes(plan: Any, source: str) -> None:
     """Refuse a plan CRS whose axes are not two lengths in one unit, x to the right of y.
 
-    `source` names the coordinates in the message. Files hold east before north whatever order a CRS declares,
-    so north before east is usual. A local system may be turned, but not mirrored.
+    `source` names the coordinates in the message. Files hold east before north whatever order a CRS
+    declares, so north before east is usual. A local system may be turned, but not mirrored.
     """
     directions = [axis.direction for axis in plan.axis_info[:2]]
     if len(directions) < 2:
         raise InputError(
-            f"expected {source} in a CRS of two axes in plan, got {plan.name} ({plan.type_name.lower()}); "
+            f"expected {source} in a CRS of two axes in plan, got {plan.name} "
+            f"({plan.type_name.lower()}); "
             "name a projected CRS with --crs"
         )
     if not runs_east_and_north(directions, is_local=plan.is_engineering):
         raise InputError(
-            f"expected {source} in a CRS whose axes run east and north, got {plan.name}, whose axes run "
-            f"{' and '.join(directions)}; reproject to a CRS of the place that counts east and north"
+            f"expected {source} in a CRS whose axes run east and north, got {plan.name}, whose "
+            "axes run "
+            f"{' and '.join(directions)}; reproject to a CRS of the place that counts east and "
+            "north"
         )
     for axis in plan.axis_info[:2]:
         check_unit(axis, plan, source)
     first, second = plan.axis_info[:2]
     if first.unit_conversion_factor != second.unit_conversion_factor:
         raise InputError(
-            f"expected {source} in a CRS with one unit in plan, got {plan.name} in {first.unit_name} and "
+            f"expected {source} in a CRS with one unit in plan, got {plan.name} in "
+            f"{first.unit_name} and "
             f"{second.unit_name}; reproject to a CRS with one unit"
         )
 
 
 def runs_east_and_north(directions: Sequence[str], is_local: bool) -> bool:
-    """Whether two axes may be taken as x to the right and y upwards. Both axes of a polar CRS run away from the pole.
+    """Whether two axes may be taken as x to the right and y upwards.
+
+    Both axes of a polar CRS run away from the pole.
 
     >>> runs_east_and_north(("north", "east"), False), runs_east_and_north(("south", "west"), False)
     (True, False)
-    >>> runs_east_and_north(("southWest", "southEast"), True), runs_east_and_north(("west", "north"), True)
+    >>> runs_east_and_north(("southWest", "southEast"), True), runs_east_and_north(("west",
+    ...     "north"), True)
     (True, False)
     """
     first, second = directions
@@ -86,6 +111,8 @@ def check_unit(axis: Any, crs: Any, source: str) -> None:
     is_angle = axis.unit_name.lower().startswith(ANGLES)
     if is_angle or not LEAST_UNIT_M <= axis.unit_conversion_factor <= MOST_UNIT_M:
         raise InputError(
-            f"expected {source} in a CRS that counts in metres, feet or another unit of length, got {crs.name} in "
-            f"units of {axis.unit_conversion_factor:g} ({axis.unit_name}); name the right CRS with --crs"
+            f"expected {source} in a CRS that counts in metres, feet or another unit of length, "
+            f"got {crs.name} in "
+            f"units of {axis.unit_conversion_factor:g} ({axis.unit_name}); name the right CRS with "
+            "--crs"
         )

@@ -1,4 +1,6 @@
-"""Points and cells, compiled: the inner loops behind PointGrid, thinning and the sorting of a city's points."""
+"""Points and cells, compiled: the inner loops behind PointGrid, thinning and the sorting of a
+city's points.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,10 @@ from ..compiled import compiled
 
 @compiled
 def cell_keys(xy, cell_m, first_column, first_row, columns):
-    """Number (n,) of each point's cell, row by row; `first_column`, `first_row` are the first cell's in the world's grid."""
+    """Number (n,) of each point's cell, row by row;
+
+    `first_column`, `first_row` are the first cell's in the world's grid.
+    """
     keys = np.empty(len(xy), np.int64)
     for i in range(len(xy)):
         column = np.int64(np.floor(xy[i, 0] / cell_m) - first_column)
@@ -20,7 +25,9 @@ def cell_keys(xy, cell_m, first_column, first_row, columns):
 
 @compiled
 def mask_at(mask, xy, index, x_low, y_low):
-    """The mask's byte (k,) at the whole-metre cells of the points `xy[index]`, 0 outside; its corner is (x_low, y_low)."""
+    """The mask's byte (k,) at the whole-metre cells of the points `xy[index]`, 0 outside; its
+    corner is (x_low, y_low).
+    """
     found = np.zeros(len(index), np.uint8)
     for k in range(len(index)):
         column = np.int64(np.floor(xy[index[k], 0] - x_low))
@@ -32,7 +39,9 @@ def mask_at(mask, xy, index, x_low, y_low):
 
 @compiled
 def is_first(xyz, hashes):
-    """Whether each of the points (n, 3) is the first with its coordinates, by open addressing on their hashes (n,)."""
+    """Whether each of the points (n, 3) is the first with its coordinates, by open addressing on
+    their hashes (n,).
+    """
     size = 16
     while size < 2 * len(xyz):
         size *= 2

@@ -57,9 +57,14 @@ def features(
             units = known or units_named(name, otherwise)
         try:
             transform = read_transform(document) or transform
-            yield Feature(read_objects(document), world_vertices(document, transform, units), place, units)
+            yield Feature(
+                read_objects(document), world_vertices(document, transform, units), place, units
+            )
         except UNUSABLE as error:
-            told = InputError(f"expected CityJSON that can be read in {place}, got {reason_of(error)}; mend it there")
+            told = InputError(
+                f"expected CityJSON that can be read in {place}, got {reason_of(error)}; mend it "
+                "there"
+            )
             (refuse if document["type"] == "CityJSON" else damaged)(told)
             yield Feature({}, np.empty((0, 3)), place, units, True)
 
@@ -98,9 +103,14 @@ def world_vertices(
 
 def unusable(id: str, feature: Feature, error: Exception) -> InputError:
     """Say in a sentence why the city object `id` of a feature cannot be used."""
-    where = feature.place if f"building {id:.80} in " in feature.place else f"{id:.80} in {feature.place}"
+    where = (
+        feature.place
+        if f"building {id:.80} in " in feature.place
+        else f"{id:.80} in {feature.place}"
+    )
     return InputError(
-        f"expected {where} to be one that can be used, got {reason_of(error)}; mend it there, or make the file anew with "
+        f"expected {where} to be one that can be used, got {reason_of(error)}; mend it there, or "
+        "make the file anew with "
         "`hiproof build`"
     )
 
@@ -121,7 +131,8 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
         document = parsed(read_text(path), str(path))
         if document.get("type") != "CityJSON":
             raise InputError(
-                f'expected "type": "CityJSON" in {path}, got {document.get("type")!r}; is this another kind of JSON?'
+                f'expected "type": "CityJSON" in {path}, got {document.get("type")!r}; is this '
+                "another kind of JSON?"
             )
         yield document, str(path)
         return
@@ -142,7 +153,9 @@ def documents(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[dict[str,
     except (OSError, UnicodeDecodeError) as error:
         raise unreadable(path, error) from error
     if not seen_header:
-        raise InputError(f"expected a CityJSON line at the start of {path}, got an empty file; write it anew")
+        raise InputError(
+            f"expected a CityJSON line at the start of {path}, got an empty file; write it anew"
+        )
 
 
 def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
@@ -152,7 +165,8 @@ def parsed_line(line: str, place: str, seen_header: bool) -> dict[str, Any]:
     kind = document.get("type")
     if kind != "CityJSON" and not (seen_header and kind == "CityJSONFeature"):
         raise InputError(
-            f"expected a CityJSON line followed by CityJSONFeatures, got one of type {excerpt(kind)} in {place}; is this another "
+            "expected a CityJSON line followed by CityJSONFeatures, got one of type "
+            f"{excerpt(kind)} in {place}; is this another "
             "kind of JSON?"
         )
     return document
@@ -171,10 +185,17 @@ def parsed(text: str, place: str) -> dict[str, Any]:
     # A ValueError too for numbers of thousands of digits.
     except (ValueError, RecursionError) as error:
         if text.lstrip("\ufeff \t\r\n").startswith("<"):
-            raise InputError(f"expected JSON in {place}, got XML, such as CityGML; name a CityJSON file") from error
-        raise InputError(f"expected JSON in {place}, got: {error}; the file is damaged or cut off") from error
+            raise InputError(
+                f"expected JSON in {place}, got XML, such as CityGML; name a CityJSON file"
+            ) from error
+        raise InputError(
+            f"expected JSON in {place}, got: {error}; the file is damaged or cut off"
+        ) from error
     if not isinstance(value, dict):
-        raise InputError(f"expected a JSON object in {place}, got {type(value).__name__}; is this the right file?")
+        raise InputError(
+            f"expected a JSON object in {place}, got {type(value).__name__}; is this the right "
+            "file?"
+        )
     return readable(value) if ESCAPED.search(text) else value
 
 

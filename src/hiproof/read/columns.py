@@ -13,7 +13,9 @@ NAMES = {
 
 
 def find_columns(header: Sequence[str]) -> tuple[int, ...] | None:
-    """Indices of x, y, z and, where there is one, classification among column names; None unless x, y and z are named.
+    """Indices of x, y, z and, where there is one, classification among column names;
+
+    None unless x, y and z are named.
 
     >>> find_columns(["Intensity", "X", "Y", "Z", "Classification"])
     (1, 2, 3, 4)

@@ -1,6 +1,8 @@
-"""Points of a COPC file: of the octree's nodes whose cubes meet a box, each node held against its own cube.
+"""Points of a COPC file: of the octree's nodes whose cubes meet a box, each node held against its
+own cube.
 
-Only those nodes are fetched and decoded. The nodes themselves were found, once a file, when its header was checked.
+Only those nodes are fetched and decoded. The nodes themselves were found, once a file, when its
+header was checked.
 """
 
 from __future__ import annotations
@@ -18,8 +20,16 @@ from .plausible import Implausible
 Box = tuple[float, float, float, float]
 
 
-def copc_record(file: BinaryIO, facts: LasFacts, octree: Octree, box: Box, selection: laspy.DecompressionSelection):
-    """laspy's record of all points in the nodes that meet `box` (xmin, ymin, xmax, ymax), and the first of each node."""
+def copc_record(
+    file: BinaryIO,
+    facts: LasFacts,
+    octree: Octree,
+    box: Box,
+    selection: laspy.DecompressionSelection,
+):
+    """laspy's record of all points in the nodes that meet `box` (xmin, ymin, xmax, ymax), and the
+    first of each node.
+    """
     header = laspy.LasHeader.read_from(file, read_evlrs=False)
     nodes = nodes_meeting(facts, octree, box)
     chunks = list(zip(nodes["points"].tolist(), nodes["bytes"].tolist(), strict=True))
@@ -27,9 +37,13 @@ def copc_record(file: BinaryIO, facts: LasFacts, octree: Octree, box: Box, selec
     if len(nodes):
         compressed = np.frombuffer(b"".join(bytes_of(file, node) for node in nodes), np.uint8)
         laszip = np.frombuffer(facts.laszip, np.uint8)
-        lazrs.decompress_points_with_chunk_table(compressed, laszip, content, chunks, selection.to_lazrs())
+        lazrs.decompress_points_with_chunk_table(
+            compressed, laszip, content, chunks, selection.to_lazrs()
+        )
     packed = PackedPointRecord.from_buffer(content, header.point_format)
-    return nodes, ScaleAwarePointRecord(packed.array, packed.point_format, header.scales, header.offsets)
+    return nodes, ScaleAwarePointRecord(
+        packed.array, packed.point_format, header.scales, header.offsets
+    )
 
 
 def bytes_of(file: BinaryIO, node: np.void) -> bytes:
@@ -38,7 +52,9 @@ def bytes_of(file: BinaryIO, node: np.void) -> bytes:
 
 
 def nodes_meeting(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
-    """The nodes that hold points and meet `box` in plan, in the order in which they stand in the file."""
+    """The nodes that hold points and meet `box` in plan, in the order in which they stand in the
+    file.
+    """
     low, high = cubes(facts, octree, octree.nodes)
     meets = (low[:, :2] <= box[2:]).all(axis=1) & (high[:, :2] >= box[:2]).all(axis=1)
     found = octree.nodes[meets]
@@ -46,7 +62,9 @@ def nodes_meeting(facts: LasFacts, octree: Octree, box: Box) -> np.ndarray:
 
 
 def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper corners (n, 3) of the nodes' cubes, wider by what rounding may move a point."""
+    """Lower and upper corners (n, 3) of the nodes' cubes, wider by what rounding may move a
+    point.
+    """
     level, place = nodes["key"][:, :1], nodes["key"][:, 1:]
     side = np.ldexp(2 * octree.half, -level)
     low = octree.centre - octree.half + place * side
@@ -54,7 +72,9 @@ def cubes(facts: LasFacts, octree: Octree, nodes: np.ndarray) -> tuple[np.ndarra
 
 
 def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Octree) -> None:
-    """Raise Implausible where a node's points, which follow one another in `xyz` (n, 3), leave its cube."""
+    """Raise Implausible where a node's points, which follow one another in `xyz` (n, 3), leave its
+    cube.
+    """
     if not len(nodes):
         return
     starts = np.cumsum([0, *nodes["points"][:-1]])
@@ -62,4 +82,7 @@ def check_nodes(xyz: np.ndarray, nodes: np.ndarray, facts: LasFacts, octree: Oct
     outside = (np.minimum.reduceat(xyz, starts) < low) | (np.maximum.reduceat(xyz, starts) > high)
     if outside.any():
         level, *place = nodes["key"][np.argmax(outside.any(axis=1))].tolist()
-        raise Implausible(f"its octree's node {place} of level {level} has points outside its bounds; it is damaged")
+        raise Implausible(
+            f"its octree's node {place} of level {level} has points outside its bounds; it is "
+            "damaged"
+        )

@@ -1,4 +1,6 @@
-"""Coordinate reference systems: are two the same in plan, in which units do they count, how do two combine."""
+"""Coordinate reference systems: are two the same in plan, in which units do they count, how do two
+combine.
+"""
 
 from __future__ import annotations
 
@@ -35,7 +37,9 @@ class UnknownCRS:
 
 
 def parse_crs(value: Any) -> CRS | None:
-    """A pyproj CRS from an EPSG number, "EPSG:7415", WKT or a CRS; None and "" stay None. Raises InputError otherwise.
+    """A pyproj CRS from an EPSG number, "EPSG:7415", WKT or a CRS;
+
+    None and "" stay None. Raises InputError otherwise.
 
     >>> parse_crs("EPSG:28992").to_epsg()
     28992
@@ -47,7 +51,8 @@ def parse_crs(value: Any) -> CRS | None:
     except CRSError as error:
         text = str(value)[:60]
         raise InputError(
-            f'expected a coordinate reference system such as "EPSG:7415", got {text!r} ({reason_of(error)}); '
+            f'expected a coordinate reference system such as "EPSG:7415", got {text!r} '
+            f"({reason_of(error)}); "
             "give its EPSG code or its WKT"
         ) from error
 
@@ -55,7 +60,8 @@ def parse_crs(value: Any) -> CRS | None:
 def reason_of(error: CRSError) -> str:
     """What PROJ says is wrong, without the definition, which pyproj repeats whole.
 
-    >>> reason_of(CRSError("Invalid projection: FOO[1]: (Internal Proj Error: proj_create: unrecognized format)"))
+    >>> inner = "Internal Proj Error: proj_create: unrecognized format"
+    >>> reason_of(CRSError(f"Invalid projection: FOO[1]: ({inner})"))
     'unrecognized format'
     """
     reason = str(error).rpartition("Internal Proj Error: ")[2].removeprefix("proj_create: ")
@@ -80,12 +86,16 @@ def vertical_crs(crs: CRS) -> CRS | None:
 
 
 def names_place(crs: CRS | None) -> bool:
-    """Whether coordinates in `crs` lie anywhere on the Earth. A local CRS and one of heights alone leave that open.
+    """Whether coordinates in `crs` lie anywhere on the Earth.
 
-    >>> names_place(CRS("EPSG:28992")), names_place(CRS("EPSG:5709")), names_place(CRS.from_wkt('LOCAL_CS["site"]'))
-    (True, False, False)
+    A local CRS and one of heights alone leave that open.
+
+    >>> [names_place(CRS(text)) for text in ("EPSG:28992", "EPSG:5709", 'LOCAL_CS["site"]')]
+    [True, False, False]
     """
-    return crs is not None and not names_heights_alone(crs) and not horizontal_crs(crs).is_engineering
+    return (
+        crs is not None and not names_heights_alone(crs) and not horizontal_crs(crs).is_engineering
+    )
 
 
 def names_heights_alone(crs: CRS) -> bool:
@@ -94,7 +104,9 @@ def names_heights_alone(crs: CRS) -> bool:
 
 
 def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
-    """Whether coordinates in plan mean the same place in both, whatever the heights. An unknown CRS equals nothing.
+    """Whether coordinates in plan mean the same place in both, whatever the heights.
+
+    An unknown CRS equals nothing.
 
     >>> same_horizontal(CRS("EPSG:7415"), CRS("EPSG:28992"))
     True
@@ -110,13 +122,18 @@ def same_horizontal(first: CRS | None, second: CRS | None) -> bool:
 
 @functools.lru_cache(maxsize=64)
 def epsg_code(crs: CRS) -> int | None:
-    """EPSG number of `crs` where pyproj is sure of it, else None; kept, for looking it up takes a millisecond or several."""
+    """EPSG number of `crs` where pyproj is sure of it, else None; kept, for looking it up takes a
+    millisecond or several.
+    """
     authority = crs.to_authority("EPSG", min_confidence=70)
     return int(authority[1]) if authority else None
 
 
 def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
-    """Compound CRS of a plan and a height system; `horizontal` alone where it has heights already or none are given."""
+    """Compound CRS of a plan and a height system;
+
+    `horizontal` alone where it has heights already or none are given.
+    """
     if horizontal is None or vertical is None or vertical_crs(horizontal) is not None:
         return horizontal
     from pyproj.crs import CompoundCRS
@@ -128,12 +145,15 @@ def combine(horizontal: CRS | None, vertical: CRS | None) -> CRS | None:
 
 
 def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "auto") -> Units:
-    """Units that coordinates in `crs` count in; heights of a CRS without any are taken to be in the plan's unit.
+    """Units that coordinates in `crs` count in; heights of a CRS without any are taken to be in the
+    plan's unit.
 
-    `named` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS in degrees, and for a name
-    that contradicts the CRS; `source` is what the message calls the coordinates.
+    `named` is a key of NAMED_UNITS for coordinates without a CRS. Raises InputError for a CRS in
+    degrees, and for a name that contradicts the CRS; `source` is what the message calls the
+    coordinates.
 
-    >>> str(units_of(CRS("EPSG:2263"))), str(units_of(CRS("EPSG:2263+5703"))), str(units_of(None, named="foot"))
+    >>> str(units_of(CRS("EPSG:2263"))), str(units_of(CRS("EPSG:2263+5703"))), str(units_of(None,
+    ...     named="foot"))
     ('US survey foot', 'US survey foot, heights in metre', 'foot')
     """
     if crs is None:
@@ -145,16 +165,20 @@ def units_of(crs: CRS | None, source: str = "the point clouds", named: str = "au
         raise InputError(
             f"expected {source} in a projected CRS, got {crs.name} in "
             f"{'degrees' if plan.is_geographic else 'geocentric coordinates'}; "
-            "reproject it first, to the UTM zone or the national grid of the place (`pdal translate`, `ogr2ogr`)"
+            "reproject it first, to the UTM zone or the national grid of the place (`pdal "
+            "translate`, `ogr2ogr`)"
         )
     check_plan_axes(plan, source)
     across = plan.axis_info[0]
     up = height_axis(crs) or across
     check_height_axis(up, crs, source)
-    units = Units(across.unit_conversion_factor, up.unit_conversion_factor, across.unit_name, up.unit_name)
+    units = Units(
+        across.unit_conversion_factor, up.unit_conversion_factor, across.unit_name, up.unit_name
+    )
     if named != "auto" and abs(NAMED_UNITS[named].plan / units.plan - 1) > 1e-9:
         raise InputError(
-            f"expected {source} in {named}, as --unit says, got {crs.name} in {units}; leave --unit out, "
+            f"expected {source} in {named}, as --unit says, got {crs.name} in {units}; leave "
+            "--unit out, "
             "or say with --crs which CRS is right"
         )
     return units
@@ -169,19 +193,24 @@ def height_axis(crs: CRS) -> Any:
 
 
 def units_of_heights_alone(heights: CRS, source: str, named: str) -> Units:
-    """Units of coordinates whose CRS names heights alone: the plan's unit has to be that of the heights."""
+    """Units of coordinates whose CRS names heights alone: the plan's unit has to be that of the
+    heights.
+    """
     units, up = NAMED_UNITS[named], heights.axis_info[0]
     check_height_axis(up, heights, source)
     if abs(up.unit_conversion_factor / units.plan - 1) > 1e-9:
         raise InputError(
-            f"expected {source} in a CRS of the plan, got {heights.name}, which names heights alone, in {up.unit_name}; "
+            f"expected {source} in a CRS of the plan, got {heights.name}, which names heights "
+            f"alone, in {up.unit_name}; "
             "name both with --crs, such as EPSG:28992+5709"
         )
     return units
 
 
 def units_named(name: str | None, otherwise: Units = METRES) -> Units:
-    """Units of the CRS that a file names by URN or address, `otherwise` where it names none that is known."""
+    """Units of the CRS that a file names by URN or address, `otherwise` where it names none that is
+    known.
+    """
     try:
         crs = parse_crs(name)
     except InputError:
@@ -190,14 +219,19 @@ def units_named(name: str | None, otherwise: Units = METRES) -> Units:
 
 
 def same_heights(first: CRS, second: CRS) -> bool:
-    """Whether heights mean the same in both; a CRS that names none goes with any whose heights are in its unit.
+    """Whether heights mean the same in both; a CRS that names none goes with any whose heights are
+    in its unit.
 
-    >>> same_heights(CRS("EPSG:7415"), CRS("EPSG:28992")), same_heights(CRS("EPSG:2263+6360"), CRS("EPSG:2263+5703"))
+    >>> same_heights(CRS("EPSG:7415"), CRS("EPSG:28992")), same_heights(CRS("EPSG:2263+6360"),
+    ...     CRS("EPSG:2263+5703"))
     (True, False)
     """
     if abs(units_of(first).height / units_of(second).height - 1) > 1e-9:
         return False
-    codes = [None if height is None else epsg_code(height) for height in (vertical_crs(first), vertical_crs(second))]
+    codes = [
+        None if height is None else epsg_code(height)
+        for height in (vertical_crs(first), vertical_crs(second))
+    ]
     return None in codes or codes[0] == codes[1]
 
 
@@ -214,7 +248,10 @@ def described(crs: CRS | None) -> str:
 
 
 def way_between(source: CRS, target: CRS) -> Transformer:
-    """The transformation of plans from `source` to `target`, x before y. Raises InputError where there is none."""
+    """The transformation of plans from `source` to `target`, x before y.
+
+    Raises InputError where there is none.
+    """
     plans = horizontal_crs(source), horizontal_crs(target)
     try:
         if any(plan.is_geocentric or plan.is_vertical for plan in plans):
@@ -222,13 +259,16 @@ def way_between(source: CRS, target: CRS) -> Transformer:
         return Transformer.from_crs(source, target, always_xy=True)
     except ProjError as error:
         raise InputError(
-            f"expected a way from {described(source)} to {described(target)}, got none that PROJ knows; "
+            f"expected a way from {described(source)} to {described(target)}, got none that PROJ "
+            "knows; "
             "check which CRS each file names, or reproject one of them"
         ) from error
 
 
 def degrees_of(crs: CRS, xy: np.ndarray) -> np.ndarray:
-    """Longitude and latitude (n, 2) of positions (n, 2) in the plan of `crs`, NaN where it leaves the place open."""
+    """Longitude and latitude (n, 2) of positions (n, 2) in the plan of `crs`, NaN where it leaves
+    the place open.
+    """
     if not names_place(crs):
         return np.full(xy.shape, np.nan)
     try:
@@ -238,7 +278,9 @@ def degrees_of(crs: CRS, xy: np.ndarray) -> np.ndarray:
 
 
 def best_of(crs: Any, target: Any, **options: Any) -> Any:
-    """pyproj's best transformation from `crs` to `target` that can be carried out here, None where there is none."""
+    """pyproj's best transformation from `crs` to `target` that can be carried out here, None where
+    there is none.
+    """
     from pyproj.transformer import TransformerGroup
 
     with warnings.catch_warnings():

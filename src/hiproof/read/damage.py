@@ -52,7 +52,8 @@ class LeftOut:
         """Raise InputError where every building is damaged."""
         if self.count and all(are_damaged):
             raise InputError(
-                f"expected a building that can be read, got {counted(self.count, 'damaged one')} and no other; "
+                f"expected a building that can be read, got {counted(self.count, 'damaged one')} "
+                "and no other; "
                 "make the files anew with `hiproof build` or `hiproof reconstruct`"
             )
 

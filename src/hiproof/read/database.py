@@ -1,7 +1,9 @@
-"""Footprints from PostGIS: `postgresql://user:password@host/database?table=schema.name[&geometry=column][&where=condition]`.
+"""Footprints from PostGIS:
+`postgresql://user:password@host/database?table=schema.name[&geometry=column][&where=condition]`.
 
-GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg and their geometries as WKB. The
-condition is the user's own SQL: it is sent as part of one statement in a read-only transaction, and can change nothing.
+GDAL's wheels come without its PostgreSQL driver, so rows are read with psycopg and their geometries
+as WKB. The condition is the user's own SQL: it is sent as part of one statement in a read-only
+transaction, and can change nothing.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ from .wkb import as_polygons, geometry_of
 
 TIMEOUT_S = 10  # to reach a server; libpq would wait for minutes
 SCHEMES = ("postgresql", "postgres")
-ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")  # whose user and password, where it has any, are whole
+# whose user and password, where it has any, are whole
+ADDRESS = re.compile(r"\w+://[^/?#]*(:[^/?#]*)?@")
 
 
 def is_database(source: Any) -> bool:
@@ -34,26 +37,36 @@ def is_database(source: Any) -> bool:
 def read_table(
     source: str, where: str | None = None
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray]]:
-    """The table a source names, in the shape pyogrio gives files: metadata (fields, crs), row numbers, geometries, columns.
+    """The table a source names, in the shape pyogrio gives files: metadata (fields, crs), row
+    numbers, geometries, columns.
 
-    `where` is a condition beside the source's own. Raises InputError in a full sentence when the database, the table or the geometry column cannot be used.
+    `where` is a condition beside the source's own. Raises InputError in a full sentence when the
+    database, the table or the geometry column cannot be used.
     """
     with opened(source, where) as table:
         rows = list(table.rows())
     if not rows:
         raise InputError(
-            f"expected footprints in {table.name}, got a table without rows; name another, or relax the condition"
+            f"expected footprints in {table.name}, got a table without rows; name another, or "
+            "relax the condition"
         )
     srids = {shapely.get_srid(shape) for shape, _ in rows if shape is not None}
     names = sorted({name for _, attributes in rows for name in attributes})
     columns = [np.array([attributes.get(name) for _, attributes in rows], object) for name in names]
     geometries = np.empty(len(rows), object)
     geometries[:] = [shape for shape, _ in rows]
-    return {"fields": names, "crs": crs_of(srids, table.name)}, np.arange(len(rows)), geometries, columns
+    return (
+        {"fields": names, "crs": crs_of(srids, table.name)},
+        np.arange(len(rows)),
+        geometries,
+        columns,
+    )
 
 
 def table_crs(source: str) -> str | None:
-    """The reference system of the table a source names, without reading its rows; raises InputError as `read_table`."""
+    """The reference system of the table a source names, without reading its rows; raises InputError
+    as `read_table`.
+    """
     with opened(source) as table:
         return crs_of(table.srids(), table.name)
 
@@ -62,7 +75,8 @@ def crs_of(srids: set[int], table: str) -> str | None:
     known = srids - {0}
     if len(known) > 1:
         raise InputError(
-            f"expected one reference system in {table}, got SRIDs {sorted(known)}; choose rows with &where="
+            f"expected one reference system in {table}, got SRIDs {sorted(known)}; choose rows "
+            "with &where="
         )
     return f"EPSG:{known.pop()}" if known else None
 
@@ -77,20 +91,26 @@ class Table:
     where: str | None
 
     def query(self, text: str) -> None:
-        """Run `text` with {g}, {n} and {t} for the geometry column, its name as a value and the table."""
+        """Run `text` with {g}, {n} and {t} for the geometry column, its name as a value and the
+        table.
+        """
         from psycopg import sql
 
         names = {"g": sql.Identifier(self.geometry), "n": sql.Literal(self.geometry)}
         # a line of its own: a comment at the condition's end must not swallow what follows it
         condition = sql.SQL(f" where {self.where}\n" if self.where else "")
         table = sql.SQL("{} t").format(sql.Identifier(*self.name.split("."))) + condition
-        # asking for binary results takes the extended protocol, whose messages hold one statement each
+        # asking for binary results takes the extended protocol, whose messages hold one statement
+        # each
         self.cursor.execute(sql.SQL(text).format(t=table, **names), binary=True)
 
     def rows(self) -> Iterator[tuple]:
-        """(geometry or None, attributes) ordered by their own content, so that storage does not matter."""
+        """(geometry or None, attributes) ordered by their own content, so that storage does not
+        matter.
+        """
         self.query(
-            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, to_jsonb(t) - {n} as attributes from {t} order by 2, 1"
+            "select ST_AsEWKB(ST_CurveToLine({g})) as ewkb, to_jsonb(t) - {n} as attributes from "
+            "{t} order by 2, 1"
         )
         for ewkb, attributes in self.cursor:
             yield (geometry_of(as_polygons(bytes(ewkb))) if ewkb is not None else None), attributes
@@ -102,18 +122,25 @@ class Table:
 
 @contextmanager
 def opened(source: str, condition: str | None = None) -> Iterator[Table]:
-    """The table of a source in a database that stays open for the block, whose errors become InputErrors."""
+    """The table of a source in a database that stays open for the block, whose errors become
+    InputErrors.
+    """
     dsn, table, geometry, where = parse_source(source)
     # each on lines of its own: a comment at its end must not swallow the bracket
     where = f"({where}\n) and ({condition}\n)" if where and condition else where or condition
     psycopg = import_psycopg()
     try:
-        with psycopg.connect(dsn, connect_timeout=TIMEOUT_S) as connection, connection.cursor() as cursor:
+        with (
+            psycopg.connect(dsn, connect_timeout=TIMEOUT_S) as connection,
+            connection.cursor() as cursor,
+        ):
             connection.read_only = True
             yield Table(cursor, table, geometry or geometry_column(cursor, table, source), where)
     except psycopg.Error as error:
         reason = str(error).strip().splitlines()[0]
-        raise InputError(f"expected a PostGIS table at {source}, got: {reason}; check address and table") from error
+        raise InputError(
+            f"expected a PostGIS table at {source}, got: {reason}; check address and table"
+        ) from error
 
 
 def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
@@ -122,32 +149,44 @@ def parse_source(source: str) -> tuple[str, str, str | None, str | None]:
         url = urlsplit(refuse_half_a_password(source))
         query = parse_qs(url.query)
     except ValueError as error:
-        raise InputError(f"expected a PostGIS table at {source}, got: {error}; check the address") from error
+        raise InputError(
+            f"expected a PostGIS table at {source}, got: {error}; check the address"
+        ) from error
     own = {name: query.pop(name, [None])[0] for name in ("table", "geometry", "where")}
     if not own["table"]:
-        raise InputError(f"expected a table in {source}, got none; add ?table=schema.name to the address")
+        raise InputError(
+            f"expected a table in {source}, got none; add ?table=schema.name to the address"
+        )
     dsn = urlunsplit(url._replace(query=urlencode(query, doseq=True)))
     return dsn, own["table"], own["geometry"], own["where"]
 
 
 def refuse_half_a_password(address: str) -> str:
-    """`address`, unless its password ends at a / ? or # of its own: the rest would be taken for a host and shown."""
+    """`address`, unless its password ends at a / ? or # of its own: the rest would be taken for a
+    host and shown.
+    """
     remember(address)
     if ADDRESS.match(masked(address)) and not ADDRESS.match(address):
         raise InputError(
-            f"expected %2F, %3F and %23 for / ? and # in the password of {address}, got the signs themselves"
+            f"expected %2F, %3F and %23 for / ? and # in the password of {address}, got the signs "
+            "themselves"
         )
     return address
 
 
 def geometry_column(cursor: Any, table: str, source: str) -> str:
     schema, _, name = table.rpartition(".")
-    sql = "select f_geometry_column from geometry_columns where f_table_name = %s and (%s = '' or f_table_schema = %s)"
+    sql = (
+        "select f_geometry_column from geometry_columns where f_table_name = %s and (%s = '' or "
+        "f_table_schema = %s)"
+    )
     cursor.execute(sql, (name, schema, schema))
     found = [column for (column,) in cursor.fetchall()]
     if len(found) != 1:
         got = ", ".join(found) or "none"
-        raise InputError(f"expected one geometry column in {table}, got {got}; name it with &geometry=")
+        raise InputError(
+            f"expected one geometry column in {table}, got {got}; name it with &geometry="
+        )
     return found[0]
 
 

@@ -1,7 +1,8 @@
 """The features of a layer through pyogrio; attributes that it cannot read come as text.
 
-One value can make pyogrio give up a whole layer: the 30th of February, text in no encoding, a list of booleans. GDAL
-itself reads all of these, so the attribute is read again through its virtual format, declared as text.
+One value can make pyogrio give up a whole layer: the 30th of February, text in no encoding, a list
+of booleans. GDAL itself reads all of these, so the attribute is read again through its virtual
+format, declared as text.
 """
 
 from __future__ import annotations
@@ -20,27 +21,38 @@ SLASHED_DATE = re.compile(r"^(\d{1,5})/(\d\d)/(\d\d)")
 """How GDAL writes a date as text."""
 
 UNREADABLE = (ValueError, OverflowError, FieldError)
-"""What pyogrio raises for a value that it cannot represent; text that is no UTF-8 is a ValueError, too."""
+"""What pyogrio raises for a value that it cannot represent; text that is no UTF-8 is a ValueError,
+too.
+"""
 
 
 def read_layer(
     path: str, layer: str | int | None, **chosen: Any
 ) -> tuple[dict[str, Any], np.ndarray, np.ndarray, list[np.ndarray], list[str]]:
-    """pyogrio's metadata, numbers, WKB and columns of a layer, and the names of the attributes read as text.
+    """pyogrio's metadata, numbers, WKB and columns of a layer, and the names of the attributes read
+    as text.
 
     `chosen` are pyogrio's own options that choose among the features.
     """
-    read = partial(pyogrio.raw.read, path, layer=layer, return_fids=True, datetime_as_string=True, **chosen)
+    read = partial(
+        pyogrio.raw.read, path, layer=layer, return_fids=True, datetime_as_string=True, **chosen
+    )
     try:
         return (*read(), [])
     except UNREADABLE as error:
         info = pyogrio.read_info(path, layer=layer)
-        odd = [] if "SQL" in str(error) else [name for name in info["fields"] if not is_readable(path, layer, name)]
+        odd = (
+            []
+            if "SQL" in str(error)
+            else [name for name in info["fields"] if not is_readable(path, layer, name)]
+        )
         if not odd:
             raise
     meta, numbers, wkb, columns = read(columns=[name for name in info["fields"] if name not in odd])
     known = dict(zip(meta["fields"], zip(columns, meta["dtypes"], strict=True), strict=True))
-    known |= {name: (column_as_text(path, info["layer_name"], name, numbers), "object") for name in odd}
+    known |= {
+        name: (column_as_text(path, info["layer_name"], name, numbers), "object") for name in odd
+    }
     names = [name for name in info["fields"] if name in known]
     meta = {**meta, "fields": names, "dtypes": [known[name][1] for name in names]}
     return meta, numbers, wkb, [known[name][0] for name in names], odd
@@ -49,17 +61,23 @@ def read_layer(
 def is_readable(path: str, layer: str | int | None, name: str) -> bool:
     """Whether pyogrio can represent every value of an attribute."""
     try:
-        pyogrio.raw.read(path, layer=layer, columns=[name], read_geometry=False, datetime_as_string=True)
+        pyogrio.raw.read(
+            path, layer=layer, columns=[name], read_geometry=False, datetime_as_string=True
+        )
     except UNREADABLE:
         return False
     return True
 
 
 def column_as_text(path: str, layer: str, name: str, numbers: np.ndarray) -> np.ndarray:
-    """An attribute of the features with these numbers as text (n,); what is no UTF-8 has replacement characters."""
+    """An attribute of the features with these numbers as text (n,); what is no UTF-8 has
+    replacement characters.
+    """
     source = virtual_layer(path, layer, text=name)
     try:
-        _, _, _, columns = pyogrio.raw.read(source, fids=numbers, read_geometry=False, encoding="latin-1")
+        _, _, _, columns = pyogrio.raw.read(
+            source, fids=numbers, read_geometry=False, encoding="latin-1"
+        )
     except (*UNREADABLE, DataSourceError, FeatureError):
         columns = []
     if not columns:

@@ -1,4 +1,6 @@
-"""Building footprints from whatever pyogrio reads: every feature becomes one Footprint or more, none is lost."""
+"""Building footprints from whatever pyogrio reads: every feature becomes one Footprint or more,
+none is lost.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,15 @@ from ..masking import remember
 from ..model import Footprint
 from ..settings import Settings
 from .attribute_columns import as_declared, where_known
-from .crs import described, names_heights_alone, names_place, parse_crs, same_horizontal, units_of, way_between
+from .crs import (
+    described,
+    names_heights_alone,
+    names_place,
+    parse_crs,
+    same_horizontal,
+    units_of,
+    way_between,
+)
 from .database import is_database, read_table, table_crs
 from .features import read_layer
 from .layers import list_layers, source_of
@@ -36,7 +46,17 @@ UNDEFINED_CRS = ("Undefined Cartesian SRS", "Undefined geographic SRS", "Undefin
 
 Box = tuple[float, float, float, float]
 ID_NAMES = (
-    *("id", "building_id", "identificatie", "identificatiebagpnd", "gml_id", "gmlid", "fid", "osm_id", "egid"),
+    *(
+        "id",
+        "building_id",
+        "identificatie",
+        "identificatiebagpnd",
+        "gml_id",
+        "gmlid",
+        "fid",
+        "osm_id",
+        "egid",
+    ),
     *("objectid", "globalid", "uuid", "cleabs", "lokaalid"),
 )
 
@@ -50,14 +70,19 @@ def read_footprints(
     where: str | None = None,
     bbox: Box | None = None,
 ) -> tuple[Footprint, ...]:
-    """Footprints of a file, URL or data source name in world metres, in `target_crs` (the cloud's) where one is given.
+    """Footprints of a file, URL or data source name in world metres, in `target_crs` (the cloud's)
+    where one is given.
 
-    `layer` names one of a file's layers, which may be left out where only one holds geometries. Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the feature's id; polygons
-    without area stay, with an empty polygon. Rings are clockwise, holes counter-clockwise, as in a Shapefile and whatever the file's are. `where` is an SQL condition on their attributes; of those, only the ones that
-    meet `bbox` (xmin, ymin, xmax, ymax), in the coordinates of `target_crs`, are given. Ids come from `id_attribute`, else from the first usual column without
-    gaps or repeats, else they are the feature's number. `settings.read.crs` stands in for a `target_crs` that is None,
-    `settings.read.unit` for the unit where there is no CRS. Raises InputError for what cannot be read, holds no features
-    or several layers, or names a CRS that cannot be transformed.
+    `layer` names one of a file's layers, which may be left out where only one holds geometries.
+    Multipolygons are split into footprints `ID-1`, `ID-2`, ... whose attribute `part_of` is the
+    feature's id; polygons without area stay, with an empty polygon. Rings are clockwise, holes
+    counter-clockwise, as in a Shapefile and whatever the file's are. `where` is an SQL condition on
+    their attributes; of those, only the ones that meet `bbox` (xmin, ymin, xmax, ymax), in the
+    coordinates of `target_crs`, are given. Ids come from `id_attribute`, else from the first usual
+    column without gaps or repeats, else they are the feature's number. `settings.read.crs` stands
+    in for a `target_crs` that is None, `settings.read.unit` for the unit where there is no CRS.
+    Raises InputError for what cannot be read, holds no features or several layers, or names a CRS
+    that cannot be transformed.
     """
     read = (settings or Settings()).read
     target = parse_crs(target_crs) or parse_crs(read.crs)
@@ -69,18 +94,29 @@ def read_footprints(
     geometries = transformed(geometries, source, target, path)
     units = units_of(target or source, f"the footprints of {path}", read.unit)
     geometries = geometries if units.are_metres else shapely.transform(geometries, units.to_metres)
-    footprints = tuple(unique_ids(split_features(ids, geometries, surfaces, attributes, path), path))
+    footprints = tuple(
+        unique_ids(split_features(ids, geometries, surfaces, attributes, path), path)
+    )
     say_which_overlie(footprints, path)
-    return footprints if bbox is None else tuple(f for f in footprints if meets(f.polygon, bbox, units))
+    return (
+        footprints
+        if bbox is None
+        else tuple(f for f in footprints if meets(f.polygon, bbox, units))
+    )
 
 
 def meets(polygon: shapely.Polygon, bbox: Box, units: Units) -> bool:
     """Whether a polygon in world metres meets a box in coordinates of `units`."""
-    return bool(shapely.intersects(polygon, shapely.box(*units.to_metres(np.reshape(bbox, (2, 2))).ravel())))
+    return bool(
+        shapely.intersects(polygon, shapely.box(*units.to_metres(np.reshape(bbox, (2, 2))).ravel()))
+    )
 
 
 def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | None:
-    """CRS that a footprint file names, None where it names none. Raises InputError as `read_footprints` does."""
+    """CRS that a footprint file names, None where it names none.
+
+    Raises InputError as `read_footprints` does.
+    """
     if is_database(path):
         return plan_crs(table_crs(str(path)))
     source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
@@ -88,20 +124,26 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
 
 
 def plan_crs(text: str | None) -> CRS | None:
-    """The CRS that a vector file names, None for one of heights alone and for GeoPackage's "undefined"."""
+    """The CRS that a vector file names, None for one of heights alone and for GeoPackage's
+    "undefined".
+    """
     crs = parse_crs(text)
     return None if crs is None or names_heights_alone(crs) or crs.name in UNDEFINED_CRS else crs
 
 
 def one_layer(path: str | Path, layer: str | int | None) -> str | int | None:
-    """`layer`, or the only layer of a file that holds geometries. Raises InputError, listing them, where several do."""
+    """`layer`, or the only layer of a file that holds geometries.
+
+    Raises InputError, listing them, where several do.
+    """
     if layer is not None:
         return layer
     named = reading(lambda: list_layers(str(path)), path)
     layers = [name for name, geometry in named if geometry is not None]
     if len(layers) > 1:
         raise InputError(
-            f"expected one layer of footprints in {path}, got {len(layers)}: {', '.join(map(str, layers))}; "
+            f"expected one layer of footprints in {path}, got {len(layers)}: "
+            f"{', '.join(map(str, layers))}; "
             "name one with --layer"
         )
     return layers[0] if layers else None
@@ -114,7 +156,8 @@ def read_features(
     bbox: Box | None = None,
     bbox_crs: CRS | None = None,
 ) -> tuple[dict, np.ndarray, np.ndarray, list[np.ndarray]]:
-    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and attribute columns.
+    """pyogrio's metadata, feature numbers, shapely geometries (None where a feature has none) and
+    attribute columns.
 
     Of a file, those around `bbox` in `bbox_crs` are read, and perhaps others.
     """
@@ -125,30 +168,44 @@ def read_features(
     source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
     info = reading(lambda: pyogrio.read_info(source, layer=layer), path)
     chosen = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
-    meta, numbers, wkb, columns, as_text = reading(lambda: read_layer(source, layer, **chosen), path, info)
+    meta, numbers, wkb, columns, as_text = reading(
+        lambda: read_layer(source, layer, **chosen), path, info
+    )
     if as_text:
         names = ", ".join(as_text)
-        warnings.warn(f"{path}: read as text, for a value does not fit the attribute's type: {names}", InputWarning)
+        warnings.warn(
+            f"{path}: read as text, for a value does not fit the attribute's type: {names}",
+            InputWarning,
+        )
     if wkb is None:
-        raise InputError(f"expected polygons in {path}, got a table without geometry; name another file or layer")
+        raise InputError(
+            f"expected polygons in {path}, got a table without geometry; name another file or layer"
+        )
     if not len(wkb) and (where or bbox):
         said = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
         raise InputError(
-            f"expected footprints in {path} ({told_box(info['total_bounds'])}) that {said} let through, got none; relax or leave out what does not fit"
+            f"expected footprints in {path} ({told_box(info['total_bounds'])}) that {said} let "
+            "through, got none; relax or leave out what does not fit"
         )
     if not len(wkb):
-        raise InputError(f"expected footprints in {path}, got a layer without features; name another file or layer")
+        raise InputError(
+            f"expected footprints in {path}, got a layer without features; name another file or "
+            "layer"
+        )
     geometries = geometries_of(wkb)
     kinds = {g.geom_type for g in geometries if g is not None}
     if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
         raise InputError(
-            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or close the lines first"
+            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or "
+            "close the lines first"
         )
 
     def known_of(name: str) -> np.ndarray:
         # of all columns: in some formats those left out are empty to the condition as well
         known: dict[str, Any] = {**chosen, "layer": layer, "where": where_known(name, where)}
-        told, *_, values, _ = reading(lambda: read_layer(source, read_geometry=False, **known), path, info)
+        told, *_, values, _ = reading(
+            lambda: read_layer(source, read_geometry=False, **known), path, info
+        )
         return values[list(told["fields"]).index(name)]
 
     return meta, numbers, geometries, as_declared(meta["fields"], meta["dtypes"], columns, known_of)
@@ -161,7 +218,9 @@ def refuse_missing(path: str | Path) -> None:
     if not Path(path).exists():
         raise InputError(f"expected footprints at {path}, got no such file; check the path")
     if Path(path).is_file() and Path(path).stat().st_size == 0:
-        raise InputError(f"expected footprints in {path}, got an empty file; copy or download it again")
+        raise InputError(
+            f"expected footprints in {path}, got an empty file; copy or download it again"
+        )
 
 
 def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
@@ -174,30 +233,38 @@ def box_in(crs: CRS | None, bbox: Box, bbox_crs: CRS | None) -> Box:
 
 
 def reading(read: Callable[[], Any], path: str | Path, info: dict[str, Any] | None = None) -> Any:
-    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that helps; with the `info` of
-    a layer, its attributes for a condition that does not go with them."""
+    """`read()`, with pyogrio's errors turned into an InputError that lists the layers where that
+    helps; with the `info` of a layer, its attributes for a condition that does not go with them.
+    """
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # pyogrio remarks on measured geometries and mixed layers, which are fine
+            # pyogrio remarks on measured geometries and mixed layers, which are fine
+            warnings.simplefilter("ignore")
             return read()
-    except (FeatureError, ValueError) as error:  # ValueError: a condition on other files than databases
+    # ValueError: a condition on other files than databases
+    except (FeatureError, ValueError) as error:
         if info is None or "SQL" not in str(error):
             raise unreadable(path, error) from error
         told, names = str(error).partition(": ")[2], ", ".join(info["fields"]) or "none"
         raise InputError(
-            f"expected --where in SQL on the attributes of {path} ({names}), got: {told}; use these names"
+            f"expected --where in SQL on the attributes of {path} ({names}), got: {told}; use "
+            "these names"
         ) from error
     except DataLayerError as error:
         layers = ", ".join(str(name) for name, _ in list_layers(str(path)))
-        raise InputError(f"expected a layer of {path} (it has {layers}), got: {error}; use one of these") from error
+        raise InputError(
+            f"expected a layer of {path} (it has {layers}), got: {error}; use one of these"
+        ) from error
     except (DataSourceError, OSError, RuntimeError) as error:
         raise unreadable(path, error) from error
 
 
 def unreadable(path: str | Path, error: Exception) -> InputError:
-    told = str(error).partition("; It might help")[0].rstrip(".")  # what follows is advice on GDAL's own options
+    # what follows is advice on GDAL's own options
+    told = str(error).partition("; It might help")[0].rstrip(".")
     return InputError(
-        f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, got: {told}; "
+        f"expected a vector file that GDAL reads (GeoPackage, GeoJSON, Shapefile, ...) at {path}, "
+        f"got: {told}; "
         "check the file, or convert it with ogr2ogr"
     )
 
@@ -206,13 +273,19 @@ def attribute_rows(names: list[str], columns: list[np.ndarray], count: int) -> l
     """One dictionary a feature of plain Python values; what is not set (None, NaN) is left out."""
     values = [[plain_value(value) for value in column.tolist()] for column in columns]
     return [
-        {name: column[row] for name, column in zip(names, values, strict=True) if column[row] is not None}
+        {
+            name: column[row]
+            for name, column in zip(names, values, strict=True)
+            if column[row] is not None
+        }
         for row in range(count)
     ]
 
 
 def plain_value(value: Any) -> Any:
-    """A value as JSON knows it: NaN becomes None, dates ISO text, bytes hexadecimal, arrays lists."""
+    """A value as JSON knows it: NaN becomes None, dates ISO text, bytes hexadecimal, arrays
+    lists.
+    """
     if isinstance(value, np.ndarray):
         return value.tolist()
     if isinstance(value, float) and not np.isfinite(value):
@@ -225,21 +298,30 @@ def plain_value(value: Any) -> Any:
 def feature_ids(
     rows: list[dict[str, Any]], numbers: np.ndarray, id_attribute: str | None, path: str | Path
 ) -> list[str]:
-    """The id of each feature as text: by the attribute asked for, a usual one, or the feature's number."""
+    """The id of each feature as text: by the attribute asked for, a usual one, or the feature's
+    number.
+    """
     by_number = [str(number) for number in numbers]
     names = {name.lower(): name for row in rows for name in row}
     if id_attribute is not None:
-        name = id_attribute if any(id_attribute in row for row in rows) else names.get(id_attribute.lower())
+        name = (
+            id_attribute
+            if any(id_attribute in row for row in rows)
+            else names.get(id_attribute.lower())
+        )
         if name is None:
             raise InputError(
-                f"expected the attribute {id_attribute!r} in {path}, got {', '.join(names.values()) or 'none at all'}; "
+                f"expected the attribute {id_attribute!r} in {path}, got "
+                f"{', '.join(names.values()) or 'none at all'}; "
                 "name one of these with --id-attribute"
             )
         ids = [id_text(row.get(name)) for row in rows]
         missing = ids.count("")
         if missing:
             warnings.warn(
-                f"{path}: {counted(missing, 'feature')} without {name}; the number stands in for it", InputWarning
+                f"{path}: {counted(missing, 'feature')} without {name}; the number stands in for "
+                "it",
+                InputWarning,
             )
         return [id or number for id, number in zip(ids, by_number, strict=True)]
     usual = [names[name] for name in ID_NAMES if name in names]
@@ -249,40 +331,58 @@ def feature_ids(
             return ids
     if usual:
         warnings.warn(
-            f"{path}: {usual[0]} repeats or is missing, so buildings go by their number; --id-attribute {usual[0]} takes it all the same",
+            f"{path}: {usual[0]} repeats or is missing, so buildings go by their number; "
+            f"--id-attribute {usual[0]} takes it all the same",
             InputWarning,
         )
     return by_number
 
 
 def id_text(value: Any) -> str:
-    """An id as text, empty where there is none; whole numbers that a format stores as floats lose their decimal point."""
+    """An id as text, empty where there is none; whole numbers that a format stores as floats lose
+    their decimal point.
+    """
     if value is None or not str(value).strip():
         return ""
     return str(int(value)) if isinstance(value, float) and value.is_integer() else str(value)
 
 
-def transformed(geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path) -> np.ndarray:
-    """Geometries in plan in the target CRS. Raises InputError where that is impossible or leads to no numbers."""
+def transformed(
+    geometries: np.ndarray, source: CRS | None, target: CRS | None, path: str | Path
+) -> np.ndarray:
+    """Geometries in plan in the target CRS.
+
+    Raises InputError where that is impossible or leads to no numbers.
+    """
     geometries = shapely.force_2d(geometries)
     if source is None or not source.is_geographic:
         advice = "name their CRS in the file (`ogr2ogr -a_srs EPSG:4326`), or reproject them"
         named = "no CRS" if source is None else described(source)
-        refuse_degrees(shapely.bounds(geometries), f"the footprints of {path}, which names {named},", advice)
+        refuse_degrees(
+            shapely.bounds(geometries), f"the footprints of {path}, which names {named},", advice
+        )
     if source is None and target is not None:
-        warnings.warn(f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning)
+        warnings.warn(
+            f"{path}: names no CRS; taken to be in the cloud's, {described(target)}", InputWarning
+        )
     if source is None or target is None or same_horizontal(source, target):
         return geometries
     if not names_place(source):
-        taken = f"names a local CRS, {described(source)}; taken to be in the cloud's, {described(target)}"
+        taken = (
+            f"names a local CRS, {described(source)}; taken to be in the cloud's, "
+            f"{described(target)}"
+        )
         warnings.warn(f"{path}: {taken}", InputWarning)
         return shapely.transform(geometries, lambda xy: xy * times_between(source, target))
     transformer = way_between(source, target)
     warn_if_coarse(find_operation(str(path), source, target, middle_of(geometries)))
-    moved = shapely.transform(geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1])))
+    moved = shapely.transform(
+        geometries, lambda xy: np.column_stack(transformer.transform(xy[:, 0], xy[:, 1]))
+    )
     if not np.isfinite(shapely.get_coordinates(moved)).any():
         raise InputError(
-            f"expected footprints of {path} that can be moved from {source.name} to the cloud's {target.name}, got "
+            f"expected footprints of {path} that can be moved from {source.name} to the cloud's "
+            f"{target.name}, got "
             f"coordinates outside that system; {advice_on(source)}"
         )
     return moved
@@ -294,7 +394,10 @@ def times_between(source: CRS, target: CRS) -> float:
 
 
 def middle_of(geometries: np.ndarray) -> tuple[float, float]:
-    """The middle (x, y) of the geometries, by the medians of their boxes; (0, 0) where none has any."""
+    """The middle (x, y) of the geometries, by the medians of their boxes;
+
+    (0, 0) where none has any.
+    """
     boxes = shapely.bounds(geometries)
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     x, y = np.median((boxes[:, :2] + boxes[:, 2:]) / 2, axis=0) if len(boxes) else (0.0, 0.0)
@@ -304,7 +407,10 @@ def middle_of(geometries: np.ndarray) -> tuple[float, float]:
 def advice_on(source: CRS) -> str:
     """What to do about coordinates that the CRS `source` cannot have."""
     if source.is_geographic:
-        return "they are no degrees: name their CRS in the file, for a GeoJSON that names none counts as WGS 84 (`ogr2ogr -a_srs`)"
+        return (
+            "they are no degrees: name their CRS in the file, for a GeoJSON that names none counts "
+            "as WGS 84 (`ogr2ogr -a_srs`)"
+        )
     return "check which CRS each file names"
 
 
@@ -315,10 +421,15 @@ def split_features(
     attributes: list[dict[str, Any]],
     path: str | Path,
 ) -> list[Footprint]:
-    """Footprints of features, several of one whose polygons stand apart; `surfaces` (n,) are faces of one body each."""
+    """Footprints of features, several of one whose polygons stand apart;
+
+    `surfaces` (n,) are faces of one body each.
+    """
     footprints, mended, empty, split = [], 0, 0, []
     invalid = ~(shapely.is_valid(geometries) | shapely.is_missing(geometries) | surfaces)
-    for id, geometry, is_one, row, was_invalid in zip(ids, geometries, surfaces, attributes, invalid, strict=True):
+    for id, geometry, is_one, row, was_invalid in zip(
+        ids, geometries, surfaces, attributes, invalid, strict=True
+    ):
         polygons = [clockwise(polygon) for polygon in simple_polygons(geometry, is_one)]
         mended += bool(was_invalid and not polygons[0].is_empty)
         empty += polygons[0].is_empty
@@ -327,25 +438,36 @@ def split_features(
         else:
             split.append(len(polygons))
             parts = enumerate(polygons, start=1)
-            footprints += [Footprint(f"{id}-{number}", polygon, {**row, "part_of": id}) for number, polygon in parts]
+            footprints += [
+                Footprint(f"{id}-{number}", polygon, {**row, "part_of": id})
+                for number, polygon in parts
+            ]
     if split:
         many = counted(len(split), "feature") + " of several polygons"
-        warnings.warn(f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...", InputWarning)
+        warnings.warn(
+            f"{path}: {many} became {sum(split)} buildings, named by its id and -1, -2, ...",
+            InputWarning,
+        )
     if surfaces.any():
         bodies = counted(int(surfaces.sum()), "feature") + " of faces in space"
-        warnings.warn(f"{path}: {bodies}; the area that they cover from above is the outline", InputWarning)
+        warnings.warn(
+            f"{path}: {bodies}; the area that they cover from above is the outline", InputWarning
+        )
     if mended:
         warnings.warn(f"{path}: {counted(mended, 'invalid footprint')} repaired", InputWarning)
     if empty:
         warnings.warn(
-            f"{path}: {counted(empty, 'feature')} with no area that a building could have; such get no model, but a status",
+            f"{path}: {counted(empty, 'feature')} with no area that a building could have; such "
+            "get no model, but a status",
             InputWarning,
         )
     return footprints
 
 
 def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footprint]:
-    """Ids made unique by a suffix `_2`, `_3`; a copy of an earlier polygon names it in its attribute `copy_of`."""
+    """Ids made unique by a suffix `_2`, `_3`; a copy of an earlier polygon names it in its
+    attribute `copy_of`.
+    """
     taken = {footprint.id for footprint in footprints}
     used: set[str] = set()
     first_by_shape: dict[bytes, str] = {}
@@ -364,28 +486,35 @@ def unique_ids(footprints: Sequence[Footprint], path: str | Path) -> list[Footpr
         result.append(Footprint(id, footprint.polygon, attributes))
     if renamed:
         warnings.warn(
-            f"{path}: {counted(renamed, 'footprint')} with the id of an earlier one got a suffix such as _2",
+            f"{path}: {counted(renamed, 'footprint')} with the id of an earlier one got a suffix "
+            "such as _2",
             InputWarning,
         )
     if copies:
         warnings.warn(
-            f"{path}: {counted(copies, 'footprint')} with the polygon of another; see the attribute copy_of",
+            f"{path}: {counted(copies, 'footprint')} with the polygon of another; see the "
+            "attribute copy_of",
             InputWarning,
         )
     return result
 
 
 def say_which_overlie(footprints: Sequence[Footprint], path: str | Path) -> None:
-    """One line where footprints lie on larger ones: each gets a model of the same points, and the models overlap."""
+    """One line where footprints lie on larger ones: each gets a model of the same points, and the
+    models overlap.
+    """
     polygons = np.array([footprint.polygon for footprint in footprints])
     pairs = shapely.STRtree(polygons).query(shapely.point_on_surface(polygons), predicate="within")
     pairs = pairs[:, pairs[0] != pairs[1]]
     pairs = pairs[:, ~shapely.equals(*polygons[pairs])]  # of copies is told elsewhere
     if pairs.size:
-        smaller, larger = np.take_along_axis(pairs, np.argsort(shapely.area(polygons[pairs]), axis=0), axis=0)
+        smaller, larger = np.take_along_axis(
+            pairs, np.argsort(shapely.area(polygons[pairs]), axis=0), axis=0
+        )
         warnings.warn(
             f"{path}: {counted(len(np.unique(smaller)), 'footprint')} on top of a larger one "
-            f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have the same points and overlap; "
+            f"({footprints[smaller[0]].id} on {footprints[larger[0]].id}): models of both have the "
+            "same points and overlap; "
             "keep one of them",
             InputWarning,
         )

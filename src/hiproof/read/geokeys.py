@@ -1,4 +1,5 @@
-"""The CRS that the GeoTIFF keys of a LAS file define: by EPSG's codes, or by a unit alone where the rest is the file's own.
+"""The CRS that the GeoTIFF keys of a LAS file define: by EPSG's codes, or by a unit alone where the
+rest is the file's own.
 
 Key numbers are those of GeoTIFF 1.1 (OGC 19-008r4), section 7.
 """
@@ -25,7 +26,9 @@ GEODETIC_CRS = 2048
 """Key of the code of a CRS in degrees, or of the base of a projected one."""
 
 PROJECTED_CRS, PROJECTED_CITATION, PLAN_UNIT, PLAN_UNIT_SIZE = 3072, 3073, 3076, 3077
-"""Keys of the code of a projected CRS, of its name, of its unit and of the length of a unit without a code."""
+"""Keys of the code of a projected CRS, of its name, of its unit and of the length of a unit without
+a code.
+"""
 
 VERTICAL_CRS, VERTICAL_UNIT = 4096, 4099
 """Keys of the codes of a height system and of its unit."""
@@ -60,10 +63,16 @@ class GeoKeys:
         {3072: 28992}
         """
         count = struct.unpack_from("<4H", directory)[3] if len(directory) >= 8 else 0
-        if (count == 0 and any(directory[8:])) or len(directory) < 8 + 8 * count or directory[:2] != b"\1\0":
+        if (
+            (count == 0 and any(directory[8:]))
+            or len(directory) < 8 + 8 * count
+            or directory[:2] != b"\1\0"
+        ):
             raise CRSError(f"a key directory of {len(directory)} bytes that tells of {count} keys")
         entries = struct.iter_unpack("<4H", directory[8 : 8 + 8 * count])
-        return cls({key: value_at(place, length, at, doubles, texts) for key, place, length, at in entries})
+        return cls(
+            {key: value_at(place, length, at, doubles, texts) for key, place, length, at in entries}
+        )
 
     def code(self, key: int) -> int:
         """The value of a key that holds a code, UNDEFINED where it is missing."""
@@ -71,7 +80,10 @@ class GeoKeys:
         return value if isinstance(value, int) else UNDEFINED
 
     def plan(self) -> CRS | None:
-        """The CRS of the plan, local where only its unit is defined. Raises CRSError where not even that is."""
+        """The CRS of the plan, local where only its unit is defined.
+
+        Raises CRSError where not even that is.
+        """
         code, model = self.code(PROJECTED_CRS), self.code(MODEL)
         if code in EPSG_CODES:
             return with_unit(CRS.from_epsg(code), self.plan_unit())
@@ -105,7 +117,10 @@ class GeoKeys:
         return None if code == UNDEFINED else unit_of_code(code)
 
     def heights(self) -> CRS | None:
-        """The CRS of the heights, None without any. Where code and unit disagree the unit counts."""
+        """The CRS of the heights, None without any.
+
+        Where code and unit disagree the unit counts.
+        """
         code, unit = self.code(VERTICAL_CRS), self.code(VERTICAL_UNIT)
         named = heights_of_code(code) if code in EPSG_CODES else None
         if unit in (UNDEFINED, USER_DEFINED):
@@ -156,7 +171,9 @@ def linear_units() -> dict[int, tuple[str, float]]:
 
     units = get_units_map(auth_name="EPSG", category="linear", allow_deprecated=True).values()
     exact = {9003: 1200 / 3937}  # which the data base has to 15 digits
-    return {int(unit.code): (unit.name, exact.get(int(unit.code), unit.conv_factor)) for unit in units}
+    return {
+        int(unit.code): (unit.name, exact.get(int(unit.code), unit.conv_factor)) for unit in units
+    }
 
 
 def unit_of_code(code: int) -> tuple[str, float]:
@@ -187,4 +204,7 @@ def local_crs(name: str, unit: str, factor: float) -> CRS:
 
 def heights_in(name: str, unit: str, factor: float) -> CRS:
     """A vertical CRS in a unit of `factor` metres."""
-    return CRS.from_wkt(f'VERT_CS["{name} ({unit})",VERT_DATUM["{name}",2005],UNIT["{unit}",{factor!r}],AXIS["Up",UP]]')
+    return CRS.from_wkt(
+        f'VERT_CS["{name} '
+        f'({unit})",VERT_DATUM["{name}",2005],UNIT["{unit}",{factor!r}],AXIS["Up",UP]]'
+    )

@@ -1,6 +1,8 @@
-"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk; by path or by address (see remote.py).
+"""LAS, LAZ and COPC files through laspy and lazrs, chunk by chunk; by path or by address (see
+remote.py).
 
-Before laspy opens a file, `las_header` has held its header against its size; what is decoded is held against the header.
+Before laspy opens a file, `las_header` has held its header against its size; what is decoded is
+held against the header.
 """
 
 from __future__ import annotations
@@ -23,7 +25,8 @@ from .plausible import Implausible
 from .remote import is_url, opened
 from .runs import boxes_of_runs
 
-Chunk = tuple[np.ndarray, np.ndarray | None]  # xyz (n, 3) float64, classification (n,) uint8 or None
+# xyz (n, 3) float64, classification (n,) uint8 or None
+Chunk = tuple[np.ndarray, np.ndarray | None]
 FIELDS = laspy.DecompressionSelection
 WANTED = FIELDS.base() | FIELDS.Z | FIELDS.CLASSIFICATION | FIELDS.FLAGS
 
@@ -37,22 +40,29 @@ def explained(path: str | Path) -> Iterator[None]:
         raise
     except Implausible as error:
         raise InputError(
-            f"expected a LAS, LAZ or COPC file that is what its header says at {path}, got another: {error}; copy or download it "
+            f"expected a LAS, LAZ or COPC file that is what its header says at {path}, got "
+            f"another: {error}; copy or download it "
             "again, or have its header written anew (`pdal translate`)"
         ) from error
     except BaseException as error:
-        # A panic inside lazrs arrives as pyo3's PanicException, which is no Exception; interrupts must pass through.
+        # A panic inside lazrs arrives as pyo3's PanicException, which is no Exception; interrupts
+        # must pass through.
         if not isinstance(error, Exception) and type(error).__name__ != "PanicException":
             raise
         reason = str(error) or type(error).__name__
         raise InputError(
-            f"expected a complete LAS, LAZ or COPC file at {path}, got one that cannot be decoded ({reason}); "
-            "it may be truncated: copy or download it again, and compare its size with the original's"
+            f"expected a complete LAS, LAZ or COPC file at {path}, got one that cannot be decoded "
+            f"({reason}); "
+            "it may be truncated: copy or download it again, and compare its size with the "
+            "original's"
         ) from error
 
 
 def read_las_header(path: str | Path) -> laspy.LasHeader:
-    """The header of a LAS, LAZ or COPC file. Raises InputError when it cannot be read or cannot be true."""
+    """The header of a LAS, LAZ or COPC file.
+
+    Raises InputError when it cannot be read or cannot be true.
+    """
     facts_of(path)
     with explained(path), opened(path) as file, laspy.open(file) as reader:
         return reader.header
@@ -66,7 +76,9 @@ def facts_of(path: str | Path) -> LasFacts:
 
 @functools.lru_cache(maxsize=64)
 def facts_at(path: str, changed: int | None) -> LasFacts:
-    """Found once a process for the file that was `changed` then: an indexed file is opened for each of its squares."""
+    """Found once a process for the file that was `changed` then: an indexed file is opened for each
+    of its squares.
+    """
     with opened(path) as file:
         return read_facts(file)
 
@@ -78,17 +90,20 @@ def las_chunks(
     runs: np.ndarray | None = None,
     noted: list[np.ndarray] | None = None,
 ) -> Iterator[Chunk]:
-    """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the box are decoded.
+    """Yield the chunks of `path`; of a COPC file with a `box` only the octree's nodes that meet the
+    box are decoded.
 
-    `runs` (k, 2) of points, [first, end), limit what is read of another file. To `noted` go the boxes (k, 4) of the runs
-    of each chunk (runs.py), of all its points.
+    `runs` (k, 2) of points, [first, end), limit what is read of another file. To `noted` go the
+    boxes (k, 4) of the runs of each chunk (runs.py), of all its points.
     """
     if box is not None and is_copc(path):
         yield copc_chunk(path, box)
         return
     facts, low, high, left_out = facts_of(path), np.full(3, np.inf), np.full(3, -np.inf), 0
     with explained(path):
-        for record in records(path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()):
+        for record in records(
+            path, chunk_points, [(0, facts.count)] if runs is None else runs.tolist()
+        ):
             xyz = coordinates(record)
             lowest, highest = check_points(xyz, facts)
             low, high = np.minimum(low, lowest), np.maximum(high, highest)
@@ -103,8 +118,13 @@ def las_chunks(
 
 
 def records(path: str | Path, chunk_points: int, runs: list[tuple[int, int]]) -> Iterator[Any]:
-    """laspy's records of the `runs` of points, [first, end), at most `chunk_points` at a time and none empty."""
-    with opened(path) as file, laspy.open(file, decompression_selection=WANTED, read_evlrs=False) as reader:
+    """laspy's records of the `runs` of points, [first, end), at most `chunk_points` at a time and
+    none empty.
+    """
+    with (
+        opened(path) as file,
+        laspy.open(file, decompression_selection=WANTED, read_evlrs=False) as reader,
+    ):
         for first, end in runs:
             if first:
                 reader.seek(first)
@@ -127,7 +147,9 @@ def copc_chunk(path: str | Path, box: tuple[float, float, float, float]) -> Chun
     facts = facts_of(path)
     with explained(path), opened(path) as file:
         if facts.octree is None:
-            raise Implausible("its first record says that it is COPC, and none tells of an octree; it is damaged")
+            raise Implausible(
+                "its first record says that it is COPC, and none tells of an octree; it is damaged"
+            )
         nodes, record = copc_record(file, facts, facts.octree, box, WANTED)
         xyz = coordinates(record)
         low, high = check_points(xyz, facts)
@@ -149,13 +171,19 @@ def coordinates(record) -> np.ndarray:
 
 
 def present(xyz: np.ndarray, record) -> Chunk:
-    """Coordinates (n, 3) and classes of a record without the points flagged as withheld, that is, deleted."""
+    """Coordinates (n, 3) and classes of a record without the points flagged as withheld, that is,
+    deleted.
+    """
     classification = np.asarray(record["classification"], np.uint8)
     withheld = np.asarray(record["withheld"], bool)
     return (xyz[~withheld], classification[~withheld]) if withheld.any() else (xyz, classification)
 
 
 def tell_of_withheld(count: int, path: str | Path) -> None:
-    """Say once how many points of a file were left out as withheld: by the chunk, a tile of a country takes a thousand lines."""
+    """Say once how many points of a file were left out as withheld: by the chunk, a tile of a
+    country takes a thousand lines.
+    """
     if count:
-        warnings.warn(f"{path}: {counted(count, 'point')} flagged as withheld left out", InputWarning)
+        warnings.warn(
+            f"{path}: {counted(count, 'point')} flagged as withheld left out", InputWarning
+        )

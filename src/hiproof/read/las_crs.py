@@ -1,4 +1,6 @@
-"""The CRS that a LAS file's records define: WKT, or GeoTIFF keys where there is no WKT that can be understood."""
+"""The CRS that a LAS file's records define: WKT, or GeoTIFF keys where there is no WKT that can be
+understood.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,10 @@ def las_crs(records: dict[int, bytes]) -> CRS | UnknownCRS | None:
     found, faults = [], []
     for is_there, read in (
         (bool(text), lambda: CRS.from_wkt(text)),
-        (DIRECTORY in records, lambda: crs_of_keys(*(records.get(id, b"") for id in (DIRECTORY, DOUBLES, TEXTS)))),
+        (
+            DIRECTORY in records,
+            lambda: crs_of_keys(*(records.get(id, b"") for id in (DIRECTORY, DOUBLES, TEXTS))),
+        ),
     ):
         try:
             found.append(read() if is_there else None)

@@ -1,8 +1,11 @@
-"""Is what a LAS, LAZ or COPC file says of itself possible? Asked before any number in it is believed.
+"""Is what a LAS, LAZ or COPC file says of itself possible?
 
-Every count is held against the file's size: of records, of points, of LASzip's chunks, of COPC's pages and nodes. Scales,
-offsets and bounds are held against each other. The layouts are those of ASPRS' LAS 1.4 R15, of LASzip's record and chunk
-table (Isenburg 2013), and of the COPC specification 1.0.
+Asked before any number in it is believed.
+
+Every count is held against the file's size: of records, of points, of LASzip's chunks, of COPC's
+pages and nodes. Scales, offsets and bounds are held against each other. The layouts are those of
+ASPRS' LAS 1.4 R15, of LASzip's record and chunk table (Isenburg 2013), and of the COPC
+specification 1.0.
 """
 
 from __future__ import annotations
@@ -21,13 +24,16 @@ HEADER_BYTES = {0: 227, 1: 227, 2: 227, 3: 235, 4: 375, 5: 393}  # by minor vers
 RECORD_BYTES = (20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67)  # by point format, without extra bytes
 # LAZ's bit in the point format, its size of chunks that vary, its compressor of layered chunks
 COMPRESSED, VARIABLE_CHUNKS, LAYERED = 0x80, 2**32 - 1, 3
-COARSEST_SCALE = 10.0  # units of a coordinate's last digit; no survey is coarser, a damaged header is
+# units of a coordinate's last digit; no survey is coarser, a damaged header is
+COARSEST_SCALE = 10.0
 MOST_CHUNK_POINTS = 10_000_000  # a decoder makes room for a whole chunk; LASzip's own have 50,000
 NODES = np.dtype([("key", "<i4", 4), ("start", "<u8"), ("bytes", "<i4"), ("points", "<i4")])
 
 
 class Octree(NamedTuple):
-    """COPC's: the `nodes` (n,) that hold points, of NODES, `centre` (3,) and half the width of the cube around all."""
+    """COPC's: the `nodes` (n,) that hold points, of NODES, `centre` (3,) and half the width of the
+    cube around all.
+    """
 
     nodes: np.ndarray
     centre: np.ndarray
@@ -36,10 +42,12 @@ class Octree(NamedTuple):
 
 @dataclass(frozen=True)
 class LasFacts:
-    """What the public header block says, and the file's `size` in bytes; the arrays are (3,): x, y, z.
+    """What the public header block says, and the file's `size` in bytes; the arrays are (3,): x, y,
+    z.
 
-    `points_end` is the first byte that no point may take: of waveforms, of extended records, or the end. `laszip` is the
-    record that tells how points are compressed; only COPC has an `octree`; `projection` are the records of the CRS.
+    `points_end` is the first byte that no point may take: of waveforms, of extended records, or the
+    end. `laszip` is the record that tells how points are compressed; only COPC has an `octree`;
+    `projection` are the records of the CRS.
     """
 
     size: int
@@ -64,22 +72,34 @@ class LasFacts:
 
     @property
     def rounding(self) -> np.ndarray:
-        """How far (3,) a point may lie outside the bounds: writers take them before or after rounding, some to 1 cm."""
+        """How far (3,) a point may lie outside the bounds: writers take them before or after
+        rounding, some to 1 cm.
+        """
         return 0.01 + self.scales
 
 
 def read_facts(file: BinaryIO) -> LasFacts:
-    """The header of an open file, held against everything it can be held against. Raises Implausible with the reason."""
+    """The header of an open file, held against everything it can be held against.
+
+    Raises Implausible with the reason.
+    """
     size = file.seek(0, 2)
     file.seek(0)
     facts = parse_header(file.read(max(HEADER_BYTES.values())), size)
     check_layout(facts)
     records = dict(records_of(file, facts))
-    projection = {number: content for (user, number), content in records.items() if user == "LASF_Projection"}
-    facts = replace(facts, laszip=records.get(("laszip encoded", 22204), b""), projection=projection)
+    projection = {
+        number: content for (user, number), content in records.items() if user == "LASF_Projection"
+    }
+    facts = replace(
+        facts, laszip=records.get(("laszip encoded", 22204), b""), projection=projection
+    )
     points = compressed_points(file, facts) if facts.compressed else room_for_points(facts)
     if points != facts.count:
-        raise Implausible(f"its header tells of {facts.count} points, its data of {points}; it is truncated or damaged")
+        raise Implausible(
+            f"its header tells of {facts.count} points, its data of {points}; it is truncated or "
+            "damaged"
+        )
     if facts.count:
         check_coordinates(facts)
     return with_octree(file, facts, records["copc", 1]) if ("copc", 1) in records else facts
@@ -91,17 +111,26 @@ def parse_header(head: bytes, size: int) -> LasFacts:
         raise Implausible(f"it ends after {size} bytes, inside its header; it is truncated")
     major, minor = head[24], head[25]
     if major != 1 or minor not in HEADER_BYTES or len(head) < HEADER_BYTES[minor]:
-        raise Implausible(f"its header is that of LAS {major}.{minor} in a file of {size} bytes; 1.0 to 1.5 are known")
-    header_bytes, data_start, records, point_format, point_bytes, count = struct.unpack_from("<HIIBHI", head, 94)
+        raise Implausible(
+            f"its header is that of LAS {major}.{minor} in a file of {size} bytes; 1.0 to 1.5 are "
+            "known"
+        )
+    header_bytes, data_start, records, point_format, point_bytes, count = struct.unpack_from(
+        "<HIIBHI", head, 94
+    )
     far_start, far_count, wave_start = 0, 0, 0
     if minor >= 3 and struct.unpack_from("<H", head, 6)[0] & 2:
         wave_start = struct.unpack_from("<Q", head, 227)[0]
     if minor >= 4:
         legacy = count
         far_start, far_count, count = struct.unpack_from("<QIQ", head, 235)
-        # a writer may leave the old field at 0 although older readers know the points' format: LAS 1.4 allows it
+        # a writer may leave the old field at 0 although older readers know the points' format: LAS
+        # 1.4 allows it
         if point_format & ~COMPRESSED < 6 and legacy not in (0, count) and count <= 2**32 - 1:
-            raise Implausible(f"its header tells of {count} points and, in the field for older readers, of {legacy}")
+            raise Implausible(
+                f"its header tells of {count} points and, in the field for older readers, of "
+                f"{legacy}"
+            )
     numbers = np.array(struct.unpack_from("<12d", head, 131))
     ends = [start for start in (wave_start, far_start if far_count else 0) if start]
     return LasFacts(
@@ -128,17 +157,24 @@ def check_layout(facts: LasFacts) -> None:
     """The header, the records and the points follow one another inside the file."""
     if not HEADER_BYTES[facts.minor] <= facts.header_bytes <= facts.data_start <= facts.points_end:
         raise Implausible(
-            f"its header of {facts.header_bytes} bytes tells of points from byte {facts.data_start} "
+            f"its header of {facts.header_bytes} bytes tells of points from byte "
+            f"{facts.data_start} "
             f"to {facts.points_end}; it is truncated or damaged"
         )
-    if facts.point_format >= len(RECORD_BYTES) or facts.point_bytes < RECORD_BYTES[facts.point_format]:
+    if (
+        facts.point_format >= len(RECORD_BYTES)
+        or facts.point_bytes < RECORD_BYTES[facts.point_format]
+    ):
         raise Implausible(
-            f"its header tells of points of format {facts.point_format} in {facts.point_bytes} bytes each"
+            f"its header tells of points of format {facts.point_format} in {facts.point_bytes} "
+            "bytes each"
         )
 
 
 def records_of(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int], bytes]]:
-    """Variable length records as ((user id, number), content), none of which may reach beyond its place."""
+    """Variable length records as ((user id, number), content), none of which may reach beyond its
+    place.
+    """
     far_start, far_count = facts.far_records
     for start, end, count, form in (
         (facts.header_bytes, facts.data_start, facts.records, "<2x16sHH32x"),
@@ -147,7 +183,8 @@ def records_of(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int
         head_bytes = struct.calcsize(form)
         if start + count * head_bytes > end:
             raise Implausible(
-                f"its header tells of {count} records from byte {start} on, where only {end - start} are left"
+                f"its header tells of {count} records from byte {start} on, where only "
+                f"{end - start} are left"
             )
         for _ in range(count):
             file.seek(start)
@@ -155,7 +192,8 @@ def records_of(file: BinaryIO, facts: LasFacts) -> Iterator[tuple[tuple[str, int
             start += head_bytes + length
             if start > end:
                 raise Implausible(
-                    f"its record {number} ends at byte {start}, beyond byte {end}; it is truncated or damaged"
+                    f"its record {number} ends at byte {start}, beyond byte {end}; it is truncated "
+                    "or damaged"
                 )
             content = file.read(length) if length <= 0xFFFF else b""
             yield (user.split(b"\0")[0].decode("latin-1"), number), content
@@ -168,20 +206,35 @@ def room_for_points(facts: LasFacts) -> int:
 def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
     """How many points LASzip's chunks hold; as the header says where older versions leave it open.
 
-    Raises Implausible for a table of chunks that does not fit the file: a decoder would make room for what it says.
+    Raises Implausible for a table of chunks that does not fit the file: a decoder would make room
+    for what it says.
     """
     laszip = facts.laszip
     if len(laszip) < 34:
-        raise Implausible("its header tells of compressed points, but how they are compressed it does not say")
-    compressor, chunk_points, items = *struct.unpack_from("<H10xI", laszip), struct.unpack_from("<H", laszip, 32)[0]
-    item_bytes = sum(struct.unpack_from("<H", laszip, 36 + 6 * i)[0] for i in range(items) if 40 + 6 * i <= len(laszip))
+        raise Implausible(
+            "its header tells of compressed points, but how they are compressed it does not say"
+        )
+    compressor, chunk_points, items = (
+        *struct.unpack_from("<H10xI", laszip),
+        struct.unpack_from("<H", laszip, 32)[0],
+    )
+    item_bytes = sum(
+        struct.unpack_from("<H", laszip, 36 + 6 * i)[0]
+        for i in range(items)
+        if 40 + 6 * i <= len(laszip)
+    )
     if item_bytes != facts.point_bytes:
-        raise Implausible(f"its header tells of points of {facts.point_bytes} bytes, its compressor of {item_bytes}")
+        raise Implausible(
+            f"its header tells of points of {facts.point_bytes} bytes, its compressor of "
+            f"{item_bytes}"
+        )
     if compressor < 2:
         return facts.count
     chunks = chunk_table(file, facts)
     if max((points for points, _ in chunks), default=0) > MOST_CHUNK_POINTS:
-        raise Implausible(f"it tells of chunks of {max(chunks)[0]} points; up to {MOST_CHUNK_POINTS} are read")
+        raise Implausible(
+            f"it tells of chunks of {max(chunks)[0]} points; up to {MOST_CHUNK_POINTS} are read"
+        )
     if chunk_points == VARIABLE_CHUNKS:
         return sum(points for points, _ in chunks)
     if not chunks:
@@ -189,69 +242,93 @@ def compressed_points(file: BinaryIO, facts: LasFacts) -> int:
     full = (len(chunks) - 1) * chunk_points
     if compressor == LAYERED:
         return full + points_of_last_chunk(file, facts, chunks)
-    if facts.count_by_return > facts.count:  # the only second count: the last chunk of older formats has none
+    # the only second count: the last chunk of older formats has none
+    if facts.count_by_return > facts.count:
         return facts.count_by_return
     if not full < facts.count <= full + chunk_points:
         most = full + chunk_points
-        raise Implausible(f"its header tells of {facts.count} points, its chunks hold from {full + 1} to {most}")
+        raise Implausible(
+            f"its header tells of {facts.count} points, its chunks hold from {full + 1} to {most}"
+        )
     return facts.count
 
 
 def chunk_table(file: BinaryIO, facts: LasFacts) -> list[tuple[int, int]]:
-    """(points, bytes) of each chunk; the points are the full number where chunks are of one size."""
+    """(points, bytes) of each chunk; the points are the full number where chunks are of one
+    size.
+    """
     file.seek(facts.data_start)
     start, table = facts.data_start + 8, struct.unpack("<q", file.read(8).ljust(8, b"\xff"))[0]
     if table == -1:  # written as a stream: the place stands at the end
         file.seek(facts.size - 8)
         table = struct.unpack("<q", file.read(8))[0]
     if not start <= table <= facts.points_end - 8:
-        raise Implausible(f"its chunk table is said to be at byte {table} of {facts.size}; it is truncated or damaged")
+        raise Implausible(
+            f"its chunk table is said to be at byte {table} of {facts.size}; it is truncated or "
+            "damaged"
+        )
     file.seek(table)
     count = struct.unpack("<4xI", file.read(8))[0]
     if count * facts.point_bytes > table - start:  # the first point of a chunk is stored as it is
-        raise Implausible(f"it tells of {count} chunks of points in {table - start} bytes; it is damaged")
+        raise Implausible(
+            f"it tells of {count} chunks of points in {table - start} bytes; it is damaged"
+        )
     file.seek(facts.data_start)
     chunks = lazrs.read_chunk_table(file, lazrs.LazVlr(facts.laszip)) if count else []
     if sum(length for _, length in chunks) != table - start:
-        raise Implausible(f"its chunk table does not add up to its {table - start} bytes of points; it is damaged")
+        raise Implausible(
+            f"its chunk table does not add up to its {table - start} bytes of points; it is damaged"
+        )
     return chunks
 
 
 def points_of_last_chunk(file: BinaryIO, facts: LasFacts, chunks: list[tuple[int, int]]) -> int:
-    """How many points the last chunk says it holds: after its first point, since LAS 1.4's formats."""
+    """How many points the last chunk says it holds: after its first point, since LAS 1.4's
+    formats.
+    """
     file.seek(facts.data_start + 8 + sum(length for _, length in chunks[:-1]) + facts.point_bytes)
     return struct.unpack("<I", file.read(4).ljust(4, b"\0"))[0]
 
 
 def check_coordinates(facts: LasFacts) -> None:
-    """Scales, offsets and bounds that belong together: whole numbers of 32 bits must reach the bounds."""
+    """Scales, offsets and bounds that belong together: whole numbers of 32 bits must reach the
+    bounds.
+    """
     if not ((facts.scales > 0) & (facts.scales <= COARSEST_SCALE)).all():
-        raise Implausible(f"its header has the scales {listed(facts.scales)}; they must be above 0 and at most 10")
+        raise Implausible(
+            f"its header has the scales {listed(facts.scales)}; they must be above 0 and at most 10"
+        )
     reach = 2.0**31 * facts.scales + facts.rounding
     most = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])
     ordered = (facts.mins <= facts.maxs) & (np.maximum(abs(facts.mins), abs(facts.maxs)) <= most)
     reached = (facts.mins >= facts.offsets - reach) & (facts.maxs <= facts.offsets + reach)
     if not (ordered & reached).all():
         raise Implausible(
-            f"its header's bounds ({listed(facts.mins)}) to ({listed(facts.maxs)}) cannot be those of coordinates "
+            f"its header's bounds ({listed(facts.mins)}) to ({listed(facts.maxs)}) cannot be those "
+            "of coordinates "
             f"with the offset ({listed(facts.offsets)}) and the scale ({listed(facts.scales)})"
         )
 
 
 def with_octree(file: BinaryIO, facts: LasFacts, info: bytes) -> LasFacts:
-    """The facts with COPC's octree, whose cube holds the bounds and whose nodes hold as many points as the header says."""
+    """The facts with COPC's octree, whose cube holds the bounds and whose nodes hold as many points
+    as the header says.
+    """
     if len(info) < 160:
         raise Implausible(f"its COPC record has {len(info)} bytes instead of 160")
     *centre, half, _, page, page_bytes = struct.unpack_from("<5d2Q", info)
     low, high = np.array(centre) - half - facts.rounding, np.array(centre) + half + facts.rounding
     if facts.count and not ((facts.mins >= low) & (facts.maxs <= high)).all():
         raise Implausible(
-            f"its octree of half width {half:g} about ({listed(centre)}) does not hold its header's bounds"
+            f"its octree of half width {half:g} about ({listed(centre)}) does not hold its "
+            "header's bounds"
         )
     nodes = nodes_of_pages(file, facts, page, page_bytes)
     points = int(nodes["points"].sum(dtype=np.int64))
     if points != facts.count:
-        raise Implausible(f"its header tells of {facts.count} points, the nodes of its octree of {points}")
+        raise Implausible(
+            f"its header tells of {facts.count} points, the nodes of its octree of {points}"
+        )
     return replace(facts, octree=Octree(nodes, np.array(centre), half))
 
 
@@ -261,16 +338,28 @@ def nodes_of_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) 
     while waiting:
         start, length = waiting.pop()
         if start in seen:
-            raise Implausible(f"its octree's page at byte {start} points to itself or is pointed to twice")
+            raise Implausible(
+                f"its octree's page at byte {start} points to itself or is pointed to twice"
+            )
         if length < 0 or start + length > facts.size:
-            raise Implausible(f"its octree's page of {length} bytes at byte {start} is beyond its {facts.size} bytes")
+            raise Implausible(
+                f"its octree's page of {length} bytes at byte {start} is beyond its {facts.size} "
+                "bytes"
+            )
         seen.add(start)
         file.seek(start)
         nodes = np.frombuffer(file.read(length // NODES.itemsize * NODES.itemsize), NODES)
         held = nodes[nodes["points"] > 0]
         ends = held["start"] + np.maximum(held["bytes"], 0).astype(np.uint64)
-        if (nodes["points"] < -1).any() or (held["bytes"] <= 0).any() or (ends > facts.points_end).any():
-            raise Implausible(f"a node of its octree's page at byte {start} is beyond its points or of negative size")
+        if (
+            (nodes["points"] < -1).any()
+            or (held["bytes"] <= 0).any()
+            or (ends > facts.points_end).any()
+        ):
+            raise Implausible(
+                f"a node of its octree's page at byte {start} is beyond its points or of negative "
+                "size"
+            )
         found.append(held)
         below = nodes[nodes["points"] == -1]
         waiting += zip(below["start"].tolist(), below["bytes"].tolist(), strict=True)
@@ -278,7 +367,8 @@ def nodes_of_pages(file: BinaryIO, facts: LasFacts, page: int, page_bytes: int) 
 
 
 def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarray]:
-    """The lowest and highest coordinates, (3,) each, of decoded points (n, 3), those of the header where there is none.
+    """The lowest and highest coordinates, (3,) each, of decoded points (n, 3), those of the header
+    where there is none.
 
     Raises Implausible where points lie outside the header's bounds.
     """
@@ -286,22 +376,28 @@ def check_points(xyz: np.ndarray, facts: LasFacts) -> tuple[np.ndarray, np.ndarr
     if not ((low >= facts.mins - facts.rounding) & (high <= facts.maxs + facts.rounding)).all():
         raise Implausible(
             f"it has points from ({listed(low)}) to ({listed(high)}), outside its header's bounds "
-            f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its header or its points are damaged"
+            f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its header or its points are "
+            "damaged"
         )
     return low, high
 
 
 def check_all_points(low: np.ndarray, high: np.ndarray, facts: LasFacts) -> None:
-    """Raise Implausible where all points together, from `low` (3,) to `high` (3,), fall short of the header's bounds."""
+    """Raise Implausible where all points together, from `low` (3,) to `high` (3,), fall short of
+    the header's bounds.
+    """
     if not ((low <= facts.mins + SHORT) & (high >= facts.maxs - SHORT)).all():
         raise Implausible(
             f"its points reach from ({listed(low)}) to ({listed(high)}), its header's bounds from "
-            f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its scale, its count or its bounds are wrong"
+            f"({listed(facts.mins)}) to ({listed(facts.maxs)}); its scale, its count or its bounds "
+            "are wrong"
         )
 
 
 SHORT = 1.0
-"""How far the points may fall short of the header's bounds, in the file's unit: some producers write those of the tile."""
+"""How far the points may fall short of the header's bounds, in the file's unit: some producers
+write those of the tile.
+"""
 
 
 def listed(values: Iterable[float]) -> str:

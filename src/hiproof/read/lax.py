@@ -1,11 +1,13 @@
-"""The spatial index that LAStools writes beside a LAS or LAZ file (`.lax`): a quadtree whose cells name runs of points.
+"""The spatial index that LAStools writes beside a LAS or LAZ file (`.lax`): a quadtree whose cells
+name runs of points.
 
-All of the file are little-endian words of four bytes: "LASX" and a version; "LASS" and a type (0: quadtree); "LASQ", a
-version, levels, level_index, implicit_levels (0 here), min_x, max_x, min_y, max_y as float32; "LASV", a version, the
-number of cells, and for each its index, its number of runs, how many points are in it, and the first and last point of
-each run. Cells of a level are numbered after those of all coarser ones, two bits a level (1: upper half in x, 2: in y).
-A run may hold points of other cells, too. The layout is that of LASlib's lasindex, lasquadtree and lasinterval
-(rapidlasso, open source).
+All of the file are little-endian words of four bytes: "LASX" and a version; "LASS" and a type (0:
+quadtree); "LASQ", a version, levels, level_index, implicit_levels (0 here), min_x, max_x, min_y,
+max_y as float32; "LASV", a version, the number of cells, and for each its index, its number of
+runs, how many points are in it, and the first and last point of each run. Cells of a level are
+numbered after those of all coarser ones, two bits a level (1: upper half in x, 2: in y). A run may
+hold points of other cells, too. The layout is that of LASlib's lasindex, lasquadtree and
+lasinterval (rapidlasso, open source).
 """
 
 from __future__ import annotations
@@ -24,12 +26,14 @@ from .runs import RunIndex
 def read_lax(path: str | Path) -> RunIndex | None:
     """The index beside the LAS or LAZ file at `path`; None where there is none.
 
-    One that cannot be understood, or that tells of another number of points than the file, is left aside with an
-    InputWarning. Raises InputError where the file's own header cannot be read.
+    One that cannot be understood, or that tells of another number of points than the file, is left
+    aside with an InputWarning. Raises InputError where the file's own header cannot be read.
     """
     if is_url(path):
         return None
-    beside = next((p for p in (Path(path).with_suffix(end) for end in (".lax", ".LAX")) if p.is_file()), None)
+    beside = next(
+        (p for p in (Path(path).with_suffix(end) for end in (".lax", ".LAX")) if p.is_file()), None
+    )
     if beside is None:
         return None
     points = read_las_header(path).point_count
@@ -38,13 +42,18 @@ def read_lax(path: str | Path) -> RunIndex | None:
         if told != points or index.runs.max(initial=0) > points:
             raise ValueError(f"it tells of {told} points, the file has {points}")
     except (ValueError, IndexError, OSError) as error:
-        warnings.warn(f"{beside}: is left aside as an index of {path} ({error}); make it again", InputWarning)
+        warnings.warn(
+            f"{beside}: is left aside as an index of {path} ({error}); make it again", InputWarning
+        )
         return None
     return index
 
 
 def parsed(words: np.ndarray) -> tuple[RunIndex, int]:
-    """The index in a file's words, and how many points its cells hold; ValueError or IndexError for another file."""
+    """The index in a file's words, and how many points its cells hold;
+
+    ValueError or IndexError for another file.
+    """
     for place, mark in ((0, b"LASX"), (2, b"LASS"), (4, b"LASQ"), (13, b"LASV")):
         if words[place : place + 1].tobytes() != mark:
             raise ValueError(f"expected {mark.decode()} in its word {place}")
@@ -65,7 +74,9 @@ def parsed(words: np.ndarray) -> tuple[RunIndex, int]:
 
 
 def cell_box(index: int, root: tuple[np.float32, ...]) -> tuple[float, float, float, float]:
-    """Box of a cell, halved in float32 as the writer does, and wider by what float32 cannot tell apart."""
+    """Box of a cell, halved in float32 as the writer does, and wider by what float32 cannot tell
+    apart.
+    """
     level = 0
     while index >= 4**level:
         index -= 4**level

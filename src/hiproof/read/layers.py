@@ -1,7 +1,7 @@
 """The layers of a vector file, those that pyogrio refuses by their declaration included.
 
-pyogrio opens no layer that is declared as TIN or PolyhedralSurface. GDAL's virtual format gives the same layer
-without that declaration, so its features can be read.
+pyogrio opens no layer that is declared as TIN or PolyhedralSurface. GDAL's virtual format gives the
+same layer without that declaration, so its features can be read.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ def source_of(path: str, layer: str | int | None) -> tuple[str, str | int | None
 
 
 def virtual_layer(path: str, layer: str, geometry: str = "", text: str = "") -> str:
-    """GDAL's virtual format of one layer, its `geometry` declared anew, or with one attribute alone, as text.
+    """GDAL's virtual format of one layer, its `geometry` declared anew, or with one attribute
+    alone, as text.
 
     `path` may be what this function made.
     """

@@ -1,7 +1,9 @@
-"""Which operation PROJ uses between two CRSs, how accurate it is, and which missing grid would be more accurate.
+"""Which operation PROJ uses between two CRSs, how accurate it is, and which missing grid would be
+more accurate.
 
-PROJ transforms between datums by the best operation whose grids are installed. Where the grid of a better one is
-missing it takes a coarser one without a word, and everything moves by metres. `find_operation` names both.
+PROJ transforms between datums by the best operation whose grids are installed. Where the grid of a
+better one is missing it takes a coarser one without a word, and everything moves by metres.
+`find_operation` names both.
 """
 
 from __future__ import annotations
@@ -21,15 +23,19 @@ from ..errors import InputWarning
 from .crs import described, parse_crs
 
 COARSE_M = 1.0
-"""Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their neighbours' roofs."""
+"""Accuracy (m) from which on an operation is worth a remark: footprints a metre off take their
+neighbours' roofs.
+"""
 
 
 @dataclass(frozen=True)
 class Operation:
-    """An operation of PROJ from the CRS `source` to `target` near `place` (x, y in `source`), used for `subject`.
+    """An operation of PROJ from the CRS `source` to `target` near `place` (x, y in `source`), used
+    for `subject`.
 
-    `accuracy_m` is PROJ's, None where it states none. `missing_grids` are those of the best operation that cannot be
-    used because they are not installed, and `missing_accuracy_m` is its accuracy; empty and None where none is better.
+    `accuracy_m` is PROJ's, None where it states none. `missing_grids` are those of the best
+    operation that cannot be used because they are not installed, and `missing_accuracy_m` is its
+    accuracy; empty and None where none is better.
     """
 
     subject: str
@@ -48,18 +54,29 @@ class Operation:
 
     @property
     def remark(self) -> str:
-        """What a user should know of a coarse operation, with what to do about it; empty for an accurate one."""
+        """What a user should know of a coarse operation, with what to do about it; empty for an
+        accurate one.
+        """
         if not self.is_coarse:
             return ""
-        accuracy = "to an unknown accuracy" if self.accuracy_m is None else f"to {self.accuracy_m:g} m"
+        accuracy = (
+            "to an unknown accuracy" if self.accuracy_m is None else f"to {self.accuracy_m:g} m"
+        )
         ways = f"{described(parse_crs(self.source))} to {described(parse_crs(self.target))}"
         said = f"{self.subject}: transformed from {ways} {accuracy} ({self.name})"
         if not self.missing_grids:
-            return f"{said}; PROJ knows no better way, so check that the models lie where they should"
+            return (
+                f"{said}; PROJ knows no better way, so check that the models lie where they should"
+            )
         files = " ".join(f"--file {grid}" for grid in self.missing_grids)
-        better = "" if self.missing_accuracy_m is None else f", accurate to {self.missing_accuracy_m:g} m,"
+        better = (
+            ""
+            if self.missing_accuracy_m is None
+            else f", accurate to {self.missing_accuracy_m:g} m,"
+        )
         return (
-            f"{said}; a better way{better} needs {', '.join(self.missing_grids)}, which is not installed: "
+            f"{said}; a better way{better} needs {', '.join(self.missing_grids)}, which is not "
+            "installed: "
             f"run `projsync {files}`, or set PROJ_NETWORK=ON"
         )
 
@@ -73,13 +90,19 @@ class Operation:
 
 
 def find_operation(subject: str, source: CRS, target: CRS, place: tuple[float, float]) -> Operation:
-    """Find the operation that `Transformer.from_crs(source, target)` uses at `place` (x, y in `source`)."""
+    """Find the operation that `Transformer.from_crs(source, target)` uses at `place` (x, y in
+    `source`).
+    """
     x, y = (float(value) for value in place)
-    return dataclasses.replace(operation_at(source.to_string(), target.to_string(), (x, y)), subject=subject)
+    return dataclasses.replace(
+        operation_at(source.to_string(), target.to_string(), (x, y)), subject=subject
+    )
 
 
 def is_current(operation: Operation) -> bool:
-    """Check whether PROJ still uses this operation: not where a grid has been installed or removed since."""
+    """Check whether PROJ still uses this operation: not where a grid has been installed or removed
+    since.
+    """
     now = operation_at(operation.source, operation.target, operation.place)
     return (now.name, now.accuracy_m) == (operation.name, operation.accuracy_m)
 
@@ -100,7 +123,9 @@ def operation_at(source: str, target: str, place: tuple[float, float]) -> Operat
     except ProjError:  # a single operation, which is the transformer itself
         used = transformer
     accuracy = used.accuracy if used.accuracy is not None and used.accuracy >= 0 else None
-    better = [way for way in missing_ways(source, target, place) if is_better(way.accuracy, accuracy)]
+    better = [
+        way for way in missing_ways(source, target, place) if is_better(way.accuracy, accuracy)
+    ]
     found = Operation("", source, target, place, used.description, accuracy)
     if not better:
         return found
@@ -114,8 +139,11 @@ def missing_ways(source: str, target: str, place: tuple[float, float]) -> list:
     lon, lat = Transformer.from_crs(source, "EPSG:4326", always_xy=True).transform(*place)
     area = AreaOfInterest(lon, lat, lon, lat) if math.isfinite(lon) and math.isfinite(lat) else None
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)  # of the missing grids, which are what is asked for
-        return TransformerGroup(source, target, always_xy=True, area_of_interest=area).unavailable_operations
+        # of the missing grids, which are what is asked for
+        warnings.simplefilter("ignore", UserWarning)
+        return TransformerGroup(
+            source, target, always_xy=True, area_of_interest=area
+        ).unavailable_operations
 
 
 def is_better(accuracy: float, than: float | None) -> bool:

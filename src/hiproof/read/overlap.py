@@ -1,4 +1,7 @@
-"""Do footprints lie where the cloud does? Where not, the usual slips are tried, to say what it looks like."""
+"""Do footprints lie where the cloud does?
+
+Where not, the usual slips are tried, to say what it looks like.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,8 @@ from .crs import (
 )
 
 DEGREES_WIDE = 0.2  # no building is narrower in metres, hardly a tile wider in degrees
-AREA_MARGIN = 2.0  # degrees that a CRS is commonly used beyond its area: a zone is kept at the border of the next
+# degrees that a CRS is commonly used beyond its area: a zone is kept at the border of the next
+AREA_MARGIN = 2.0
 NEIGHBOURS = (1, -1, 2, -2)  # zones of one grid have consecutive codes
 FOOT_M = 0.3048  # m, by definition
 
@@ -37,44 +41,67 @@ def check_overlap(
     cloud_crs: CRS | None = None,
     units: Units = METRES,
 ) -> None:
-    """Raise InputError when no footprint meets the cloud's `bounds`, of one file or of several; all in world metres.
+    """Raise InputError when no footprint meets the cloud's `bounds`, of one file or of several; all
+    in world metres.
 
-    Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax, ymax, zmax). The CRSs
-    are those that the two sides name, `units` those of the CRS they are in; the message says what they look like.
+    Bounds are (xmin, ymin, xmax, ymax) or, as in a point file's header, (xmin, ymin, zmin, xmax,
+    ymax, zmax). The CRSs are those that the two sides name, `units` those of the CRS they are in;
+    the message says what they look like.
     """
-    boxes = shapely.bounds([footprint.polygon for footprint in footprints if not footprint.polygon.is_empty])
+    boxes = shapely.bounds(
+        [footprint.polygon for footprint in footprints if not footprint.polygon.is_empty]
+    )
     files = np.atleast_2d(np.asarray(bounds, float))
     files = files[:, [0, 1, 3, 4]] if files.shape[1] == 6 else files
-    if not len(boxes) or len(shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*files.T))[0]):
+    if not len(boxes) or len(
+        shapely.STRtree(shapely.box(*boxes.T)).query(shapely.box(*files.T))[0]
+    ):
         return
     files = units.from_metres(files.reshape(-1, 2)).reshape(-1, 4)
     moved = units.from_metres((boxes[:, :2] + boxes[:, 2:]) / 2)
     middles = reprojected(moved, cloud_crs, footprints_crs)
-    guess = next((what for what, xy in slips(middles, footprints_crs, cloud_crs) if any_inside(xy, files)), None)
+    guess = next(
+        (what for what, xy in slips(middles, footprints_crs, cloud_crs) if any_inside(xy, files)),
+        None,
+    )
     raise InputError(
-        f"expected footprints that overlap the cloud in {extent(files[:, :2], files[:, 2:])} ({described(cloud_crs)}), "
+        f"expected footprints that overlap the cloud in {extent(files[:, :2], files[:, 2:])} "
+        f"({described(cloud_crs)}), "
         f"got footprints in {extent(middles, middles)} ({described(footprints_crs)}); "
         + (guess or "check the CRS each file names, or say the cloud's with --crs")
     )
 
 
 def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tuple[str, np.ndarray]]:
-    """What footprints at `xy` (n, 2), in their own CRS `named`, may be instead, and where the cloud's CRS has them then.
+    """What footprints at `xy` (n, 2), in their own CRS `named`, may be instead, and where the
+    cloud's CRS has them then.
 
     Where only one side names a CRS the other is taken to be in it.
     """
     swapped, own, target = xy[:, ::-1], named or cloud, cloud or named
-    yield "their x and y look swapped: swap them, in the footprints or in the cloud", reprojected(swapped, own, target)
+    yield (
+        "their x and y look swapped: swap them, in the footprints or in the cloud",
+        reprojected(swapped, own, target),
+    )
     if target is not None:
         if not same_horizontal(own, target):
-            text = f"their coordinates look like the cloud's {described(target)}: name that CRS in the footprints"
+            text = (
+                f"their coordinates look like the cloud's {described(target)}: name that CRS in "
+                "the footprints"
+            )
             yield f"{text}, or the cloud's own with --crs if it is another", xy
         degrees = parse_crs("EPSG:4326")
         for what, pairs in (("longitude and latitude", xy), ("latitude and longitude", swapped)):
             if (np.abs(pairs) <= (180, 90)).all():
-                text = f"they look like {what} in degrees: name EPSG:4326 in the footprints, with longitude first"
+                text = (
+                    f"they look like {what} in degrees: name EPSG:4326 in the footprints, with "
+                    "longitude first"
+                )
                 yield text, reprojected(pairs, degrees, target)
-        yield "the cloud looks like longitude and latitude in degrees: reproject it", reprojected(xy, own, degrees)
+        yield (
+            "the cloud looks like longitude and latitude in degrees: reproject it",
+            reprojected(xy, own, degrees),
+        )
         # a side that names its CRS is doubted only where the other names one, too
         for neighbour in neighbours(own if cloud is not None else None):
             text = f"they look like {described(neighbour)}: name the right zone in the footprints"
@@ -83,8 +110,14 @@ def slips(xy: np.ndarray, named: CRS | None, cloud: CRS | None) -> Iterator[tupl
             for near in (*neighbours(target), *utm_zones(reprojected(xy, own, degrees))):
                 text = f"the cloud looks like {described(near)}: name the right zone with --crs"
                 yield text, reprojected(xy, own, near)
-    yield "they look like metres and the cloud like feet: name CRSs, or the cloud's --unit", xy / FOOT_M
-    yield "they look like feet and the cloud like metres: name CRSs, or the cloud's --unit", xy * FOOT_M
+    yield (
+        "they look like metres and the cloud like feet: name CRSs, or the cloud's --unit",
+        xy / FOOT_M,
+    )
+    yield (
+        "they look like feet and the cloud like metres: name CRSs, or the cloud's --unit",
+        xy * FOOT_M,
+    )
 
 
 def neighbours(crs: CRS | None) -> Iterator[CRS]:
@@ -102,23 +135,33 @@ def neighbours(crs: CRS | None) -> Iterator[CRS]:
 
 
 def utm_zones(lon_lat: np.ndarray) -> Iterator[CRS]:
-    """The UTM zones that positions in degrees (n, 2) lie in: Europe's, North America's, the world's."""
+    """The UTM zones that positions in degrees (n, 2) lie in: Europe's, North America's, the
+    world's.
+    """
     lon, lat = np.median(lon_lat, axis=0)
     if np.isfinite((lon, lat)).all():
         zone = int((lon + 180) // 6) % 60 + 1
-        north = ([25800 + zone] if 28 <= zone <= 38 else []) + ([26900 + zone] if zone <= 23 else []) + [32600 + zone]
+        north = (
+            ([25800 + zone] if 28 <= zone <= 38 else [])
+            + ([26900 + zone] if zone <= 23 else [])
+            + [32600 + zone]
+        )
         yield from map(CRS.from_epsg, north if lat > 0 else [32700 + zone])
 
 
 def reprojected(xy: np.ndarray, source: CRS | None, target: CRS | None) -> np.ndarray:
-    """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either is unknown."""
+    """Positions (n, 2) moved from `source` to `target`, as they are where the two are one or either
+    is unknown.
+    """
     transformer = None if source is None or target is None else transformer_between(source, target)
     return xy if transformer is None else np.column_stack(transformer.transform(*xy.T))
 
 
 @functools.lru_cache(maxsize=8)
 def transformer_between(source: CRS, target: CRS) -> Transformer | None:
-    """From `source` to `target`, None where they are the same or PROJ knows no way; kept, for it takes long to choose one."""
+    """From `source` to `target`, None where they are the same or PROJ knows no way; kept, for it
+    takes long to choose one.
+    """
     if same_horizontal(source, target) or not (names_place(source) and names_place(target)):
         return None
     try:
@@ -133,18 +176,24 @@ def any_inside(xy: np.ndarray, boxes: np.ndarray) -> bool:
 
 
 def refuse_degrees(boxes: np.ndarray, what: str, advice: str) -> None:
-    """Raise InputError where the `boxes` (n, 4) of things without a CRS look like degrees; NaN where one is empty."""
+    """Raise InputError where the `boxes` (n, 4) of things without a CRS look like degrees;
+
+    NaN where one is empty.
+    """
     boxes = boxes[np.isfinite(boxes).all(axis=1)]
     low, high = boxes[:, :2], boxes[:, 2:]
     degrees = (np.abs(boxes) <= (180, 90, 180, 90)).all()
     if len(boxes) and degrees and np.median((high - low).max(axis=1)) < DEGREES_WIDE:
         raise InputError(
-            f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like degrees; {advice}"
+            f"expected {what} in metres, got coordinates in {extent(low, high)}, which look like "
+            f"degrees; {advice}"
         )
 
 
 def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
-    """Where on Earth positions (n, 2) in `crs` lie, where that is far from the area it is made for; else None."""
+    """Where on Earth positions (n, 2) in `crs` lie, where that is far from the area it is made for;
+    else None.
+    """
     area = horizontal_crs(crs).area_of_use
     if area is None or area.west > area.east:
         return None
@@ -159,7 +208,9 @@ def doubtful_place(crs: CRS, xy: np.ndarray) -> str | None:
 
 
 def stretch(crs: CRS, xy: np.ndarray) -> float:
-    """How many metres of `crs` a metre on the ground is at positions (n, 2), in the worse of its directions; 1 where unknown."""
+    """How many metres of `crs` a metre on the ground is at positions (n, 2), in the worse of its
+    directions; 1 where unknown.
+    """
     plan = horizontal_crs(crs)
     lon, lat = np.median(degrees_of(crs, xy), axis=0)
     if not (plan.is_projected and np.isfinite((lon, lat)).all()):

@@ -1,18 +1,23 @@
-"""What no input may say: coordinates that no reference system of this Earth gives, and counts that no file has room for."""
+"""What no input may say: coordinates that no reference system of this Earth gives, and counts that
+no file has room for.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
 MOST_PLAN = 1e9
-"""Largest x or y, in the input's unit: the widest systems in use (Gauss-Kruger zones in feet) stay below 2e8."""
+"""Largest x or y, in the input's unit: the widest systems in use (Gauss-Kruger zones in feet) stay
+below 2e8.
+"""
 
 MOST_HEIGHT = 1e6
 """Largest height, in the input's unit: Everest has 29,032 feet."""
 
 LOWEST_LAND_M, HIGHEST_LAND_M = -600.0, 9000.0
-"""Heights of land on Earth (m): the Dead Sea's shore lies at -430 and ellipsoidal heights up to 107 lower. Codes for
-"no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet."""
+"""Heights of land on Earth (m): the Dead Sea's shore lies at -430 and ellipsoidal heights up to 107
+lower. Codes for "no data" such as -9999, 9999 and -32767 lie beyond, also in decimetres and feet.
+"""
 
 
 class Implausible(ValueError):
@@ -20,9 +25,11 @@ class Implausible(ValueError):
 
 
 def is_plausible(xyz: np.ndarray) -> np.ndarray:
-    """Whether each point of (n, 2) or (n, 3) has coordinates that can be; those that are no numbers have not.
+    """Whether each point of (n, 2) or (n, 3) has coordinates that can be; those that are no numbers
+    have not.
 
-    >>> is_plausible(np.array([[85000.0, 446000.0, 2.0], [1e300, 0.0, 0.0], [0.0, np.nan, 0.0]])).tolist()
+    >>> is_plausible(np.array([[85000.0, 446000.0, 2.0], [1e300, 0.0, 0.0], [0.0, np.nan,
+    ...     0.0]])).tolist()
     [True, False, False]
     """
     most = np.array([MOST_PLAN, MOST_PLAN, MOST_HEIGHT])[: xyz.shape[1]]
@@ -30,7 +37,9 @@ def is_plausible(xyz: np.ndarray) -> np.ndarray:
 
 
 def bounds_of(xyz: np.ndarray) -> np.ndarray:
-    """The lowest and the highest coordinates (2, 3) of points (n, 3), n of 1 or more; NaN where one is.
+    """The lowest and the highest coordinates (2, 3) of points (n, 3), n of 1 or more;
+
+    NaN where one is.
 
     A column at a time, a ninth of the time that `xyz.min(axis=0)` takes.
 

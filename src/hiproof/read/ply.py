@@ -1,4 +1,7 @@
-"""Points of PLY files, ascii and binary. A reader of its own: only the vertices' scalars are needed."""
+"""Points of PLY files, ascii and binary.
+
+A reader of its own: only the vertices' scalars are needed.
+"""
 
 from __future__ import annotations
 
@@ -28,7 +31,9 @@ BYTE_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">
 
 @dataclass(frozen=True)
 class PlyLayout:
-    """The header: byte order ("" is ascii), vertices, their properties (name, NumPy type), columns of x y z class."""
+    """The header: byte order ("" is ascii), vertices, their properties (name, NumPy type), columns
+    of x y z class.
+    """
 
     byte_order: str
     count: int
@@ -37,13 +42,18 @@ class PlyLayout:
 
 
 def ply_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
-    """Yield the vertices of a PLY file. Raises InputError for a header or a body that is not one."""
+    """Yield the vertices of a PLY file.
+
+    Raises InputError for a header or a body that is not one.
+    """
     with opened(path) as file:
         layout = read_ply_header(file, path)
         refuse_missing_bytes(file, layout, path)
         remaining = layout.count
         while remaining:
-            table = read_vertices(file, layout, min(remaining, chunk_points), path, layout.count - remaining)
+            table = read_vertices(
+                file, layout, min(remaining, chunk_points), path, layout.count - remaining
+            )
             yield np.ascontiguousarray(table[:, :3]), classes_of(table)
             remaining -= len(table)
 
@@ -55,7 +65,8 @@ def refuse_missing_bytes(file: BinaryIO, layout: PlyLayout, path: str | Path) ->
     least = len("0 0 0") if layout.byte_order == "" else record_type(layout).itemsize
     if layout.count * least > end - start:
         raise InputError(
-            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, got {end - start} bytes of them; "
+            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, "
+            f"got {end - start} bytes of them; "
             "the file is truncated: copy or download it again"
         )
 
@@ -65,7 +76,9 @@ def record_type(layout: PlyLayout) -> np.dtype:
     return np.dtype([(name, layout.byte_order + kind) for name, kind in layout.properties])
 
 
-def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int) -> np.ndarray:
+def read_vertices(
+    file: BinaryIO, layout: PlyLayout, count: int, path: str | Path, read: int
+) -> np.ndarray:
     """The next `count` vertices as a float64 table of x, y, z and, where there is one, class."""
     if layout.byte_order == "":
         table = parse_rows(file, TextLayout(0, None, layout.columns), count, path, read)
@@ -75,10 +88,13 @@ def read_vertices(file: BinaryIO, layout: PlyLayout, count: int, path: str | Pat
         buffer = file.read(dtype.itemsize * count)
         found = len(buffer) // dtype.itemsize
         records = np.frombuffer(buffer, dtype, found)
-        table = np.column_stack([records[layout.properties[column][0]].astype(float) for column in layout.columns])
+        table = np.column_stack(
+            [records[layout.properties[column][0]].astype(float) for column in layout.columns]
+        )
     if found < count:
         raise InputError(
-            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, got {read + found}; "
+            f"expected {counted(layout.count, 'vertex', 'vertices')} in {path} as its header says, "
+            f"got {read + found}; "
             "the file is truncated: copy or download it again"
         )
     return table
@@ -126,6 +142,7 @@ def header_lines(file: BinaryIO, path: str | Path) -> Iterator[list[str]]:
 
 def unreadable(path: str | Path, got: str) -> InputError:
     return InputError(
-        f"expected a PLY file whose first element is the vertices with scalar x, y, z in {path}, got {got}; "
+        f"expected a PLY file whose first element is the vertices with scalar x, y, z in {path}, "
+        f"got {got}; "
         "export the points alone, or write them as LAZ"
     )

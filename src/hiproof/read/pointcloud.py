@@ -1,4 +1,6 @@
-"""Point clouds from files: LAS, LAZ, COPC, text and PLY, found by their content and ending, read in chunks."""
+"""Point clouds from files: LAS, LAZ, COPC, text and PLY, found by their content and ending, read in
+chunks.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +37,10 @@ from .runs import RUN_POINTS
 
 
 class Reader(NamedTuple):
-    """A kind of point file: what it is called, its endings, the bytes that its files start with (none in text), and how it is read:
-    chunks of a file's coordinates (n, 3) and classes (n,) or None, of so many points at most."""
+    """A kind of point file: what it is called, its endings, the bytes that its files start with
+    (none in text), and how it is read: chunks of a file's coordinates (n, 3) and classes (n,) or
+    None, of so many points at most.
+    """
 
     name: str
     suffixes: tuple[str, ...]
@@ -50,18 +54,31 @@ READERS = {
     "ply": Reader("PLY", (".ply",), b"ply", ply.ply_chunks),
     "text": Reader("text (" + " ".join(TEXT_SUFFIXES) + ")", TEXT_SUFFIXES, b"", text.text_chunks),
 }
-"""A further kind of point file is a module and a line here. Only "las" is asked for more: parts of a file, a CRS."""
+"""A further kind of point file is a module and a line here.
+
+Only "las" is asked for more: parts of a file, a CRS.
+"""
 
 POINT_SUFFIXES = tuple(suffix for reader in READERS.values() for suffix in reader.suffixes)
 FORMATS = " or ".join(", ".join(reader.name for reader in READERS.values()).rsplit(", ", 1))
-PACKED = {b"\x1f\x8b": "gunzip", b"PK\x03\x04": "unzip", b"BZh": "bunzip2", b"\xfd7zX": "unxz", b"7z\xbc\xaf": "7z x"}
-ELSEWHERE = {b"ASTM-E57": "E57", b"# .PCD": "PCD"}  # point clouds of other kinds, by their first bytes
+PACKED = {
+    b"\x1f\x8b": "gunzip",
+    b"PK\x03\x04": "unzip",
+    b"BZh": "bunzip2",
+    b"\xfd7zX": "unxz",
+    b"7z\xbc\xaf": "7z x",
+}
+# point clouds of other kinds, by their first bytes
+ELSEWHERE = {b"ASTM-E57": "E57", b"# .PCD": "PCD"}
 CHUNK_POINTS = 5 * RUN_POINTS  # 30 MB while they are sorted
 
 COARSE_M = (
-    0.05  # coordinates in larger steps are told of: they add a third of it to the noise, as much as a good scanner has
+    # coordinates in larger steps are told of: they add a third of it to the noise, as much as a
+    # good scanner has
+    0.05
 )
-STEPS = (1.0, 0.5, 0.25, 0.2, 0.125, 0.1, 0.0625)  # that text rounds to, or 32 bits at a national grid's coordinates
+# that text rounds to, or 32 bits at a national grid's coordinates
+STEPS = (1.0, 0.5, 0.25, 0.2, 0.125, 0.1, 0.0625)
 STEP_POINTS = (100, 10_000)  # fewer say nothing of steps, more nothing new
 
 Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metres, inclusive
@@ -69,9 +86,12 @@ Box = tuple[float, float, float, float]  # xmin, ymin, xmax, ymax in world metre
 
 @dataclass(frozen=True)
 class PointFileHeader:
-    """What a point file says of itself; `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit.
+    """What a point file says of itself;
 
-    `steps` are those in which its coordinates come, in plan and in height, in its unit too: 0 where they are fine or not known.
+    `bounds` are (xmin, ymin, zmin, xmax, ymax, zmax) in the file's own unit.
+
+    `steps` are those in which its coordinates come, in plan and in height, in its unit too: 0 where
+    they are fine or not known.
     """
 
     path: str
@@ -82,12 +102,16 @@ class PointFileHeader:
     steps: tuple[float, float] = (0.0, 0.0)
 
 
-def read_points(*paths: str | Path, settings: Settings | None = None, box: Box | None = None) -> PointCloud:
-    """All points of the files, folders or wildcards `paths` in world metres, those outside `box` in plan left out.
+def read_points(
+    *paths: str | Path, settings: Settings | None = None, box: Box | None = None
+) -> PointCloud:
+    """All points of the files, folders or wildcards `paths` in world metres, those outside `box` in
+    plan left out.
 
-    Classes are kept, NaN and infinite coordinates dropped with an InputWarning. The CRS is `settings.read.crs` where
-    that is given, else the files' own; coordinates in feet are made metres, and `units` of the cloud tells what they
-    were. Raises InputError for what is missing, unreadable, empty, in degrees, or in different CRSs.
+    Classes are kept, NaN and infinite coordinates dropped with an InputWarning. The CRS is
+    `settings.read.crs` where that is given, else the files' own; coordinates in feet are made
+    metres, and `units` of the cloud tells what they were. Raises InputError for what is missing,
+    unreadable, empty, in degrees, or in different CRSs.
     """
     files, read = expand_paths(paths), (settings or Settings()).read
     headers = {str(file): las_file_header(file) for file in files}
@@ -101,7 +125,11 @@ def read_points(*paths: str | Path, settings: Settings | None = None, box: Box |
         where = "" if box is None else f" inside the box {tuple(float(side) for side in box)}"
         raise InputError(
             f"expected points{where} in {', '.join(map(str, files))}, got none; "
-            + ("check the file" if box is None else "check the box against the files' bounds and CRS")
+            + (
+                "check the file"
+                if box is None
+                else "check the box against the files' bounds and CRS"
+            )
         )
     return PointCloud(xyz, joined_classes(clouds), crs, tuple(str(file) for file in files), units)
 
@@ -114,17 +142,22 @@ def iter_points(
     units: Units = METRES,
     noted: list[np.ndarray] | None = None,
 ) -> Iterator[PointCloud]:
-    """Yield the points of one file, at most `chunk_points` (CHUNK_POINTS) at a time, without their CRS: memory stays bounded.
+    """Yield the points of one file, at most `chunk_points` (CHUNK_POINTS) at a time, without their
+    CRS: memory stays bounded.
 
     `units` are those of the file's coordinates; the points, and `box`, are in world metres.
 
-    Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Of LAS and LAZ only the
-    `runs` (k, 2) of points, [first, end), are read where they are given, and where these lie goes to `noted` (see runs.py).
-    Raises InputError as `read_points` does, an empty file excepted, which yields nothing.
+    Only a COPC file with a `box` comes as a single chunk, which holds the points in the box. Of LAS
+    and LAZ only the `runs` (k, 2) of points, [first, end), are read where they are given, and where
+    these lie goes to `noted` (see runs.py). Raises InputError as `read_points` does, an empty file
+    excepted, which yields nothing.
     """
     kind, most = file_kind(path), chunk_points or CHUNK_POINTS
-    if kind == "las":  # whose points lie within its header's bounds, and these are plausible (las_header.py)
-        chunks = las.las_chunks(path, most, None if box is None else box_in_file(box, units), runs, noted)
+    # whose points lie within its header's bounds, and these are plausible (las_header.py)
+    if kind == "las":
+        chunks = las.las_chunks(
+            path, most, None if box is None else box_in_file(box, units), runs, noted
+        )
     else:
         chunks = plausible_chunks(READERS[kind].chunks(path, most), path)
     for xyz, classes in chunks:
@@ -136,7 +169,9 @@ def iter_points(
 
 
 def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[las.Chunk]:
-    """The chunks of a file without points that have no numbers as coordinates; it may hold none that no place has."""
+    """The chunks of a file without points that have no numbers as coordinates; it may hold none
+    that no place has.
+    """
     dropped = 0
     for xyz, classes in chunks:
         refuse_implausible(xyz, path)
@@ -147,11 +182,16 @@ def plausible_chunks(chunks: Iterator[las.Chunk], path: str | Path) -> Iterator[
             xyz, classes = chosen(xyz, classes, keep)
         yield xyz, classes
     if dropped:
-        warnings.warn(f"{path}: {counted(dropped, 'point')} with NaN or infinite coordinates left out", InputWarning)
+        warnings.warn(
+            f"{path}: {counted(dropped, 'point')} with NaN or infinite coordinates left out",
+            InputWarning,
+        )
 
 
 def as_input_error(error: Exception, path: str | Path) -> InputError:
-    """What reading one file came to, as that file's error: where a run reads many, none may end the others' work."""
+    """What reading one file came to, as that file's error: where a run reads many, none may end the
+    others' work.
+    """
     if isinstance(error, InputError):
         return error
     return InputError(
@@ -168,13 +208,16 @@ def refuse_implausible(xyz: np.ndarray, path: str | Path) -> None:
     if beyond.any():
         point = ", ".join(f"{value:g}" for value in xyz[np.argmax(beyond)])
         raise InputError(
-            f"expected coordinates up to {MOST_PLAN:g} and heights up to {MOST_HEIGHT:g} in {path}, got the point {point}; "
+            f"expected coordinates up to {MOST_PLAN:g} and heights up to {MOST_HEIGHT:g} in "
+            f"{path}, got the point {point}; "
             "put it right or leave it out"
         )
 
 
 def read_header(path: str | Path) -> PointFileHeader:
-    """Bounds, count and CRS of one file: from the header of LAS, LAZ and COPC, by one pass over text and PLY."""
+    """Bounds, count and CRS of one file: from the header of LAS, LAZ and COPC, by one pass over
+    text and PLY.
+    """
     header = las_file_header(path)
     if header is not None:
         return header
@@ -195,12 +238,19 @@ def las_file_header(path: str | Path) -> PointFileHeader | None:
     bounds = (*header.mins.tolist(), *header.maxs.tolist())
     steps = (float(max(header.scales[:2])), float(header.scales[2]))
     return PointFileHeader(
-        str(path), bounds, header.point_count, las_crs(las.facts_of(path).projection), header.point_format.id, steps
+        str(path),
+        bounds,
+        header.point_count,
+        las_crs(las.facts_of(path).projection),
+        header.point_format.id,
+        steps,
     )
 
 
 def steps_of(xyz: np.ndarray) -> tuple[float, float]:
-    """The largest of STEPS in which coordinates (n, 3) come, in plan and in height; 0 where they are finer or too few.
+    """The largest of STEPS in which coordinates (n, 3) come, in plan and in height;
+
+    0 where they are finer or too few.
 
     >>> steps_of(np.arange(600.0).reshape(-1, 3) * [0.5, 1.0, 0.01])
     (0.5, 0.0)
@@ -212,33 +262,49 @@ def steps_of(xyz: np.ndarray) -> tuple[float, float]:
 
     def step_of(values: np.ndarray) -> float:
         return next(
-            (step for step in STEPS if np.allclose(values, step * np.rint(values / step), rtol=0, atol=1e-4)), 0.0
+            (
+                step
+                for step in STEPS
+                if np.allclose(values, step * np.rint(values / step), rtol=0, atol=1e-4)
+            ),
+            0.0,
         )
 
     return step_of(apart[:, :2]), step_of(apart[:, 2])
 
 
 def say_how_coarse(headers: list[PointFileHeader], units: Units) -> None:
-    """One line where coordinates, in `units`, come in larger steps than COARSE_M: roofs are then no finer."""
+    """One line where coordinates, in `units`, come in larger steps than COARSE_M: roofs are then no
+    finer.
+    """
     coarse = {}
     for header in headers:
         plan_m, height_m = header.steps[0] * units.plan, header.steps[1] * units.height
-        told = [f"{m:.3g} m in {way}" for m, way in ((plan_m, "plan"), (height_m, "height")) if m > COARSE_M]
+        told = [
+            f"{m:.3g} m in {way}"
+            for m, way in ((plan_m, "plan"), (height_m, "height"))
+            if m > COARSE_M
+        ]
         if told:
             coarse[header.path] = " and ".join(told)
     if coarse:
         path, steps = next(iter(coarse.items()))
         warnings.warn(
-            f"{path}{and_others(list(coarse))}: coordinates come in steps of {steps}, and roofs are no finer; "
+            f"{path}{and_others(list(coarse))}: coordinates come in steps of {steps}, and roofs "
+            "are no finer; "
             "write the file anew from its source with steps of 0.01 m or less",
             InputWarning,
         )
 
 
 def expand_paths(paths: tuple[str | Path, ...]) -> list[str | Path]:
-    """The files that paths, folders and wildcards name, each once, in the order given; folders are sorted."""
+    """The files that paths, folders and wildcards name, each once, in the order given; folders are
+    sorted.
+    """
     if not paths:
-        raise InputError("expected at least one point cloud, got none; name a file, a folder or a wildcard")
+        raise InputError(
+            "expected at least one point cloud, got none; name a file, a folder or a wildcard"
+        )
     files: dict[str, str | Path] = {}
     for path in paths:
         for file in expand_path(path):
@@ -251,21 +317,35 @@ def expand_path(path: str | Path) -> list[str | Path]:
         return [path]
     folder = Path(path)
     if folder.is_dir():
-        found = sorted(p for p in folder.iterdir() if p.suffix.lower() in POINT_SUFFIXES and p.is_file())
+        found = sorted(
+            p for p in folder.iterdir() if p.suffix.lower() in POINT_SUFFIXES and p.is_file()
+        )
         if not found:
-            raise InputError(f"expected point files in the folder {path}, got none; it may hold {FORMATS}")
+            raise InputError(
+                f"expected point files in the folder {path}, got none; it may hold {FORMATS}"
+            )
         return without_other_text(found)
     if folder.exists():
         return [folder]
-    matches = sorted(match for match in glob.glob(str(path), recursive=True) if Path(match).is_file())
+    matches = sorted(
+        match for match in glob.glob(str(path), recursive=True) if Path(match).is_file()
+    )
     if not matches:
-        raise InputError(f"expected a point cloud at {path}, got no such file; check the path (or the wildcard)")
+        raise InputError(
+            f"expected a point cloud at {path}, got no such file; check the path (or the wildcard)"
+        )
     return [Path(match) for match in matches]
 
 
 def without_other_text(files: list[Path]) -> list[str | Path]:
-    """The point files of a folder without text that holds no points, as long as there are others: a delivery's notes and lists."""
-    points = [file for file in files if file.suffix.lower() not in TEXT_SUFFIXES or text.is_of_points(file)]
+    """The point files of a folder without text that holds no points, as long as there are others: a
+    delivery's notes and lists.
+    """
+    points = [
+        file
+        for file in files
+        if file.suffix.lower() not in TEXT_SUFFIXES or text.is_of_points(file)
+    ]
     if not points:
         return list(files)
     if len(points) < len(files):
@@ -287,7 +367,8 @@ def file_kind(path: str | Path) -> str:
             head = file.read(8)
     except OSError as error:
         raise InputError(
-            f"expected a readable point cloud at {path}, got: {error.strerror or error}; check the path"
+            f"expected a readable point cloud at {path}, got: {error.strerror or error}; check the "
+            "path"
         ) from error
     suffix = Path(path).suffix.lower()
     if not head:
@@ -298,12 +379,18 @@ def file_kind(path: str | Path) -> str:
     for start, name in ELSEWHERE.items():
         if head.startswith(start):
             raise InputError(
-                f"expected {FORMATS} at {path}, got {name}; convert it first (`pdal translate {path} {Path(path).with_suffix('.laz')}`)"
+                f"expected {FORMATS} at {path}, got {name}; convert it first (`pdal translate "
+                f"{path} {Path(path).with_suffix('.laz')}`)"
             )
     for start, program in PACKED.items():
         if head.startswith(start):
-            raise InputError(f"expected {FORMATS} at {path}, got a packed file; unpack it first: {program} {path}")
-    got = "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
+            raise InputError(
+                f"expected {FORMATS} at {path}, got a packed file; unpack it first: {program} "
+                f"{path}"
+            )
+    got = (
+        "something else" if suffix in POINT_SUFFIXES else f"a file ending in {suffix or 'nothing'}"
+    )
     raise InputError(
         f"expected {FORMATS} at {path}, got {got} that starts with {head[:4]!r}; "
         "if it is text with x y z on each line, rename it to .xyz"
@@ -311,21 +398,28 @@ def file_kind(path: str | Path) -> str:
 
 
 def file_crs(path: str | Path) -> Any:
-    """The CRS that a point file names, None where it names none that can be understood: text and PLY never do."""
+    """The CRS that a point file names, None where it names none that can be understood: text and
+    PLY never do.
+    """
     header = las_file_header(path)
     return None if header is None or isinstance(header.crs, UnknownCRS) else header.crs
 
 
 def common_crs(crs_of: dict[str, Any], given: Any = None, unit: str = "auto") -> Any:
-    """The one CRS of point files, from what each names: `given` where that is a CRS, else the files' own.
+    """The one CRS of point files, from what each names: `given` where that is a CRS, else the
+    files' own.
 
-    Files that name none go with those that do, and files overruled by `given` go with it, with an InputWarning each.
-    Raises InputError, naming both files, where two disagree, and for a CRS that cannot be understood while neither
-    `given` nor a `unit` stands in for it.
+    Files that name none go with those that do, and files overruled by `given` go with it, with an
+    InputWarning each. Raises InputError, naming both files, where two disagree, and for a CRS that
+    cannot be understood while neither `given` nor a `unit` stands in for it.
     """
     if given is None and unit == "auto":
         refuse_unknown(crs_of)
-    named = {path: crs for path, crs in crs_of.items() if crs is not None and not isinstance(crs, UnknownCRS)}
+    named = {
+        path: crs
+        for path, crs in crs_of.items()
+        if crs is not None and not isinstance(crs, UnknownCRS)
+    }
     if given is not None:
         overruled = [path for path, crs in named.items() if not same_horizontal(crs, given)]
         if overruled:
@@ -341,24 +435,30 @@ def common_crs(crs_of: dict[str, Any], given: Any = None, unit: str = "auto") ->
     unnamed = [path for path in crs_of if path not in named]
     if named and unnamed:
         warnings.warn(
-            f"{unnamed[0]}{and_others(unnamed)}: names no CRS; taken in {described(named[first])} as {first} is",
+            f"{unnamed[0]}{and_others(unnamed)}: names no CRS; taken in {described(named[first])} "
+            f"as {first} is",
             InputWarning,
         )
     return max(named.values(), key=lambda crs: vertical_crs(crs) is not None, default=None)
 
 
 def refuse_unknown(crs_of: dict[str, Any]) -> None:
-    """Raise InputError where a file defines a CRS that cannot be understood: its unit might be any."""
+    """Raise InputError where a file defines a CRS that cannot be understood: its unit might
+    be any.
+    """
     for path, crs in crs_of.items():
         if isinstance(crs, UnknownCRS):
             raise InputError(
-                f"expected a coordinate reference system that PROJ understands in {path}, got {crs.reason}; "
+                f"expected a coordinate reference system that PROJ understands in {path}, got "
+                f"{crs.reason}; "
                 "name the right one with --crs, or its unit alone with --unit"
             )
 
 
 def refuse_other_crs(files: list[str | Path], crs: Any, source: str) -> None:
-    """Raise InputError where one of the files names another CRS than `crs`, that of `source`; unknown goes with any."""
+    """Raise InputError where one of the files names another CRS than `crs`, that of `source`;
+    unknown goes with any.
+    """
     for file in files if crs is not None else ():
         own = file_crs(file)
         if names_place(own):
@@ -369,8 +469,10 @@ def refuse_two(first: Any, first_source: str, second: Any, second_source: str) -
     """Raise InputError where two CRSs differ in plan or in heights."""
     if first != second and not (same_horizontal(first, second) and same_heights(first, second)):
         raise InputError(
-            f"expected all clouds in one CRS, got {described(first)} in {first_source} and {described(second)} in "
-            f"{second_source}; reproject one of them, or say with --crs which is right where a header is wrong"
+            f"expected all clouds in one CRS, got {described(first)} in {first_source} and "
+            f"{described(second)} in "
+            f"{second_source}; reproject one of them, or say with --crs which is right where a "
+            "header is wrong"
         )
 
 
@@ -379,18 +481,25 @@ def and_others(paths: list[str]) -> str:
 
 
 def joined_classes(clouds: list[PointCloud]) -> np.ndarray | None:
-    """Classes of all clouds one after the other; 0 (never classified) where a file has none; None where no file has."""
+    """Classes of all clouds one after the other;
+
+    0 (never classified) where a file has none; None where no file has.
+    """
     if all(cloud.classification is None for cloud in clouds):
         return None
     return np.concatenate([cloud.classes for cloud in clouds])
 
 
-def chosen(xyz: np.ndarray, classes: np.ndarray | None, keep: np.ndarray) -> tuple[np.ndarray, np.ndarray | None]:
+def chosen(
+    xyz: np.ndarray, classes: np.ndarray | None, keep: np.ndarray
+) -> tuple[np.ndarray, np.ndarray | None]:
     return xyz[keep], None if classes is None else classes[keep]
 
 
 def box_in_file(box: Box, units: Units) -> Box:
-    """A box in the file's unit that holds all of `box`: a trifle wider where rounding could cut its border off."""
+    """A box in the file's unit that holds all of `box`: a trifle wider where rounding could cut its
+    border off.
+    """
     if units.are_metres:
         return box
     (xmin, ymin), (xmax, ymax) = units.from_metres(np.reshape(box, (2, 2))) + [[-0.01], [0.01]]

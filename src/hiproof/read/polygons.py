@@ -1,4 +1,7 @@
-"""Plan polygons put right: flattened, split, repaired. Nothing vanishes: what has no area becomes an empty polygon."""
+"""Plan polygons put right: flattened, split, repaired.
+
+Nothing vanishes: what has no area becomes an empty polygon.
+"""
 
 from __future__ import annotations
 
@@ -8,21 +11,27 @@ import shapely
 from ..geometry.rings import enclosed
 from .plausible import is_plausible
 
-SLIVER_SHARE = 0.01  # of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
+# of a repaired footprint's area; smaller fragments are artefacts of the self-intersection
+SLIVER_SHARE = 0.01
 SLIVER_M2 = 0.5  # m2; what repairing a polygon leaves beside it, less than any building
 JOIN_M = 0.001  # m; faces of one body that are as far apart were one before they were rounded
 LEVEL = 0.01  # units of height that a flat outline's heights may differ by
 DEGENERATE_M2 = 1e-6  # m2; numerically nothing
-WIDEST_M = 4000.0  # beyond any building; what is kept of terrain around one grows with the square of it
+# beyond any building; what is kept of terrain around one grows with the square of it
+WIDEST_M = 4000.0
 MOST_MEETINGS = 20_000  # of edges that follow not on one another: mending takes time for each
 EDGES_A_LOOK = 256  # edges looked up at once: memory stays small for outlines of any length
 
 
-def simple_polygons(geometry: shapely.Geometry | None, is_body: bool = False) -> list[shapely.Polygon]:
-    """The valid polygons of any geometry, heights left out; one empty polygon where it encloses no area.
+def simple_polygons(
+    geometry: shapely.Geometry | None, is_body: bool = False
+) -> list[shapely.Polygon]:
+    """The valid polygons of any geometry, heights left out; one empty polygon where it encloses no
+    area.
 
-    A self-intersecting polygon is repaired (its holes and loops kept as areas), and slivers of the repair dropped.
-    Polygons that overlap are one, and so are all that touch where they are faces of a body.
+    A self-intersecting polygon is repaired (its holes and loops kept as areas), and slivers of the
+    repair dropped. Polygons that overlap are one, and so are all that touch where they are faces of
+    a body.
 
     >>> bow_tie = shapely.Polygon([(0, 0), (4, 4), (4, 0), (0, 4)])
     >>> sorted(p.area for p in simple_polygons(bow_tie))
@@ -41,7 +50,11 @@ def simple_polygons(geometry: shapely.Geometry | None, is_body: bool = False) ->
 
 def is_surface(geometry: shapely.Geometry | None) -> bool:
     """Whether the polygons of a geometry are faces in space: several, and not all at one height."""
-    if geometry is None or not shapely.has_z(geometry) or len(polygons := polygons_in(geometry)) < 2:
+    if (
+        geometry is None
+        or not shapely.has_z(geometry)
+        or len(polygons := polygons_in(geometry)) < 2
+    ):
         return False
     z = shapely.get_coordinates(polygons, include_z=True)[:, 2]
     z = z[np.isfinite(z)]
@@ -58,10 +71,15 @@ def overlap(polygons: list[shapely.Polygon]) -> bool:
 
 
 def united(polygons: list[shapely.Polygon]) -> list[shapely.Polygon]:
-    """What polygons cover together, without the hairline gaps that rounding leaves between faces."""
+    """What polygons cover together, without the hairline gaps that rounding leaves between
+    faces.
+    """
     whole = shapely.simplify(shapely.union_all(polygons, grid_size=JOIN_M), JOIN_M)
     parts = [part for part in polygons_in(whole) if part.area > SLIVER_M2]
-    return [shapely.Polygon(part.exterior, [hole for hole in part.interiors if is_hole(hole)]) for part in parts]
+    return [
+        shapely.Polygon(part.exterior, [hole for hole in part.interiors if is_hole(hole)])
+        for part in parts
+    ]
 
 
 def is_hole(ring: shapely.LinearRing) -> bool:
@@ -70,7 +88,9 @@ def is_hole(ring: shapely.LinearRing) -> bool:
 
 
 def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
-    """Polygons of a geometry, those of multipolygons and collections one by one; points and lines are left out."""
+    """Polygons of a geometry, those of multipolygons and collections one by one; points and lines
+    are left out.
+    """
     if geometry is None:
         return []
     parts = shapely.get_parts(geometry)
@@ -80,31 +100,42 @@ def polygons_in(geometry: shapely.Geometry | None) -> list[shapely.Polygon]:
 
 
 def repaired(polygon: shapely.Polygon) -> list[shapely.Polygon]:
-    """`polygon` itself where it is valid, else the valid polygons that make_valid finds, without slivers; none where
-    it is no building's: without numbers, wider than WIDEST_M, or tangled beyond MOST_MEETINGS."""
+    """`polygon` itself where it is valid, else the valid polygons that make_valid finds, without
+    slivers; none where it is no building's: without numbers, wider than WIDEST_M, or tangled beyond
+    MOST_MEETINGS.
+    """
     if not is_buildings_size(polygon):
         return []
     found = [polygon] if shapely.is_valid(polygon) else polygons_in(mended(polygon))
     total = sum(part.area for part in found)
     least = min(SLIVER_M2, SLIVER_SHARE * total)
-    return [part for part in found if part.area > max(least if len(found) > 1 else 0.0, DEGENERATE_M2)]
+    return [
+        part for part in found if part.area > max(least if len(found) > 1 else 0.0, DEGENERATE_M2)
+    ]
 
 
 def is_buildings_size(polygon: shapely.Polygon) -> bool:
-    """Whether all coordinates are numbers on this Earth and no farther apart than the widest building is wide."""
+    """Whether all coordinates are numbers on this Earth and no farther apart than the widest
+    building is wide.
+    """
     xy = shapely.get_coordinates(polygon)
     return len(xy) > 0 and bool(is_plausible(xy).all() and np.ptp(xy, axis=0).max() <= WIDEST_M)
 
 
 def mended(polygon: shapely.Polygon) -> shapely.Geometry | None:
-    """The area its rings enclose, what they enclose twice counted once; None where too many edges meet to say."""
+    """The area its rings enclose, what they enclose twice counted once;
+
+    None where too many edges meet to say.
+    """
     if meetings(polygon) > MOST_MEETINGS:
         return None
     return enclosed(polygon)
 
 
 def meetings(polygon: shapely.Polygon) -> int:
-    """How many pairs of edges may cross, by their boxes and without neighbours; counted to a little above the most."""
+    """How many pairs of edges may cross, by their boxes and without neighbours; counted to a little
+    above the most.
+    """
     xy, ring = shapely.get_coordinates(shapely.get_rings(polygon), return_index=True)
     edges = shapely.linestrings(np.stack([xy[:-1], xy[1:]], axis=1)[ring[:-1] == ring[1:]])
     tree, found = shapely.STRtree(edges), 0

@@ -1,6 +1,7 @@
 """A raster terrain model: its pixels read in tiles when asked for, as heights in metres.
 
-What its file calls no data, and values that stand for no data without its saying so, are no heights.
+What its file calls no data, and values that stand for no data without its saying so, are no
+heights.
 """
 
 from __future__ import annotations
@@ -19,9 +20,23 @@ from ..errors import DamagedRaster, InputError, InputWarning
 from ..extras import needed
 from ..frames import Units
 from ..masking import masked, remember
-from .crs import horizontal_crs, names_place, parse_crs, same_horizontal, units_of, vertical_crs, way_between
+from .crs import (
+    horizontal_crs,
+    names_place,
+    parse_crs,
+    same_horizontal,
+    units_of,
+    vertical_crs,
+    way_between,
+)
 from .plausible import HIGHEST_LAND_M, LOWEST_LAND_M
-from .raster_checks import alpha_band, band_unit, height_band, refuse_without_position, scale_and_offset
+from .raster_checks import (
+    alpha_band,
+    band_unit,
+    height_band,
+    refuse_without_position,
+    scale_and_offset,
+)
 
 TILE_PX = 512
 """Side (pixels) of what is read at once. GeoTIFFs are often stored in such tiles."""
@@ -30,7 +45,9 @@ TILES_KEPT = 8
 """Tiles kept in memory (8 MB). Buildings come in order of place."""
 
 MOST_TILES_CHECKED = 4000
-"""Tiles read before work starts, to find damage: 1 GB of pixels, some 40 s of a run over hundreds of thousands of buildings."""
+"""Tiles read before work starts, to find damage: 1 GB of pixels, some 40 s of a run over hundreds
+of thousands of buildings.
+"""
 
 CODES = (
     0.0,
@@ -52,28 +69,38 @@ CODES = (
 """Stored values that programs write for "no data", whatever their scale and unit."""
 
 ISOLATED_M = 5.0
-"""Distance (m) from all other heights that makes one of CODES no height: ground has steps of that size, but no ground
-between them is rare."""
+"""Distance (m) from all other heights that makes one of CODES no height: ground has steps of that
+size, but no ground between them is rare.
+"""
 
 FEWEST_CODED = 4
 """Pixels with such a value, below which it is chance."""
 
 MOST_BETWEEN = 0.01
-"""Other pixels within ISOLATED_M of such a value, as a share of those that have it: blends along its border."""
+"""Other pixels within ISOLATED_M of such a value, as a share of those that have it: blends along
+its border.
+"""
 
 SAMPLED_TILES = 4
-"""Tiles along each side of the raster that are compared for it, evenly spread: the answer does not depend on what was read."""
+"""Tiles along each side of the raster that are compared for it, evenly spread: the answer does not
+depend on what was read.
+"""
 
 
 class RasterTerrain:
-    """A raster terrain model, interpolated bilinearly between its pixel centres. It may be in another CRS than the cloud.
+    """A raster terrain model, interpolated bilinearly between its pixel centres.
 
-    Pixels are read in tiles when asked for, a few of which are kept, so memory does not grow with the raster. Pixels
-    without a height take no part: beside pixels with heights these count alone, amid others the answer is NaN.
+    It may be in another CRS than the cloud.
+
+    Pixels are read in tiles when asked for, a few of which are kept, so memory does not grow with
+    the raster. Pixels without a height take no part: beside pixels with heights these count alone,
+    amid others the answer is NaN.
     """
 
     def __init__(self, path: str | Path, crs: Any = None, units: Units | None = None):
-        """Open `path` to be asked in `crs`, None for the raster's own, counted in world metres. Raises InputError.
+        """Open `path` to be asked in `crs`, None for the raster's own, counted in world metres.
+
+        Raises InputError.
 
         `units` are those of `crs`, which need naming where there is none.
         """
@@ -96,16 +123,21 @@ class RasterTerrain:
 
         try:
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", NotGeoreferencedWarning)  # it is refused, in a sentence
+                # it is refused, in a sentence
+                warnings.simplefilter("ignore", NotGeoreferencedWarning)
                 return rasterio.open(self.path)
         except (RasterioError, OSError) as error:
             raise InputError(
-                f"expected a raster that GDAL reads (GeoTIFF, ...) at {self.path}, got: {error}; check the file"
+                f"expected a raster that GDAL reads (GeoTIFF, ...) at {self.path}, got: {error}; "
+                "check the file"
             ) from error
 
     def __getstate__(self) -> dict:
         """Without the open file and the tiles, so that a worker process opens its own."""
-        return {**{k: v for k, v in vars(self).items() if k not in ("dataset", "transformer")}, "tiles": OrderedDict()}
+        return {
+            **{k: v for k, v in vars(self).items() if k not in ("dataset", "transformer")},
+            "tiles": OrderedDict(),
+        }
 
     def __setstate__(self, state: dict) -> None:
         vars(self).update(state)
@@ -116,7 +148,10 @@ class RasterTerrain:
         return parse_crs(self.dataset.crs.to_wkt()) if self.dataset.crs else None
 
     def make_transformer(self):
-        """From the coordinates asked for to the raster's; None where they are the same in plan, or one is unknown or local."""
+        """From the coordinates asked for to the raster's;
+
+        None where they are the same in plan, or one is unknown or local.
+        """
         own = self.own_crs
         if self.crs is None or own is None or same_horizontal(self.crs, own):
             return None
@@ -125,9 +160,11 @@ class RasterTerrain:
         return way_between(self.crs, own)
 
     def height_unit(self) -> float:
-        """Metres in one unit of the raster's heights: as its band says, else its CRS, else as the cloud counts.
+        """Metres in one unit of the raster's heights: as its band says, else its CRS, else as the
+        cloud counts.
 
-        Heights over a plan in degrees are metres. Those over a plan in feet that name no unit are taken for feet.
+        Heights over a plan in degrees are metres. Those over a plan in feet that name no unit are
+        taken for feet.
         """
         named, own = band_unit(self.dataset.units[self.band - 1], self.path), self.own_crs
         if named is not None:
@@ -139,7 +176,10 @@ class RasterTerrain:
             return 1.0
         units = units_of(own, f"the terrain model {self.path}")
         if vertical_crs(own) is None and not units.are_metres:
-            warnings.warn(f"{self.path}: names no unit of its heights; taken as {units.height_name}", InputWarning)
+            warnings.warn(
+                f"{self.path}: names no unit of its heights; taken as {units.height_name}",
+                InputWarning,
+            )
         return units.height
 
     @property
@@ -148,20 +188,27 @@ class RasterTerrain:
         return tuple(self.dataset.bounds)
 
     def height_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Height (n,) in metres at `xy_world` (n, 2), NaN outside the raster and where it has none."""
+        """Height (n,) in metres at `xy_world` (n, 2), NaN outside the raster and where it has
+        none.
+        """
         row, column, inside = self.pixels_at(xy_world)
         heights = np.full(len(row), np.nan)
-        # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its centre's value.
+        # Bilinear interpolation runs between pixel centres; the outermost half pixel takes its
+        # centre's value.
         column = np.clip(column[inside] - 0.5, 0, self.dataset.width - 1)
         row = np.clip(row[inside] - 0.5, 0, self.dataset.height - 1)
         found = np.full(len(row), np.nan)
         for tile, here in by_tile(row, column):
-            found[here] = bilinear(self.tile(*tile), row[here] - tile[0] * TILE_PX, column[here] - tile[1] * TILE_PX)
+            found[here] = bilinear(
+                self.tile(*tile), row[here] - tile[0] * TILE_PX, column[here] - tile[1] * TILE_PX
+            )
         heights[inside] = found
         return heights
 
     def is_coded_at(self, xy_world: np.ndarray) -> np.ndarray:
-        """Whether (n,) the pixel at each of `xy_world` (n, 2) holds a value that is no height, though its file calls it data."""
+        """Whether (n,) the pixel at each of `xy_world` (n, 2) holds a value that is no height,
+        though its file calls it data.
+        """
         row, column, inside = self.pixels_at(xy_world)
         coded = np.zeros(len(row), bool)
         column = np.clip(np.floor(column[inside]), 0, self.dataset.width - 1).astype(int)
@@ -169,22 +216,35 @@ class RasterTerrain:
         found = np.zeros(len(row), bool)
         for tile, here in by_tile(row, column):
             pixels = self.tile(*tile)
-            found[here] = np.isinf(pixels[row[here] - tile[0] * TILE_PX, column[here] - tile[1] * TILE_PX])
+            found[here] = np.isinf(
+                pixels[row[here] - tile[0] * TILE_PX, column[here] - tile[1] * TILE_PX]
+            )
         coded[inside] = found
         return coded
 
     def pixels_at(self, xy_world: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Rows and columns (n,) of the raster at `xy_world` (n, 2), and whether (n,) they are inside it."""
+        """Rows and columns (n,) of the raster at `xy_world` (n, 2), and whether (n,) they are
+        inside it.
+        """
         xy = self.units.from_metres(np.asarray(xy_world, float)[:, :2])
         if self.transformer is not None:
             xy = np.column_stack(self.transformer.transform(xy[:, 0], xy[:, 1]))
         to_pixel = ~self.dataset.transform
         column = to_pixel.a * xy[:, 0] + to_pixel.b * xy[:, 1] + to_pixel.c
         row = to_pixel.d * xy[:, 0] + to_pixel.e * xy[:, 1] + to_pixel.f
-        return row, column, (column >= 0) & (row >= 0) & (column <= self.dataset.width) & (row <= self.dataset.height)
+        return (
+            row,
+            column,
+            (column >= 0)
+            & (row >= 0)
+            & (column <= self.dataset.width)
+            & (row <= self.dataset.height),
+        )
 
     def knows_any(self, xy_world: np.ndarray) -> bool:
-        """Whether there is a height at any of `xy_world` (n, 2). Raises DamagedRaster where it cannot be read.
+        """Whether there is a height at any of `xy_world` (n, 2).
+
+        Raises DamagedRaster where it cannot be read.
 
         Of more than MOST_TILES_CHECKED tiles so many are read, evenly spread.
         """
@@ -196,8 +256,9 @@ class RasterTerrain:
         return bool(np.isfinite(self.height_at(asked)).any())
 
     def tile(self, row: int, column: int) -> np.ndarray:
-        """Heights (m) of a tile and one more row and column, where the raster has them: NaN without data, infinite where
-        what is stored is no height."""
+        """Heights (m) of a tile and one more row and column, where the raster has them: NaN without
+        data, infinite where what is stored is no height.
+        """
         key = (row, column)
         if key not in self.tiles:
             stored, heights = self.stored_and_heights(row, column)
@@ -211,7 +272,9 @@ class RasterTerrain:
         return self.tiles[key]
 
     def stored_and_heights(self, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
-        """What a tile stores, NaN without data, and that in metres, infinite where no ground is so low or so high."""
+        """What a tile stores, NaN without data, and that in metres, infinite where no ground is so
+        low or so high.
+        """
         from rasterio.errors import RasterioError
         from rasterio.windows import Window
 
@@ -219,12 +282,17 @@ class RasterTerrain:
         width = min(TILE_PX + 1, self.dataset.width - column * TILE_PX)
         window = Window(column * TILE_PX, row * TILE_PX, width, height)
         try:
-            stored = self.dataset.read(self.band, window=window, masked=True).astype(float).filled(np.nan)
+            stored = (
+                self.dataset.read(self.band, window=window, masked=True)
+                .astype(float)
+                .filled(np.nan)
+            )
             if self.alpha is not None:
                 stored[self.dataset.read(self.alpha, window=window) == 0] = np.nan
         except (RasterioError, OSError) as error:
             raise DamagedRaster(
-                f"expected a complete raster at {self.path}, got: {error.__cause__ or error}; copy or download it again"
+                f"expected a complete raster at {self.path}, got: {error.__cause__ or error}; copy "
+                "or download it again"
             ) from error
         with np.errstate(over="ignore"):
             heights = (stored * self.scale + self.offset) * self.metres_in_height
@@ -233,8 +301,13 @@ class RasterTerrain:
 
     @cached_property
     def codes(self) -> tuple[float, ...]:
-        """Those of CODES that are no heights here: pixels hold them that lie far from all others of some tiles."""
-        pairs = [self.stored_and_heights(*tile) for tile in sampled_tiles(self.dataset.height, self.dataset.width)]
+        """Those of CODES that are no heights here: pixels hold them that lie far from all others of
+        some tiles.
+        """
+        pairs = [
+            self.stored_and_heights(*tile)
+            for tile in sampled_tiles(self.dataset.height, self.dataset.width)
+        ]
         stored = np.concatenate([stored[np.isfinite(heights)] for stored, heights in pairs])
         heights = np.concatenate([heights[np.isfinite(heights)] for _, heights in pairs])
         return tuple(code for code in CODES if is_isolated(heights, stored == code))
@@ -246,12 +319,16 @@ def by_tile(row: np.ndarray, column: np.ndarray) -> Iterator[tuple[tuple[int, in
     tiles, index = np.unique(places.astype(int), axis=0, return_inverse=True)
     order = np.argsort(index.ravel(), kind="stable")
     ends = np.cumsum(np.bincount(index.ravel(), minlength=len(tiles)))
-    for tile, here in zip(tiles.tolist(), np.split(order, ends[:-1]), strict=True) if len(tiles) else ():
+    for tile, here in (
+        zip(tiles.tolist(), np.split(order, ends[:-1]), strict=True) if len(tiles) else ()
+    ):
         yield (tile[0], tile[1]), here
 
 
 def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
-    """SAMPLED_TILES by SAMPLED_TILES tiles of a raster, evenly spread, or all where it has fewer."""
+    """SAMPLED_TILES by SAMPLED_TILES tiles of a raster, evenly spread, or all where it has
+    fewer.
+    """
     along = [
         np.unique(np.linspace(0, (size - 1) // TILE_PX, SAMPLED_TILES).round().astype(int)).tolist()
         for size in (height, width)
@@ -260,7 +337,10 @@ def sampled_tiles(height: int, width: int) -> list[tuple[int, int]]:
 
 
 def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
-    """Whether pixels have one height, far from all other `heights` (n,) but for few; False where there are no others."""
+    """Whether pixels have one height, far from all other `heights` (n,) but for few;
+
+    False where there are no others.
+    """
     coded = int(is_coded.sum())
     if coded < FEWEST_CODED or coded == len(heights):
         return False
@@ -269,12 +349,21 @@ def is_isolated(heights: np.ndarray, is_coded: np.ndarray) -> bool:
 
 
 def bilinear(pixels: np.ndarray, row: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Weighted mean (n,) of the four pixels around each position, those that are not finite left out; NaN where all are."""
+    """Weighted mean (n,) of the four pixels around each position, those that are not finite left
+    out; NaN where all are.
+    """
     row0, column0 = np.floor(row).astype(int), np.floor(column).astype(int)
-    row1, column1 = np.minimum(row0 + 1, pixels.shape[0] - 1), np.minimum(column0 + 1, pixels.shape[1] - 1)
+    row1, column1 = (
+        np.minimum(row0 + 1, pixels.shape[0] - 1),
+        np.minimum(column0 + 1, pixels.shape[1] - 1),
+    )
     down, right = row - row0, column - column0
-    values = np.stack([pixels[row0, column0], pixels[row0, column1], pixels[row1, column0], pixels[row1, column1]])
-    weights = np.stack([(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right])
+    values = np.stack(
+        [pixels[row0, column0], pixels[row0, column1], pixels[row1, column0], pixels[row1, column1]]
+    )
+    weights = np.stack(
+        [(1 - down) * (1 - right), (1 - down) * right, down * (1 - right), down * right]
+    )
     known = np.isfinite(values)
     weights, values = np.where(known, weights, 0.0), np.where(known, values, 0.0)
     total = weights.sum(axis=0)

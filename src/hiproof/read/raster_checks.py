@@ -20,74 +20,116 @@ UNIT_NAMES = {
     "mm millimetre millimeter millimetres millimeters": 0.001,
     "km kilometre kilometer kilometres kilometers": 1000.0,
     "ft foot feet intft ftint internationalfoot internationalfeet footinternational": 0.3048,
-    "usft ftus ussurveyfoot ussurveyfeet surveyfoot surveyfeet footussurvey footus usfoot usfeet": 1200 / 3937,
+    "usft ftus ussurveyfoot ussurveyfeet surveyfoot surveyfeet footussurvey footus usfoot "
+    "usfeet": 1200 / 3937,
     "yd yard yards": 0.9144,
 }
 """Metres in each unit that a band may name, by its spellings without blanks and punctuation."""
 
 METRES_IN = {name: metres for names, metres in UNIT_NAMES.items() for name in names.split()}
 NO_UNIT = ("", "unknown", "unnamed", "none", "na")
-DATUM = re.compile(r"\b(above|over|nap|nn|nhn|navd\w*|egm\w*|msl|asl|a\.s\.l)\b.*|\+.*")  # "m above sea level", "m+NAP"
-PICTURE = ("red", "green", "blue", "palette", "hue", "saturation", "lightness", "cyan", "magenta", "yellow", "black")
+# "m above sea level", "m+NAP"
+DATUM = re.compile(r"\b(above|over|nap|nn|nhn|navd\w*|egm\w*|msl|asl|a\.s\.l)\b.*|\+.*")
+PICTURE = (
+    "red",
+    "green",
+    "blue",
+    "palette",
+    "hue",
+    "saturation",
+    "lightness",
+    "cyan",
+    "magenta",
+    "yellow",
+    "black",
+)
 
 
 def refuse_without_position(dataset: Any, path: str) -> None:
-    """Raise InputError for a raster whose pixels lie nowhere: no geotransform, or one that maps them onto a line."""
+    """Raise InputError for a raster whose pixels lie nowhere: no geotransform, or one that maps
+    them onto a line.
+    """
     transform = dataset.transform
     if transform.is_identity:
         raise InputError(
-            f"expected a georeferenced raster of heights at {path}, got an image without position; name a GeoTIFF"
+            f"expected a georeferenced raster of heights at {path}, got an image without position; "
+            "name a GeoTIFF"
         )
     size = math.hypot(*transform[:2], *transform[3:5])
-    if not all(map(math.isfinite, transform[:6])) or not abs(transform.determinant) > 1e-12 * size**2:
+    if (
+        not all(map(math.isfinite, transform[:6]))
+        or not abs(transform.determinant) > 1e-12 * size**2
+    ):
         raise InputError(
-            f"expected a raster whose pixels have an area at {path}, got the geotransform {tuple(transform[:6])}; "
+            f"expected a raster whose pixels have an area at {path}, got the geotransform "
+            f"{tuple(transform[:6])}; "
             "export it again with its position"
         )
 
 
 def height_band(dataset: Any, path: str) -> int:
-    """The number of the band that holds heights: the first that is no transparency. Raises InputError for pictures.
+    """The number of the band that holds heights: the first that is no transparency.
+
+    Raises InputError for pictures.
 
     A raster of several such bands is used with a warning that names the one taken.
     """
     if not dataset.count:
         names = ", ".join(dataset.subdatasets[:3]) or "none"
-        raise InputError(f"expected a raster band of heights at {path}, got a container of {names}; name one of them")
+        raise InputError(
+            f"expected a raster band of heights at {path}, got a container of {names}; name one of "
+            "them"
+        )
     kinds = [interpretation.name.lower() for interpretation in dataset.colorinterp]
     bands = [number for number, kind in enumerate(kinds, 1) if kind != "alpha"]
     band = bands[0] if bands else 1
     if kinds[band - 1] in PICTURE or str(dataset.dtypes[band - 1]).startswith("complex"):
         what = (
-            "complex numbers" if "complex" in str(dataset.dtypes[band - 1]) else f"a picture (band {kinds[band - 1]})"
+            "complex numbers"
+            if "complex" in str(dataset.dtypes[band - 1])
+            else f"a picture (band {kinds[band - 1]})"
         )
-        raise InputError(f"expected a raster of heights at {path}, got {what}; name a terrain model")
+        raise InputError(
+            f"expected a raster of heights at {path}, got {what}; name a terrain model"
+        )
     if len(bands) > 1:
-        warnings.warn(f"{path}: has {len(bands)} bands; the heights are taken from band {band}", InputWarning)
+        warnings.warn(
+            f"{path}: has {len(bands)} bands; the heights are taken from band {band}", InputWarning
+        )
     return band
 
 
 def alpha_band(dataset: Any) -> int | None:
-    """The number of the band of transparency, None without one. GDAL takes no notice of it beside heights in decimals."""
+    """The number of the band of transparency, None without one.
+
+    GDAL takes no notice of it beside heights in decimals.
+    """
     kinds = [interpretation.name.lower() for interpretation in dataset.colorinterp]
     return kinds.index("alpha") + 1 if "alpha" in kinds[1:] else None
 
 
 def scale_and_offset(dataset: Any, band: int, path: str) -> tuple[float, float]:
-    """What a stored value is multiplied by and what is added to it then. Raises InputError where they give no height."""
+    """What a stored value is multiplied by and what is added to it then.
+
+    Raises InputError where they give no height.
+    """
     scale, offset = float(dataset.scales[band - 1]), float(dataset.offsets[band - 1])
     if not (math.isfinite(scale) and scale and math.isfinite(offset)):
         raise InputError(
-            f"expected a scale and an offset of the heights at {path}, got {scale:g} and {offset:g}; "
+            f"expected a scale and an offset of the heights at {path}, got {scale:g} and "
+            f"{offset:g}; "
             "correct them (`gdal_edit -scale 1 -offset 0`)"
         )
     return scale, offset
 
 
 def band_unit(name: str | None, path: str) -> float | None:
-    """Metres in the unit that a band names, None where it names none. Raises InputError for units that are no lengths.
+    """Metres in the unit that a band names, None where it names none.
 
-    >>> band_unit("US survey foot", "dtm.tif") == 1200 / 3937, band_unit("m above sea level", "dtm.tif")
+    Raises InputError for units that are no lengths.
+
+    >>> band_unit("US survey foot", "dtm.tif") == 1200 / 3937, band_unit("m above sea level",
+    ...     "dtm.tif")
     (True, 1.0)
     """
     for plain in spellings(name or ""):
@@ -96,7 +138,8 @@ def band_unit(name: str | None, path: str) -> float | None:
         if plain in NO_UNIT:
             return None
     raise InputError(
-        f"expected heights in metres or feet at {path}, got a band in {name!r}; convert them to metres "
+        f"expected heights in metres or feet at {path}, got a band in {name!r}; convert them to "
+        "metres "
         "(`gdal_calc`), or correct the unit"
     )
 

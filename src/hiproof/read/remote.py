@@ -1,4 +1,6 @@
-"""Files by address: whatever fsspec knows (http, https, s3, gs, ...), read in ranges as far as the server allows."""
+"""Files by address: whatever fsspec knows (http, https, s3, gs, ...), read in ranges as far as the
+server allows.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +28,10 @@ def is_url(path: str | Path) -> bool:
 
 @contextmanager
 def opened(path: str | Path) -> Iterator[BinaryIO]:
-    """A seekable binary file at a path or an address. Raises InputError where an address cannot be opened."""
+    """A seekable binary file at a path or an address.
+
+    Raises InputError where an address cannot be opened.
+    """
     with open_address(str(path)) if is_url(path) else Path(path).open("rb") as file:
         yield file
 
@@ -38,9 +43,12 @@ def open_address(url: str) -> BinaryIO:
         # buffered once more: fsspec's own files read lines of any length only
         return io.BufferedReader(fsspec.open(url, "rb", block_size=BLOCK_BYTES).open())
     except ImportError as error:
-        raise InputError(f"expected what fsspec needs to open {url}, got: {error}; install it") from error
+        raise InputError(
+            f"expected what fsspec needs to open {url}, got: {error}; install it"
+        ) from error
     except Exception as error:  # each of fsspec's file systems raises errors of its own
-        told = error.__cause__ or error  # of what it cannot reach fsspec itself tells the address alone
+        # of what it cannot reach fsspec itself tells the address alone
+        told = error.__cause__ or error
         raise InputError(
             f"expected a point cloud at {url}, got: {str(told) or type(told).__name__}; check it"
         ) from error

@@ -1,6 +1,9 @@
-"""RoofN3D (Wichmann et al. 2018): `roofn3d_buildings.csv` and the labels in `roofn3d_surfacegrowing.csv`, streamed.
+"""RoofN3D (Wichmann et al.
 
-The points' WKT has no inner parentheses and fields run to megabytes, so coordinates are parsed as one run of numbers.
+2018): `roofn3d_buildings.csv` and the labels in `roofn3d_surfacegrowing.csv`, streamed.
+
+The points' WKT has no inner parentheses and fields run to megabytes, so coordinates are parsed as
+one run of numbers.
 """
 
 from __future__ import annotations
@@ -28,8 +31,10 @@ UNITS_PER_M = 1000  # points are matched to surfaces by their millimetres: the f
 
 @dataclass(frozen=True)
 class RoofN3DRecord:
-    """One building: `type` a name of our catalogue (None for a class we do not know, in `class_name`), `points` (n, 3)
-    in metres of EPSG:26918, `outline` its plan polygon, empty where the file has none."""
+    """One building: `type` a name of our catalogue (None for a class we do not know, in
+    `class_name`), `points` (n, 3) in metres of EPSG:26918, `outline` its plan polygon, empty where
+    the file has none.
+    """
 
     id: str
     type: str | None
@@ -39,9 +44,11 @@ class RoofN3DRecord:
 
 
 def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
-    """Yield the buildings of `roofn3d_buildings.csv`, each id once (the first row counts), one row in memory at a time.
+    """Yield the buildings of `roofn3d_buildings.csv`, each id once (the first row counts), one row
+    in memory at a time.
 
-    Raises InputError for a file of another layout and for coordinates that are no numbers, naming the row.
+    Raises InputError for a file of another layout and for coordinates that are no numbers, naming
+    the row.
     """
     seen: set[str] = set()
     repeated = 0
@@ -55,16 +62,21 @@ def read_roofn3d(path: str | Path) -> Iterator[RoofN3DRecord]:
         class_name = (row["class"] or "").strip()
         yield RoofN3DRecord(row["id"], TYPES.get(class_name.lower()), class_name, points, outline)
     if repeated:
-        warnings.warn(f"{path}: {counted(repeated, 'row')} with the id of an earlier one left out", InputWarning)
+        warnings.warn(
+            f"{path}: {counted(repeated, 'row')} with the id of an earlier one left out",
+            InputWarning,
+        )
 
 
 def read_roofn3d_labels(
     path: str | Path, records: Iterator[RoofN3DRecord]
 ) -> Iterator[tuple[RoofN3DRecord, np.ndarray]]:
-    """Yield each record with its points' labels (n,): the surface (0, 1, ...) of each, -1 where no surface has it.
+    """Yield each record with its points' labels (n,): the surface (0, 1, ...) of each, -1 where no
+    surface has it.
 
-    `path` is `roofn3d_surfacegrowing.csv`; it has no label per point, so points are matched by their coordinates, to the
-    millimetre. Surfaces count in the order of the file. Only where the surfaces lie in the file is kept in memory.
+    `path` is `roofn3d_surfacegrowing.csv`; it has no label per point, so points are matched by
+    their coordinates, to the millimetre. Surfaces count in the order of the file. Only where the
+    surfaces lie in the file is kept in memory.
     """
     offsets = surface_offsets(path)
     with open(path, "rb") as file:
@@ -80,8 +92,11 @@ def read_roofn3d_labels(
 
 
 def surface_offsets(path: str | Path) -> dict[str, list[int]]:
-    """Where in the file (bytes) the rows of each building start; a row is a line, as no field holds a line break."""
-    next(rows(path, ("points", "fk_buildings")), None)  # refuses another layout before the pass over the whole file
+    """Where in the file (bytes) the rows of each building start; a row is a line, as no field holds
+    a line break.
+    """
+    # refuses another layout before the pass over the whole file
+    next(rows(path, ("points", "fk_buildings")), None)
     offsets: dict[str, list[int]] = {}
     with open(path, "rb") as file:
         header = next(csv.reader([file.readline().decode("utf-8-sig")]))
@@ -96,14 +111,20 @@ def surface_offsets(path: str | Path) -> dict[str, list[int]]:
 
 
 def rows(path: str | Path, needed: tuple[str, ...]) -> Iterator[tuple[int, dict[str, str]]]:
-    """Number (the header is 1) and fields by name of each row. Raises InputError when a needed column is missing."""
+    """Number (the header is 1) and fields by name of each row.
+
+    Raises InputError when a needed column is missing.
+    """
     csv.field_size_limit(FIELD_LIMIT)
     try:
         with open(path, newline="", encoding="utf-8-sig") as file:
             reader = csv.DictReader(file)
             missing = [name for name in needed if name not in (reader.fieldnames or [])]
             if missing:
-                got = ", ".join(name[:30] for name in (reader.fieldnames or [])[:8]) or "an empty file"
+                got = (
+                    ", ".join(name[:30] for name in (reader.fieldnames or [])[:8])
+                    or "an empty file"
+                )
                 raise InputError(
                     f"expected RoofN3D's columns {', '.join(needed)} in {path}, got {got}; "
                     "name roofn3d_buildings.csv or roofn3d_surfacegrowing.csv as downloaded"
@@ -111,7 +132,9 @@ def rows(path: str | Path, needed: tuple[str, ...]) -> Iterator[tuple[int, dict[
             for number, row in enumerate(reader, start=2):
                 yield number, {name: (value or "") for name, value in row.items() if name}
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputError(f"expected a CSV file of RoofN3D at {path}, got: {error}; check the file") from error
+        raise InputError(
+            f"expected a CSV file of RoofN3D at {path}, got: {error}; check the file"
+        ) from error
 
 
 @contextmanager
@@ -120,12 +143,15 @@ def naming_row(path: str | Path, number: int) -> Iterator[None]:
         yield
     except (ValueError, shapely.errors.ShapelyError) as error:
         raise InputError(
-            f"expected WKT coordinates in row {number} of {path}, got: {error}; the file may be cut off: download it again"
+            f"expected WKT coordinates in row {number} of {path}, got: {error}; the file may be "
+            "cut off: download it again"
         ) from error
 
 
 def coordinates(wkt: str) -> np.ndarray:
-    """Points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`, with or without inner parentheses; (0, 3) of an empty field.
+    """Points (n, 3) of `MULTIPOINT Z (x y z,x y z,...)`, with or without inner parentheses;
+
+    (0, 3) of an empty field.
 
     >>> coordinates("MULTIPOINT Z (1 2 3,4 5 6.5)").tolist()
     [[1.0, 2.0, 3.0], [4.0, 5.0, 6.5]]

@@ -34,8 +34,14 @@ def read_shell(shell: Any, values: Any, surfaces: Any, count: int) -> list[Surfa
     faces = [read_rings(face, count) for face in list_of(shell, "a shell")]
     numbers = list_of([] if values is None else values, "semantic values")
     known = list_of(surfaces, "semantic surfaces")
-    told = ({} if number is None else surface_at(number, known) for number in chain(numbers, repeat(None)))
-    return [Surface(rings, semantics.get("type", WALL), semantics) for rings, semantics in zip(faces, told)]  # noqa: B905
+    told = (
+        {} if number is None else surface_at(number, known)
+        for number in chain(numbers, repeat(None))
+    )
+    return [
+        Surface(rings, semantics.get("type", WALL), semantics)
+        for rings, semantics in zip(faces, told)  # noqa: B905
+    ]
 
 
 def read_rings(face: Any, count: int) -> Rings:

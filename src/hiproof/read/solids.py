@@ -27,7 +27,14 @@ from .shells import list_of, read_geometries, read_shell
 
 GML_NAMESPACES = ("http://www.opengis.net/gml", "http://www.opengis.net/gml/3.2")
 XLINK_HREF = "{http://www.w3.org/1999/xlink}href"
-SURFACES = {"RoofSurface", "WallSurface", "GroundSurface", "OuterCeilingSurface", "OuterFloorSurface", "ClosureSurface"}
+SURFACES = {
+    "RoofSurface",
+    "WallSurface",
+    "GroundSurface",
+    "OuterCeilingSurface",
+    "OuterFloorSurface",
+    "ClosureSurface",
+}
 
 
 def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[str, Solid]]:
@@ -51,7 +58,8 @@ def read_solids(path: str | Path, damaged: Damaged = refuse) -> Iterator[tuple[s
     }
     if path.is_dir():
         raise InputError(
-            f"expected a file of solids, got the folder {path}; name one in it, such as buildings.city.jsonl"
+            f"expected a file of solids, got the folder {path}; name one in it, such as "
+            "buildings.city.jsonl"
         )
     if suffix not in readers:
         raise InputError(
@@ -83,7 +91,9 @@ def feature_solids(feature: Feature, damaged: Damaged = refuse) -> Iterator[tupl
     """Shells of all city objects of one CityJSON object or feature."""
     for name, city_object in feature.objects.items():
         try:
-            if isinstance(city_object, dict) and not str(city_object.get("type")).startswith("Building"):
+            if isinstance(city_object, dict) and not str(city_object.get("type")).startswith(
+                "Building"
+            ):
                 continue
             found = [
                 solid
@@ -116,7 +126,9 @@ def geometry_shells(geometry: dict[str, Any], vertices: np.ndarray) -> list[Soli
     return shells
 
 
-def shell_solid(shell: Any, values: Any, surfaces: Any, vertices: np.ndarray, inward: bool = False) -> Solid:
+def shell_solid(
+    shell: Any, values: Any, surfaces: Any, vertices: np.ndarray, inward: bool = False
+) -> Solid:
     """One shell (faces of rings of indices) with its semantics, on the vertices it uses."""
     found = read_shell(shell, values, surfaces, len(vertices))
     used = sorted({index for surface in found for ring in surface.rings for index in ring})
@@ -145,7 +157,9 @@ def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str,
 
     members, units = 0, METRES
     try:
-        for _, element in etree.iterparse(str(path), events=("end",), huge_tree=True, resolve_entities=False):
+        for _, element in etree.iterparse(
+            str(path), events=("end",), huge_tree=True, resolve_entities=False
+        ):
             if local_name(element) == "Envelope" and not members:
                 units = units_named(element.get("srsName"))
             if local_name(element) not in ("cityObjectMember", "featureMember"):
@@ -166,7 +180,9 @@ def citygml_solids(path: Path, damaged: Damaged = refuse) -> Iterator[tuple[str,
             f"expected well-formed CityGML in {path}, got: {error}; the file is damaged or cut off"
         ) from error
     if members == 0:
-        raise InputError(f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?")
+        raise InputError(
+            f"expected cityObjectMember elements in {path}, got none; is this a CityGML 2.0 file?"
+        )
 
 
 def gml_id(element: Any) -> str | None:
@@ -178,8 +194,12 @@ def gml_id(element: Any) -> str | None:
 
 def member_solids(member: Any, path: Path) -> Iterator[tuple[str, Solid]]:
     """Shells of one cityObjectMember; a building and each of its parts under its own id."""
-    polygons = {gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"}
-    owners = [element for element in member.iter() if local_name(element) in ("Building", "BuildingPart")]
+    polygons = {
+        gml_id(element): element for element in member.iter() if local_name(element) == "Polygon"
+    }
+    owners = [
+        element for element in member.iter() if local_name(element) in ("Building", "BuildingPart")
+    ]
     for owner in owners or list(member)[:1]:
         solids, place = [], f"{gml_id(owner) or 'a building without an id'} in {path}"
         for element in own_descendants(owner):
@@ -227,7 +247,8 @@ def gml_shells(solid: Any, polygons: dict[str | None, Any], place: str) -> list[
             if reference is not None:
                 if reference.lstrip("#") not in polygons:
                     raise InputError(
-                        f"expected a polygon with id {reference} among the surfaces of {place}, got none;"
+                        f"expected a polygon with id {reference} among the surfaces of {place}, "
+                        "got none;"
                         " the solid refers to a surface that is missing"
                     )
                 members.append(polygons[reference.lstrip("#")])
@@ -261,13 +282,18 @@ def polygons_solid(polygons: list[Any], place: str, inward: bool = False) -> Sol
 
 def ring_points(ring: Any, place: str) -> list[tuple[float, ...]]:
     """Points of a gml:LinearRing from posList or pos."""
-    texts = [element.text or "" for element in ring.iter() if local_name(element) in ("posList", "pos")]
+    texts = [
+        element.text or "" for element in ring.iter() if local_name(element) in ("posList", "pos")
+    ]
     try:
         values = [float(word) for word in " ".join(texts).split()]
     except ValueError as error:
-        raise InputError(f"expected numbers in a gml:posList of {place}, got: {error}; export the file anew") from error
+        raise InputError(
+            f"expected numbers in a gml:posList of {place}, got: {error}; export the file anew"
+        ) from error
     if len(values) % 3:
         raise InputError(
-            f"expected three coordinates a point in a gml:LinearRing of {place}, got {counted(len(values), 'number')}; export the file anew, in 3D"
+            f"expected three coordinates a point in a gml:LinearRing of {place}, got "
+            f"{counted(len(values), 'number')}; export the file anew, in 3D"
         )
     return [tuple(values[k : k + 3]) for k in range(0, len(values), 3)]

@@ -1,6 +1,7 @@
 """How high is the ground: what answers that, and several of them in turn.
 
-Each answers `height_at` and names its `source`; a `TerrainChain` asks the next where one does not know.
+Each answers `height_at` and names its `source`; a `TerrainChain` asks the next where one does not
+know.
 """
 
 from __future__ import annotations
@@ -17,7 +18,10 @@ from .raster import RasterTerrain, import_rasterio
 
 
 class Terrain(Protocol):
-    """Heights of the ground in world coordinates; `source` is the text a building's output names it by."""
+    """Heights of the ground in world coordinates;
+
+    `source` is the text a building's output names it by.
+    """
 
     @property
     def source(self) -> str: ...
@@ -42,18 +46,23 @@ class TerrainChain:
         return self.heights_and_sources(xy_world)[0]
 
     def known_heights(self, xy_world: np.ndarray, fewest: int) -> np.ndarray:
-        """Heights (n,) of the first terrain that knows so many of `xy_world` (n, 2) and does not guess (by a true `is_guess`);
-        NaN where there is none."""
+        """Heights (n,) of the first terrain that knows so many of `xy_world` (n, 2) and does not
+        guess (by a true `is_guess`); NaN where there is none.
+        """
         for terrain in self.terrains:
             heights = (
-                np.full(len(xy_world), np.nan) if getattr(terrain, "is_guess", False) else terrain.height_at(xy_world)
+                np.full(len(xy_world), np.nan)
+                if getattr(terrain, "is_guess", False)
+                else terrain.height_at(xy_world)
             )
             if np.isfinite(heights).sum() >= fewest:
                 return heights
         return np.full(len(xy_world), np.nan)
 
     def heights_and_sources(self, xy_world: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
-        """Heights (n,) and the sources that answered at least once, by preference: what a building's output names."""
+        """Heights (n,) and the sources that answered at least once, by preference: what a
+        building's output names.
+        """
         xy = np.asarray(xy_world, float)[:, :2]
         heights, sources = np.full(len(xy), np.nan), []
         for terrain in self.terrains:
@@ -67,7 +76,9 @@ class TerrainChain:
 
 
 def read_terrain(path: str | Path, crs: Any = None, units: Units | None = None) -> RasterTerrain:
-    """The terrain model at `path`, to be asked in world metres of `crs`, the cloud's. Raises InputError.
+    """The terrain model at `path`, to be asked in world metres of `crs`, the cloud's.
+
+    Raises InputError.
 
     `units` tell those of a cloud without a CRS. It takes rasterio, the extra `terrain`.
     """

@@ -1,4 +1,6 @@
-"""Points as text: XYZ, CSV, TXT, ASC and PTS, with or without a header, the delimiter found from the first lines."""
+"""Points as text: XYZ, CSV, TXT, ASC and PTS, with or without a header, the delimiter found from
+the first lines.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +24,9 @@ COMMENTS = ("#", "//")
 
 @dataclass(frozen=True)
 class TextLayout:
-    """How a text file lays out points: lines to skip, delimiter (None: white space), columns of x, y, z (and class)."""
+    """How a text file lays out points: lines to skip, delimiter (None: white space), columns of x,
+    y, z (and class).
+    """
 
     skip: int
     delimiter: str | None
@@ -30,10 +34,16 @@ class TextLayout:
 
 
 def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
-    """Yield the points of a text file. Raises InputError naming the first line that holds no point."""
+    """Yield the points of a text file.
+
+    Raises InputError naming the first line that holds no point.
+    """
     layout = sniff(path)
     read = 0
-    with opened(path) as binary, io.TextIOWrapper(binary, encoding="utf-8-sig", errors="replace") as file:
+    with (
+        opened(path) as binary,
+        io.TextIOWrapper(binary, encoding="utf-8-sig", errors="replace") as file,
+    ):
         list(islice(file, layout.skip))
         while True:
             table = parse_rows(file, layout, chunk_points, path, read)
@@ -48,7 +58,8 @@ def text_chunks(path: str | Path, chunk_points: int) -> Iterator[Chunk]:
 def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int) -> np.ndarray:
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", UserWarning)  # NumPy warns of an empty rest, which is the normal end
+            # NumPy warns of an empty rest, which is the normal end
+            warnings.simplefilter("ignore", UserWarning)
             return np.loadtxt(
                 file,
                 delimiter=layout.delimiter,
@@ -59,8 +70,10 @@ def parse_rows(file, layout: TextLayout, count: int, path: str | Path, read: int
             )
     except (ValueError, IndexError) as error:
         raise InputError(
-            f"expected three numbers x y z on every line of {path}, got another after {counted(read, 'point')} ({error}); "
-            "write one point a line with a decimal point, the columns separated by blanks, commas, semicolons or tabs"
+            f"expected three numbers x y z on every line of {path}, got another after "
+            f"{counted(read, 'point')} ({error}); "
+            "write one point a line with a decimal point, the columns separated by blanks, commas, "
+            "semicolons or tabs"
         ) from error
 
 
@@ -71,18 +84,26 @@ def classes_of(table: np.ndarray) -> np.ndarray | None:
 
 
 def sniff(path: str | Path) -> TextLayout:
-    """Find the layout from the first lines. Raises InputError when they are no text or hold no three numbers."""
+    """Find the layout from the first lines.
+
+    Raises InputError when they are no text or hold no three numbers.
+    """
     with opened(path) as file:
         head = file.read(65536)
     if head.startswith((b"\xff\xfe", b"\xfe\xff")):
-        raise InputError(f"expected text in UTF-8 in {path}, got UTF-16; save it as UTF-8 or plain text")
+        raise InputError(
+            f"expected text in UTF-8 in {path}, got UTF-16; save it as UTF-8 or plain text"
+        )
     if head[:16].lstrip().lower().startswith(b"ncols"):
         raise InputError(
-            f"expected lines of x y z in {path}, got an ESRI ASCII grid; convert a surface model to points (`gdal2xyz`), "
+            f"expected lines of x y z in {path}, got an ESRI ASCII grid; convert a surface model "
+            "to points (`gdal2xyz`), "
             "or name a model of the ground with --terrain"
         )
     if b"\0" in head:
-        raise InputError(f"expected text with x y z on each line in {path}, got binary data; rename it")
+        raise InputError(
+            f"expected text with x y z on each line in {path}, got binary data; rename it"
+        )
     lines = head.decode("utf-8-sig", errors="replace").splitlines()
     names: list[str] = []
     for number, line in enumerate(lines):

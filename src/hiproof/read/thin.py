@@ -1,4 +1,6 @@
-"""Thinning to one point a cell of the world's own grid: the result depends neither on the order of points nor on tiles."""
+"""Thinning to one point a cell of the world's own grid: the result depends neither on the order of
+points nor on tiles.
+"""
 
 from __future__ import annotations
 
@@ -9,25 +11,29 @@ import numpy as np
 
 from .cell_kernel import cell_keys, is_first
 
-UNITS_PER_M = 10_000  # sums and comparisons run on whole tenths of a millimetre: integers do not mind their order
+# sums and comparisons run on whole tenths of a millimetre: integers do not mind their order
+UNITS_PER_M = 10_000
 MOST_COUNTED = 2**16  # cells: numbers of 16 bits NumPy sorts by counting them
 MOST_CELLS_A_POINT = 16  # beyond it sorting is cheaper than a table of all cells
 
 
 def thin_to_grid(xyz: np.ndarray, cell_m: float) -> np.ndarray:
-    """One point (m, 3) a cell: the mean position in plan and the lower median height of the cell's points (n, 3).
+    """One point (m, 3) a cell: the mean position in plan and the lower median height of the cell's
+    points (n, 3).
 
-    >>> thin_to_grid(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.6, 0.4, 2.0], [1.5, 0.5, 7.0]]), 1.0).tolist()
+    >>> thin_to_grid(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.6, 0.4, 2.0], [1.5, 0.5,
+    ...     7.0]]), 1.0).tolist()
     [[0.4, 0.4, 2.0], [1.5, 0.5, 7.0]]
     """
     return rank_in_cells(xyz, cell_m, lambda counts: (counts - 1) // 2)
 
 
 def thin_to_count(xyz: np.ndarray, most: int) -> np.ndarray:
-    """At most `most` of the points (n, 3): those whose coordinates' hashes are the lowest, in the order they came in.
+    """At most `most` of the points (n, 3): those whose coordinates' hashes are the lowest, in the
+    order they came in.
 
-    A hash is as good as a draw, so density falls evenly, but it depends on the point alone: the same set of points
-    leaves the same ones, however it was cut and whatever order it came in.
+    A hash is as good as a draw, so density falls evenly, but it depends on the point alone: the
+    same set of points leaves the same ones, however it was cut and whatever order it came in.
     """
     if len(xyz) <= most:
         return xyz
@@ -35,7 +41,8 @@ def thin_to_count(xyz: np.ndarray, most: int) -> np.ndarray:
 
 
 def without_repeats(xyz: np.ndarray) -> np.ndarray:
-    """The points (n, 3) each once, in the order they came in: what stands in two overlapping files counts once.
+    """The points (n, 3) each once, in the order they came in: what stands in two overlapping files
+    counts once.
 
     >>> len(without_repeats(np.array([[0.2, 0.2, 1.0], [0.4, 0.6, 3.0], [0.2, 0.2, 1.0]])))
     2
@@ -45,7 +52,10 @@ def without_repeats(xyz: np.ndarray) -> np.ndarray:
 
 
 def hashes(xyz: np.ndarray) -> np.ndarray:
-    """A 64-bit hash (n,) of each point's coordinates (splitmix64's mixing steps, Steele et al. 2014)."""
+    """A 64-bit hash (n,) of each point's coordinates (splitmix64's mixing steps, Steele et al.
+
+    2014).
+    """
     bits = np.ascontiguousarray(np.asarray(xyz, float)[:, :3]).view(np.uint64)
     mixed = np.zeros(len(bits), np.uint64)
     for column in bits.T:
@@ -58,8 +68,12 @@ def hashes(xyz: np.ndarray) -> np.ndarray:
     return mixed
 
 
-def rank_in_cells(xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-    """One point a cell, its height the one of `rank(counts)` among the cell's heights in ascending order."""
+def rank_in_cells(
+    xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """One point a cell, its height the one of `rank(counts)` among the cell's heights in ascending
+    order.
+    """
     if not len(xyz):
         return np.empty((0, 3))
     xyz, cell_m = np.ascontiguousarray(xyz, float), float(cell_m)
@@ -80,14 +94,18 @@ def rank_in_cells(xyz: np.ndarray, cell_m: float, rank: Callable[[np.ndarray], n
 
 
 def cell_range(xy: np.ndarray, cell_m: float) -> tuple[tuple[int, int], tuple[int, int]]:
-    """The first cell (column, row) of the world's grid that holds one of `xy` (n, 2 or more), n > 0, and the (columns, rows)."""
+    """The first cell (column, row) of the world's grid that holds one of `xy` (n, 2 or more), n >
+    0, and the (columns, rows).
+    """
     low = [math.floor(xy[:, axis].min() / cell_m) for axis in (0, 1)]
     high = [math.floor(xy[:, axis].max() / cell_m) for axis in (0, 1)]
     return (low[0], low[1]), (high[0] - low[0] + 1, high[1] - low[1] + 1)
 
 
 def occupied_cells(keys: np.ndarray, cells: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """np.unique of `keys` (n,) below `cells`, with inverse and counts; by a table where that is not much larger."""
+    """np.unique of `keys` (n,) below `cells`, with inverse and counts; by a table where that is not
+    much larger.
+    """
     if cells > MOST_CELLS_A_POINT * len(keys):
         return np.unique(keys, return_inverse=True, return_counts=True)
     counts = np.bincount(keys)

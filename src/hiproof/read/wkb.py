@@ -1,4 +1,6 @@
-"""Geometries from WKB: surfaces in space, which GEOS does not know, become collections of polygons."""
+"""Geometries from WKB: surfaces in space, which GEOS does not know, become collections
+of polygons.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,12 @@ Z_FLAG, M_FLAG, SRID_FLAG = 1 << 31, 1 << 30, 1 << 29
 
 
 def geometries_of(wkb: np.ndarray) -> np.ndarray:
-    """Geometries (n,) of WKB (n,), None where there is none or it cannot be read; unclosed rings are closed."""
-    known = np.array([as_polygons(body) if body is not None else None for body in wkb], dtype=object)
+    """Geometries (n,) of WKB (n,), None where there is none or it cannot be read; unclosed rings
+    are closed.
+    """
+    known = np.array(
+        [as_polygons(body) if body is not None else None for body in wkb], dtype=object
+    )
     try:
         return shapely.from_wkb(known, on_invalid="fix")
     except (shapely.errors.ShapelyError, NotImplementedError, ValueError):

@@ -1,4 +1,5 @@
-"""Recognising a roof before fitting it: the shipped PointNet++ in ONNX Runtime, and its part in the choice of type.
+"""Recognising a roof before fitting it: the shipped PointNet++ in ONNX Runtime, and its part in the
+choice of type.
 
 sampling    farthest points and ball neighbours, compiled
 arrange     a cloud in its canonical frame, as the network takes it (shared with training)

@@ -1,6 +1,8 @@
-"""A building's cloud arranged for the network: canonical frame, local features, farthest-point levels, neighbourhoods.
+"""A building's cloud arranged for the network: canonical frame, local features, farthest-point
+levels, neighbourhoods.
 
-All of it is free of weights, shared by training and inference, and follows the points under rotation about Z.
+All of it is free of weights, shared by training and inference, and follows the points under
+rotation about Z.
 """
 
 from __future__ import annotations
@@ -14,7 +16,9 @@ from .sampling import arranged, thin_to_grid
 
 @dataclass(frozen=True)
 class Layout:
-    """Sizes of the network's input: `points` kept of a cloud, points of each `levels`, `neighbours` in a group."""
+    """Sizes of the network's input: `points` kept of a cloud, points of each `levels`, `neighbours`
+    in a group.
+    """
 
     points: int = 256
     levels: tuple[int, int, int] = (128, 64, 16)
@@ -26,9 +30,10 @@ class Layout:
 class Arrangement:
     """One cloud as the network takes it; N points, level sizes S1, S2, S3, K neighbours.
 
-    `chosen` (N,) indices into the cloud, repeated where it has fewer than N points; `features` (N, 11) float32;
-    `groups` per level (S, K) indices into the level above; `radii` (3,) metres; `up_indices`, `up_weights` (S1, 3) into
-    level 3 and (N, 3) into level 1: inverse-distance interpolation; `sampled` the number of distinct points.
+    `chosen` (N,) indices into the cloud, repeated where it has fewer than N points; `features` (N,
+    11) float32; `groups` per level (S, K) indices into the level above; `radii` (3,) metres;
+    `up_indices`, `up_weights` (S1, 3) into level 3 and (N, 3) into level 1: inverse-distance
+    interpolation; `sampled` the number of distinct points.
     """
 
     chosen: np.ndarray
@@ -41,7 +46,9 @@ class Arrangement:
 
 
 def arrange(xyz: np.ndarray, layout: Layout) -> Arrangement:
-    """Arrange a building's cloud `xyz` (n, 3), metres in any frame, n >= 1 finite points, for the network."""
+    """Arrange a building's cloud `xyz` (n, 3), metres in any frame, n >= 1 finite points, for the
+    network.
+    """
     thinned = thin_to_grid(xyz, layout.thinned)
     local = np.ascontiguousarray(xyz[thinned] - xyz[thinned].mean(axis=0), dtype=float)
     order, *described = arranged(local, layout.points, *layout.levels, layout.neighbours)

@@ -18,14 +18,17 @@ EXTRA_DIMENSIONS = (("roof_type", "uint8"), ("not_roof", "float32"), ("building"
 
 
 def segment_files(clouds: list[Path], out: Path, settings: Settings) -> dict[Path, str]:
-    """Label each cloud of `clouds` as one building; write the points to `out` (LAZ or LAS) and the types to a CSV
-    of the same name. Returns why, by file, where a building could not be labelled.
+    """Label each cloud of `clouds` as one building; write the points to `out` (LAZ or LAS) and the
+    types to a CSV of the same name. Returns why, by file, where a building could not be labelled.
 
-    Raises InputError if none could, and for weights that cannot be used; OutputError if `out` cannot be written.
+    Raises InputError if none could, and for weights that cannot be used; OutputError if `out`
+    cannot be written.
     """
     out = Path(out)
     if out.suffix.lower() not in (".laz", ".las"):
-        raise OutputError(f"expected --out to name a .laz or .las file, got {out}; the table is written beside it")
+        raise OutputError(
+            f"expected --out to name a .laz or .las file, got {out}; the table is written beside it"
+        )
     model = load(settings.segment.weights or str(SHIPPED_WEIGHTS), settings.segment.device)
     labelled, failures, crs, units = [], {}, None, METRES
     for number, path in enumerate(clouds, start=1):
@@ -57,7 +60,9 @@ def write_points(
     las.x, las.y, las.z = xyz.T
     las.roof_type = np.concatenate([found.labels + 1 for *_, found in labelled]).astype(np.uint8)
     las.not_roof = np.concatenate([found.not_roof for *_, found in labelled]).astype(np.float32)
-    las.building = np.concatenate([np.full(len(points), number) for number, _, points, _ in labelled])
+    las.building = np.concatenate(
+        [np.full(len(points), number) for number, _, points, _ in labelled]
+    )
     las.classification = np.where(las.roof_type > 0, 6, 1)
     try:
         out.parent.mkdir(parents=True, exist_ok=True)
@@ -66,8 +71,12 @@ def write_points(
         raise OutputError(f"expected to write {out}, got: {error}; choose another --out") from error
 
 
-def write_table(path: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types) -> None:
-    """One row a building: number, file, points, share of roof points, type, and the probability of every type."""
+def write_table(
+    path: Path, labelled: list[tuple[int, Path, np.ndarray, Segmentation]], types
+) -> None:
+    """One row a building: number, file, points, share of roof points, type, and the probability of
+    every type.
+    """
     try:
         with open(path, "w", newline="", encoding="utf-8") as file:
             table = csv.writer(file)
@@ -77,4 +86,6 @@ def write_table(path: Path, labelled: list[tuple[int, Path, np.ndarray, Segmenta
                 share = f"{found.is_roof.mean():.3f}"
                 table.writerow([number, source, len(points), share, found.type, *probabilities])
     except OSError as error:
-        raise OutputError(f"expected to write {path}, got: {error}; choose another --out") from error
+        raise OutputError(
+            f"expected to write {path}, got: {error}; choose another --out"
+        ) from error

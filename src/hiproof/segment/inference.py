@@ -1,7 +1,8 @@
-"""The shipped network in ONNX Runtime: `segment` labels a building's points and names its roof type.
+"""The shipped network in ONNX Runtime: `segment` labels a building's points and names its roof
+type.
 
-The first step of Li, Zhang and Shan (2020): only roof points go on to the fit, with the network's probabilities as the
-prior of its choice of type.
+The first step of Li, Zhang and Shan (2020): only roof points go on to the fit, with the network's
+probabilities as the prior of its choice of type.
 """
 
 from __future__ import annotations
@@ -23,8 +24,16 @@ from .nearest import nearest_of
 
 FORMAT = "hiproof-roof-types-2"
 INPUT_NAMES = (
-    "features", "group1", "group2", "group3", "radii", "up_index1", "up_index2", "up_weight1", "up_weight2",
-)  # fmt: skip
+    "features",
+    "group1",
+    "group2",
+    "group3",
+    "radii",
+    "up_index1",
+    "up_index2",
+    "up_weight1",
+    "up_weight2",
+)
 OUTPUT_NAMES = ("point_logits", "type_logits")
 SHIPPED_WEIGHTS = Path(__file__).parent / "weights" / "roof_types.onnx"
 NOT_ROOF = -1  # label of what is no roof
@@ -39,9 +48,10 @@ CARRIED_CHUNK = 200_000  # points labelled at once: memory stays bounded
 class Segmentation:
     """What the network says of one building's n points.
 
-    `types` probability of the building's roof type by name, in the catalogue's order, summing to 1. `logits`
-    (m, types + 1), not-roof last, of the m points `sampled` (m, 3) that the network took of all points `xyz` (n, 3);
-    what is said of each of the n points is carried over from them when it is first asked for.
+    `types` probability of the building's roof type by name, in the catalogue's order, summing to 1.
+    `logits` (m, types + 1), not-roof last, of the m points `sampled` (m, 3) that the network took
+    of all points `xyz` (n, 3); what is said of each of the n points is carried over from them when
+    it is first asked for.
     """
 
     types: dict[str, float]
@@ -76,7 +86,9 @@ class Segmentation:
 
     @property
     def weights(self) -> np.ndarray:
-        """(n,) weight of each point in a fit: 0 where it is surely no roof, else 1; all 1 where hardly any is left."""
+        """(n,) weight of each point in a fit: 0 where it is surely no roof, else 1; all 1 where
+        hardly any is left.
+        """
         kept = self.not_roof < SURELY_NOT_ROOF
         return kept.astype(float) if kept.sum() >= FEWEST_POINTS else np.ones(len(kept))
 
@@ -91,16 +103,17 @@ class Model:
 
 
 def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentation:
-    """Roof type, and roof or not, of every point of one building, and the probabilities of the building's type.
+    """Roof type, and roof or not, of every point of one building, and the probabilities of the
+    building's type.
 
-    `points` (n, 3) metres, any frame and order, n >= 10; but for rounding, the answer does not change when they turn
-    about Z. A cloud beyond the network's size is thinned to farthest points and its labels are carried back to all
-    points. Types outside `settings.fit.types` get probability 0: the paper's three-type configuration is
-    `("pyramid", "gable", "hip")`.
+    `points` (n, 3) metres, any frame and order, n >= 10; but for rounding, the answer does not
+    change when they turn about Z. A cloud beyond the network's size is thinned to farthest points
+    and its labels are carried back to all points. Types outside `settings.fit.types` get
+    probability 0: the paper's three-type configuration is `("pyramid", "gable", "hip")`.
 
-    Raises FitError for points no roof can be told from (fewer than 10, all in one place, not finite), InputError for
-    an array of another shape, for weights that are missing or of another kind and without ONNX Runtime (the extra `network`),
-    SettingsError for a device not there.
+    Raises FitError for points no roof can be told from (fewer than 10, all in one place, not
+    finite), InputError for an array of another shape, for weights that are missing or of another
+    kind and without ONNX Runtime (the extra `network`), SettingsError for a device not there.
 
     >>> x, y = np.meshgrid(np.arange(0, 12, 0.5), np.arange(0, 8, 0.5))
     >>> gable = np.column_stack([x.ravel(), y.ravel(), 6 - 0.7 * abs(y.ravel() - 3.75)])
@@ -120,41 +133,53 @@ def segment(points: np.ndarray, settings: Settings | None = None) -> Segmentatio
 
 
 def barred_types(model: Model, allowed: tuple[str, ...]) -> np.ndarray:
-    """Log prior (types,) of a choice among `allowed` types, or those nearest to them, only: 0 or minus infinity; empty allows all."""
+    """Log prior (types,) of a choice among `allowed` types, or those nearest to them, only: 0 or
+    minus infinity; empty allows all.
+    """
     classes = {nearest_of(name, model.types) for name in allowed}
     if allowed and not classes & set(model.types):
         raise SettingsError(
-            f"expected fit.types to name types the network knows ({', '.join(model.types)}), got {', '.join(allowed)}"
+            f"expected fit.types to name types the network knows ({', '.join(model.types)}), got "
+            f"{', '.join(allowed)}"
         )
     return np.array([0.0 if not allowed or name in classes else -np.inf for name in model.types])
 
 
 def run(model: Model, arrangements: list[Arrangement]) -> tuple[np.ndarray, np.ndarray]:
     """Point logits (B N, types + 1) and type logits (B, types) of arranged buildings."""
-    point_logits, type_logits = model.session.run(list(OUTPUT_NAMES), stacked(arrangements, model.layout))
+    point_logits, type_logits = model.session.run(
+        list(OUTPUT_NAMES), stacked(arrangements, model.layout)
+    )
     return point_logits, type_logits
 
 
 def stacked(arrangements: list[Arrangement], layout: Layout) -> dict[str, np.ndarray]:
-    """The graph's inputs by name for B buildings: flat over buildings, indices counting rows of the level above."""
+    """The graph's inputs by name for B buildings: flat over buildings, indices counting rows of the
+    level above.
+    """
     sizes = (layout.points, *layout.levels)
 
     def flat(indices, size):
         return np.concatenate([index + i * size for i, index in enumerate(indices)])
 
     groups = [flat([a.groups[level] for a in arrangements], sizes[level]) for level in range(3)]
-    ups = [flat([a.up_indices[k] for a in arrangements], sizes[above]) for k, above in ((0, 3), (1, 1))]
+    ups = [
+        flat([a.up_indices[k] for a in arrangements], sizes[above]) for k, above in ((0, 3), (1, 1))
+    ]
     weights = [np.concatenate([a.up_weights[k] for a in arrangements]) for k in (0, 1)]
     features = np.concatenate([a.features for a in arrangements])
     radii = np.stack([a.radii for a in arrangements])
     return dict(zip(INPUT_NAMES, (features, *groups, radii, *ups, *weights), strict=True))
 
 
-def carried_back(probability: np.ndarray, sampled: np.ndarray, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Labels (n,) and not-roof probability (n,) of all `xyz` from the nearest of the `sampled` points.
+def carried_back(
+    probability: np.ndarray, sampled: np.ndarray, xyz: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Labels (n,) and not-roof probability (n,) of all `xyz` from the nearest of the `sampled`
+    points.
 
-    `probability` (m, types + 1), not-roof last; the mean of the three nearest weighted by inverse distance, in pieces,
-    so that memory beyond the result is bounded.
+    `probability` (m, types + 1), not-roof last; the mean of the three nearest weighted by inverse
+    distance, in pieces, so that memory beyond the result is bounded.
     """
     from scipy.spatial import cKDTree
 
@@ -164,7 +189,9 @@ def carried_back(probability: np.ndarray, sampled: np.ndarray, xyz: np.ndarray) 
         piece = slice(start, start + CARRIED_CHUNK)
         distance, index = tree.query(xyz[piece], k=min(CARRIED_NEIGHBOURS, len(sampled)))
         weight = 1.0 / (distance + 1e-3)
-        mean = np.einsum("nk,nkc->nc", weight / weight.sum(axis=1, keepdims=True), probability[index])
+        mean = np.einsum(
+            "nk,nkc->nc", weight / weight.sum(axis=1, keepdims=True), probability[index]
+        )
         not_roof[piece] = mean[:, -1]
         labels[piece] = np.where(mean[:, -1] > 0.5, NOT_ROOF, mean[:, :-1].argmax(axis=1))
     return labels, not_roof
@@ -174,7 +201,9 @@ def checked_points(points: np.ndarray) -> np.ndarray:
     """`points` as float64 (n, 3) in a frame of their own. Raises as `segment` does."""
     xyz = np.asarray(points)
     if xyz.ndim != 2 or xyz.shape[1] < 3 or not np.issubdtype(xyz.dtype, np.number):
-        raise InputError(f"expected points as an (n, 3) array of numbers, got shape {xyz.shape} of {xyz.dtype}")
+        raise InputError(
+            f"expected points as an (n, 3) array of numbers, got shape {xyz.shape} of {xyz.dtype}"
+        )
     if len(xyz) < FEWEST_POINTS:
         raise FitError(
             f"expected at least {FEWEST_POINTS} points to recognise a roof, got {len(xyz)}; "
@@ -183,42 +212,58 @@ def checked_points(points: np.ndarray) -> np.ndarray:
     xyz = xyz[:, :3].astype(float)
     finite = np.isfinite(xyz).all(axis=1)
     if not finite.all():
-        raise FitError(f"expected finite coordinates, got NaN or infinity in {np.sum(~finite)} of {len(xyz)} points")
+        raise FitError(
+            f"expected finite coordinates, got NaN or infinity in {np.sum(~finite)} of {len(xyz)} "
+            "points"
+        )
     if np.ptp(xyz[:, :2], axis=0).max() < 1e-6:
-        raise FitError(f"expected points spread over a roof, got {counted(len(xyz), 'point')} all in one place")
+        raise FitError(
+            f"expected points spread over a roof, got {counted(len(xyz), 'point')} all in one place"
+        )
     return xyz - xyz[0]
 
 
 @lru_cache(maxsize=4)
 def load(weights: str, device: str = "cpu") -> Model:
-    """The network in the ONNX file `weights`, loaded once a process, on one thread. Raises as `segment` does."""
+    """The network in the ONNX file `weights`, loaded once a process, on one thread.
+
+    Raises as `segment` does.
+    """
     onnxruntime = import_onnxruntime()
     if device == "cuda" and "CUDAExecutionProvider" not in onnxruntime.get_available_providers():
         found = ", ".join(onnxruntime.get_available_providers())
         raise SettingsError(
-            f"expected a CUDA device for segment.device = 'cuda', but ONNX Runtime here offers only {found}; "
+            "expected a CUDA device for segment.device = 'cuda', but ONNX Runtime here offers "
+            f"only {found}; "
             "install onnxruntime-gpu or set it to 'cpu'"
         )
     if not Path(weights).is_file():
         raise InputError(
-            f"expected the network's weights at {weights}, but there is no such file; install hiproof again, "
+            f"expected the network's weights at {weights}, but there is no such file; install "
+            "hiproof again, "
             "name another ONNX file in segment.weights, or reconstruct without the network"
         )
     options = onnxruntime.SessionOptions()
     options.intra_op_num_threads = options.inter_op_num_threads = 1
     options.log_severity_level = 4
-    providers = ["CUDAExecutionProvider", "CPUExecutionProvider"] if device == "cuda" else ["CPUExecutionProvider"]
+    providers = (
+        ["CUDAExecutionProvider", "CPUExecutionProvider"]
+        if device == "cuda"
+        else ["CPUExecutionProvider"]
+    )
     try:
         session = onnxruntime.InferenceSession(weights, options, providers=providers)
         metadata = session.get_modelmeta().custom_metadata_map
     except Exception as error:
         raise InputError(
-            f"expected an ONNX network in {weights}, got a file ONNX Runtime cannot read ({first_line(error)}); "
+            f"expected an ONNX network in {weights}, got a file ONNX Runtime cannot read "
+            f"({first_line(error)}); "
             "install hiproof again or export the network anew with `hiproof train`"
         ) from error
     if metadata.get("format") != FORMAT:
         raise InputError(
-            f"expected an ONNX file of the kind {FORMAT!r} in {weights}, got {metadata.get('format', 'another network')!r}; "
+            f"expected an ONNX file of the kind {FORMAT!r} in {weights}, got "
+            f"{metadata.get('format', 'another network')!r}; "
             "use a file written by this version's `hiproof train`"
         )
     layout = json.loads(metadata["layout"])
@@ -228,7 +273,10 @@ def load(weights: str, device: str = "cpu") -> Model:
 
 
 def import_onnxruntime(otherwise: str = "") -> Any:
-    """What runs the network. Raises InputError where it is missing, with how to do without it, if that can be."""
+    """What runs the network.
+
+    Raises InputError where it is missing, with how to do without it, if that can be.
+    """
     return needed("onnxruntime", "network", "recognising roofs", otherwise)
 
 

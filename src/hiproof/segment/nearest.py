@@ -1,4 +1,6 @@
-"""What a roof type is to a network that knows fewer: the first type that it knows of the same CityGML code."""
+"""What a roof type is to a network that knows fewer: the first type that it knows of the same
+CityGML code.
+"""
 
 from __future__ import annotations
 
@@ -17,4 +19,7 @@ def nearest_of(name: str, known: Iterable[str]) -> str:
     if name in known or name not in CATALOGUE:
         return name
     code = CATALOGUE[name].citygml_code
-    return next((other for other in known if other in CATALOGUE and CATALOGUE[other].citygml_code == code), name)
+    return next(
+        (other for other in known if other in CATALOGUE and CATALOGUE[other].citygml_code == code),
+        name,
+    )

@@ -1,4 +1,6 @@
-"""Prior times evidence: the network's probabilities and the fits' BIC into the posterior of the roof type."""
+"""Prior times evidence: the network's probabilities and the fits' BIC into the posterior of the
+roof type.
+"""
 
 from __future__ import annotations
 
@@ -12,16 +14,18 @@ from .nearest import nearest_of
 if TYPE_CHECKING:
     from ..model import Fit
 
-# Calibrated on simulated buildings of 2-10 points/m2 and on scanned real shapes (`python -m benchmarks.segment
-# --calibrate`). The evidence is tempered because it counts the points as independent and the roof as exactly of its
-# type, and real roofs are neither.
+# Calibrated on simulated buildings of 2-10 points/m2 and on scanned real shapes (`python -m
+# benchmarks.segment --calibrate`). The evidence is tempered because it counts the points as
+# independent and the roof as exactly of its type, and real roofs are neither.
 EVIDENCE_EXPONENT = 0.1
 SMALLEST_PRIOR = 1e-4  # probability; the network is never so sure that evidence cannot overrule it
-# A type missing from the BICs was given up by the fit as far behind. How far is not known, and an annex or a dormer
-# alone can set a type back so much that it says little: it counts as this many nats behind the best.
+# A type missing from the BICs was given up by the fit as far behind. How far is not known, and an
+# annex or a dormer alone can set a type back so much that it says little: it counts as this many
+# nats behind the best.
 GIVEN_UP_NATS, GIVEN_UP_NATS_A_POINT = 2.0, 0.006
-# The network may name a roof against the evidence, but a shape that lies farther from the points than the evidence's
-# by more than this is not built: a gable over a house and its porch is named so and fits neither.
+# The network may name a roof against the evidence, but a shape that lies farther from the points
+# than the evidence's by more than this is not built: a gable over a house and its porch is named so
+# and fits neither.
 FARTHER_AT_MOST_M = 0.01
 OUTLIER_DISTANCE_M = 1.0  # m from the roof at which an outlier is counted when fits are compared
 
@@ -34,11 +38,12 @@ def combine(
 ) -> dict[str, float]:
     """Posterior probability of every roof type, best first.
 
-    `types` the network's probability by type, `bics` by type from `Fit.bics` (lower is better, on the scale of twice a
-    negative log-likelihood, without a prior in them) of a fit to `points` points; posterior proportional to
-    prior * exp(-BIC / 2)^b. A type the fit gave up gets a BIC some way behind the best; one the network does not know
-    the prior of the nearest that it does; one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the posterior,
-    and without `types` the evidence alone counts.
+    `types` the network's probability by type, `bics` by type from `Fit.bics` (lower is better, on
+    the scale of twice a negative log-likelihood, without a prior in them) of a fit to `points`
+    points; posterior proportional to prior * exp(-BIC / 2)^b. A type the fit gave up gets a BIC
+    some way behind the best; one the network does not know the prior of the nearest that it does;
+    one of probability 0 that was not fitted is left out. Without finite `bics` the prior is the
+    posterior, and without `types` the evidence alone counts.
 
     >>> combine({"gable": 0.5, "hip": 0.5}, {"gable": 100.0, "hip": 260.0})["gable"] > 0.9
     True
@@ -51,9 +56,13 @@ def combine(
         names = names if types else list(known)
     if not names:
         return {}
-    given_up = min(known.values(), default=0.0) + 2 * (GIVEN_UP_NATS + GIVEN_UP_NATS_A_POINT * points)
+    given_up = min(known.values(), default=0.0) + 2 * (
+        GIVEN_UP_NATS + GIVEN_UP_NATS_A_POINT * points
+    )
     bic = np.array([known.get(name, given_up) for name in names])
-    log_posterior = np.array(list(log_prior(types, tuple(names)).values())) - evidence_exponent * bic / 2
+    log_posterior = (
+        np.array(list(log_prior(types, tuple(names)).values())) - evidence_exponent * bic / 2
+    )
     posterior = np.exp(log_posterior - log_posterior.max())
     posterior /= posterior.sum()
     ranked = np.argsort(-posterior, kind="stable")
@@ -61,24 +70,34 @@ def combine(
 
 
 def log_prior(types: dict[str, float], names: tuple[str, ...] = ()) -> dict[str, float]:
-    """Natural logarithm of the network's probability of each of `names` (all of `types` by default), bounded below.
+    """Natural logarithm of the network's probability of each of `names` (all of `types` by
+    default), bounded below.
 
     A network may be wrong with confidence; no evidence could undo a prior of zero.
     """
-    return {name: float(np.log(max(prior_of(name, types), SMALLEST_PRIOR))) for name in names or tuple(types)}
+    return {
+        name: float(np.log(max(prior_of(name, types), SMALLEST_PRIOR)))
+        for name in names or tuple(types)
+    }
 
 
 def prior_of(name: str, types: dict[str, float]) -> float:
-    """The probability of a type; of one that the network does not know that of the nearest, else the mean."""
+    """The probability of a type; of one that the network does not know that of the nearest, else
+    the mean.
+    """
     return types.get(nearest_of(name, types), 1.0 / max(len(types), 1))
 
 
-def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]) -> tuple[Fit, dict[str, float]]:
+def most_probable(
+    fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]
+) -> tuple[Fit, dict[str, float]]:
     """The fit to build, and the posterior by type, best first.
 
-    It is the fit of the type with the highest posterior, unless its roof lies clearly farther from the points than the
-    most evident one: then that. (By the paper's objective, which knows no outliers, the type decides.) `fit` fits a roof of the types named (empty: all of them), such as `fit_roof` with its
-    points bound; it is called a second time only where the network disagrees with the evidence.
+    It is the fit of the type with the highest posterior, unless its roof lies clearly farther from
+    the points than the most evident one: then that. (By the paper's objective, which knows no
+    outliers, the type decides.) `fit` fits a roof of the types named (empty: all of them), such as
+    `fit_roof` with its points bound; it is called a second time only where the network disagrees
+    with the evidence.
     """
     found = fit(())
     posterior = combine(types, found.bics, found.points_used)
@@ -92,6 +111,8 @@ def most_probable(fit: Callable[[tuple[str, ...]], Fit], types: dict[str, float]
 
 
 def expected_distance(fit: Fit) -> float:
-    """Mean distance (m) of a fit's points from its roof by its own account of noise and outliers."""
+    """Mean distance (m) of a fit's points from its roof by its own account of noise and
+    outliers.
+    """
     on_roof = np.sqrt(2 / np.pi) * fit.noise_m  # mean of the absolute value of a normal
     return (1 - fit.outlier_share) * on_roof + fit.outlier_share * OUTLIER_DISTANCE_M

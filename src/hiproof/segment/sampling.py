@@ -1,6 +1,8 @@
-"""Compiled arrangement of a cloud: the parts of PointNet++ that choose, describe and group points and carry no weights.
+"""Compiled arrangement of a cloud: the parts of PointNet++ that choose, describe and group points
+and carry no weights.
 
-`arranged` is the one entry; everything it calls is compiled into it, so that a process loads one function.
+`arranged` is the one entry; everything it calls is compiled into it, so that a process loads one
+function.
 """
 
 from __future__ import annotations
@@ -24,21 +26,24 @@ FEATURES = (
     "offset_y",
     "spacing",
 )
-POSITION_SCALE = (10.0, 10.0, 5.0)  # m that positions are divided by: an ordinary house lies within 1
+# m that positions are divided by: an ordinary house lies within 1
+POSITION_SCALE = (10.0, 10.0, 5.0)
 SURFACE_NEIGHBOURS = 10  # points that tell a point's normal and roughness
 BALL_FACTOR = 2.0  # radius of a neighbourhood over the spacing of its level's points
 INTERPOLATED = 3  # points that a feature is carried back from, as in PointNet++
-HARMONIC_WIDTH = math.radians(12.0)  # rad; slopes further off the peak say nothing of the building's axes
+# rad; slopes further off the peak say nothing of the building's axes
+HARMONIC_WIDTH = math.radians(12.0)
 
 
 @compiled
 def arranged(xyz, count, level1, level2, level3, group_size):
     """Everything the network takes of a cloud `xyz` (n, 3), metres about an origin near it, n >= 1.
 
-    `count` points are chosen, of which each level keeps a prefix; where n is smaller, they repeat from the start.
-    Returns the `order` of the choice (min(count, n),), indices into `xyz`; `features` (count, 11) float32, named by
-    FEATURES; `groups` of the three levels, (level, group_size) indices into the level above; their `radii` (3,) float32,
-    metres; and for the way back (level1, 3) indices into level 3 and (count, 3) into level 1, with their weights.
+    `count` points are chosen, of which each level keeps a prefix; where n is smaller, they repeat
+    from the start. Returns the `order` of the choice (min(count, n),), indices into `xyz`;
+    `features` (count, 11) float32, named by FEATURES; `groups` of the three levels, (level,
+    group_size) indices into the level above; their `radii` (3,) float32, metres; and for the way
+    back (level1, 3) indices into level 3 and (count, 3) into level 1, with their weights.
     """
     x, y, z = xyz[:, 0].copy(), xyz[:, 1].copy(), xyz[:, 2].copy()
     order, cover, nearest, reach = farthest_points(x, y, z, count)
@@ -67,7 +72,9 @@ def arranged(xyz, count, level1, level2, level3, group_size):
 
 @compiled
 def described(x, y, z, surface, spacing, count):
-    """Features (count, 11) of points (s,) and their `surface` (s, 7) in the building's own axes, repeated to `count`."""
+    """Features (count, 11) of points (s,) and their `surface` (s, 7) in the building's own axes,
+    repeated to `count`.
+    """
     cosine, sine = canonical_axes(x, y, surface)
     features = np.empty((count, len(FEATURES)), np.float32)
     for row in range(count):
@@ -90,10 +97,11 @@ def described(x, y, z, surface, spacing, count):
 def farthest_points(x, y, z, count):
     """Farthest-point sampling of n points: a prefix of the order is a coarser sample.
 
-    The first is the farthest from the centroid, so that the order depends neither on the points' order nor on the
-    frame. Returns `order` (min(count, n),); `cover`, the largest distance of any point to its nearest chosen one after
-    each choice (metres); and, as the distances from each choice are known anyway, the indices `nearest` of its
-    SURFACE_NEIGHBOURS nearest points, itself among them, with `reach`, the distance of the farthest of these.
+    The first is the farthest from the centroid, so that the order depends neither on the points'
+    order nor on the frame. Returns `order` (min(count, n),); `cover`, the largest distance of any
+    point to its nearest chosen one after each choice (metres); and, as the distances from each
+    choice are known anyway, the indices `nearest` of its SURFACE_NEIGHBOURS nearest points, itself
+    among them, with `reach`, the distance of the farthest of these.
     """
     n = len(x)
     count, keep = min(count, n), min(SURFACE_NEIGHBOURS, n)
@@ -109,7 +117,8 @@ def farthest_points(x, y, z, count):
         farthest = cover_from(x, y, z, current, away, uncovered, bits)
         shortest[:] = np.inf
         last = np.inf
-        # Clouds often come sorted by place: from the point outwards few others are nearer than the last one kept.
+        # Clouds often come sorted by place: from the point outwards few others are nearer than the
+        # last one kept.
         for start, stop, step in ((current, n, 1), (current - 1, -1, -1)):
             for i in range(start, stop, step):
                 if away[i] < last:
@@ -124,8 +133,10 @@ def farthest_points(x, y, z, count):
 
 @compiled
 def cover_from(x, y, z, current, away, uncovered, bits):
-    """Squared distances of all points from the `current` one into `away`, and into `uncovered` those from the nearest
-    chosen one, the largest of whose `bits` are returned: LLVM compares several integers at a time, but not floats."""
+    """Squared distances of all points from the `current` one into `away`, and into `uncovered`
+    those from the nearest chosen one, the largest of whose `bits` are returned: LLVM compares
+    several integers at a time, but not floats.
+    """
     cx, cy, cz = x[current], y[current], z[current]
     for i in range(len(x)):
         away[i] = (x[i] - cx) ** 2 + (y[i] - cy) ** 2 + (z[i] - cz) ** 2
@@ -150,8 +161,9 @@ def insert(shortest, indices, place, distance, index):
 def local_surfaces(x, y, z, order, nearest, reach):
     """What the `nearest` (s, k) points around each of `order` (s,) say, as rows of seven.
 
-    The upward normal of their plane (3), the roughness across it (m), the point's height above their mean along it
-    (convexity, m), and the plan vector to their mean over their `reach` (2): long at the cloud's border.
+    The upward normal of their plane (3), the roughness across it (m), the point's height above
+    their mean along it (convexity, m), and the plan vector to their mean over their `reach` (2):
+    long at the cloud's border.
     """
     surface = np.empty((len(order), 7))
     for s in range(len(order)):
@@ -168,15 +180,20 @@ def local_surfaces(x, y, z, order, nearest, reach):
         surface[s, 0], surface[s, 1], surface[s, 2] = nx, ny, nz
         surface[s, 3] = math.sqrt(max(variance, 0.0))
         surface[s, 4] = (x[i] - mx) * nx + (y[i] - my) * ny + (z[i] - mz) * nz
-        surface[s, 5], surface[s, 6] = (mx - x[i]) / max(reach[s], 1e-6), (my - y[i]) / max(reach[s], 1e-6)
+        surface[s, 5], surface[s, 6] = (
+            (mx - x[i]) / max(reach[s], 1e-6),
+            (my - y[i]) / max(reach[s], 1e-6),
+        )
     return surface
 
 
 @compiled
 def plane_normal(xx, xy, xz, yy, yz, zz):
-    """Upward unit eigenvector of the smallest eigenvalue of a covariance, and that eigenvalue (Smith 1961).
+    """Upward unit eigenvector of the smallest eigenvalue of a covariance, and that eigenvalue
+    (Smith 1961).
 
-    Points in one place or on a line have no plane: their normal would be a draw of the rounding, so call it vertical.
+    Points in one place or on a line have no plane: their normal would be a draw of the rounding, so
+    call it vertical.
     """
     mean = (xx + yy + zz) / 3
     aside = xy * xy + xz * xz + yz * yz
@@ -191,7 +208,8 @@ def plane_normal(xx, xy, xz, yy, yz, zz):
     smallest = mean + 2 * scale * math.cos(angle + 2 * math.pi / 3)
     if 3 * mean - largest - smallest < 1e-6 * largest + 1e-9:
         return 0.0, 0.0, 1.0, max(smallest, 0.0)
-    # The eigenvector is normal to the rows of C - smallest: the longest of their cross products is the surest.
+    # The eigenvector is normal to the rows of C - smallest: the longest of their cross products is
+    # the surest.
     a, b, c = xx - smallest, yy - smallest, zz - smallest
     best, nx, ny, nz = 0.0, 0.0, 0.0, 1.0
     for ux, uy, uz in (
@@ -212,9 +230,10 @@ def plane_normal(xx, xy, xz, yy, yz, zz):
 def canonical_axes(x, y, surface):
     """Cosine and sine of the building's own direction in plan, in the full circle.
 
-    Up to quarter turns it is the four-fold harmonic of the normals' azimuths (slopes and walls both point along a
-    roof's axes; rough neighbourhoods, trees and edges, count less), re-weighted twice; then its first axis is the one
-    along which the points spread more, and points to the side to which the roof falls more.
+    Up to quarter turns it is the four-fold harmonic of the normals' azimuths (slopes and walls both
+    point along a roof's axes; rough neighbourhoods, trees and edges, count less), re-weighted
+    twice; then its first axis is the one along which the points spread more, and points to the side
+    to which the roof falls more.
     """
     n = len(surface)
     weight, azimuth = np.empty(n), np.empty(n)
@@ -227,8 +246,13 @@ def canonical_axes(x, y, surface):
         for s in range(n):
             aside = azimuth[s] - kappa
             aside -= math.pi / 2 * round(aside / (math.pi / 2))
-            near = weight[s] if turn == 0 else weight[s] * math.exp(-((aside / HARMONIC_WIDTH) ** 2))
-            real, imaginary = real + near * math.cos(4 * aside), imaginary + near * math.sin(4 * aside)
+            near = (
+                weight[s] if turn == 0 else weight[s] * math.exp(-((aside / HARMONIC_WIDTH) ** 2))
+            )
+            real, imaginary = (
+                real + near * math.cos(4 * aside),
+                imaginary + near * math.sin(4 * aside),
+            )
         kappa += math.atan2(imaginary, real) / 4
     cosine, sine = math.cos(kappa), math.sin(kappa)
     if np.var(cosine * y - sine * x) > np.var(cosine * x + sine * y):
@@ -242,11 +266,12 @@ def canonical_axes(x, y, surface):
 
 @compiled
 def grouped(x, y, z, centres, sources, count, radius):
-    """The nearest `count` of the first `sources` points within `radius` of each of the first `centres`, which repeat
-    from the start where the points end: indices and distances (centres, count).
+    """The nearest `count` of the first `sources` points within `radius` of each of the first
+    `centres`, which repeat from the start where the points end: indices and distances (centres,
+    count).
 
-    Missing neighbours repeat the nearest one, which a maximum over the group does not notice. Every ball must hold a
-    source, as it does where the centres are among them.
+    Missing neighbours repeat the nearest one, which a maximum over the group does not notice. Every
+    ball must hold a source, as it does where the centres are among them.
     """
     indices, distances = np.zeros((centres, count), np.int64), np.empty((centres, count))
     away, shortest = np.empty(sources), np.empty(count)
@@ -277,10 +302,11 @@ def inverse_shares(distances):
 
 
 def thin_to_grid(xyz, count, chunk=500_000):
-    """Indices of one point a grid cell, the cell chosen so that about `count` or fewer of `xyz` (n, 3) remain.
+    """Indices of one point a grid cell, the cell chosen so that about `count` or fewer of `xyz` (n,
+    3) remain.
 
-    Works in pieces of `chunk` points, so that memory beyond the input is bounded. Clouds of `count` points or fewer
-    are kept whole.
+    Works in pieces of `chunk` points, so that memory beyond the input is bounded. Clouds of `count`
+    points or fewer are kept whole.
     """
     n = len(xyz)
     if n <= count:
@@ -301,7 +327,9 @@ def first_of_each_cell(xyz, low, cell, chunk):
     kept = []
     for start in range(0, len(xyz), chunk):
         steps = np.floor((xyz[start : start + chunk] - low) / cell).astype(np.int64)
-        keys, first = np.unique((steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_index=True)
+        keys, first = np.unique(
+            (steps[:, 0] << 42) + (steps[:, 1] << 21) + steps[:, 2], return_index=True
+        )
         new = ~np.isin(keys, seen, assume_unique=True)
         seen = np.union1d(seen, keys[new])
         kept.append(start + first[new])

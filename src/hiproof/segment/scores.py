@@ -1,4 +1,6 @@
-"""Figures of a classification: confusion matrix, accuracy, balanced accuracy, recalls, mean intersection over union."""
+"""Figures of a classification: confusion matrix, accuracy, balanced accuracy, recalls, mean
+intersection over union.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +11,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Scores:
-    """What a confusion matrix (true, told) of classes `names` says; classes that never occur count nowhere.
+    """What a confusion matrix (true, told) of classes `names` says; classes that never occur count
+    nowhere.
 
     >>> scores = Scores.of(np.array([0, 0, 1, 1]), np.array([0, 0, 1, 0]), ("flat", "gable"))
     >>> scores.accuracy, scores.balanced_accuracy, scores.lowest_recall
@@ -34,7 +37,11 @@ class Scores:
     def recalls(self) -> dict[str, float]:
         """Share of each true class told rightly, of those that occur."""
         truths = self.confusion.sum(axis=1)
-        return {name: float(self.confusion[i, i] / truths[i]) for i, name in enumerate(self.names) if truths[i]}
+        return {
+            name: float(self.confusion[i, i] / truths[i])
+            for i, name in enumerate(self.names)
+            if truths[i]
+        }
 
     @property
     def balanced_accuracy(self) -> float:

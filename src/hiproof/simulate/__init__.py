@@ -1,8 +1,9 @@
-"""Roofs whose truth is known and an airborne scanner over them: for training, experiments, tests and the demo.
+"""Roofs whose truth is known and an airborne scanner over them: for training, experiments, tests
+and the demo.
 
 building = random_building(rng, "hip")          one primitive (roofs, shapes) ...
 building = random_compound(rng, "L")            ... or several (compounds)
-cloud = scan(building, rng, ScanSettings())     labelled points (scene -> flight -> raycast -> scanner)
+cloud = scan(building, rng, ScanSettings()) labelled points (scene -> flight -> raycast -> scanner)
 points, labels, type = training_sample(rng)     the same for a network (training)
 
 town             houses along streets on hilly ground (relief), with what stands around them

@@ -8,12 +8,17 @@ import typer
 from ..errors import HiproofError
 from ..log import counted
 
-app = typer.Typer(add_completion=False, no_args_is_help=True, help="Simulated towns with their truth.")
+app = typer.Typer(
+    add_completion=False, no_args_is_help=True, help="Simulated towns with their truth."
+)
 
 
 @app.command()
 def neighbourhood(
-    out: Annotated[Path, typer.Argument(help="folder for cloud.laz, footprints.gpkg, terrain.tif and truth.json")],
+    out: Annotated[
+        Path,
+        typer.Argument(help="folder for cloud.laz, footprints.gpkg, terrain.tif and truth.json"),
+    ],
     seed: Annotated[int, typer.Option(help="the same seed gives the same neighbourhood")] = 5,
 ) -> None:
     """The demo's neighbourhood: every roof type and several compounds."""
@@ -24,12 +29,16 @@ def neighbourhood(
     except HiproofError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error
-    typer.echo(f"{counted(counts['buildings'], 'building')}, {counted(counts['points'], 'point')} in {out}")
+    typer.echo(
+        f"{counted(counts['buildings'], 'building')}, {counted(counts['points'], 'point')} in {out}"
+    )
 
 
 @app.command()
 def city(
-    out: Annotated[Path, typer.Argument(help="new folder for tiles/*.laz, footprints.gpkg and truth.jsonl")],
+    out: Annotated[
+        Path, typer.Argument(help="new folder for tiles/*.laz, footprints.gpkg and truth.jsonl")
+    ],
     buildings: Annotated[int, typer.Option(help="how many buildings")] = 10000,
     density: Annotated[float, typer.Option(help="points per square metre")] = 5.0,
     tile: Annotated[float, typer.Option(help="side of a tile in metres")] = 500.0,
@@ -42,7 +51,10 @@ def city(
     try:
         for counts in write_city(out, City(buildings, seed, density, tile)):
             total += counts.points
-            typer.echo(f"{counts.tile}: {counted(counts.buildings, 'building')}, {counted(counts.points, 'point')}")
+            typer.echo(
+                f"{counts.tile}: {counted(counts.buildings, 'building')}, "
+                f"{counted(counts.points, 'point')}"
+            )
     except HiproofError as error:
         typer.echo(f"error: {error}", err=True)
         raise typer.Exit(2) from error

@@ -1,7 +1,8 @@
-"""A simulated city of any size, made tile by tile: street blocks of houses and works on hills, surveyed from the air.
+"""A simulated city of any size, made tile by tile: street blocks of houses and works on hills,
+surveyed from the air.
 
-Every block is drawn from a seed of its own, so a tile needs only the blocks that reach into it: memory stays that of
-one tile, and a tile is the same whatever else is made.
+Every block is drawn from a seed of its own, so a tile needs only the blocks that reach into it:
+memory stays that of one tile, and a tile is the same whatever else is made.
 """
 
 from __future__ import annotations
@@ -25,7 +26,8 @@ from .town import Lot, furnished, street_side
 
 ORIGIN_XY = np.array([95000.0, 455000.0])
 GROUND_M = 15.0  # m, heights of hills over valleys
-HEADING = math.radians(11.0)  # rad; streets along no axis, so that nothing leans on the axes by chance
+# rad; streets along no axis, so that nothing leans on the axes by chance
+HEADING = math.radians(11.0)
 BLOCK_M = np.array([100.0, 64.0])
 STREET_M = 10.0  # m between blocks, pavements included
 BUILDINGS_A_BLOCK = 9.6  # on average, from which a city's number of blocks is told
@@ -54,14 +56,23 @@ HOUSES = {
     "winged_hip": 0.01,
     "L_of_hips": 0.02,
 }
-WORKS = {"shed": 0.35, "saw_tooth_hall": 0.15, "flat": 0.2, "two_level": 0.15, "monopitch": 0.1, "U": 0.05}
+WORKS = {
+    "shed": 0.35,
+    "saw_tooth_hall": 0.15,
+    "flat": 0.2,
+    "two_level": 0.15,
+    "monopitch": 0.1,
+    "U": 0.05,
+}
 
 
 @dataclass(frozen=True)
 class City:
-    """The first `buildings` buildings of the endless city of `seed`, surveyed at `density` (points/m2).
+    """The first `buildings` buildings of the endless city of `seed`, surveyed at `density`
+    (points/m2).
 
-    Blocks lie in rows of `blocks_a_row`; block (i, j) is the same in every city of that seed, whatever its size.
+    Blocks lie in rows of `blocks_a_row`; block (i, j) is the same in every city of that seed,
+    whatever its size.
     """
 
     buildings: int
@@ -71,11 +82,15 @@ class City:
 
     def __post_init__(self) -> None:
         if not 1 <= self.buildings <= 10_000_000:
-            raise InputError(f"expected 1 to 10000000 buildings, got {self.buildings}; 10000 is a small city")
+            raise InputError(
+                f"expected 1 to 10000000 buildings, got {self.buildings}; 10000 is a small city"
+            )
         if not 50.0 <= self.tile_m <= 5000.0:
             raise InputError(f"expected tiles of 50 to 5000 m, got {self.tile_m}; 500 is usual")
         if not 0.1 <= self.density <= 100.0:
-            raise InputError(f"expected a density of 0.1 to 100 points/m2, got {self.density}; 1 to 20 is usual")
+            raise InputError(
+                f"expected a density of 0.1 to 100 points/m2, got {self.density}; 1 to 20 is usual"
+            )
 
     @property
     def blocks_a_row(self) -> int:
@@ -102,7 +117,9 @@ def block_buildings(seed: int, i: int, j: int, terrain: Relief) -> list[SimBuild
     opposite = corner + turned(np.array([[length, depth]]), HEADING)[0]
     half = depth / 2 - 1.0
     front = street_side(rng, drawn_names(rng, HOUSES), corner, HEADING, length, half, terrain)
-    back = street_side(rng, drawn_names(rng, HOUSES), opposite, HEADING + math.pi, length, half, terrain)
+    back = street_side(
+        rng, drawn_names(rng, HOUSES), opposite, HEADING + math.pi, length, half, terrain
+    )
     return front + back
 
 
@@ -114,14 +131,18 @@ def drawn_names(rng: np.random.Generator, weights: dict[str, float]) -> Iterator
 
 
 class Stock:
-    """Which buildings stand in which block, known by number alone; the buildings are drawn again when asked for."""
+    """Which buildings stand in which block, known by number alone; the buildings are drawn again
+    when asked for.
+    """
 
     def __init__(self, city: City):
         self.city, self.terrain = city, city.terrain
         self.blocks, self.first = self.counted()
         corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1)]) * BLOCK_M
         lower = np.array(self.blocks) * BLOCK_M
-        plan = turned((lower[:, None] + corners).reshape(-1, 2), HEADING).reshape(-1, 4, 2) + ORIGIN_XY
+        plan = (
+            turned((lower[:, None] + corners).reshape(-1, 2), HEADING).reshape(-1, 4, 2) + ORIGIN_XY
+        )
         self.low, self.high = plan.min(axis=1), plan.max(axis=1)
         self.lots = lru_cache(maxsize=CACHED_BLOCKS)(self.lots_of)
 
@@ -137,7 +158,10 @@ class Stock:
         return blocks, first
 
     def lots_of(self, block: int) -> tuple[Lot, ...]:
-        """The lots of a block, drawn by its number alone; `lots` keeps those of the blocks asked for last."""
+        """The lots of a block, drawn by its number alone;
+
+        `lots` keeps those of the blocks asked for last.
+        """
         start, seed, (i, j) = self.first[block], self.city.seed, self.blocks[block]
         buildings = block_buildings(seed, i, j, self.terrain)[: self.city.buildings - start]
         return tuple(
@@ -146,7 +170,9 @@ class Stock:
         )
 
     def blocks_near(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-        """Numbers of the blocks that reach within SURROUNDINGS_M of the rectangle from `low` to `high` (2,)."""
+        """Numbers of the blocks that reach within SURROUNDINGS_M of the rectangle from `low` to
+        `high` (2,).
+        """
         is_near = (self.low < high + SURROUNDINGS_M) & (self.high > low - SURROUNDINGS_M)
         return np.flatnonzero(is_near.all(axis=1))
 
@@ -180,13 +206,16 @@ class Written(NamedTuple):
 def write_city(folder: Path, city: City) -> Iterator[Written]:
     """Write tiles/*.laz, footprints.gpkg and truth.jsonl to `folder`; yields what each tile holds.
 
-    Each building is in footprints and truth once, with the tile its frame's origin lies in. Raises OutputError where
-    the folder cannot be written or already holds a city.
+    Each building is in footprints and truth once, with the tile its frame's origin lies in. Raises
+    OutputError where the folder cannot be written or already holds a city.
     """
     stock, settings = Stock(city), ScanSettings(density=city.density)
     footprints, truth = folder / "footprints.gpkg", folder / "truth.jsonl"
     if footprints.exists() or truth.exists():
-        raise OutputError(f"expected a folder without a city in it, got {folder}; remove its files or choose another")
+        raise OutputError(
+            f"expected a folder without a city in it, got {folder}; remove its files or choose "
+            "another"
+        )
     try:
         (folder / "tiles").mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -196,13 +225,18 @@ def write_city(folder: Path, city: City) -> Iterator[Written]:
     for bounds in stock.tiles():
         name = f"{bounds[0]:.0f}_{bounds[1]:.0f}"
         lots = stock.near(bounds)
-        clouds = survey(stock.patches(bounds), lots, stock.terrain, city.flight, city.seed, settings)
+        clouds = survey(
+            stock.patches(bounds), lots, stock.terrain, city.flight, city.seed, settings
+        )
         points = write_laz(folder / "tiles" / f"{name}.laz", clouds, np.array([*bounds[:2], 0.0]))
         own = [lot for lot in lots if holds(bounds, lot)]
         if own:
             write_footprints(footprints, own, append=footprints.exists())
         with truth.open("a") as file:
-            file.writelines(json.dumps({"id": lot.id, "tile": name, **lot.building.truth()}) + "\n" for lot in own)
+            file.writelines(
+                json.dumps({"id": lot.id, "tile": name, **lot.building.truth()}) + "\n"
+                for lot in own
+            )
         yield Written(name, len(own), points)
 
 

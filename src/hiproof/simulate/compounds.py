@@ -1,7 +1,9 @@
-"""Compound buildings: wings, annexes, steps, rows and dormers, as the maximum of their parts' roofs.
+"""Compound buildings: wings, annexes, steps, rows and dormers, as the maximum of their parts'
+roofs.
 
-Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under the main roof as
-far as its ridge, so that the maximum of both makes the valley, and a dormer until its top is under the slope.
+Parts are laid out in the building's own (u, v) axes, u along the main ridge; a wing reaches under
+the main roof as far as its ridge, so that the maximum of both makes the valley, and a dormer until
+its top is under the slope.
 """
 
 from __future__ import annotations
@@ -33,12 +35,22 @@ DORMER_GAP_M, DORMER_BACK_M = 0.8, 0.3
 
 
 class Layout:
-    """The building's axes: parts are placed by their centre (u, v) and a number of quarter turns."""
+    """The building's axes: parts are placed by their centre (u, v) and a number of quarter
+    turns.
+    """
 
     def __init__(self, kappa: float):
         self.kappa = kappa
 
-    def part(self, type: str, parameters: dict[str, float], u: float, v: float, z: float, quarters: int = 0) -> Part:
+    def part(
+        self,
+        type: str,
+        parameters: dict[str, float],
+        u: float,
+        v: float,
+        z: float,
+        quarters: int = 0,
+    ) -> Part:
         cosine, sine = math.cos(self.kappa), math.sin(self.kappa)
         translation = np.array([cosine * u - sine * v, sine * u + cosine * v, z])
         return make_part(type, parameters, self.kappa + quarters * math.pi / 2, translation)
@@ -50,10 +62,11 @@ def random_compound(
     origin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
     kappa: float | None = None,
 ) -> SimBuilding:
-    """A compound of `kind` (one of COMPOUND_KINDS; drawn when None) on the ground at `origin` (world).
+    """A compound of `kind` (one of COMPOUND_KINDS; drawn when None) on the ground at `origin`
+    (world).
 
-    L, L_of_hips, T, cross, extension, two_level and saw_tooth_hall have two parts, U and winged_hip three, a dormered
-    house two to five, a row three to six. Raises InputError for an unknown kind.
+    L, L_of_hips, T, cross, extension, two_level and saw_tooth_hall have two parts, U and winged_hip
+    three, a dormered house two to five, a row three to six. Raises InputError for an unknown kind.
 
     >>> len(random_compound(np.random.default_rng(0), "U").roof.parts)
     3
@@ -83,17 +96,28 @@ def winged(rng: np.random.Generator, layout: Layout, kind: str) -> list[Part]:
     step = rng.uniform(0.8, 2.5) if type == "flat" or rng.random() < 0.3 else 0.0
     parts = [main]
     for side in wings:
-        # A hip's inner end slopes down, so hipped wings cross the whole main body; gables stop under its ridge.
-        inner = -width / 2 - (reach if kind == "cross" else 0.0) if kind == "cross" or type == "hip" else 0.0
+        # A hip's inner end slopes down, so hipped wings cross the whole main body; gables stop
+        # under its ridge.
+        inner = (
+            -width / 2 - (reach if kind == "cross" else 0.0)
+            if kind == "cross" or type == "hip"
+            else 0.0
+        )
         outer = width / 2 + reach
         parameters = regular(type, outer - inner, wing_width, slope)
-        u = side * (length - wing_width) / 2 + (rng.uniform(-0.15, 0.15) * (length - wing_width) if side == 0 else 0.0)
-        parts.append(layout.part(type, parameters, u, (inner + outer) / 2, max(2.2, eave - step), quarters=1))
+        u = side * (length - wing_width) / 2 + (
+            rng.uniform(-0.15, 0.15) * (length - wing_width) if side == 0 else 0.0
+        )
+        parts.append(
+            layout.part(type, parameters, u, (inner + outer) / 2, max(2.2, eave - step), quarters=1)
+        )
     return parts
 
 
 def regular(type: str, length: float, width: float, slope: float) -> dict[str, float]:
-    """A gable, hip (all four slopes equal, longer than wide) or flat roof of given plan and slope."""
+    """A gable, hip (all four slopes equal, longer than wide) or flat roof of given plan and
+    slope.
+    """
     parameters = {"length": float(length), "width": float(width)}
     if type != "flat":
         parameters["height"] = float(width / 2 * slope)
@@ -103,14 +127,18 @@ def regular(type: str, length: float, width: float, slope: float) -> dict[str, f
 
 
 def extended(rng: np.random.Generator, layout: Layout) -> list[Part]:
-    """A house with a lower annex along its eave: a flat roof, or a lean-to that rises towards the house."""
+    """A house with a lower annex along its eave: a flat roof, or a lean-to that rises towards the
+    house.
+    """
     type = str(rng.choice(("gable", "hip", "half_hip", "mansard", "asymmetric_gable", "gambrel")))
     house, eave = random_parameters(rng, type), random_eave(rng) + 2.0
     depth, span = rng.uniform(2.5, 5.0), house["length"] * rng.uniform(0.4, 1.0)
     lean_to = rng.random() < 0.5
     rise = depth * math.tan(math.radians(rng.uniform(8, 25))) if lean_to else 0.0
     z = max(2.0, eave - rise - rng.uniform(0.3, 1.5))
-    annex = {"length": float(span), "width": float(depth)} | ({"height": float(rise)} if lean_to else {})
+    annex = {"length": float(span), "width": float(depth)} | (
+        {"height": float(rise)} if lean_to else {}
+    )
     u = rng.uniform(-0.5, 0.5) * (house["length"] - span)
     v = -(house["width"] + depth) / 2
     return [
@@ -127,7 +155,9 @@ def two_level_blocks(rng: np.random.Generator, layout: Layout) -> list[Part]:
     v = (low["width"] - high["width"]) / 2
     return [
         layout.part("flat", low, 0.0, 0.0, eave),
-        layout.part("flat", high, (low["length"] + high["length"]) / 2, v, eave + rng.uniform(1.2, 6.0)),
+        layout.part(
+            "flat", high, (low["length"] + high["length"]) / 2, v, eave + rng.uniform(1.2, 6.0)
+        ),
     ]
 
 
@@ -143,7 +173,9 @@ def saw_tooth_hall_and_office(rng: np.random.Generator, layout: Layout) -> list[
 
 
 def houses_in_a_row(rng: np.random.Generator, layout: Layout) -> list[Part]:
-    """Terraced houses: slices of one depth whose ridges run along the row, some stepped, now and then a flat one."""
+    """Terraced houses: slices of one depth whose ridges run along the row, some stepped, now and
+    then a flat one.
+    """
     count, depth = int(rng.integers(3, 7)), rng.uniform(7.5, 11.0)
     slope, eave, u = math.tan(math.radians(rng.uniform(28, 50))), random_eave(rng) + 1.0, 0.0
     parts = []
@@ -172,20 +204,26 @@ def dormered(rng: np.random.Generator, layout: Layout) -> list[Part]:
         v = side * (width / 2 - front - depth / 2)
         quarters = {"gable": 1, "flat": 0, "monopitch": 0 if side < 0 else 2}[shape]
         length, across = (depth, span) if shape == "gable" else (span, depth)
-        parameters = {"length": float(length), "width": float(across)} | ({"height": top[1]} if top[1] else {})
-        parts += [layout.part(shape, parameters, float(u), v, eave + top[0], quarters) for u in centres]
+        parameters = {"length": float(length), "width": float(across)} | (
+            {"height": top[1]} if top[1] else {}
+        )
+        parts += [
+            layout.part(shape, parameters, float(u), v, eave + top[0], quarters) for u in centres
+        ]
     return parts
 
 
 def dormer(
     rng: np.random.Generator, span: float, slope: float, width: float
 ) -> tuple[str, float, float, tuple[float, float]]:
-    """Type, depth, distance of its front from the eave, and (eave over the house's eave, rise) of a dormer of `span` on
-    a roof of `width` and `slope`; its back ends under the slope."""
+    """Type, depth, distance of its front from the eave, and (eave over the house's eave, rise) of a
+    dormer of `span` on a roof of `width` and `slope`; its back ends under the slope.
+    """
     type = str(rng.choice(("gable", "flat", "monopitch"), p=(0.5, 0.25, 0.25)))
     front, own_slope = rng.uniform(0.6, 1.1), math.tan(math.radians(rng.uniform(6, 14)))
     rise = span / 2 * math.tan(math.radians(rng.uniform(25, 36))) if type == "gable" else 0.0
-    # The top stays half a metre under the house's ridge; the house's least width and slope leave a wall of 0.7 m.
+    # The top stays half a metre under the house's ridge; the house's least width and slope leave a
+    # wall of 0.7 m.
     wall = min(rng.uniform(1.1, 1.7), (width / 2 - front) * slope - rise - 0.5)
     meets = (wall + rise) / (slope - (own_slope if type == "monopitch" else 0.0))
     depth = min(meets + DORMER_BACK_M, width / 2 - front)
@@ -213,13 +251,22 @@ def winged_hip_roof(rng: np.random.Generator, layout: Layout) -> list[Part]:
 
 
 def hips_that_share_a_corner(rng: np.random.Generator, layout: Layout) -> list[Part]:
-    """Two hips of one width, slope and eave that share a corner: their ridges meet there at one height."""
+    """Two hips of one width, slope and eave that share a corner: their ridges meet there at one
+    height.
+    """
     width, eave = rng.uniform(6.5, 10.5), random_eave(rng)
     slope = math.tan(math.radians(rng.uniform(20, 48)))
     length, reach = width * rng.uniform(1.7, 2.6), width * rng.uniform(0.7, 1.4)
     return [
         layout.part("hip", regular("hip", length, width, slope), 0.0, 0.0, eave),
-        layout.part("hip", regular("hip", width + reach, width, slope), (length - width) / 2, reach / 2, eave, 1),
+        layout.part(
+            "hip",
+            regular("hip", width + reach, width, slope),
+            (length - width) / 2,
+            reach / 2,
+            eave,
+            1,
+        ),
     ]
 
 

@@ -1,4 +1,6 @@
-"""Random changes of a building's parts: what a person, a program or a slip of the hand may do to parameters."""
+"""Random changes of a building's parts: what a person, a program or a slip of the hand may do to
+parameters.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +17,8 @@ KINDS = ("parameter", "type", "ridge", "eave", "turn", "move", "size", "add", "r
 def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int, dict[str, Any]]:
     """(kind, part, change) for `Building.with_part`, or `without_part` where the kind is "remove".
 
-    Parameters become anything from a hundredth to four times what they were, now and then below zero or none at all;
-    types any other; parts go up to 5 m aside, and turn anywhere.
+    Parameters become anything from a hundredth to four times what they were, now and then below
+    zero or none at all; types any other; parts go up to 5 m aside, and turn anywhere.
     """
     kind = str(rng.choice(KINDS))
     index = int(rng.integers(len(building.parts)))
@@ -27,8 +29,16 @@ def random_edit(rng: np.random.Generator, building: Building) -> tuple[str, int,
         name = str(rng.choice(list(part.parameters)))
         return kind, index, {name: random_value(rng, part.parameters[name])}
     if kind == "add":
-        place = [rng.uniform(x0, x1), rng.uniform(y0, y1), float(part.translation[2]) + rng.uniform(-2.0, 4.0)]
-        new = {"type": str(rng.choice(list(CATALOGUE))), "position": place, "rotation": rng.uniform(-180.0, 180.0)}
+        place = [
+            rng.uniform(x0, x1),
+            rng.uniform(y0, y1),
+            float(part.translation[2]) + rng.uniform(-2.0, 4.0),
+        ]
+        new = {
+            "type": str(rng.choice(list(CATALOGUE))),
+            "position": place,
+            "rotation": rng.uniform(-180.0, 180.0),
+        }
         return kind, len(building.parts), new | {"width": width, "length": length}
     changes: dict[str, dict[str, Any]] = {
         "type": {"type": str(rng.choice(list(CATALOGUE)))},
@@ -46,10 +56,15 @@ def random_value(rng: np.random.Generator, value: float) -> float:
     slip = rng.random()
     if slip < 0.05:
         return 0.0
-    return float(value * np.exp(rng.uniform(np.log(0.01), np.log(4.0))) * (-1.0 if slip < 0.1 else 1.0))
+    return float(
+        value * np.exp(rng.uniform(np.log(0.01), np.log(4.0))) * (-1.0 if slip < 0.1 else 1.0)
+    )
 
 
 def edited(rng: np.random.Generator, building: Building) -> Building:
-    """The building after a random edit. Raises the HiproofError of an edit that makes no building."""
+    """The building after a random edit.
+
+    Raises the HiproofError of an edit that makes no building.
+    """
     kind, index, change = random_edit(rng, building)
     return building.without_part(index) if kind == "remove" else building.with_part(index, **change)

@@ -1,4 +1,6 @@
-"""The demo: a small neighbourhood with every roof type and several compounds, on a slope, with trees."""
+"""The demo: a small neighbourhood with every roof type and several compounds, on a slope, with
+trees.
+"""
 
 from __future__ import annotations
 
@@ -52,7 +54,9 @@ def neighbourhood(seed: int = DEMO_SEED) -> tuple[list[Lot], Relief]:
         top = max(depth_across(building, start, heading) for building in side)
         start = start + turned(np.array([[0.0, top + STREET_WIDTH_M]]), heading)[0]
         buildings += side
-    return [furnished(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)], terrain
+    return [
+        furnished(rng, f"house-{k:02d}", building) for k, building in enumerate(buildings, 1)
+    ], terrain
 
 
 def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> float:
@@ -62,14 +66,20 @@ def depth_across(building: SimBuilding, start: np.ndarray, heading: float) -> fl
 
 
 def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
-    """Write the neighbourhood's FILES to `folder`; counts of buildings and points. Made by
-    `python -m hiproof.simulate neighbourhood FOLDER`. Raises InputError without rasterio (the extra `terrain`)."""
+    """Write the neighbourhood's FILES to `folder`; counts of buildings and points.
+
+    Made by `python -m hiproof.simulate neighbourhood FOLDER`. Raises InputError without rasterio
+    (the extra `terrain`).
+    """
     from ..read.raster import import_rasterio
 
     import_rasterio()
     lots, terrain = neighbourhood(seed)
     corners = np.array([lot.building.footprint.bounds for lot in lots])
-    low, high = np.floor(corners[:, :2].min(axis=0)) - BORDER_M, np.ceil(corners[:, 2:].max(axis=0)) + BORDER_M
+    low, high = (
+        np.floor(corners[:, :2].min(axis=0)) - BORDER_M,
+        np.ceil(corners[:, 2:].max(axis=0)) + BORDER_M,
+    )
     bounds = (*low, *high)
     flight = Flight(heading=math.radians(70.0), origin=ORIGIN_XY - 250.0)
     folder.mkdir(parents=True, exist_ok=True)
@@ -77,6 +87,10 @@ def write_neighbourhood(folder: Path, seed: int = DEMO_SEED) -> dict[str, int]:
     points = write_laz(folder / "cloud.laz", clouds, np.array([*low, 0.0]))
     write_footprints(folder / "footprints.gpkg", lots)
     write_terrain(folder / "terrain.tif", bounds, terrain)
-    truth = {"crs": CRS, "seed": seed, "buildings": [{"id": lot.id, **lot.building.truth()} for lot in lots]}
+    truth = {
+        "crs": CRS,
+        "seed": seed,
+        "buildings": [{"id": lot.id, **lot.building.truth()} for lot in lots],
+    }
     (folder / "truth.json").write_text(json.dumps(truth, indent=1) + "\n")
     return {"buildings": len(lots), "points": points}

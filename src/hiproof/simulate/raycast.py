@@ -1,9 +1,9 @@
 """Compiled laser beams against a scene: the first surface a beam meets on its way down.
 
-A beam is written by height: p(z) = (x0 + sx z, y0 + sy z, z), so that a body bounded by half-spaces n . p <= d is
-entered at the lowest of the heights its upward-facing sides allow and left at the highest of the others. Three kinds
-of body: convex ones (roof pieces, chimneys, neighbours), triangles (any solid read from a file), and crowns of trees
-that let part of the light through.
+A beam is written by height: p(z) = (x0 + sx z, y0 + sy z, z), so that a body bounded by half-spaces
+n . p <= d is entered at the lowest of the heights its upward-facing sides allow and left at the
+highest of the others. Three kinds of body: convex ones (roof pieces, chimneys, neighbours),
+triangles (any solid read from a file), and crowns of trees that let part of the light through.
 """
 
 from __future__ import annotations
@@ -15,11 +15,14 @@ from ..compiled import compiled
 
 @compiled
 def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
-    """Lower `z_hit` (n,) is raised to the entry height wherever a convex body lies above it; `face` (n,) gets its side.
+    """Lower `z_hit` (n,) is raised to the entry height wherever a convex body lies above it;
 
-    Beams are `xy0` (n, 2) at z = 0 and `slope` (n, 2) = (dx/dz, dy/dz). Body b has the rows starts[b]:starts[b+1] of
-    `halfspaces` (k, 4) = (nx, ny, nz, d), and no beam hits it that passes by its disc, `discs` (b, 4) = (x, y, z,
-    radius). Both outputs are changed in place; `face` is a row of `halfspaces`.
+    `face` (n,) gets its side.
+
+    Beams are `xy0` (n, 2) at z = 0 and `slope` (n, 2) = (dx/dz, dy/dz). Body b has the rows
+    starts[b]:starts[b+1] of `halfspaces` (k, 4) = (nx, ny, nz, d), and no beam hits it that passes
+    by its disc, `discs` (b, 4) = (x, y, z, radius). Both outputs are changed in place; `face` is a
+    row of `halfspaces`.
     """
     for i in range(len(xy0)):
         x0, y0, sx, sy = xy0[i, 0], xy0[i, 1], slope[i, 0], slope[i, 1]
@@ -50,7 +53,8 @@ def cast_convex(xy0, slope, halfspaces, starts, discs, z_hit, face):
 def cast_triangles(xy0, slope, triangles, z_hit, face):
     """The same for `triangles` (m, 3, 3); `face` gets the triangle's index.
 
-    Each corner is carried along the beam to z = 0, where the beam is a point: its barycentric weights give the height.
+    Each corner is carried along the beam to z = 0, where the beam is a point: its barycentric
+    weights give the height.
     """
     for i in range(len(xy0)):
         x0, y0, sx, sy = xy0[i, 0], xy0[i, 1], slope[i, 0], slope[i, 1]
@@ -72,11 +76,12 @@ def cast_triangles(xy0, slope, triangles, z_hit, face):
 
 @compiled
 def cast_crowns(xy0, slope, crowns, free_path, z_crown):
-    """Raise `z_crown` (n,) to where a beam is caught in a tree's crown, after `free_path` (n,) metres of leaves.
+    """Raise `z_crown` (n,) to where a beam is caught in a tree's crown, after `free_path` (n,)
+    metres of leaves.
 
-    `crowns` (t, 5) = (x, y, z of the centre, horizontal and vertical half axes) of upright ellipsoids. A beam whose way
-    through a crown is shorter than its free path comes out below, so the ground and the roof under a tree are thinned,
-    not hidden.
+    `crowns` (t, 5) = (x, y, z of the centre, horizontal and vertical half axes) of upright
+    ellipsoids. A beam whose way through a crown is shorter than its free path comes out below, so
+    the ground and the roof under a tree are thinned, not hidden.
     """
     for i in range(len(xy0)):
         for t in range(len(crowns)):
@@ -98,10 +103,11 @@ def cast_crowns(xy0, slope, crowns, free_path, z_crown):
 
 @compiled
 def cast_waves(xy0, slope, waves, base):
-    """Heights (n,) where the beams meet the terrain z = base + sum of amplitude sin(kx x + ky y + phase).
+    """Heights (n,) where the beams meet the terrain z = base + sum of amplitude sin(kx x + ky y +
+    phase).
 
-    `waves` (w, 4) = (kx, ky, phase, amplitude). Three Newton steps from the base reach far less than a millimetre, as
-    the terrain's slope and curvature are small.
+    `waves` (w, 4) = (kx, ky, phase, amplitude). Three Newton steps from the base reach far less
+    than a millimetre, as the terrain's slope and curvature are small.
     """
     z = np.full(len(xy0), base)
     for i in range(len(xy0)):

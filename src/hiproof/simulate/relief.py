@@ -27,8 +27,9 @@ class Plane:
 
 @dataclass(frozen=True)
 class Relief:
-    """Hills as a sum of plane waves: `waves` (w, 4) = (kx, ky, phase, amplitude in metres) about `base` (m); positions
-    are taken relative to `origin` (2,)."""
+    """Hills as a sum of plane waves: `waves` (w, 4) = (kx, ky, phase, amplitude in metres) about
+    `base` (m); positions are taken relative to `origin` (2,).
+    """
 
     waves: np.ndarray
     base: float
@@ -47,7 +48,9 @@ class Relief:
     def height_at(self, xy: np.ndarray) -> np.ndarray:
         """Terrain height (n,) at `xy` (n, 2)."""
         x, y = (np.asarray(xy, float) - self.origin).T
-        return self.base + sum(amplitude * np.sin(kx * x + ky * y + phase) for kx, ky, phase, amplitude in self.waves)
+        return self.base + sum(
+            amplitude * np.sin(kx * x + ky * y + phase) for kx, ky, phase, amplitude in self.waves
+        )
 
     def moved(self, shift: np.ndarray) -> Relief:
         """The same terrain in a frame whose points are those of this one plus `shift` (3,)."""

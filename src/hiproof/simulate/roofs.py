@@ -1,4 +1,6 @@
-"""Buildings whose truth is known: one primitive with dimensions and slopes as real roofs have them."""
+"""Buildings whose truth is known: one primitive with dimensions and slopes as real
+roofs have them.
+"""
 
 from __future__ import annotations
 
@@ -19,9 +21,9 @@ from .shapes import ROOF_TYPES, make_part
 class SimBuilding:
     """A building made up, with its truth.
 
-    `type` is the roof type of its largest part, `kind` "single" or the compound's kind. `roof` is in its own frame,
-    whose origin (world) lies on the ground at the building: local heights are heights above that ground. `z_ground`
-    (world).
+    `type` is the roof type of its largest part, `kind` "single" or the compound's kind. `roof` is
+    in its own frame, whose origin (world) lies on the ground at the building: local heights are
+    heights above that ground. `z_ground` (world).
     """
 
     type: str
@@ -54,7 +56,9 @@ class SimBuilding:
         return shapely.transform(self.outline, self.roof.frame.to_world)
 
     def truth(self) -> dict:
-        """Plain values for JSON: type, kind, ground height, frame origin and every part's parameters."""
+        """Plain values for JSON: type, kind, ground height, frame origin and every part's
+        parameters.
+        """
         return {
             "type": self.type,
             "kind": self.kind,
@@ -78,7 +82,8 @@ def random_building(
     origin: np.ndarray | tuple[float, float, float] = (0.0, 0.0, 0.0),
     kappa: float | None = None,
 ) -> SimBuilding:
-    """A building of one primitive, its ground at `origin` (world), turned by `kappa` (rad; drawn when None).
+    """A building of one primitive, its ground at `origin` (world), turned by `kappa` (rad; drawn
+    when None).
 
     Raises InputError for a type that is not in the catalogue.
 
@@ -90,11 +95,15 @@ def random_building(
     if type not in CATALOGUE:
         raise InputError(f"expected a roof type ({', '.join(CATALOGUE)}), got {type!r}")
     kappa = rng.uniform(-math.pi, math.pi) if kappa is None else kappa
-    part = make_part(type, random_parameters(rng, type), kappa, np.array([0.0, 0.0, random_eave(rng)]))
+    part = make_part(
+        type, random_parameters(rng, type), kappa, np.array([0.0, 0.0, random_eave(rng)])
+    )
     return assemble((part,), "single", origin)
 
 
-def assemble(parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[float, float, float]) -> SimBuilding:
+def assemble(
+    parts: tuple[Part, ...], kind: str, origin: np.ndarray | tuple[float, float, float]
+) -> SimBuilding:
     """`parts` as a building on the ground at `origin`; the outline is the union of their pieces."""
     roof = Roof(parts, united_outline(parts), LocalFrame(np.asarray(origin, float)))
     return SimBuilding(largest_of(roof).type, kind, roof, float(origin[2]))
@@ -106,7 +115,9 @@ def largest_of(roof: Roof) -> Part:
 
 
 def building_of(truth: dict) -> SimBuilding:
-    """The building whose `SimBuilding.truth` was written to a file. Raises InputError for anything else.
+    """The building whose `SimBuilding.truth` was written to a file.
+
+    Raises InputError for anything else.
 
     >>> building = random_building(np.random.default_rng(3), "mansard")
     >>> building_of(building.truth()).outline.equals_exact(building.outline, 1e-9)
@@ -114,13 +125,19 @@ def building_of(truth: dict) -> SimBuilding:
     """
     try:
         parts = tuple(
-            make_part(part["type"], part["parameters"], part["kappa"], np.array(part["translation"], float))
+            make_part(
+                part["type"],
+                part["parameters"],
+                part["kappa"],
+                np.array(part["translation"], float),
+            )
             for part in truth["parts"]
         )
         return assemble(parts, truth["kind"], truth["origin"])
     except (KeyError, TypeError, ValueError) as error:
         raise InputError(
-            f"expected a building's truth as the simulator writes it, got: {error!r}; give a line of truth.jsonl"
+            f"expected a building's truth as the simulator writes it, got: {error!r}; give a line "
+            "of truth.jsonl"
         ) from error
 
 
@@ -134,11 +151,15 @@ def turned_building(building: SimBuilding, angle: float) -> SimBuilding:
 
 
 def united_outline(parts: tuple[Part, ...]) -> shapely.Polygon:
-    """Union of all pieces, joined in the axes of the first part, where common edges are exactly on one line."""
+    """Union of all pieces, joined in the axes of the first part, where common edges are exactly on
+    one line.
+    """
     outlines = [piece.outline for part in parts for piece in part.pieces]
     if len(outlines) == 1:
         return outlines[0]
-    aligned = [shapely.transform(outline, lambda xy: turned(xy, -parts[0].kappa)) for outline in outlines]
+    aligned = [
+        shapely.transform(outline, lambda xy: turned(xy, -parts[0].kappa)) for outline in outlines
+    ]
     union = shapely.union_all(aligned, grid_size=1e-6).normalize().reverse()
     return shapely.transform(union.simplify(0.0), lambda xy: turned(xy, parts[0].kappa))
 
@@ -154,11 +175,14 @@ def random_eave(rng: np.random.Generator) -> float:
     return float(rng.choice((2.4, 3.0, 5.5, 5.8, 8.5, 11.5)) + rng.uniform(-0.3, 0.5))
 
 
-def random_parameters(rng: np.random.Generator, type: str, width: float | None = None) -> dict[str, float]:
+def random_parameters(
+    rng: np.random.Generator, type: str, width: float | None = None
+) -> dict[str, float]:
     """theta_p of one roof of `type`; `width` (m) may be given, for parts that must fit together.
 
-    The shapes' own draws keep each type apart from its neighbours in the catalogue: a hip has a ridge, a half-hip a gable wall
-    worth the name, an asymmetric gable a visible difference of slopes or eaves.
+    The shapes' own draws keep each type apart from its neighbours in the catalogue: a hip has a
+    ridge, a half-hip a gable wall worth the name, an asymmetric gable a visible difference of
+    slopes or eaves.
     """
     width = float(rng.uniform(5.0, 13.0)) if width is None else float(width)
     return get(type).drawn(rng, width)

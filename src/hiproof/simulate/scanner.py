@@ -1,4 +1,6 @@
-"""An airborne laser scanner over made-up buildings and over solids: labelled points with the faults of real clouds."""
+"""An airborne laser scanner over made-up buildings and over solids: labelled points with the faults
+of real clouds.
+"""
 
 from __future__ import annotations
 
@@ -32,9 +34,13 @@ LEAF_PATH_M = 1.8  # m that a beam goes through leaves on average before it meet
 
 @dataclass(frozen=True)
 class ScanSettings:
-    """The scanner. `density` (points/m2 in plan, all swaths together), one-sigma noises (m) along the beam and in plan,
-    the beam's radius on the ground (m), the largest scan angle (deg), the registration error between swaths (m), how
-    far around the outline points are kept (m), and the defects' probabilities."""
+    """The scanner.
+
+    `density` (points/m2 in plan, all swaths together), one-sigma noises (m) along the beam and in
+    plan, the beam's radius on the ground (m), the largest scan angle (deg), the registration error
+    between swaths (m), how far around the outline points are kept (m), and the defects'
+    probabilities.
+    """
 
     density: float = 5.0
     range_noise_m: float = 0.025
@@ -48,8 +54,11 @@ class ScanSettings:
 
 @dataclass(frozen=True)
 class Scan:
-    """`points` (n, 3) world metres; `label` (n,) index into the catalogue, NOT_ROOF for all else; `source` (n,) index into
-    SOURCES (roof, wall, ground, tree, clutter)."""
+    """`points` (n, 3) world metres;
+
+    `label` (n,) index into the catalogue, NOT_ROOF for all else; `source` (n,) index into SOURCES
+    (roof, wall, ground, tree, clutter).
+    """
 
     points: np.ndarray
     label: np.ndarray
@@ -65,7 +74,9 @@ class Scan:
         return Scan(self.points + shift, self.label, self.source)
 
 
-def scan(building: SimBuilding, rng: np.random.Generator, settings: ScanSettings | None = None) -> Scan:
+def scan(
+    building: SimBuilding, rng: np.random.Generator, settings: ScanSettings | None = None
+) -> Scan:
     """One building as a scanner sees it, with what stands around it.
 
     >>> from hiproof.simulate import random_building, scan
@@ -76,7 +87,11 @@ def scan(building: SimBuilding, rng: np.random.Generator, settings: ScanSettings
     """
     settings = checked(settings or ScanSettings())
     scene = random_scene(rng, building, settings.defects)
-    outline = building.outline if settings.margin_m == 0 else building.outline.buffer(settings.margin_m, quad_segs=2)
+    outline = (
+        building.outline
+        if settings.margin_m == 0
+        else building.outline.buffer(settings.margin_m, quad_segs=2)
+    )
     z_roof = building.roof.parts[0].translation[2]
     return scan_scene(scene, outline, z_roof, rng, settings).moved(building.roof.frame.origin)
 
@@ -89,13 +104,16 @@ def scan_solids(
 ) -> Scan:
     """Solids of any origin (all in one frame) as a scanner sees them together.
 
-    Their RoofSurfaces are labelled with `types` (names of the catalogue; None or an unknown name gives NOT_ROOF but
-    still the source "roof"). The terrain is level at the solids' lowest height. Of the defects only the scanner's own
-    happen (missing strips, swath edges, partial roofs, outliers). Raises InputError without solids.
+    Their RoofSurfaces are labelled with `types` (names of the catalogue; None or an unknown name
+    gives NOT_ROOF but still the source "roof"). The terrain is level at the solids' lowest height.
+    Of the defects only the scanner's own happen (missing strips, swath edges, partial roofs,
+    outliers). Raises InputError without solids.
     """
     settings = checked(settings or ScanSettings())
     if not solids:
-        raise InputError("expected at least one solid to scan, got none; check the file that was read")
+        raise InputError(
+            "expected at least one solid to scan, got none; check the file that was read"
+        )
     types = [None] * len(solids) if types is None else types
     labels = [label_of(type) for type in types]
     vertices = np.concatenate([solid.vertices for solid in solids])
@@ -104,19 +122,29 @@ def scan_solids(
     cells = shapely.polygons(scene.triangles[:, :, :2])
     plan = shapely.union_all(cells[shapely.area(cells) > 1e-6])
     height = float(vertices[:, 2].max() - origin[2])
-    return scan_scene(scene, plan.buffer(settings.margin_m, quad_segs=2), height / 2, rng, settings).moved(origin)
+    return scan_scene(
+        scene, plan.buffer(settings.margin_m, quad_segs=2), height / 2, rng, settings
+    ).moved(origin)
 
 
 def scan_scene(
-    scene: Scene, area: shapely.Geometry, z_ref: float, rng: np.random.Generator, settings: ScanSettings
+    scene: Scene,
+    area: shapely.Geometry,
+    z_ref: float,
+    rng: np.random.Generator,
+    settings: ScanSettings,
 ) -> Scan:
-    """Beams over `area` (plan, the scene's frame), their returns with noise, and the cloud's defects."""
+    """Beams over `area` (plan, the scene's frame), their returns with noise, and the cloud's
+    defects.
+    """
     x_low, y_low, x_high, y_high = area.bounds
     centre = np.array([(x_low + x_high) / 2, (y_low + y_high) / 2])
     reach = math.hypot(x_high - x_low, y_high - y_low) / 2
     tan_max = math.tan(math.radians(settings.max_scan_angle_deg))
     defects = settings.defects
-    swaths = random_swaths(rng, settings.density, tan_max, settings.registration_m, defects.swath_edge, reach / 2)
+    swaths = random_swaths(
+        rng, settings.density, tan_max, settings.registration_m, defects.swath_edge, reach / 2
+    )
     radius = reach + tan_max * z_ref
     beams = [beams_of(rng, swath, centre, radius, z_ref) for swath in swaths]
     if rng.random() < defects.missing_strip:
@@ -131,8 +159,9 @@ def scan_scene(
 
 
 def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: ScanSettings) -> Scan:
-    """Points of all beams: a wide beam mixes the heights of two near surfaces and splits over two far ones; leaves
-    catch some of the light and let the rest through."""
+    """Points of all beams: a wide beam mixes the heights of two near surfaces and splits over two
+    far ones; leaves catch some of the light and let the rest through.
+    """
     z_hit, source, label = first_hits(scene, beams.xy0, beams.slope)
     n = len(z_hit)
     xy0, slope, shift = beams.xy0, beams.slope, beams.shift
@@ -147,7 +176,9 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
             np.concatenate([first, second[split]])
             for first, second in ((z_hit, z_aside), (source, source_aside), (label, label_aside))
         )
-        xy0, slope, shift = (np.concatenate([values, values[split]]) for values in (xy0, slope, shift))
+        xy0, slope, shift = (
+            np.concatenate([values, values[split]]) for values in (xy0, slope, shift)
+        )
     if len(scene.crowns):
         z_hit, source, label, kept = caught_by_leaves(scene, xy0, slope, z_hit, source, label, rng)
         xy0, slope, shift = xy0[kept], slope[kept], shift[kept]
@@ -158,8 +189,12 @@ def returns(scene: Scene, beams: Beams, rng: np.random.Generator, settings: Scan
     return Scan(points + shift, label, source)
 
 
-def first_hits(scene: Scene, xy0: np.ndarray, slope: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Height (n,), source and label (n,) of the first surface each beam meets; terrain where there is nothing else."""
+def first_hits(
+    scene: Scene, xy0: np.ndarray, slope: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Height (n,), source and label (n,) of the first surface each beam meets; terrain where there
+    is nothing else.
+    """
     z_hit = scene.terrain.hit(xy0, slope)
     source, label = np.full(len(xy0), SOURCE_GROUND, np.int8), np.full(len(xy0), NOT_ROOF, np.int8)
     for cast, bodies, sources, labels in (
@@ -183,8 +218,9 @@ def caught_by_leaves(
     label: np.ndarray,
     rng: np.random.Generator,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """The returns with those of leaves, and the beam index of each: a third of the beams caught return from below
-    too."""
+    """The returns with those of leaves, and the beam index of each: a third of the beams caught
+    return from below too.
+    """
     z_crown = np.full(len(xy0), -np.inf)
     cast_crowns(xy0, slope, scene.crowns, rng.exponential(LEAF_PATH_M, len(xy0)), z_crown)
     caught = z_crown > z_hit
@@ -196,7 +232,9 @@ def caught_by_leaves(
     return z, sources, labels, kept
 
 
-def without_strip(rng: np.random.Generator, beams: Beams, heading: float, centre: np.ndarray, reach: float) -> Beams:
+def without_strip(
+    rng: np.random.Generator, beams: Beams, heading: float, centre: np.ndarray, reach: float
+) -> Beams:
     """Some scan lines lost: a band of 0.8 to 3 m across the flight."""
     along = (beams.xy0 - centre) @ (math.cos(heading), math.sin(heading))
     start, width = rng.uniform(-0.7, 0.7) * reach, rng.uniform(0.8, 3.0)
@@ -204,8 +242,9 @@ def without_strip(rng: np.random.Generator, beams: Beams, heading: float, centre
 
 
 def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, reach: float) -> Scan:
-    """A part of the roof that gave no return (wet, dark, or hidden): all points of a disc about some place near the
-    edge."""
+    """A part of the roof that gave no return (wet, dark, or hidden): all points of a disc about
+    some place near the edge.
+    """
     angle, radius = rng.uniform(-math.pi, math.pi), reach * rng.uniform(0.25, 0.6)
     middle = centre + 0.8 * reach * np.array([math.cos(angle), math.sin(angle)])
     keep = ((cloud.points[:, :2] - middle) ** 2).sum(axis=1) > radius**2
@@ -215,15 +254,25 @@ def without_corner(rng: np.random.Generator, cloud: Scan, centre: np.ndarray, re
 def with_outliers(rng: np.random.Generator, cloud: Scan, share: float) -> Scan:
     """A few returns from nothing: birds above, multiple reflections below."""
     count = rng.poisson(share * len(cloud))
-    at = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(0.0, 1.0, (count, 3)) * (0.3, 0.3, 3.0)
+    at = cloud.points[rng.integers(len(cloud), size=count)] + rng.normal(0.0, 1.0, (count, 3)) * (
+        0.3,
+        0.3,
+        3.0,
+    )
     points = np.concatenate([cloud.points, at])
     label = np.concatenate([cloud.label, np.full(count, NOT_ROOF, np.int8)])
-    return Scan(points, label, np.concatenate([cloud.source, np.full(count, SOURCE_CLUTTER, np.int8)]))
+    return Scan(
+        points, label, np.concatenate([cloud.source, np.full(count, SOURCE_CLUTTER, np.int8)])
+    )
 
 
-def uniform_points(building: SimBuilding, rng: np.random.Generator, density: float = 4.72, noise: float = 0.12):
-    """Points (n, 3) world metres drawn as in the paper's Table 3: uniform over the outline, on the roof, with vertical
-    errors whose size is uniform within 1 `noise` for 90 %, within 1-2 for 9 % and within 2-3 for 1 % of the points."""
+def uniform_points(
+    building: SimBuilding, rng: np.random.Generator, density: float = 4.72, noise: float = 0.12
+):
+    """Points (n, 3) world metres drawn as in the paper's Table 3: uniform over the outline, on the
+    roof, with vertical errors whose size is uniform within 1 `noise` for 90 %, within 1-2 for 9 %
+    and within 2-3 for 1 % of the points.
+    """
     outline = building.outline
     x_low, y_low, x_high, y_high = outline.bounds
     count = rng.poisson(density * (x_high - x_low) * (y_high - y_low))
@@ -242,10 +291,24 @@ def bare_scene(building: SimBuilding) -> Scene:
 def checked(settings: ScanSettings) -> ScanSettings:
     """`settings`, or InputError where a scanner could not have them."""
     if not 0.05 <= settings.density <= 1000:
-        raise InputError(f"expected a density of 0.05 to 1000 points/m2, got {settings.density}; 1 to 20 is usual")
-    lengths = settings.range_noise_m, settings.horizontal_noise_m, settings.beam_radius_m, settings.margin_m
+        raise InputError(
+            f"expected a density of 0.05 to 1000 points/m2, got {settings.density}; 1 to 20 is "
+            "usual"
+        )
+    lengths = (
+        settings.range_noise_m,
+        settings.horizontal_noise_m,
+        settings.beam_radius_m,
+        settings.margin_m,
+    )
     if not all(0 <= length < math.inf for length in lengths):
-        raise InputError(f"expected noise, beam radius and margin of 0 m or more, got {settings}; 0 switches them off")
+        raise InputError(
+            f"expected noise, beam radius and margin of 0 m or more, got {settings}; 0 switches "
+            "them off"
+        )
     if not 0 <= settings.max_scan_angle_deg <= 45:
-        raise InputError(f"expected a scan angle of 0 to 45 degrees, got {settings.max_scan_angle_deg}; 20 is usual")
+        raise InputError(
+            f"expected a scan angle of 0 to 45 degrees, got {settings.max_scan_angle_deg}; 20 is "
+            "usual"
+        )
     return settings

@@ -1,4 +1,6 @@
-"""What the beams can hit: buildings, solids, trees and clutter as half-spaces, triangles and crowns."""
+"""What the beams can hit: buildings, solids, trees and clutter as half-spaces, triangles and
+crowns.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,9 @@ DISC_SLACK_M = 3.0  # a building's walls may go this far down below its own grou
 
 @dataclass(frozen=True)
 class Defects:
-    """How often a building's surroundings and cloud have each defect (probabilities), and the share of outliers."""
+    """How often a building's surroundings and cloud have each defect (probabilities), and the share
+    of outliers.
+    """
 
     tree: float = 0.35
     chimney: float = 0.4
@@ -44,9 +48,12 @@ class Defects:
 
 @dataclass(frozen=True)
 class Scene:
-    """Bodies in one local frame. `halfspaces` (k, 4) in bodies `starts` (b + 1) within `discs` (b, 4), `source` and
-    `label` (k,) of each side; `triangles` (m, 3, 3) with their `triangle_source` and `triangle_label`; `crowns` (t, 5);
-    `terrain` the ground below all."""
+    """Bodies in one local frame.
+
+    `halfspaces` (k, 4) in bodies `starts` (b + 1) within `discs` (b, 4), `source` and `label` (k,)
+    of each side; `triangles` (m, 3, 3) with their `triangle_source` and `triangle_label`; `crowns`
+    (t, 5); `terrain` the ground below all.
+    """
 
     halfspaces: np.ndarray
     starts: np.ndarray
@@ -62,8 +69,9 @@ class Scene:
 
 @dataclass(frozen=True)
 class Body:
-    """A convex body: the prism of a piece's outline under its planes, with what a hit on its top is; the piece's
-    frame is that of the scene less `shift` (3,)."""
+    """A convex body: the prism of a piece's outline under its planes, with what a hit on its top
+    is; the piece's frame is that of the scene less `shift` (3,).
+    """
 
     piece: Piece
     top_source: int = SOURCE_ROOF
@@ -73,16 +81,23 @@ class Body:
 
 
 def halfspaces_of(piece: Piece) -> np.ndarray:
-    """Outline edges, then planes, as rows (nx, ny, nz, d) with n . p <= d inside. Raises InputError when not convex."""
+    """Outline edges, then planes, as rows (nx, ny, nz, d) with n . p <= d inside.
+
+    Raises InputError when not convex.
+    """
     ring = shapely.get_coordinates(piece.outline.exterior)
     if len(piece.outline.interiors):
-        raise InputError("expected convex roof pieces to scan, got a hole; split the outline or scan a solid instead")
+        raise InputError(
+            "expected convex roof pieces to scan, got a hole; split the outline or scan a solid "
+            "instead"
+        )
     edge = np.diff(ring, axis=0)
     turn = edge[:, 0] * np.roll(edge[:, 1], -1) - edge[:, 1] * np.roll(edge[:, 0], -1)
     sign = 1.0 if turn.sum() > 0 else -1.0
     if (sign * turn < -1e-6).any():
         raise InputError(
-            "expected convex roof pieces to scan, got a re-entrant corner; split it or scan a solid instead"
+            "expected convex roof pieces to scan, got a re-entrant corner; split it or scan a "
+            "solid instead"
         )
     walls = np.zeros((len(edge), 4))
     walls[:, 0], walls[:, 1] = sign * edge[:, 1], -sign * edge[:, 0]
@@ -93,7 +108,9 @@ def halfspaces_of(piece: Piece) -> np.ndarray:
 
 
 def disc_of(body: Body) -> tuple[float, float, float, float]:
-    """(x, y, z, radius): beams up to 45 degrees off the vertical that hit the body above ground pass this disc at z."""
+    """(x, y, z, radius): beams up to 45 degrees off the vertical that hit the body above ground
+    pass this disc at z.
+    """
     corners = shapely.get_coordinates(body.piece.outline)
     low, high = corners.min(axis=0), corners.max(axis=0)
     x, y = (low + high) / 2 + body.shift[:2]
@@ -104,7 +121,9 @@ def disc_of(body: Body) -> tuple[float, float, float, float]:
     return x, y, half_height + body.shift[2], radius + half_height + DISC_SLACK_M
 
 
-def scene_of(bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: Plane | Relief | None = None) -> Scene:
+def scene_of(
+    bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: Plane | Relief | None = None
+) -> Scene:
     """Bodies packed for the beams; `crowns` and `terrain` are in the scene's frame."""
     sides, discs, source, label = [np.empty((0, 4))], [], [], []
     for body in bodies:
@@ -128,11 +147,17 @@ def scene_of(bodies: Sequence[Body], crowns: np.ndarray | None = None, terrain: 
 
 def building_bodies(building: SimBuilding) -> list[Body]:
     """The building's pieces, each roof labelled with its part's type."""
-    return [Body(piece, label=label_of(part.type)) for part in building.roof.parts for piece in part.pieces]
+    return [
+        Body(piece, label=label_of(part.type))
+        for part in building.roof.parts
+        for piece in part.pieces
+    ]
 
 
 def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> Scene:
-    """`building` with the clutter, neighbours, trees and sloping ground that `defects` allows, in its local frame."""
+    """`building` with the clutter, neighbours, trees and sloping ground that `defects` allows, in
+    its local frame.
+    """
     bodies = building_bodies(building) + superstructures(rng, building, defects)
     has_neighbour, has_tree = rng.random(2) < (defects.neighbour, defects.tree)
     if has_neighbour:
@@ -142,10 +167,16 @@ def random_scene(rng: np.random.Generator, building: SimBuilding, defects: Defec
     return scene_of(bodies, crowns, terrain)
 
 
-def superstructures(rng: np.random.Generator, building: SimBuilding, defects: Defects) -> list[Body]:
+def superstructures(
+    rng: np.random.Generator, building: SimBuilding, defects: Defects
+) -> list[Body]:
     """Chimneys, dormers and antennas that stand on the building's roof."""
     bodies = []
-    has_chimney, has_dormer, has_antenna = rng.random(3) < (defects.chimney, defects.dormer, defects.antenna)
+    has_chimney, has_dormer, has_antenna = rng.random(3) < (
+        defects.chimney,
+        defects.dormer,
+        defects.antenna,
+    )
     if has_chimney:
         bodies += [chimney(rng, building) for _ in range(1 + int(rng.random() < 0.3))]
     if has_dormer:
@@ -180,7 +211,9 @@ def antenna(rng: np.random.Generator, building: SimBuilding) -> Body:
 
 
 def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
-    """One to three boxes that come out of a slope and meet it at their back; none on a flat roof."""
+    """One to three boxes that come out of a slope and meet it at their back; none on a flat
+    roof.
+    """
     bodies = []
     for _ in range(1 + int(2.5 * rng.random() ** 2)):
         xy, piece = place_on_roof(rng, building)
@@ -190,7 +223,9 @@ def dormers(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
         if steepness < 0.35:
             continue
         uphill = gradient / steepness
-        depth, width = np.minimum(rng.uniform((1.2, 1.2), (2.4, 3.0)), 0.3 * math.sqrt(piece.outline.area))
+        depth, width = np.minimum(
+            rng.uniform((1.2, 1.2), (2.4, 3.0)), 0.3 * math.sqrt(piece.outline.area)
+        )
         z_back = piece.height_at((xy + uphill * depth / 2)[None])[0]
         side = math.atan2(uphill[1], uphill[0])
         rise = width / 2 * rng.uniform(0.3, 0.7) if rng.random() < 0.5 else 0.0
@@ -221,7 +256,9 @@ def neighbour(rng: np.random.Generator, building: SimBuilding) -> list[Body]:
 
 
 def trees(rng: np.random.Generator, building: SimBuilding) -> np.ndarray:
-    """One to three crowns (t, 5) whose trunks stand outside, mostly near a corner, and lean over the roof."""
+    """One to three crowns (t, 5) whose trunks stand outside, mostly near a corner, and lean over
+    the roof.
+    """
     corners = shapely.get_coordinates(building.outline.exterior)[:-1]
     centre = corners.mean(axis=0)
     crowns = []
@@ -255,14 +292,18 @@ def solids_scene(solids: list[Solid], labels: list[int]) -> Scene:
 
 
 def triangulated(vertices: np.ndarray, rings: tuple[tuple[int, ...], ...]) -> np.ndarray:
-    """Triangles (m, 3, 3) of one planar polygon with holes, cut in the coordinate plane it faces most."""
+    """Triangles (m, 3, 3) of one planar polygon with holes, cut in the coordinate plane it faces
+    most.
+    """
     outer = vertices[list(rings[0])]
     if len(rings) == 1 and len(outer) == 3:
         return outer[None]
     normal = ring_normal(outer)
     drop = int(np.argmax(np.abs(normal)))
     kept = [axis for axis in range(3) if axis != drop]
-    flat = shapely.make_valid(shapely.Polygon(outer[:, kept], [vertices[list(ring)][:, kept] for ring in rings[1:]]))
+    flat = shapely.make_valid(
+        shapely.Polygon(outer[:, kept], [vertices[list(ring)][:, kept] for ring in rings[1:]])
+    )
     if abs(normal[drop]) < 1e-9 or flat.area < 1e-9:
         return np.empty((0, 3, 3))
     cells = shapely.get_parts(shapely.constrained_delaunay_triangles(flat))

@@ -1,4 +1,6 @@
-"""Roof parts of the catalogue placed in plan, and the small flat or gabled boxes that stand on roofs."""
+"""Roof parts of the catalogue placed in plan, and the small flat or gabled boxes that stand on
+roofs.
+"""
 
 from __future__ import annotations
 
@@ -15,24 +17,37 @@ ROOF_TYPES = (
     *("flat", "monopitch", "gable", "hip", "half_hip"),
     *("pyramid", "mansard", "shed", "asymmetric_gable", "gambrel"),
 )
-"""The types of whole roofs: what a building made up at random has where none is named, and what the network tells apart."""
+"""The types of whole roofs: what a building made up at random has where none is named, and what the
+network tells apart.
+"""
 
 
 def label_of(type: str | None) -> int:
-    """The label of a roof's points: the place of its type in the catalogue, NOT_ROOF for what is none."""
+    """The label of a roof's points: the place of its type in the catalogue, NOT_ROOF for what is
+    none.
+    """
     return list(CATALOGUE).index(type) if type in CATALOGUE else NOT_ROOF
 
 
-def make_part(type: str, parameters: dict[str, float], kappa: float, translation: np.ndarray) -> Part:
-    """One primitive with theta_p `parameters`, turned by `kappa` about Z and moved by `translation` (3,), its eave at
-    translation's height; the parameters it carries are the canonical ones of its surface."""
+def make_part(
+    type: str, parameters: dict[str, float], kappa: float, translation: np.ndarray
+) -> Part:
+    """One primitive with theta_p `parameters`, turned by `kappa` about Z and moved by `translation`
+    (3,), its eave at translation's height; the parameters it carries are the canonical ones of its
+    surface.
+    """
     primitive = CATALOGUE[type].variant(parameters)
-    return primitive.part(primitive.canonical_theta(primitive.to_theta(parameters, kappa, translation)))
+    return primitive.part(
+        primitive.canonical_theta(primitive.to_theta(parameters, kappa, translation))
+    )
 
 
-def box(xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float, rise: float = 0.0) -> Piece:
-    """A block of `size` (along, across) about `xy`, turned by `kappa`: flat at `z_top`, or with `rise` a gable whose
-    ridge is at `z_top`."""
+def box(
+    xy: np.ndarray, size: tuple[float, float], z_top: float, kappa: float, rise: float = 0.0
+) -> Piece:
+    """A block of `size` (along, across) about `xy`, turned by `kappa`: flat at `z_top`, or with
+    `rise` a gable whose ridge is at `z_top`.
+    """
     cosine, sine = math.cos(kappa), math.sin(kappa)
     corners = np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]) * (size[0] / 2, size[1] / 2)
     outline = shapely.Polygon(corners @ np.array([(cosine, sine), (-sine, cosine)]) + xy)

@@ -21,7 +21,8 @@ from .town import Lot, town_scene
 CRS = "EPSG:7415"
 PATCH_M = 100.0  # m, side of what is scanned at once: memory stays small for any town
 OUTLIER_SHARE = 2e-4  # of the points: birds and multipath
-EPOCH = datetime.date(2020, 1, 1)  # a date that does not change, so that the same seed gives the same bytes
+# a date that does not change, so that the same seed gives the same bytes
+EPOCH = datetime.date(2020, 1, 1)
 CLASS_GROUND, CLASS_TREE, CLASS_BUILDING = 2, 5, 6  # classes of ASPRS
 
 Bounds = tuple[float, float, float, float]
@@ -29,8 +30,10 @@ Bounds = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Flight:
-    """Parallel flight lines over a town: `heading` (rad) through `origin` (2,), flying height, half the field of view
-    (deg), the distance between lines, and `registration` (m), one sigma of a line's offset."""
+    """Parallel flight lines over a town: `heading` (rad) through `origin` (2,), flying height, half
+    the field of view (deg), the distance between lines, and `registration` (m), one sigma of a
+    line's offset.
+    """
 
     heading: float
     origin: np.ndarray
@@ -39,9 +42,12 @@ class Flight:
     line_distance_m: float = 620.0
     registration_m: float = 0.02
 
-    def swaths_over(self, seed: int, centre: np.ndarray, radius: float, density: float) -> list[Swath]:
-        """Swaths of all flight lines that see the disc of `radius` about `centre`; together they have `density` in
-        the mean."""
+    def swaths_over(
+        self, seed: int, centre: np.ndarray, radius: float, density: float
+    ) -> list[Swath]:
+        """Swaths of all flight lines that see the disc of `radius` about `centre`; together they
+        have `density` in the mean.
+        """
         half_width = self.altitude_m * math.tan(math.radians(self.half_view_deg))
         spacing = math.sqrt(2 * half_width / self.line_distance_m / density)
         along, across = turned((centre - self.origin)[None], -self.heading)[0]
@@ -104,14 +110,18 @@ def surveyed_patch(
     seed: int,
     settings: ScanSettings,
 ) -> Scan:
-    """Points of one patch between its corners `low` and `high` (2,), drawn from a seed of its place."""
+    """Points of one patch between its corners `low` and `high` (2,), drawn from a seed of its
+    place.
+    """
     xy_centre = (low + high) / 2
     centre = np.array([*xy_centre, float(terrain.height_at(xy_centre[None])[0])])
     rng = np.random.default_rng([seed, 3, *(np.round(xy_centre * 100).astype(np.int64) % 2**32)])
     reach = math.hypot(*(high - low)) / 2
     swaths = flight.swaths_over(seed, xy_centre, reach, settings.density)
     beams = joined([beams_of(rng, swath, np.zeros(2), reach + 8.0, 4.0) for swath in swaths])
-    cloud = returns(town_scene(lots, terrain, centre), within(beams, high - xy_centre + 12.0), rng, settings)
+    cloud = returns(
+        town_scene(lots, terrain, centre), within(beams, high - xy_centre + 12.0), rng, settings
+    )
     cloud = with_outliers(rng, cloud, OUTLIER_SHARE).moved(centre)
     inside = np.all((cloud.points[:, :2] >= low) & (cloud.points[:, :2] < high), axis=1)
     return cloud.chosen(inside)
@@ -131,7 +141,10 @@ def classes_of(cloud: Scan) -> np.ndarray:
 
 
 def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: float = 0.01) -> int:
-    """Clouds in one LAZ 1.4 file, streamed; the number of points. Raises OutputError where it cannot be written."""
+    """Clouds in one LAZ 1.4 file, streamed; the number of points.
+
+    Raises OutputError where it cannot be written.
+    """
     import laspy
     from pyproj import CRS as ProjCRS
 
@@ -141,7 +154,9 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
     header.creation_date, header.generating_software = EPOCH, "hiproof simulate"
     count = 0
     try:
-        with laspy.open(path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs) as writer:
+        with laspy.open(
+            path, mode="w", header=header, laz_backend=laspy.LazBackend.Lazrs
+        ) as writer:
             for cloud in clouds:
                 record = laspy.ScaleAwarePointRecord.zeros(len(cloud), header=header)
                 record.x, record.y, record.z = cloud.points.T
@@ -150,7 +165,9 @@ def write_laz(path: Path, clouds: Iterator[Scan], origin: np.ndarray, scale_m: f
                 writer.write_points(record)
                 count += len(cloud)
     except OSError as error:
-        raise OutputError(f"expected to write {path}, got: {error}; choose a folder that can be written") from error
+        raise OutputError(
+            f"expected to write {path}, got: {error}; choose a folder that can be written"
+        ) from error
     return count
 
 
@@ -165,9 +182,22 @@ def write_terrain(path: Path, bounds: Bounds, terrain: Relief, pixel_m: float = 
     x = np.arange(x_low + pixel_m / 2, x_high, pixel_m)
     y = np.arange(y_high - pixel_m / 2, y_low, -pixel_m)
     grid = np.stack(np.meshgrid(x, y), axis=-1)
-    heights = np.round(terrain.height_at(grid.reshape(-1, 2)).reshape(grid.shape[:2]), 3).astype(np.float32)
-    profile = {"driver": "GTiff", "count": 1, "dtype": "float32", "compress": "deflate", "predictor": 3}
-    shape = {"height": len(y), "width": len(x), "crs": CRS, "transform": from_origin(x_low, y_high, pixel_m, pixel_m)}
+    heights = np.round(terrain.height_at(grid.reshape(-1, 2)).reshape(grid.shape[:2]), 3).astype(
+        np.float32
+    )
+    profile = {
+        "driver": "GTiff",
+        "count": 1,
+        "dtype": "float32",
+        "compress": "deflate",
+        "predictor": 3,
+    }
+    shape = {
+        "height": len(y),
+        "width": len(x),
+        "crs": CRS,
+        "transform": from_origin(x_low, y_high, pixel_m, pixel_m),
+    }
     with rasterio.open(path, "w", **profile, **shape) as file:
         file.write(heights, 1)
 

@@ -1,7 +1,8 @@
 """Buildings along streets on hilly ground: the stock of which neighbourhoods and cities are made.
 
-A lot is a building where it stands, with its chimneys, dormers and trees; a street side is a line of lots. Everything
-is drawn from the generator given, so that one seed a block makes any part of a city again without the rest.
+A lot is a building where it stands, with its chimneys, dormers and trees; a street side is a line
+of lots. Everything is drawn from the generator given, so that one seed a block makes any part of a
+city again without the rest.
 """
 
 from __future__ import annotations
@@ -25,8 +26,9 @@ TOWN_DEFECTS = replace(Defects.none(), tree=0.45, chimney=0.45, dormer=0.2, ante
 
 @dataclass(frozen=True)
 class Lot:
-    """One building where it stands, `id` its name, `bodies` all that is built in the building's frame and `crowns`
-    (t, 5) the trees around it in world coordinates."""
+    """One building where it stands, `id` its name, `bodies` all that is built in the building's
+    frame and `crowns` (t, 5) the trees around it in world coordinates.
+    """
 
     id: str
     building: SimBuilding
@@ -51,7 +53,9 @@ def make(rng: np.random.Generator, name: str, kappa: float) -> SimBuilding:
 
 
 def standing_at(building: SimBuilding, xy: np.ndarray, terrain: Relief) -> SimBuilding:
-    """The building moved so that its frame's origin is at `xy` (world), on the lowest ground under its outline."""
+    """The building moved so that its frame's origin is at `xy` (world), on the lowest ground under
+    its outline.
+    """
     corners = shapely.get_coordinates(building.outline) + xy
     z_ground = round(float(terrain.height_at(corners).min()), 3)
     frame = LocalFrame(np.array([*np.round(xy, 3), z_ground]))
@@ -83,10 +87,12 @@ def street_side(
     depth: float,
     terrain: Relief,
 ) -> list[SimBuilding]:
-    """Buildings side by side along `heading` (rad) from `start` (2,), to its left, within `length` by `depth` metres.
+    """Buildings side by side along `heading` (rad) from `start` (2,), to its left, within `length`
+    by `depth` metres.
 
-    `names` are taken one after the other until the side is full; a building deeper than the plot is turned, and left
-    out where that does not help. Terraced rows come back as their houses half of the time.
+    `names` are taken one after the other until the side is full; a building deeper than the plot is
+    turned, and left out where that does not help. Terraced rows come back as their houses half of
+    the time.
     """
     along, placed = 0.0, []
     for name in names:
@@ -116,7 +122,11 @@ def extent(building: SimBuilding, heading: float) -> tuple[np.ndarray, np.ndarra
 
 def town_scene(lots: list[Lot], terrain: Relief, centre: np.ndarray) -> Scene:
     """All `lots` in the frame whose origin is `centre` (3,) (world)."""
-    bodies = [replace(body, shift=lot.building.roof.frame.origin - centre) for lot in lots for body in lot.bodies]
+    bodies = [
+        replace(body, shift=lot.building.roof.frame.origin - centre)
+        for lot in lots
+        for body in lot.bodies
+    ]
     crowns = np.concatenate([np.empty((0, 5)), *(lot.crowns for lot in lots)])
     crowns[:, :3] -= centre
     return scene_of(bodies, crowns, terrain.moved(-centre))

@@ -27,11 +27,13 @@ def training_sample(
 ) -> tuple[np.ndarray, np.ndarray, int]:
     """One scanned building: points (n, 3) about their mean, labels (n,) and the building's type.
 
-    Labels and type index `types`; a point that is not roof has the label len(types). The density is drawn on a
-    logarithmic scale within `density` and the scanner's noise, beam and margin at random; clouds outside `n_points`
-    (count, lowest and highest) are drawn again, larger ones thinned. `defects` None means all of them.
+    Labels and type index `types`; a point that is not roof has the label len(types). The density is
+    drawn on a logarithmic scale within `density` and the scanner's noise, beam and margin at
+    random; clouds outside `n_points` (count, lowest and highest) are drawn again, larger ones
+    thinned. `defects` None means all of them.
 
-    >>> points, labels, type = training_sample(np.random.default_rng(1), ("pyramid", "gable", "hip"))
+    >>> points, labels, type = training_sample(np.random.default_rng(1), ("pyramid", "gable",
+    ...     "hip"))
     >>> points.shape[1], len(labels) == len(points), type in (0, 1, 2)
     (3, True, True)
     """
@@ -47,7 +49,8 @@ def training_sample(
         if len(cloud) >= low and (cloud.source == SOURCE_ROOF).sum() >= 0.3 * low:
             return as_sample(rng, cloud, types, kind, high)
     raise InputError(
-        f"expected point counts {n_points} that a density of {density} points/m2 can reach, got none in {ATTEMPTS} "
+        f"expected point counts {n_points} that a density of {density} points/m2 can reach, got "
+        f"none in {ATTEMPTS} "
         "buildings; widen one of them"
     )
 
@@ -59,7 +62,9 @@ def random_settings(
     n_points: tuple[int, int],
     defects: Defects | None,
 ) -> ScanSettings:
-    """A scanner at random whose density, within `density`, gives a building of `area_m2` about `n_points`."""
+    """A scanner at random whose density, within `density`, gives a building of `area_m2` about
+    `n_points`.
+    """
     low = min(max(density[0], n_points[0] / area_m2), density[1])
     high = max(min(density[1], 1.2 * n_points[1] / area_m2), low)
     logarithm, range_noise, horizontal, beam, angle, margin = rng.random(6)

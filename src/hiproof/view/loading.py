@@ -43,10 +43,16 @@ def database_rows(folder: Path, damaged: Damaged = refuse) -> Iterator[Row]:
     seen: set[str] = set()
     for model in models:
         if model.id in seen:
-            damaged(InputError(f"expected buildings of different ids in {path}, got {model.id!r:.80} again"))
+            damaged(
+                InputError(
+                    f"expected buildings of different ids in {path}, got {model.id!r:.80} again"
+                )
+            )
         elif not model.is_damaged:
             seen.add(model.id)
-            status, roof_type = (model.text(f"{OWN}{name}") or None for name in ("status", "roof_type"))
+            status, roof_type = (
+                model.text(f"{OWN}{name}") or None for name in ("status", "roof_type")
+            )
             told = model.attributes, model.solid, model.part_types, units, model.grade or None
             yield Row(model.id, status, roof_type, *told)
 
@@ -55,7 +61,11 @@ def srid_of(header: dict[str, Any]) -> int:
     """Return the EPSG code of the metadata's reference system; 0 (unknown to PostGIS) without
     one."""
     code = (reference_system(header) or "").rpartition("/")[2]
-    return int(code) if code.isascii() and code.isdigit() and len(code) < 7 and int(code) <= MOST_SRID else 0
+    return (
+        int(code)
+        if code.isascii() and code.isdigit() and len(code) < 7 and int(code) <= MOST_SRID
+        else 0
+    )
 
 
 def part_rows(path: Path) -> Iterator[list[tuple]]:
@@ -80,7 +90,8 @@ def part_rows(path: Path) -> Iterator[list[tuple]]:
                 return
     except (pyogrio.errors.DataSourceError, pyogrio.errors.DataLayerError, ValueError) as error:
         raise InputError(
-            f"expected tables that hiproof wrote at {path}, got: {error}; make them anew with `hiproof build`, or remove them"
+            f"expected tables that hiproof wrote at {path}, got: {error}; make them anew with "
+            "`hiproof build`, or remove them"
         ) from error
 
 
@@ -98,5 +109,7 @@ def read_some(path: Path, start: int) -> list[tuple]:
         raise ValueError(f"no column {missing[0]} in the layer parts")
     for attribute in PARTS_LAYER:
         if (by_name[attribute.name].dtype.kind in "OUS") != (attribute.kind == "text"):
-            raise ValueError(f"other than {attribute.kind}s in the column {attribute.name} of the layer parts")
+            raise ValueError(
+                f"other than {attribute.kind}s in the column {attribute.name} of the layer parts"
+            )
     return list(zip(*(by_name[name] for name in columns), wkb, strict=True))

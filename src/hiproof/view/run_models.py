@@ -57,7 +57,9 @@ def run_buildings(folder: Path, damaged: Damaged = refuse) -> Iterator[ViewedMod
                     damaged(InputError(f"building {model.id:.80} in {path}: {error}"))
                     continue
             if model.solid is not None:
-                yield ViewedModel(model.id, model.roof_type, model.solid, attributes, model.part_types)
+                yield ViewedModel(
+                    model.id, model.roof_type, model.solid, attributes, model.part_types
+                )
 
 
 def refuse_other_run(record: dict[str, Any], id: str, path: Path) -> None:
@@ -66,7 +68,8 @@ def refuse_other_run(record: dict[str, Any], id: str, path: Path) -> None:
     known = str(record.get("id"))
     if id != known and not id.startswith(f"{known}.."):  # where an id comes twice, models number it
         raise InputError(
-            f"expected {path} of the same run as the models, got {known!r} where these have {id!r}; "
+            f"expected {path} of the same run as the models, got {known!r} where these have "
+            f"{id!r}; "
             "make both anew with `hiproof build`"
         )
 
@@ -76,4 +79,8 @@ def parameters_text(record: dict[str, Any]) -> str | None:
     no parts."""
     refuse_other_kinds(record)
     parts = [{name: part.get(name) for name in TOLD} for part in record.get("parts") or ()]
-    return json.dumps({"origin": record.get("origin"), "parts": parts}, separators=(",", ":")) if parts else None
+    return (
+        json.dumps({"origin": record.get("origin"), "parts": parts}, separators=(",", ":"))
+        if parts
+        else None
+    )

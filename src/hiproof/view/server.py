@@ -40,7 +40,10 @@ def server_of(tileset: Path, title: str, port: int = 0) -> LoopbackServer:
 
 def page_of(title: str) -> str:
     """The page as text, scripts and styles in it."""
-    texts = {name: (files(package) / "assets" / file).read_text("utf-8") for name, (package, file) in ASSETS.items()}
+    texts = {
+        name: (files(package) / "assets" / file).read_text("utf-8")
+        for name, (package, file) in ASSETS.items()
+    }
     content = {
         "title": escape(title),
         "style": texts["style"],
@@ -61,7 +64,9 @@ def policy_of(page: str) -> str:
     "default-src 'none'; script-src 'none'; style-src 'sha256-ypeBEsobvcr6wjGzmiPcTaeG7/gUfE5yuY"
     """
     sources = {
-        kind: " ".join(digest_of(text) for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL))
+        kind: " ".join(
+            digest_of(text) for text in re.findall(rf"<{kind}>(.*?)</{kind}>", page, re.DOTALL)
+        )
         for kind in ("script", "style")
     }
     policy = SAFE["Content-Security-Policy"]
@@ -78,7 +83,11 @@ class Handler(LoopbackHandler):
     """Serves the page and the files of a folder; it lists none and follows no way out of it."""
 
     def __init__(self, *args, directory: str, page: str, **named) -> None:
-        self.folder, self.page, self.policy = Path(directory).resolve(), page.encode(), policy_of(page)
+        self.folder, self.page, self.policy = (
+            Path(directory).resolve(),
+            page.encode(),
+            policy_of(page),
+        )
         super().__init__(*args, **named)
 
     def answer(self, method: str, body: bytes) -> Answer:

@@ -1,4 +1,6 @@
-"""Every attribute and table that hiproof writes, with unit and meaning: what the formats name and the documents list."""
+"""Every attribute and table that hiproof writes, with unit and meaning: what the formats name and
+the documents list.
+"""
 
 from __future__ import annotations
 
@@ -30,28 +32,43 @@ class Table(NamedTuple):
 
 
 ROOFER = (
-    Attribute("h_ground", "number", "m", "height of the ground: the lowest terrain along the outline"),
+    Attribute(
+        "h_ground", "number", "m", "height of the ground: the lowest terrain along the outline"
+    ),
     Attribute("h_roof_min", "number", "m", "lowest height of the roof"),
     Attribute("h_roof_50p", "number", "m", "height that half of the roof's area lies below"),
     Attribute("h_roof_70p", "number", "m", "height that seven tenths of the roof's area lie below"),
     Attribute("h_roof_max", "number", "m", "highest height of the roof"),
-    Attribute("h_roof_ridge", "number", "m", "height of the longest level ridge, null where there is none"),
+    Attribute(
+        "h_roof_ridge", "number", "m", "height of the longest level ridge, null where there is none"
+    ),
     Attribute("volume_lod22", "number", "m3", "volume of the solid"),
-    Attribute("roof_type", "text", "", "roofer's type: horizontal, multiple horizontal, slanted, no points, unknown"),
+    Attribute(
+        "roof_type",
+        "text",
+        "",
+        "roofer's type: horizontal, multiple horizontal, slanted, no points, unknown",
+    ),
     Attribute("roof_n_surfaces", "count", "", "roof faces of the solid"),
     Attribute("slope", "number", "deg", "slope of the largest roof face"),
     Attribute(
         "azimuth",
         "number",
         "deg",
-        "compass direction in which the largest roof face falls, of two equal ones either; null where level",
+        "compass direction in which the largest roof face falls, of two equal ones either; null "
+        "where level",
     ),
     Attribute(
-        "rmse_lod22", "number", "m", "root mean square distance of the points from the roof, facade points included"
+        "rmse_lod22",
+        "number",
+        "m",
+        "root mean square distance of the points from the roof, facade points included",
     ),
     Attribute("pt_density", "number", "1/m2", "points by area of the outline"),
     Attribute("nodata_frac", "number", "", "share of the outline's 1 m cells that hold no point"),
-    Attribute("extrusion_mode", "text", "", "standard, lod11_fallback (a flat block) or skip (no model)"),
+    Attribute(
+        "extrusion_mode", "text", "", "standard, lod11_fallback (a flat block) or skip (no model)"
+    ),
 )
 
 OF_PARTS = (
@@ -67,48 +84,100 @@ OF_PARTS = (
 """Those that building parts have of their own."""
 
 QUALITY = Attribute(
-    "quality", "text", "", "how good the model is by its points: good, fair or poor; null where it was not measured"
+    "quality",
+    "text",
+    "",
+    "how good the model is by its points: good, fair or poor; null where it was not measured",
 )
 
 HIPROOF = (
-    Attribute("status", "text", "", "what came of the building: modelled, simplified, flat_fallback, ..."),
-    QUALITY,
-    Attribute("detail", "text", "", "the status as a sentence about this building, and what speaks against the model"),
     Attribute(
-        "roof_type", "text", "", "type of the part that shows the largest area: a name of the catalogue, or free"
+        "status", "text", "", "what came of the building: modelled, simplified, flat_fallback, ..."
+    ),
+    QUALITY,
+    Attribute(
+        "detail",
+        "text",
+        "",
+        "the status as a sentence about this building, and what speaks against the model",
+    ),
+    Attribute(
+        "roof_type",
+        "text",
+        "",
+        "type of the part that shows the largest area: a name of the catalogue, or free",
     ),
     Attribute("roof_type_probability", "number", "", "probability of that type after the fits"),
     Attribute("network_type", "text", "", "type that the network names, where it was asked"),
     Attribute("network_type_probability", "number", "", "probability that the network gives it"),
-    Attribute("h_eave", "number", "m", "height that half of the length of the roof's eaves lies below"),
+    Attribute(
+        "h_eave", "number", "m", "height that half of the length of the roof's eaves lies below"
+    ),
     Attribute("parts", "count", "", "roof parts"),
     Attribute("points", "count", "", "points that the building was judged by"),
-    Attribute("psd_mean", "number", "m", "mean distance of the points from the roof, facade points included"),
+    Attribute(
+        "psd_mean",
+        "number",
+        "m",
+        "mean distance of the points from the roof, facade points included",
+    ),
     Attribute("psd_std", "number", "m", "standard deviation of those distances"),
     Attribute("p95", "number", "m", "distance that 95 of 100 points stay below"),
     Attribute(
         "share_within_20cm",
         "number",
         "",
-        "share of the points 0.3 m or more inside the outline that lie within 0.2 m over or under the roof; null where"
+        "share of the points 0.3 m or more inside the outline that lie within 0.2 m over or under "
+        "the roof; null where"
         " fewer than ten lie there",
     ),
-    Attribute("outline_iou", "number", "", "intersection over union of the roof's outline with the footprint"),
-    Attribute("unexplained_area_m2", "number", "m2", "area most of whose points lie over 0.5 m off the roof"),
+    Attribute(
+        "outline_iou",
+        "number",
+        "",
+        "intersection over union of the roof's outline with the footprint",
+    ),
+    Attribute(
+        "unexplained_area_m2",
+        "number",
+        "m2",
+        "area most of whose points lie over 0.5 m off the roof",
+    ),
     Attribute("ground_source", "text", "", "where the ground's height came from"),
-    Attribute("shift_x", "number", "m", "how far east the footprint was moved onto its roof; 0 where it was not"),
+    Attribute(
+        "shift_x",
+        "number",
+        "m",
+        "how far east the footprint was moved onto its roof; 0 where it was not",
+    ),
     Attribute("shift_y", "number", "m", "the same north"),
     Attribute(
-        "iso19107_lod22", "text", "", "ISO 19107 codes of our own check of the solid; [] is valid, none without a model"
+        "iso19107_lod22",
+        "text",
+        "",
+        "ISO 19107 codes of our own check of the solid; [] is valid, none without a model",
     ),
     Attribute("units", "text", "", "only where coordinates are not metres: which unit is which"),
 )
 
 OSM = (
-    Attribute("roof:shape", "text", "", "of the part that shows the largest area, as OpenStreetMap names it"),
-    Attribute("roof:height", "number", "m", "from the lowest edge of that part's roof to the top of the building"),
     Attribute(
-        "roof:direction", "number", "deg", "compass direction that its largest face, or its hipped end, looks in"
+        "roof:shape",
+        "text",
+        "",
+        "of the part that shows the largest area, as OpenStreetMap names it",
+    ),
+    Attribute(
+        "roof:height",
+        "number",
+        "m",
+        "from the lowest edge of that part's roof to the top of the building",
+    ),
+    Attribute(
+        "roof:direction",
+        "number",
+        "deg",
+        "compass direction that its largest face, or its hipped end, looks in",
     ),
     Attribute("roof:angle", "number", "deg", "slope of its largest face"),
     Attribute("height", "number", "m", "from the ground to the top"),
@@ -117,7 +186,10 @@ OSM = (
 ROOF_SURFACE = (
     Attribute("rf_slope", "number", "deg", "slope of the face (in CityGML: slope)"),
     Attribute(
-        "rf_azimuth", "number", "deg", "compass direction in which it falls, null where level (in CityGML: azimuth)"
+        "rf_azimuth",
+        "number",
+        "deg",
+        "compass direction in which it falls, null where level (in CityGML: azimuth)",
     ),
     Attribute("hiproof_part", "count", "", "number of its roof part, from 0"),
     Attribute("hiproof_part_type", "text", "", "type of its roof part"),
@@ -131,7 +203,8 @@ BUILDING_PART = (
         f"{OWN}primitives",
         "list",
         "m, deg",
-        "its roof parts, each with part, type, area_m2, x, y, z_eave, rotation, parameters and deviations as in the table Parts"
+        "its roof parts, each with part, type, area_m2, x, y, z_eave, rotation, parameters and "
+        "deviations as in the table Parts"
         " (in CityGML: attribute sets hiproof_primitive_0, ...)",
     ),
 )
@@ -142,9 +215,17 @@ PARAMETERS = (
     Attribute("quality", "text", "", "as hiproof_quality"),
     Attribute("detail", "text", "", "as hiproof_detail"),
     Attribute(
-        "type", "text", "", "type of the part that shows the largest area; `hiproof build` reads those of the parts"
+        "type",
+        "text",
+        "",
+        "type of the part that shows the largest area; `hiproof build` reads those of the parts",
     ),
-    Attribute("origin", "list", "m", "origin x, y, z of the building's frame in the world; null without a model"),
+    Attribute(
+        "origin",
+        "list",
+        "m",
+        "origin x, y, z of the building's frame in the world; null without a model",
+    ),
     Attribute("parts", "list", "", "every part of the roof, as below"),
     Attribute(
         "outline",
@@ -152,29 +233,66 @@ PARAMETERS = (
         "m",
         "rings of the outline, the outer first, about the origin; the footprint's without a model",
     ),
-    Attribute("shift", "list", "m", "x, y by which the footprint was moved onto its roof to become the outline"),
+    Attribute(
+        "shift",
+        "list",
+        "m",
+        "x, y by which the footprint was moved onto its roof to become the outline",
+    ),
     Attribute("z_ground", "number", "m", "height of the ground in the world"),
     Attribute("ground_source", "text", "", "where it came from"),
-    Attribute("terrain_line", "list", "m", "closed lines of x, y, z in the world where the walls meet the terrain"),
+    Attribute(
+        "terrain_line",
+        "list",
+        "m",
+        "closed lines of x, y, z in the world where the walls meet the terrain",
+    ),
     Attribute("attributes", "object", "", "the input's own"),
     Attribute("points", "count", "", "points that the building was judged by"),
-    Attribute("residuals", "object", "m", "psd_mean, psd_std, rmse, p95, share_within_20cm, outline_iou as above"),
+    Attribute(
+        "residuals",
+        "object",
+        "m",
+        "psd_mean, psd_std, rmse, p95, share_within_20cm, outline_iou as above",
+    ),
     Attribute("density", "number", "1/m2", "points by area of the outline"),
     Attribute("nodata_share", "number", "", "as rf_nodata_frac"),
     Attribute("unexplained_area_m2", "number", "m2", "as hiproof_unexplained_area_m2"),
     Attribute("objective", "number", "", "value of what was minimised"),
-    Attribute("recognised", "object", "", "probability by roof type, from the network where it was asked"),
+    Attribute(
+        "recognised", "object", "", "probability by roof type, from the network where it was asked"
+    ),
     Attribute("types", "object", "", "probability by roof type, after the fits"),
 )
 
 PART = (
     Attribute("type", "text", "", "a name of the catalogue"),
-    Attribute("parameters", "object", "m, deg", "by name; `hiproof build --shapes` lists those of every type"),
-    Attribute("position", "list", "m", "x, y of the rectangle's centre and z of the lowest eave, about the origin"),
-    Attribute("rotation", "number", "deg", "from the x axis to the rectangle's length, counter-clockwise"),
-    Attribute("sigma", "object", "m, deg", "standard deviations by name; t_x, t_y, t_z are those of the position"),
     Attribute(
-        "outlines", "list", "m", "polygons that the part roofs, about the origin; left out: its rectangle's share"
+        "parameters",
+        "object",
+        "m, deg",
+        "by name; `hiproof build --shapes` lists those of every type",
+    ),
+    Attribute(
+        "position",
+        "list",
+        "m",
+        "x, y of the rectangle's centre and z of the lowest eave, about the origin",
+    ),
+    Attribute(
+        "rotation", "number", "deg", "from the x axis to the rectangle's length, counter-clockwise"
+    ),
+    Attribute(
+        "sigma",
+        "object",
+        "m, deg",
+        "standard deviations by name; t_x, t_y, t_z are those of the position",
+    ),
+    Attribute(
+        "outlines",
+        "list",
+        "m",
+        "polygons that the part roofs, about the origin; left out: its rectangle's share",
     ),
 )
 
@@ -186,7 +304,8 @@ SIZES = {
     "hip_height": ("m", "of a half-hip's end, from its eave to the ridge"),
     "end_height": (
         "m",
-        "of a corner, to which its end would rise at the other; its height is that of the front at the back",
+        "of a corner, to which its end would rise at the other; its height is that of the front at "
+        "the back",
     ),
     "top_width": ("m", "of a level top between slopes"),
     "top_length": ("m", "of a level top between slopes"),
@@ -209,12 +328,18 @@ SHAPE = {
         for name in shape.parameters
         if name not in SIZES
     },
-    **{f"{what}_{side}": told for side in ("front", "back", "left", "right") for what, told in OF_SIDES.items()},
+    **{
+        f"{what}_{side}": told
+        for side in ("front", "back", "left", "right")
+        for what, told in OF_SIDES.items()
+    },
 }
 """Every parameter of a part by name, but for those of cants: unit and meaning."""
 
 ANGLES = tuple(f"{what}_" for what in ("pitch", "skew", "facing"))
-"""Beginnings of the names of parameters in degrees; all others but a number of teeth are in metres."""
+"""Beginnings of the names of parameters in degrees; all others but a number of teeth
+are in metres.
+"""
 
 PARTS_LAYER = (
     Attribute("building_id", "text", "", "id of the building"),
@@ -223,14 +348,20 @@ PARTS_LAYER = (
     Attribute("area_m2", "number", "m2", "in plan, where it shows"),
     Attribute("x", "number", "m", "of its rectangle's centre in the world"),
     Attribute("y", "number", "m", "of its rectangle's centre in the world"),
-    Attribute("z_eave", "number", "m", "height of its lowest eave in the world; of its ridge or top: z_eave + height"),
+    Attribute(
+        "z_eave",
+        "number",
+        "m",
+        "height of its lowest eave in the world; of its ridge or top: z_eave + height",
+    ),
     Attribute("rotation", "number", "deg", "from the x axis to its length, counter-clockwise"),
     *(Attribute(name, "number", unit, meaning) for name, (unit, meaning) in SHAPE.items()),
     Attribute(
         "cants",
         "text",
         "deg, m, m, deg",
-        "planes over walls that cut a corner off, as JSON: a list of facing, distance, eave, pitch for each",
+        "planes over walls that cut a corner off, as JSON: a list of facing, distance, eave, pitch "
+        "for each",
     ),
     *(
         Attribute(f"{name}_sigma", "number", unit, f"standard deviation of {name}")
@@ -249,7 +380,9 @@ SURFACES_LAYER = (
     Attribute("part", "count", "", "number of its roof part, as in the layer parts"),
     Attribute("type", "text", "", "roof type of that part"),
     Attribute("slope_deg", "number", "deg", "slope of the surface"),
-    Attribute("azimuth_deg", "number", "deg", "compass direction in which it falls, null where level"),
+    Attribute(
+        "azimuth_deg", "number", "deg", "compass direction in which it falls, null where level"
+    ),
     Attribute("area_m2", "number", "m2", "true area of the surface"),
 )
 
@@ -269,14 +402,27 @@ EVALUATION = (
     Attribute("quality", "text", "", "as hiproof_quality"),
     Attribute("points", "count", "", "points of the clouds given inside the outline"),
     Attribute("density", "number", "1/m2", "points by area of the outline"),
-    Attribute("psd_mean", "number", "m", "mean distance of the points from the roof, facade points included"),
+    Attribute(
+        "psd_mean",
+        "number",
+        "m",
+        "mean distance of the points from the roof, facade points included",
+    ),
     Attribute("psd_std", "number", "m", "standard deviation of those distances"),
     Attribute("rmse", "number", "m", "root mean square of those distances"),
     Attribute("p95", "number", "m", "distance that 95 of 100 points stay below"),
     Attribute(
-        "share_within_20cm", "number", "", "as hiproof_share_within_20cm, of the points given; 0 without a model"
+        "share_within_20cm",
+        "number",
+        "",
+        "as hiproof_share_within_20cm, of the points given; 0 without a model",
     ),
-    Attribute("outline_iou", "number", "", "intersection over union of the roof's outline with the footprint"),
+    Attribute(
+        "outline_iou",
+        "number",
+        "",
+        "intersection over union of the roof's outline with the footprint",
+    ),
     Attribute("nodata_share", "number", "", "as rf_nodata_frac"),
     Attribute("unexplained_area_m2", "number", "m2", "as hiproof_unexplained_area_m2"),
     Attribute("volume_m3", "number", "m3", "volume of the solid"),
@@ -308,24 +454,37 @@ POSTGIS_ROOFS = (
     Attribute("geom", "geometry", "of the CRS", "the face as a polygon"),
 )
 
-EVERY_FORMAT = "`buildings.gml`, `buildings.city.jsonl`, the layer `buildings` of `buildings.gpkg`, `buildings.parquet`"
+EVERY_FORMAT = (
+    "`buildings.gml`, `buildings.city.jsonl`, the layer `buildings` of `buildings.gpkg`, "
+    "`buildings.parquet`"
+)
 TABLES = (
     Table("Buildings, under roofer's names", EVERY_FORMAT, ROOFER, PREFIX),
     Table("Buildings, our own", EVERY_FORMAT, HIPROOF, OWN),
     Table("Buildings, as OpenStreetMap tags them (`--osm-tags`)", EVERY_FORMAT, OSM),
-    Table("Building parts (`--parts-as buildingparts`)", "`buildings.gml`, `buildings.city.jsonl`", BUILDING_PART),
+    Table(
+        "Building parts (`--parts-as buildingparts`)",
+        "`buildings.gml`, `buildings.city.jsonl`",
+        BUILDING_PART,
+    ),
     Table("Roof surfaces", "`buildings.city.jsonl`", ROOF_SURFACE),
-    Table("Parameters: the first line", "`parameters.jsonl`; its schema: `hiproof build --schema`", HEAD),
+    Table(
+        "Parameters: the first line",
+        "`parameters.jsonl`; its schema: `hiproof build --schema`",
+        HEAD,
+    ),
     Table("Parameters: a line a building", "`parameters.jsonl`", PARAMETERS),
     Table("Parameters: a part", "`parts` of a building in `parameters.jsonl`", PART),
     Table(
         "Parts",
-        "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; where each shows, in plan",
+        "the layer `parts` of `buildings.gpkg`, `parts.parquet`, PostGIS: PREFIX_parts; where each "
+        "shows, in plan",
         PARTS_LAYER,
     ),
     Table(
         "Roof surfaces as polygons",
-        "the layer `roof_surfaces` of `buildings.gpkg`, `roof_surfaces.parquet`, PostGIS: PREFIX_roofs",
+        "the layer `roof_surfaces` of `buildings.gpkg`, `roof_surfaces.parquet`, PostGIS: "
+        "PREFIX_roofs",
         SURFACES_LAYER,
     ),
     Table("Evaluation", "`evaluation.csv`, `evaluation.json`", EVALUATION),
@@ -334,8 +493,8 @@ TABLES = (
 
 PREFACE = """# Attributes
 
-What stands in the files of a run, beside the attributes of the input, which are kept under their own names. Lengths are
-metres also where coordinates are not. Made by `hiproof attributes`.
+What stands in the files of a run, beside the attributes of the input, which are kept under
+their own names. Lengths are metres also where coordinates are not. Made by `hiproof attributes`.
 """
 
 
@@ -347,15 +506,19 @@ def attributes_text() -> str:
 def files_text() -> str:
     """Every kind of file as Markdown."""
     rows = [
-        f"| `{format.file}` | {format.what} | `hiproof {'reconstruct' if format.fragment else f'convert --format {name}'}` |"
+        f"| `{format.file}` | {format.what} | `hiproof "
+        f"{'reconstruct' if format.fragment else f'convert --format {name}'}` |"
         for name, format in FORMATS.items()
     ]
-    return "\n".join(["## Files", "", "| file | what | written by |", "| --- | --- | --- |", *rows, ""])
+    return "\n".join(
+        ["## Files", "", "| file | what | written by |", "| --- | --- | --- |", *rows, ""]
+    )
 
 
 def table_text(table: Table) -> str:
     rows = [
-        f"| `{table.prefix}{name}` | {kind} | {unit} | {meaning} |" for name, kind, unit, meaning in table.attributes
+        f"| `{table.prefix}{name}` | {kind} | {unit} | {meaning} |"
+        for name, kind, unit, meaning in table.attributes
     ]
     head = ["| name | kind | unit | meaning |", "| --- | --- | --- | --- |"]
     return "\n".join([f"## {table.title}", "", f"In {table.where}.", "", *head, *rows, ""])

@@ -1,4 +1,6 @@
-"""What a building's record says in every format: roofer's attribute names, our own, and the input's."""
+"""What a building's record says in every format: roofer's attribute names, our own, and the
+input's.
+"""
 
 from __future__ import annotations
 
@@ -31,19 +33,27 @@ def building_attributes(
     units: Units = METRES,
     osm: bool = False,
 ) -> dict[str, Any]:
-    """Attributes by name, in a fixed order: the input's own, roofer's (`prefix`), ours (`hiproof_`), with `osm` the tags of OpenStreetMap.
+    """Attributes by name, in a fixed order: the input's own, roofer's (`prefix`), ours
+    (`hiproof_`), with `osm` the tags of OpenStreetMap.
 
-    Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what we computed wins.
-    Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose coordinates are in other `units`, which
-    `hiproof_units` then says. What each is stands in attribute_list.py.
+    Values are str, int, float, bool or None; what cannot be told is None. Where names clash, what
+    we computed wins. Lengths are metres, `volume` m3, `pt_density` points/m2 also in a file whose
+    coordinates are in other `units`, which `hiproof_units` then says. What each is stands in
+    attribute_list.py.
     """
     own = {plain_text(name): plain(value) for name, value in building.attributes.items()}
-    computed = {prefix + name: value for name, value in roofer_attributes(building, figures).items()}
-    computed |= {OWN + name: value for name, value in hiproof_attributes(building, figures, units).items()}
+    computed = {
+        prefix + name: value for name, value in roofer_attributes(building, figures).items()
+    }
+    computed |= {
+        OWN + name: value for name, value in hiproof_attributes(building, figures, units).items()
+    }
     if osm:
         computed |= osm_tags(building, figures)
     if not units.are_metres:
-        computed[OWN + "units"] = f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
+        computed[OWN + "units"] = (
+            f"attributes in m, m2 and m3; plan coordinates in {units.plan_name}"
+        )
     return own | {name: plain(value) for name, value in computed.items()}
 
 
@@ -51,7 +61,9 @@ def roofer_attributes(building: Building, figures: RoofFigures | None) -> dict[s
     """The attributes that users of roofer and 3DBAG look for, without prefix."""
     quality = building.quality
     if figures is None:
-        shape = dict.fromkeys(("h_roof_min", "h_roof_50p", "h_roof_70p", "h_roof_max", "h_roof_ridge", "volume_lod22"))
+        shape = dict.fromkeys(
+            ("h_roof_min", "h_roof_50p", "h_roof_70p", "h_roof_max", "h_roof_ridge", "volume_lod22")
+        )
         roof_type, mode = "no points" if building.status is Status.NO_POINTS else "unknown", "skip"
     else:
         shape = shape_attributes(figures)
@@ -84,7 +96,9 @@ def shape_attributes(figures: RoofFigures) -> dict[str, Any]:
     }
 
 
-def hiproof_attributes(building: Building, figures: RoofFigures | None = None, units: Units = METRES) -> dict[str, Any]:
+def hiproof_attributes(
+    building: Building, figures: RoofFigures | None = None, units: Units = METRES
+) -> dict[str, Any]:
     """Our own attributes, without prefix."""
     quality, kind = building.quality, building.type
     probability = building.types.get(kind) if kind else None
@@ -96,7 +110,9 @@ def hiproof_attributes(building: Building, figures: RoofFigures | None = None, u
         "roof_type": kind,
         "roof_type_probability": None if probability is None else rounded(probability),
         "network_type": recognised,
-        "network_type_probability": None if recognised is None else rounded(building.recognised[recognised]),
+        "network_type_probability": None
+        if recognised is None
+        else rounded(building.recognised[recognised]),
         "h_eave": None if figures is None else metres(figures.h_eave),
         "parts": len(building.parts),
         "points": int(quality.points),
@@ -109,7 +125,9 @@ def hiproof_attributes(building: Building, figures: RoofFigures | None = None, u
         "ground_source": building.ground_source or None,
         "shift_x": rounded(building.shift[0]),
         "shift_y": rounded(building.shift[1]),
-        "iso19107_lod22": None if building.built is None else codes_as_written(building.solid, units),
+        "iso19107_lod22": None
+        if building.built is None
+        else codes_as_written(building.solid, units),
     }
 
 
@@ -122,6 +140,8 @@ def codes_as_written(solid: Solid, units: Units) -> str:
         return "[]"
     from ..compose import check_solid
 
-    there = Units(units.plan, units.height).to_metres(np.round(units.from_metres(solid.vertices), 4))
+    there = Units(units.plan, units.height).to_metres(
+        np.round(units.from_metres(solid.vertices), 4)
+    )
     about_origin = Solid(there, solid.faces).moved(-np.floor(there.min(axis=0)))
     return json.dumps(sorted({finding.code for finding in check_solid(about_origin)}))

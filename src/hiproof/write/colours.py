@@ -1,4 +1,6 @@
-"""One colour a roof type, the same in pictures, reports and converted models (chosen to be told apart by most eyes)."""
+"""One colour a roof type, the same in pictures, reports and converted models (chosen to be told
+apart by most eyes).
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ def linear_rgb(colour: str) -> tuple[float, float, float]:
     >>> linear_rgb("#ff0000")
     (1.0, 0.0, 0.0)
     """
-    red, green, blue = (c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in srgb(colour))
+    red, green, blue = (
+        c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in srgb(colour)
+    )
     return red, green, blue
 
 

@@ -1,8 +1,9 @@
-"""Files that appear whole or not at all: written beside their place under a hidden name, synced, then renamed.
+"""Files that appear whole or not at all: written beside their place under a hidden name, synced,
+then renamed.
 
-Whatever goes wrong on the way (an exception, Ctrl-C, a full disk), the half-written file is removed and a file that
-stood there before keeps its content. What the file system refuses becomes an OutputError, a full sentence for the
-user; errors of the caller's own code pass through unchanged.
+Whatever goes wrong on the way (an exception, Ctrl-C, a full disk), the half-written file is removed
+and a file that stood there before keeps its content. What the file system refuses becomes an
+OutputError, a full sentence for the user; errors of the caller's own code pass through unchanged.
 """
 
 from __future__ import annotations
@@ -20,8 +21,11 @@ from ..errors import OutputError
 
 ADVICE = {
     errno.ENOSPC: "the disk is full; free some space or choose another --out folder",
-    getattr(errno, "EDQUOT", -1): "your disk quota is used up; free some space or choose another --out folder",
-    errno.EFBIG: "the file grew beyond the size allowed here; raise the limit (ulimit -f) or write fewer buildings",
+    getattr(
+        errno, "EDQUOT", -1
+    ): "your disk quota is used up; free some space or choose another --out folder",
+    errno.EFBIG: "the file grew beyond the size allowed here; raise the limit (ulimit -f) or write "
+    "fewer buildings",
     errno.EACCES: "permission denied; choose a folder you may write to",
     errno.EPERM: "permission denied; choose a folder you may write to",
     errno.EROFS: "the file system is read-only; choose another folder",
@@ -31,17 +35,21 @@ ADVICE = {
     errno.ENAMETOOLONG: "the name is too long for this file system; choose a shorter one",
 }
 
-# Reading never fails so: in a block that writes, these are errors of writing whatever file they name.
-ONLY_WRITING = (errno.ENOSPC, getattr(errno, "EDQUOT", -1), errno.EFBIG, errno.EROFS)  # Windows has no EDQUOT
+# Reading never fails so: in a block that writes, these are errors of writing whatever file they
+# name.
+# Windows has no EDQUOT
+ONLY_WRITING = (errno.ENOSPC, getattr(errno, "EDQUOT", -1), errno.EFBIG, errno.EROFS)
 
 
 def output_error(path: str | os.PathLike, error: OSError) -> OutputError:
     """The sentence for `error`, met while writing `path`.
 
-    >>> str(output_error("out/a.gml", OSError(errno.ENOSPC, "No space left on device")))
-    'expected to write out/a.gml, but the disk is full; free some space or choose another --out folder'
+    >>> str(output_error("out/a.gml", OSError(errno.ENOSPC, "No space left on device")))[:50]
+    'expected to write out/a.gml, but the disk is full;'
     """
-    advice = ADVICE.get(error.errno or 0, f"got: {error}; check the path, the permissions and the space left")
+    advice = ADVICE.get(
+        error.errno or 0, f"got: {error}; check the path, the permissions and the space left"
+    )
     return OutputError(f"expected to write {os.fspath(path)}, but {advice}")
 
 
@@ -51,7 +59,9 @@ def elsewhere(error: OutputError, command: str) -> OutputError:
 
 
 class OutputFile(io.FileIO):
-    """A raw file opened for exclusive writing (and reading back) whose failing writes raise OutputError."""
+    """A raw file opened for exclusive writing (and reading back) whose failing writes raise
+    OutputError.
+    """
 
     def __init__(self, hidden: Path, path: Path):
         self.path = path
@@ -66,10 +76,12 @@ class OutputFile(io.FileIO):
 
 @contextmanager
 def atomic(path: str | os.PathLike) -> Iterator[Path]:
-    """Yield a free hidden path beside `path`, which becomes `path` when the block ends well and is removed when not.
+    """Yield a free hidden path beside `path`, which becomes `path` when the block ends well and is
+    removed when not.
 
-    The parent folder is made if missing. Raises OutputError where the place cannot be written, before the block is
-    entered if that can be known, and for the block's own errors when they come from writing the hidden file.
+    The parent folder is made if missing. Raises OutputError where the place cannot be written,
+    before the block is entered if that can be known, and for the block's own errors when they come
+    from writing the hidden file.
 
     >>> import tempfile
     >>> folder = Path(tempfile.mkdtemp())
@@ -95,25 +107,36 @@ def atomic(path: str | os.PathLike) -> Iterator[Path]:
         os.replace(hidden, path)
         sync(path.parent)
     except OSError as error:
-        if error.errno in ONLY_WRITING or str(hidden) in (str(error.filename), str(error.filename2)):
+        if error.errno in ONLY_WRITING or str(hidden) in (
+            str(error.filename),
+            str(error.filename2),
+        ):
             raise output_error(path, error) from error
         raise
     finally:
-        # After a good end the hidden name is gone; SQLite leaves journals beside it after a bad one.
-        for leftover in (hidden, *(hidden.with_name(hidden.name + end) for end in ("-journal", "-wal", "-shm"))):
+        # After a good end the hidden name is gone; SQLite leaves journals beside it after a bad
+        # one.
+        for leftover in (
+            hidden,
+            *(hidden.with_name(hidden.name + end) for end in ("-journal", "-wal", "-shm")),
+        ):
             remove(leftover)
 
 
 @contextmanager
 def atomic_file(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends well; see `atomic`."""
+    """Yield a buffered binary file, seekable and readable, that becomes `path` when the block ends
+    well; see `atomic`.
+    """
     with atomic(path) as hidden, opened(hidden, Path(path)) as file:
         yield file
 
 
 @contextmanager
 def scratch(path: str | os.PathLike) -> Iterator[BinaryIO]:
-    """Yield a temporary binary file beside `path`, gone when the block ends; a full disk raises OutputError."""
+    """Yield a temporary binary file beside `path`, gone when the block ends; a full disk raises
+    OutputError.
+    """
     hidden = hidden_name(Path(os.path.realpath(path)))
     try:
         with opened(hidden, Path(path)) as file:
@@ -134,12 +157,15 @@ def opened(hidden: Path, path: Path) -> Iterator[BinaryIO]:
         yield file
         file.flush()
     finally:
-        # Closing the raw file drops what is still buffered after a failure instead of failing again.
+        # Closing the raw file drops what is still buffered after a failure instead of failing
+        # again.
         raw.close()
 
 
 def remove(path: Path) -> None:
-    """Remove a file if it can be: where a file system is read-only, there is none, and the error before it is the one to tell."""
+    """Remove a file if it can be: where a file system is read-only, there is none, and the error
+    before it is the one to tell.
+    """
     with suppress(OSError):
         path.unlink(missing_ok=True)
 
@@ -150,8 +176,9 @@ def hidden_name(path: Path) -> Path:
 
 
 def sync(path: Path) -> None:
-    """Ask the operating system to put the file or folder at `path` on disk; folders cannot be opened everywhere, and Windows
-    does so only for files opened for writing."""
+    """Ask the operating system to put the file or folder at `path` on disk; folders cannot be
+    opened everywhere, and Windows does so only for files opened for writing.
+    """
     try:
         descriptor = os.open(path, os.O_RDONLY if path.is_dir() else os.O_RDWR)
     except PermissionError:

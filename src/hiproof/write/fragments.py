@@ -1,7 +1,7 @@
 """A building's texts, ready to be joined into the files of a run, and how they are kept until then.
 
-A work tile's buildings are one file of plain arrays: bytes one after the other with the ends of each, and numbers. A
-file that somebody else could have written is only ever read as data.
+A work tile's buildings are one file of plain arrays: bytes one after the other with the ends of
+each, and numbers. A file that somebody else could have written is only ever read as data.
 """
 
 from __future__ import annotations
@@ -28,8 +28,10 @@ EXTENT, ENDS = ".extent", ".ends"
 
 @dataclass(frozen=True)
 class Sheet:
-    """A building with all that its texts are made of: the `figures` of its solid (None without one), its `attributes`, its names in
-    CityJSON and in GML, and what the files of its run have in common."""
+    """A building with all that its texts are made of: the `figures` of its solid (None without
+    one), its `attributes`, its names in CityJSON and in GML, and what the files of its run have in
+    common.
+    """
 
     building: Building
     figures: RoofFigures | None
@@ -46,7 +48,9 @@ class Sheet:
 
 @dataclass(frozen=True)
 class Fragment:
-    """A building as a file of a run holds it: its bytes and its extent there (low x y z, high x y z), None where it has none."""
+    """A building as a file of a run holds it: its bytes and its extent there (low x y z, high x y
+    z), None where it has none.
+    """
 
     text: bytes
     extent: tuple[float, ...] | None = None
@@ -62,17 +66,26 @@ def save_fragments(file: BinaryIO, parts: Sequence[Fragments]) -> None:
     for kind in parts[0] if parts else ():
         several = [part[kind] for part in parts]
         arrays[kind] = np.frombuffer(b"".join(fragment.text for fragment in several), np.uint8)
-        arrays[kind + ENDS] = np.cumsum([len(fragment.text) for fragment in several], dtype=np.int64)
-        arrays[kind + EXTENT] = np.array([fragment.extent or NOTHING for fragment in several], float)
+        arrays[kind + ENDS] = np.cumsum(
+            [len(fragment.text) for fragment in several], dtype=np.int64
+        )
+        arrays[kind + EXTENT] = np.array(
+            [fragment.extent or NOTHING for fragment in several], float
+        )
     np.savez(file, **arrays)
 
 
 def load_fragments(path: Path) -> Iterator[Fragments]:
-    """The buildings that `save_fragments` wrote to `path`. Raises OutputError for a file that is not whole."""
+    """The buildings that `save_fragments` wrote to `path`.
+
+    Raises OutputError for a file that is not whole.
+    """
     try:
         with np.load(path, allow_pickle=False) as arrays:
             kinds = [name for name in arrays.files if not name.endswith((ENDS, EXTENT))]
-            columns = [column(arrays[kind], arrays[kind + ENDS], arrays[kind + EXTENT]) for kind in kinds]
+            columns = [
+                column(arrays[kind], arrays[kind + ENDS], arrays[kind + EXTENT]) for kind in kinds
+            ]
             for several in zip(*columns, strict=True):
                 yield dict(zip(kinds, several, strict=True))
     except (OSError, EOFError, ValueError, TypeError, KeyError, zipfile.BadZipFile) as error:
@@ -82,7 +95,9 @@ def load_fragments(path: Path) -> Iterator[Fragments]:
 
 
 def column(joined: np.ndarray, ends: np.ndarray, extents: np.ndarray) -> list[Fragment]:
-    """The texts whose bytes stand one after the other in `joined` (n,), each up to its end, with their extents (b, 6)."""
+    """The texts whose bytes stand one after the other in `joined` (n,), each up to its end, with
+    their extents (b, 6).
+    """
     content, starts = joined.tobytes(), [0, *ends.tolist()]
     texts = [content[start:end] for start, end in itertools.pairwise(starts)]
     known = [None if np.isnan(extent[0]) else tuple(extent) for extent in extents.tolist()]

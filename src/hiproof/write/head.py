@@ -16,10 +16,12 @@ from .naming import FileUnits
 
 @dataclass(frozen=True)
 class FileHead:
-    """What the files of a run have in common: the CRS (anything pyproj understands, or None), the unit of coordinates
-    without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON file, None where its first building
-    settles it, how solids are composed, what is written of buildings, what goes before roofer's attribute names, and the date
-    that CityGML gives its buildings, if any."""
+    """What the files of a run have in common: the CRS (anything pyproj understands, or None), the
+    unit of coordinates without one (a key of read.crs.NAMED_UNITS), the offset (3,) of the CityJSON
+    file, None where its first building settles it, how solids are composed, what is written of
+    buildings, what goes before roofer's attribute names, and the date that CityGML gives its
+    buildings, if any.
+    """
 
     crs: Any = None
     unit: str = "auto"
@@ -34,11 +36,16 @@ class FileHead:
         """Units of the coordinates in each file, and the way to its CRS."""
         from ..read.crs import parse_crs, units_of
 
-        return FileUnits.of(self.crs, units_of(parse_crs(self.crs), named=self.unit), self.write.out_crs)
+        return FileUnits.of(
+            self.crs, units_of(parse_crs(self.crs), named=self.unit), self.write.out_crs
+        )
 
     @functools.cached_property
     def crs_of_files(self) -> Any:
-        """The CRS that files name: the run's, or what `--out-crs` asks for. Parameters stay in the run's."""
+        """The CRS that files name: the run's, or what `--out-crs` asks for.
+
+        Parameters stay in the run's.
+        """
         from .reprojected import crs_of_files
 
         return crs_of_files(self.crs, self.write.out_crs) if self.write.out_crs else self.crs

@@ -6,7 +6,9 @@ import json
 from typing import Any
 
 # Nothing that is printed here holds itself, and to look for that takes up to a fifth of the time.
-COMPACT = json.JSONEncoder(separators=(",", ":"), ensure_ascii=False, allow_nan=False, check_circular=False)
+COMPACT = json.JSONEncoder(
+    separators=(",", ":"), ensure_ascii=False, allow_nan=False, check_circular=False
+)
 
 
 def dump(value: Any) -> bytes:

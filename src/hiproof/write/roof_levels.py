@@ -1,4 +1,6 @@
-"""Levels below which a share of a roof lies, compiled: exact areas of its triangles below a level, and a search."""
+"""Levels below which a share of a roof lies, compiled: exact areas of its triangles below a level,
+and a search.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +13,9 @@ LEVEL_TRIANGLE_M = 1e-9  # a triangle whose corners differ in height by less is 
 
 @compiled
 def area_below(level, z, plan):
-    """Plan area of the triangles with sorted heights `z` (t, 3) and signed plan areas `plan` (t,) at or below `level`."""
+    """Plan area of the triangles with sorted heights `z` (t, 3) and signed plan areas `plan` (t,)
+    at or below `level`.
+    """
     area = 0.0
     for t in range(len(z)):
         low, middle, high = z[t, 0], z[t, 1], z[t, 2]
@@ -29,11 +33,12 @@ def area_below(level, z, plan):
 def level_of_share(share, z, plan):
     """The level that `share` of the roof's plan area lies below; triangles as in `area_below`.
 
-    Between corner heights the area below a level is quadratic in the level, at the height of a level triangle it jumps:
-    both are solved exactly.
+    Between corner heights the area below a level is quadratic in the level, at the height of a
+    level triangle it jumps: both are solved exactly.
     """
     target = share * plan.sum()
-    enough = target * (1 - 1e-12)  # so that rounding does not decide where the share ends just at a level part
+    # so that rounding does not decide where the share ends just at a level part
+    enough = target * (1 - 1e-12)
     knots = np.unique(z.ravel())
     low, high = 0, len(knots) - 1
     if area_below(knots[low], z, plan) >= enough:

@@ -1,7 +1,7 @@
 """The files of a run, written in one pass over the buildings.
 
-A building's text is the same in whichever process it is made: `fragments` makes it for all files at once, in a worker,
-and `join_fragments` only puts texts one after the other.
+A building's text is the same in whichever process it is made: `fragments` makes it for all files at
+once, in a worker, and `join_fragments` only puts texts one after the other.
 """
 
 from __future__ import annotations
@@ -26,19 +26,25 @@ from .roof_figures import RoofFigures
 from .writer import BuildingWriter
 
 
-def write_all(folder: str | os.PathLike, buildings: Iterable[Building], crs: Any = None) -> list[str]:
+def write_all(
+    folder: str | os.PathLike, buildings: Iterable[Building], crs: Any = None
+) -> list[str]:
     """Write buildings.gml, buildings.city.jsonl, parameters.jsonl and buildings.gpkg to `folder`.
 
-    `buildings` may be a generator; `crs` is anything pyproj understands or None. Returns the ids of buildings whose solid
-    turned out to be broken: they are written without it, as internal errors, and do not stop the others. When anything
-    else goes wrong before the last building none of the files appears and older ones stay. Raises OutputError when the
-    folder cannot be written.
+    `buildings` may be a generator; `crs` is anything pyproj understands or None. Returns the ids of
+    buildings whose solid turned out to be broken: they are written without it, as internal errors,
+    and do not stop the others. When anything else goes wrong before the last building none of the
+    files appears and older ones stay. Raises OutputError when the folder cannot be written.
     """
     broken, head = [], FileHead(crs)
     with ExitStack() as stack:
         files = asked_files(Settings(), Path(folder))
-        # The table does most of its work at the end: entered last it is closed first, and its failure stops the others.
-        writers = [stack.enter_context(writer_of(FORMATS[name], path, head)) for name, path in files.items()]
+        # The table does most of its work at the end: entered last it is closed first, and its
+        # failure stops the others.
+        writers = [
+            stack.enter_context(writer_of(FORMATS[name], path, head))
+            for name, path in files.items()
+        ]
         for asked in buildings:
             building, figures = measured(asked)
             if building is not asked:
@@ -53,20 +59,27 @@ def writer_of(format: Format, path: Path, head: FileHead) -> BuildingWriter:
     return module_of(format.module).writer(path, head, **format.given)
 
 
-def fragments(asked: Building, names: tuple[str, str], head: FileHead) -> tuple[Building, Fragments]:
-    """The texts of one building, `names` being its CityJSON id and its gml:id, and the building they tell of.
+def fragments(
+    asked: Building, names: tuple[str, str], head: FileHead
+) -> tuple[Building, Fragments]:
+    """The texts of one building, `names` being its CityJSON id and its gml:id, and the building
+    they tell of.
 
-    They are those of the files that a run writes, `head` what these have in common, the offset of the CityJSON file included. A solid that cannot be measured is left out, as in `write_all`.
+    They are those of the files that a run writes, `head` what these have in common, the offset of
+    the CityJSON file included. A solid that cannot be measured is left out, as in `write_all`.
     """
     building, figures = measured(asked)
-    attributes = building_attributes(building, figures, units=head.units.gml, osm=head.write.osm_tags)
+    attributes = building_attributes(
+        building, figures, units=head.units.gml, osm=head.write.osm_tags
+    )
     sheet = Sheet(building, figures, attributes, *names, head)
     kinds = asked_fragments(head.write)
     return building, {kind: module_of(kind).fragment(sheet) for kind in kinds}
 
 
 def join_fragments(files: dict[str, Path], parts: Iterable[Fragments], head: FileHead) -> None:
-    """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without making any text.
+    """Write `files` of a run from `parts`, each whole or not at all; as `write_all` would, without
+    making any text.
 
     `files` are paths by format, a key of FORMATS. Raises OutputError when one cannot be written.
     """
@@ -89,5 +102,9 @@ def measured(building: Building) -> tuple[Building, RoofFigures | None]:
     except (ValueError, IndexError) as error:
         detail = f"{Status.INTERNAL_ERROR.value} ({error})"
         return dataclasses.replace(
-            building, status=Status.INTERNAL_ERROR, detail=detail, built=None, terrain_intersection=()
+            building,
+            status=Status.INTERNAL_ERROR,
+            detail=detail,
+            built=None,
+            terrain_intersection=(),
         ), None

@@ -1,4 +1,6 @@
-"""What is drawn of a building beside its own solid: footprint and roof edge, blocks, building parts, as far as asked for."""
+"""What is drawn of a building beside its own solid: footprint and roof edge, blocks, building
+parts, as far as asked for.
+"""
 
 from __future__ import annotations
 
@@ -21,8 +23,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class PartShape:
-    """A building part: its `solid` with `figures`, its LoD1.3 `block` if asked for, the roof types of its roof parts, the largest
-    first, and its attributes."""
+    """A building part: its `solid` with `figures`, its LoD1.3 `block` if asked for, the roof types
+    of its roof parts, the largest first, and its attributes.
+    """
 
     solid: Solid
     figures: RoofFigures
@@ -35,8 +38,9 @@ class PartShape:
 class Shapes:
     """A building's further geometry, None or empty where it is not asked for or there is none.
 
-    `outline` is the solid's ground, which at the height of the eaves, `z_edge`, is the roof's edge of LoD0; `lod12` and `lod13` are
-    blocks; `parts` are two or more, and have blocks of their own in place of `lod13`.
+    `outline` is the solid's ground, which at the height of the eaves, `z_edge`, is the roof's edge
+    of LoD0; `lod12` and `lod13` are blocks; `parts` are two or more, and have blocks of their own
+    in place of `lod13`.
     """
 
     outline: Face | None = None
@@ -53,8 +57,13 @@ class Shapes:
 NO_SHAPES = Shapes()
 
 
-def shapes_of(building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX) -> Shapes:
-    """The shapes of `building` that `write` asks for; `figures` are those of its solid, None without one."""
+def shapes_of(
+    building: Building, figures: RoofFigures | None, write: WriteSettings, prefix: str = PREFIX
+) -> Shapes:
+    """The shapes of `building` that `write` asks for;
+
+    `figures` are those of its solid, None without one.
+    """
     asked = set(write.lods)
     if building.built is None or figures is None or (asked == {"2.2"} and write.parts_as == "one"):
         return NO_SHAPES
@@ -79,14 +88,18 @@ def cut_into_parts(solid: Solid) -> tuple[BuildingPart, ...]:
 
 
 def whole_block(solid: Solid, ground: Face, figures: RoofFigures) -> Solid:
-    """LoD1.2: one block over the outline, as high as seven tenths of the roof lie below (as 3DBAG has it)."""
+    """LoD1.2: one block over the outline, as high as seven tenths of the roof lie below (as 3DBAG
+    has it).
+    """
     from ..compose.blocks import block
 
     return block(solid.plan_of(ground), figures.h_base, metres(figures.h_70p))
 
 
 def stepped(cut: tuple[BuildingPart, ...], figures: RoofFigures) -> Solid | None:
-    """LoD1.3 as one solid: a block for each building part, as high as seven tenths of its own roof lie below."""
+    """LoD1.3 as one solid: a block for each building part, as high as seven tenths of its own roof
+    lie below.
+    """
     from ..compose.blocks import blocks
 
     heights = [metres(roof_figures(part.solid).h_70p) for part in cut]
@@ -97,29 +110,48 @@ def part_shapes(
     building: Building, cut: tuple[BuildingPart, ...], asked: set[str], prefix: str
 ) -> tuple[PartShape, ...]:
     """The building parts with what their roof parts are."""
-    primitives = [part_values(building, number, shown) for number, shown in enumerate(building.shown_areas())]
+    primitives = [
+        part_values(building, number, shown) for number, shown in enumerate(building.shown_areas())
+    ]
     return tuple(
-        part_shape(part, [primitives[member] for member in part.members if member < len(primitives)], asked, prefix)
+        part_shape(
+            part,
+            [primitives[member] for member in part.members if member < len(primitives)],
+            asked,
+            prefix,
+        )
         for part in cut
     )
 
 
-def part_shape(part: BuildingPart, primitives: list[dict[str, Any]], asked: set[str], prefix: str) -> PartShape:
+def part_shape(
+    part: BuildingPart, primitives: list[dict[str, Any]], asked: set[str], prefix: str
+) -> PartShape:
     """A building part of these roof parts with its figures, block and attributes."""
     from ..compose.blocks import block
 
     figures = roof_figures(part.solid)
     types = tuple(values["type"] for values in primitives)
     lod13 = block(part.outline, figures.h_base, metres(figures.h_70p)) if "1.3" in asked else None
-    return PartShape(part.solid, figures, lod13, types, part_attributes(primitives, figures, prefix))
+    return PartShape(
+        part.solid, figures, lod13, types, part_attributes(primitives, figures, prefix)
+    )
 
 
-def part_attributes(primitives: list[dict[str, Any]], figures: RoofFigures, prefix: str) -> dict[str, Any]:
+def part_attributes(
+    primitives: list[dict[str, Any]], figures: RoofFigures, prefix: str
+) -> dict[str, Any]:
     """Attributes of a building part by name."""
-    found = {**shape_attributes(figures), "roof_type": figures.roofer_type, "roof_n_surfaces": figures.roof_faces}
+    found = {
+        **shape_attributes(figures),
+        "roof_type": figures.roofer_type,
+        "roof_n_surfaces": figures.roof_faces,
+    }
     return {
         **{prefix + name: plain(found[name]) for name in OF_PARTS},
         f"{OWN}h_eave": plain(metres(figures.h_eave)),
         f"{OWN}roof_type": primitives[0]["type"] if primitives else None,
-        f"{OWN}primitives": [{name: plain(value) for name, value in values.items()} for values in primitives],
+        f"{OWN}primitives": [
+            {name: plain(value) for name, value in values.items()} for values in primitives
+        ],
     }

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-WIDEST = -123456789.1234  # as many characters as any coordinate takes: room in a head for what is known at the end
+# as many characters as any coordinate takes: room in a head for what is known at the end
+WIDEST = -123456789.1234
 
 
 def rounded(value: float, digits: int = 6) -> float:
@@ -25,7 +26,8 @@ def metres(value: float) -> float:
 def plain(value: Any) -> Any:
     """`value` as str, int, float, bool or None, which every format can hold.
 
-    >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2), b"x", [1, "a"])]
+    >>> [plain(v) for v in (np.int32(3), float("nan"), np.bool_(True), datetime.date(2020, 1, 2),
+    ...     b"x", [1, "a"])]
     [3, None, True, '2020-01-02', 'x', '[1, "a"]']
     """
     if value is None or isinstance(value, (bool, int)):
@@ -50,7 +52,12 @@ def plain(value: Any) -> Any:
 def plain_text(value: Any) -> str:
     """`value` as text that every format can hold.
 
-    Halves of surrogate pairs, from files read in a wrong encoding, fit none, and a NUL ends a database's text.
+    Halves of surrogate pairs, from files read in a wrong encoding, fit none, and a NUL ends a
+    database's text.
     """
     text = str(value)
-    return text if text.isprintable() else text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")
+    return (
+        text
+        if text.isprintable()
+        else text.encode("utf-8", "replace").decode().replace("\0", "\ufffd")
+    )

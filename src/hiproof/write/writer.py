@@ -1,4 +1,6 @@
-"""The life of an output file: opened, given one building after another, finished, and only then seen."""
+"""The life of an output file: opened, given one building after another, finished, and only then
+seen.
+"""
 
 from __future__ import annotations
 
@@ -16,8 +18,8 @@ from .roof_figures import RoofFigures
 class BuildingWriter(AbstractContextManager):
     """Base of the incremental writers: `with Writer(path, ...) as writer: writer.add(building)`.
 
-    The file appears when the block ends well; after an exception nothing is left and an older file stays. A format
-    fills in `begin`, `add`, `put` and `finish`.
+    The file appears when the block ends well; after an exception nothing is left and an older file
+    stays. A format fills in `begin`, `add`, `put` and `finish`.
     """
 
     file: BinaryIO
@@ -26,7 +28,10 @@ class BuildingWriter(AbstractContextManager):
         self.path = path
 
     def begin(self, stack: ExitStack) -> None:
-        """Write what comes before the first building; `stack` closes what the format opens beside the file."""
+        """Write what comes before the first building;
+
+        `stack` closes what the format opens beside the file.
+        """
 
     @abstractmethod
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:

@@ -13,7 +13,8 @@ QUOTED = ESCAPES | str.maketrans({'"': "&quot;", "\n": "&#10;", "\t": "&#9;"})
 
 
 def xml_text(value: Any) -> str:
-    """`value` as the text of an element; control characters that XML cannot hold become replacement characters.
+    """`value` as the text of an element; control characters that XML cannot hold become replacement
+    characters.
 
     >>> xml_text("a < b"), xml_text(2.5)
     ('a &lt; b', '2.5')
@@ -40,4 +41,6 @@ def generic_attribute(name: str, value: Any) -> str:
 def attribute_set(name: str, values: dict[str, Any]) -> str:
     """A gen:genericAttributeSet of `values` by name."""
     inside = "".join(generic_attribute(key, value) for key, value in values.items())
-    return f'<gen:genericAttributeSet name="{xml_attribute(name)}">{inside}</gen:genericAttributeSet>'
+    return (
+        f'<gen:genericAttributeSet name="{xml_attribute(name)}">{inside}</gen:genericAttributeSet>'
+    )

@@ -7,7 +7,8 @@ lines   a polygon as the lines of its sides
 cost    how well an outline explains where points are and are not, and what its lines cost
 moves   lines dropped, joined, turned into common directions and moved until nothing is gained
 steps   bays and notches of a side or of a run of them, wherever points pay for them
-settle  each side to the place that the points across it give it, without the bias of outermost points
+settle  each side to the place that the points across it give it, without the bias of outermost
+        points
 """
 
 from __future__ import annotations
@@ -31,31 +32,39 @@ from .steps import RUN, stepped
 
 __all__ = ["estimate_outline"]
 
-# m over which a side is soft: the scanner's noise in plan; density outside over that inside: points of walls and trees
+# m over which a side is soft: the scanner's noise in plan; density outside over that inside: points
+# of walls and trees
 BLUR_M, STRAY = 0.15, math.exp(-4.0)
-# nats: of a line, of a further direction, of a line in that, of a sharp corner, where points are spread by chance
+# nats: of a line, of a further direction, of a line in that, of a sharp corner, where points are
+# spread by chance
 PRICES = (3.0, 3.0, 1.0, 6.0)
-# m from the border of the points' shape within which a wall is an outer one: the scanner's noise, doubled
+# m from the border of the points' shape within which a wall is an outer one: the scanner's noise,
+# doubled
 OUTER_M = 0.25
-# points a square metre up to which chance makes borders ragged; beyond, plants, gutters and what hangs out do, all points alike: prices
-# grow with these powers of the density
+# points a square metre up to which chance makes borders ragged; beyond, plants, gutters and what
+# hangs out do, all points alike: prices grow with these powers of the density
 CHANCE_DENSE, GROWTH = 8.0, (0.5, 0.5, 0.5, 1.0)
-MOST_DENSE = 40.0  # points a square metre; of more only every second, third, ... bears on what is drawn: it takes time
-SAME_DIRECTION_RAD = math.radians(1.5)  # rad; within it the direction of slopes and that of the outline are one
-AROUND_M = 2.0  # m around a court's first drawing in which its corners lie; points of twice that bear on it
+# points a square metre; of more only every second, third, ... bears on what is drawn: it takes time
+MOST_DENSE = 40.0
+# rad; within it the direction of slopes and that of the outline are one
+SAME_DIRECTION_RAD = math.radians(1.5)
+# m around a court's first drawing in which its corners lie; points of twice that bear on it
+AROUND_M = 2.0
 MOSTLY_INSIDE = 0.8  # of a court's area
 STEP_SPACINGS = 0.2  # spacings of points that lines are moved by first
 
 
 def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.Polygon:
-    """Outline, with courts, of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and across.
+    """Outline, with courts, of `points` (n, 3) or (n, 2) in metres, mostly along `kappa` (rad) and
+    across.
 
-    With heights, points of walls are known, and the outline runs through them. Each ring is the cheapest of three drawings, from few
-    corners on, from more and from many, these along another main direction where the corners have one; without `kappa` all are along
-    theirs.
-    Raises FitError for points that span no area.
+    With heights, points of walls are known, and the outline runs through them. Each ring is the
+    cheapest of three drawings, from few corners on, from more and from many, these along another
+    main direction where the corners have one; without `kappa` all are along theirs. Raises FitError
+    for points that span no area.
 
-    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12, 0.5), np.arange(0.25, 7, 0.5)))
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.25, 12, 0.5), np.arange(0.25, 7,
+    ...     0.5)))
     >>> outline = estimate_outline(np.column_stack([x, y]))
     >>> len(outline.exterior.coords) - 1, bool(abs(outline.area - 84) < 4)
     (4, True)
@@ -72,8 +81,10 @@ def estimate_outline(points: np.ndarray, kappa: float | None = None) -> shapely.
 
 
 class Cloud(NamedTuple):
-    """What all rings are drawn by: points `xy` (n, 2), which of them are a `wall`'s, which are `telling`: not those of inner walls;
-    `density` (points of the roof a square metre), `spacing` (m), `dearness` of structure."""
+    """What all rings are drawn by: points `xy` (n, 2), which of them are a `wall`'s, which are
+    `telling`: not those of inner walls; `density` (points of the roof a square metre), `spacing`
+    (m), `dearness` of structure.
+    """
 
     xy: np.ndarray
     wall: np.ndarray
@@ -86,36 +97,56 @@ class Cloud(NamedTuple):
 def cloud_of(points: np.ndarray, rough: Rough) -> Cloud:
     """What `points` (n, 2 or 3) say of the rings to be drawn."""
     xy = points[:, :2]
-    wall = on_walls(points, points, rough.spacing) if points.shape[1] > 2 else np.zeros(len(points), bool)
+    wall = (
+        on_walls(points, points, rough.spacing)
+        if points.shape[1] > 2
+        else np.zeros(len(points), bool)
+    )
     outer = wall.copy()
     outer[wall] = shapely.dwithin(rough.shape.boundary, shapely.points(xy[wall]), OUTER_M)
     density = (~wall).sum() / sum(area_of(starts[0]) for starts in rough.rings)
-    return Cloud(xy, wall, ~wall | outer, density, rough.spacing, unevenness(xy[~wall], rough.shape, rough.spacing))
+    return Cloud(
+        xy,
+        wall,
+        ~wall | outer,
+        density,
+        rough.spacing,
+        unevenness(xy[~wall], rough.shape, rough.spacing),
+    )
 
 
 def ring_of(starts: list[np.ndarray], ways: tuple[float, ...], cloud: Cloud) -> shapely.Polygon:
-    """One ring: the cheapest of the drawings from its `starts` on, each along one of the `ways` (rad)."""
+    """One ring: the cheapest of the drawings from its `starts` on, each along one of the `ways`
+    (rad).
+    """
     drawings = []
     for corners, way in zip(starts, ways, strict=True):
         angle = along_y(corners, way)
         border = border_of(cloud, corners, angle)
-        found = drawn(lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing)
+        found = drawn(
+            lines_through(turned_back(corners, angle)), border, STEP_SPACINGS * cloud.spacing
+        )
         drawings.append((found.cost, found.lines + [angle, 0.0]))
     _, lines = min(drawings, key=itemgetter(0))
-    lines = settled(lines, cloud.xy[cloud.telling], cloud.density)  # walls well inside stand below eaves that reach out
+    # walls well inside stand below eaves that reach out
+    lines = settled(lines, cloud.xy[cloud.telling], cloud.density)
     corners = np.empty_like(lines)
     find_corners(lines, corners)
     return shapely.Polygon(corners)
 
 
 def along_y(corners: np.ndarray, way: float) -> float:
-    """The `way` (rad), or that across it, such that `corners` (n, 2) turned by it reach further in y: fewer sides are as high as a point."""
+    """The `way` (rad), or that across it, such that `corners` (n, 2) turned by it reach further in
+    y: fewer sides are as high as a point.
+    """
     x, y = np.ptp(turned_back(corners, way), axis=0)
     return way if y >= x else way + 0.5 * math.pi
 
 
 def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
-    """What bears on a ring that begins with `corners` (n, 2), in axes turned by `angle` (rad): some of the points, and the prices."""
+    """What bears on a ring that begins with `corners` (n, 2), in axes turned by `angle` (rad): some
+    of the points, and the prices.
+    """
     xy, wall = turned_back(cloud.xy[cloud.telling], angle), cloud.wall[cloud.telling]
     start, court = turned_back(corners, angle), area_of(corners) < 0.0
     low, high = start.min(axis=0) - AROUND_M, start.max(axis=0) + AROUND_M
@@ -127,13 +158,18 @@ def border_of(cloud: Cloud, corners: np.ndarray, angle: float) -> Border:
     x, y = np.ascontiguousarray(xy[order].T)
     density = cloud.density / step
     dense = max(density / CHANCE_DENSE, 1.0)
-    prices = (cloud.dearness * price * dense**growth for price, growth in zip(PRICES, GROWTH, strict=True))
+    prices = (
+        cloud.dearness * price * dense**growth for price, growth in zip(PRICES, GROWTH, strict=True)
+    )
     box = low[0], high[0], low[1], high[1]
     return Border(x, y, wall[order], density, court, box, BLUR_M, costs_by_depth(STRAY), *prices)
 
 
 def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shapely.Polygon:
-    """The outline less its courts. One that is drawn as a bay already, or would cut a roof in two, is left out."""
+    """The outline less its courts.
+
+    One that is drawn as a bay already, or would cut a roof in two, is left out.
+    """
     for court in courts:
         roof = largest(shapely.difference(outline, court))
         gone = outline.area - roof.area
@@ -143,13 +179,17 @@ def with_courts(outline: shapely.Polygon, courts: list[shapely.Polygon]) -> shap
 
 
 def turned_back(xy: np.ndarray, angle: float) -> np.ndarray:
-    """Places (n, 2) in axes turned by `angle` (rad): along these a side is near few points only, and what it costs soon known."""
+    """Places (n, 2) in axes turned by `angle` (rad): along these a side is near few points only,
+    and what it costs soon known.
+    """
     c, s = math.cos(angle), math.sin(angle)
     return xy @ np.array([[c, -s], [s, c]])
 
 
 def drawn(lines: np.ndarray, border: Border, step_m: float) -> Drawing:
-    """The cheapest drawing found from `lines` (n, 2) on, mostly along the axes: few of them at first, then with what breaks them."""
+    """The cheapest drawing found from `lines` (n, 2) on, mostly along the axes: few of them at
+    first, then with what breaks them.
+    """
     drawing = redrawn(drawing_of(lines, 0.0, border), border, step_m)
     for longest in (1, RUN):  # bays of single sides come first: fewer runs go wrong
         broken = stepped(drawing, border, longest)

@@ -1,15 +1,19 @@
-"""What an outline costs: how badly it explains where points lie, and how many lines it is drawn with. Compiled.
+"""What an outline costs: how badly it explains where points lie, and how many lines it is drawn
+with. Compiled.
 
-Points of the roof are spread evenly over it, those of its walls lie on the outline. So an outline of area A around roof points of
-`density` has the likelihood
+Points of the roof are spread evenly over it, those of its walls lie on the outline. So an outline
+of area A around roof points of `density` has the likelihood
 
-    exp(-density A)  times the product over points of  density (stray + (1 - stray) Phi(depth / blur))  of the roof,
-                                                       stray + (1 - stray) exp(-(depth / blur)^2 / 2)  of walls
+    exp(-density A)  times the product over points of density (stray + (1 - stray) Phi(depth /
+                     blur)) of the roof,
+                                                       stray + (1 - stray) exp(-(depth / blur)^2 /
+                                                       2) of walls
 
-and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece, those of walls wherever the
-outline does not run through them. To this come the prices of lines (two for a notch), of directions besides the main one, of
-lines that run in them, and of sharp corners. All are in nats. A court is drawn in the same way: its ring runs clockwise, what lies in it
-is outside.
+and costs minus its logarithm: empty ground inside costs by the area, points outside by the piece,
+those of walls wherever the outline does not run through them. To this come the prices of lines (two
+for a notch), of directions besides the main one, of lines that run in them, and of sharp corners.
+All are in nats. A court is drawn in the same way: its ring runs clockwise, what lies in it is
+outside.
 """
 
 from __future__ import annotations
@@ -27,15 +31,17 @@ from .soft import SURE_BLURS, share_inside
 
 FINE = 100  # places a blur at which costs are kept; between them they are straight, to 5e-5 nats
 QUARTER = 0.5 * math.pi  # rad; lines so far apart have one direction
-SHARP = math.cos(math.radians(120.0))  # of the turn at a corner: sharper than 60 degrees inside or outside is sharp
+# of the turn at a corner: sharper than 60 degrees inside or outside is sharp
+SHARP = math.cos(math.radians(120.0))
 
-# x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's; density: of roof points a square metre.
-# court: whether the border is a court's, whose corners lie within box: x_low, x_high, y_low, y_high (m). blur (m): see above; costs: `costs_by_depth`.
-# line, direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
+# x, y (m): points of the roof and of outer walls, ascending in y; wall: which are a wall's;
+# density: of roof points a square metre. court: whether the border is a court's, whose corners lie
+# within box: x_low, x_high, y_low, y_high (m). blur (m): see above; costs: `costs_by_depth`. line,
+# direction, skew, sharp: prices of a line, a further direction, a line in that, a sharp corner.
 Border = namedtuple("Border", "x y wall density court box blur costs line direction skew sharp")
 
-# lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point costs, structure: the price of
-# the lines, cost: all of it.
+# lines (n, 2), kappa: azimuth of the main direction (rad), corners (n, 2), own (m): what each point
+# costs, structure: the price of the lines, cost: all of it.
 Drawing = namedtuple("Drawing", "lines kappa corners own structure cost")
 
 
@@ -45,16 +51,23 @@ def drawing_of(lines, kappa, border):
     corners, own = np.zeros((len(lines), 2)), np.zeros(len(border.x))
     if len(lines) < 3 or not find_corners(lines, corners) or not is_allowed(corners, border):
         return Drawing(lines, kappa, corners, own, np.inf, np.inf)
-    squared, inside = nearest_sides(corners, border.x, border.y, border.court, SURE_BLURS * border.blur)
+    squared, inside = nearest_sides(
+        corners, border.x, border.y, border.court, SURE_BLURS * border.blur
+    )
     for k in range(len(own)):
         own[k] = point_cost(squared[k], inside[k], border.wall[k], border)
-    misfit, structure = border.density * area_of(corners) + own.sum(), structure_cost(lines, kappa, border)
+    misfit, structure = (
+        border.density * area_of(corners) + own.sum(),
+        structure_cost(lines, kappa, border),
+    )
     return Drawing(lines, kappa, corners, own, structure, misfit + structure)
 
 
 @compiled
 def is_allowed(corners, border):
-    """Whether the ring runs as it has to, clockwise where it is a court's, and lies where it may."""
+    """Whether the ring runs as it has to, clockwise where it is a court's, and lies where
+    it may.
+    """
     if not border.court:
         return area_of(corners) > 0.0
     x_low, x_high, y_low, y_high = border.box
@@ -66,7 +79,9 @@ def is_allowed(corners, border):
 
 @compiled
 def structure_cost(lines, kappa, border):
-    """Price of the lines, of directions other than the main one, of lines in these, and of sharp corners."""
+    """Price of the lines, of directions other than the main one, of lines in these, and of sharp
+    corners.
+    """
     cost, ways = border.line * len(lines), np.empty(len(lines))
     for i in range(len(lines)):
         ways[i] = quarter_gap(lines[i, 0] - kappa)
@@ -79,7 +94,9 @@ def structure_cost(lines, kappa, border):
 
 @compiled
 def is_among(way, ways):
-    """Whether one of `ways` (n,), angles from -45 to 45 degrees, is the same as `way`; those at the ends are one."""
+    """Whether one of `ways` (n,), angles from -45 to 45 degrees, is the same as `way`; those at the
+    ends are one.
+    """
     found = False
     for other in ways:
         apart = abs(way - other)
@@ -89,8 +106,8 @@ def is_among(way, ways):
 
 @compiled
 def nearest_sides(corners, x, y, court, reach):
-    """Squared distances (n,) to the nearest side of points at x, y (n,), ascending in y, at most that of `reach`; and whether each is
-    inside (n,).
+    """Squared distances (n,) to the nearest side of points at x, y (n,), ascending in y, at most
+    that of `reach`; and whether each is inside (n,).
 
     Side after side, without branches, so that a processor does several points at once.
     """
@@ -120,8 +137,9 @@ def beside_side(x0, y0, x1, y1, x, y, squared, inside):
 
 @compiled
 def point_cost(squared, inside, wall, border):
-    """Minus the logarithm of how likely a point at that `squared` distance from the nearest side is, against one deep inside; that of
-    a `wall` is compared with one on the border."""
+    """Minus the logarithm of how likely a point at that `squared` distance from the nearest side
+    is, against one deep inside; that of a `wall` is compared with one on the border.
+    """
     depth = math.sqrt(squared) / border.blur
     return known_cost(depth if inside else -depth, wall, border.costs)
 
@@ -137,9 +155,13 @@ def known_cost(depth, wall, costs):
 
 @functools.cache
 def costs_by_depth(stray: float) -> np.ndarray:
-    """What points of the roof and of walls cost (2, 2 SURE_BLURS FINE + 1) from sure outside to sure inside."""
+    """What points of the roof and of walls cost (2, 2 SURE_BLURS FINE + 1) from sure outside to
+    sure inside.
+    """
     depths = np.linspace(-SURE_BLURS, SURE_BLURS, round(2 * SURE_BLURS * FINE) + 1)
-    return np.array([[cost_at_depth(depth, wall, stray) for depth in depths.tolist()] for wall in (False, True)])
+    return np.array(
+        [[cost_at_depth(depth, wall, stray) for depth in depths.tolist()] for wall in (False, True)]
+    )
 
 
 @compiled
@@ -154,8 +176,9 @@ def cost_at_depth(depth, wall, stray):
 
 @compiled
 def cost_of_change(lines, drawing, i, count, fresh, border, limit):
-    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on; infinite as soon as
-    that is known to be above `limit`."""
+    """What `lines` cost that have the first `fresh` corners in place of the `count` + 1 of the
+    drawing from `i` on; infinite as soon as that is known to be above `limit`.
+    """
     corners = corners_of_change(lines, drawing, i, count, fresh, border)
     if len(corners) == 0:
         return np.inf
@@ -165,7 +188,9 @@ def cost_of_change(lines, drawing, i, count, fresh, border, limit):
         cost -= drawing.own[k]
     if cost > limit:  # no point gains by being there
         return np.inf
-    squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
+    squared, inside = nearest_sides(
+        corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur
+    )
     for k in range(len(near)):
         cost += point_cost(squared[k], inside[k], border.wall[near[k]], border)
         if cost > limit:
@@ -175,7 +200,8 @@ def cost_of_change(lines, drawing, i, count, fresh, border, limit):
 
 @compiled
 def changed(lines, drawing, i, count, fresh, border):
-    """The drawing of `lines` that have the first `fresh` corners in place of the `count` + 1 of the drawing from `i` on.
+    """The drawing of `lines` that have the first `fresh` corners in place of the `count` + 1 of the
+    drawing from `i` on.
 
     Points away from the corners that come and go cost what they did.
     """
@@ -184,16 +210,22 @@ def changed(lines, drawing, i, count, fresh, border):
         return Drawing(lines, drawing.kappa, corners, own, np.inf, np.inf)
     near = points_near(drawing.corners, corners, i, count, fresh, border)
     cost = without_points(lines, drawing, corners, border)
-    squared, inside = nearest_sides(corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur)
+    squared, inside = nearest_sides(
+        corners, border.x[near], border.y[near], border.court, SURE_BLURS * border.blur
+    )
     for k in range(len(near)):
         own[near[k]] = point_cost(squared[k], inside[k], border.wall[near[k]], border)
         cost += own[near[k]] - drawing.own[near[k]]
-    return Drawing(lines, drawing.kappa, corners, own, structure_cost(lines, drawing.kappa, border), cost)
+    return Drawing(
+        lines, drawing.kappa, corners, own, structure_cost(lines, drawing.kappa, border), cost
+    )
 
 
 @compiled
 def corners_of_change(lines, drawing, i, count, fresh, border):
-    """The corners (n, 2) of a drawing's lines changed as `changed` has it; none where they are no polygon."""
+    """The corners (n, 2) of a drawing's lines changed as `changed` has it; none where they are no
+    polygon.
+    """
     corners, old = np.empty((len(lines), 2)), drawing.corners
     for k in range(fresh, len(lines)):
         corners[k] = old[(i + count + 1 + k - fresh) % len(old)]
@@ -211,7 +243,10 @@ def points_near(old, corners, i, count, fresh, border):
         x, y = ring[at, 0], ring[at, 1]
         x_low, x_high, y_low, y_high = min(x_low, x), max(x_high, x), min(y_low, y), max(y_high, y)
     reach = SURE_BLURS * border.blur
-    first, last = np.searchsorted(border.y, y_low - reach), np.searchsorted(border.y, y_high + reach)
+    first, last = (
+        np.searchsorted(border.y, y_low - reach),
+        np.searchsorted(border.y, y_high + reach),
+    )
     near, m = np.empty(last - first, np.int64), 0
     for k in range(first, last):
         near[m] = k
@@ -223,4 +258,9 @@ def points_near(old, corners, i, count, fresh, border):
 def without_points(lines, drawing, corners, border):
     """What changed lines cost, were each point to cost what it did."""
     structure = structure_cost(lines, drawing.kappa, border)
-    return drawing.cost + border.density * (area_of(corners) - area_of(drawing.corners)) + structure - drawing.structure
+    return (
+        drawing.cost
+        + border.density * (area_of(corners) - area_of(drawing.corners))
+        + structure
+        - drawing.structure
+    )

@@ -1,7 +1,8 @@
 """A polygon as the lines of its sides, counter-clockwise, or a court in one, clockwise. Compiled.
 
-`lines` (n, 2) hold a row a side: the azimuth of the normal that looks outwards (rad) and the line's distance from the
-origin along it (m). Corner i is where sides i - 1 and i meet, so side i runs from corner i to corner i + 1.
+`lines` (n, 2) hold a row a side: the azimuth of the normal that looks outwards (rad) and the line's
+distance from the origin along it (m). Corner i is where sides i - 1 and i meet, so side i runs from
+corner i to corner i + 1.
 """
 
 from __future__ import annotations
@@ -13,31 +14,45 @@ import numpy as np
 from ...compiled import compiled
 from .. import direction
 
-SHARPEST = 0.15  # sine of the angle between neighbours: lines closer to parallel have no corner to speak of
-BACK = math.cos(math.radians(155.0))  # of the turn at a corner: what ends in a wedge of less than 25 degrees is no roof
+# sine of the angle between neighbours: lines closer to parallel have no corner to speak of
+SHARPEST = 0.15
+# of the turn at a corner: what ends in a wedge of less than 25 degrees is no roof
+BACK = math.cos(math.radians(155.0))
 SAME_RAD = 1e-6  # rad; numerically parallel
 
 quarter_gap = compiled(direction.quarter_gap)
 
 
 def lines_through(corners: np.ndarray) -> np.ndarray:
-    """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise, or of a court, clockwise."""
+    """The sides (n, 2) of the polygon with `corners` (n, 2), counter-clockwise, or of a court,
+    clockwise.
+    """
     ends = np.roll(corners, -1, axis=0)
     step, middle = ends - corners, 0.5 * (corners + ends)
     azimuth = np.arctan2(step[:, 1], step[:, 0]) - 0.5 * math.pi
-    return np.column_stack([azimuth, middle[:, 0] * np.cos(azimuth) + middle[:, 1] * np.sin(azimuth)])
+    return np.column_stack(
+        [azimuth, middle[:, 0] * np.cos(azimuth) + middle[:, 1] * np.sin(azimuth)]
+    )
 
 
 @compiled
 def find_corners(lines, corners, fresh=-1):
-    """Write the corners (n, 2) of `lines`; False where they are no simple polygon run through in order.
+    """Write the corners (n, 2) of `lines`;
 
-    With `fresh`, only the first so many: the others are there, and the sides between them run on and cross none of each other.
+    False where they are no simple polygon run through in order.
+
+    With `fresh`, only the first so many: the others are there, and the sides between them run on
+    and cross none of each other.
     """
     n = len(lines)
     fresh = n if fresh < 0 else min(fresh, n)
     for i in range(fresh):
-        before, r_before, after, r_after = lines[i - 1, 0], lines[i - 1, 1], lines[i, 0], lines[i, 1]
+        before, r_before, after, r_after = (
+            lines[i - 1, 0],
+            lines[i - 1, 1],
+            lines[i, 0],
+            lines[i, 1],
+        )
         sine = math.sin(after - before)
         if abs(sine) < SHARPEST or math.cos(after - before) < BACK:
             return False
@@ -66,7 +81,8 @@ def crosses_another(corners, i):
         k = j + 1 if j + 1 < n else 0
         start = u * (corners[j, 1] - y) - v * (corners[j, 0] - x)
         end = u * (corners[k, 1] - y) - v * (corners[k, 0] - x)
-        if start * end < 0.0 and j != i and j != before and j != after:  # ends on either side of the line of side i
+        # ends on either side of the line of side i
+        if start * end < 0.0 and j != i and j != before and j != after:
             p, q = corners[k, 0] - corners[j, 0], corners[k, 1] - corners[j, 1]
             one = p * (y - corners[j, 1]) - q * (x - corners[j, 0])
             other = p * (y + v - corners[j, 1]) - q * (x + u - corners[j, 0])

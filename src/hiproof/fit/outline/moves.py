@@ -1,7 +1,7 @@
 """An outline redrawn until no change of a few lines explains the points more cheaply. Compiled.
 
-Changes: a line goes; one, two or three in a row become one (three are a step); one turns into a direction that others have;
-lines move; all lines of a direction turn together.
+Changes: a line goes; one, two or three in a row become one (three are a step); one turns into a
+direction that others have; lines move; all lines of a direction turn together.
 """
 
 from __future__ import annotations
@@ -16,10 +16,12 @@ from .lines import SAME_RAD, dropped, quarter_gap, replaced, shares_direction
 
 LONGEST_RUN = 3  # lines that become one
 TURN_RAD = math.radians(35.0)  # of a line, at most
-APART = (0.0, 1.0, 1.5, 0.7)  # turns by which the first and last of so many lines may differ to become one
+# turns by which the first and last of so many lines may differ to become one
+APART = (0.0, 1.0, 1.5, 0.7)
 # m and rad that lines are moved and turned by, coarse to fine
 STEPS_M, TURNS_RAD = (0.3, 0.1, 0.05), (0.03, 0.01, 0.003)
-# of all moves; of shifts by one step; changes of one kind at most, which ends what would go in circles
+# of all moves; of shifts by one step; changes of one kind at most, which ends what would go in
+# circles
 ROUNDS, SHIFT_ROUNDS, MOST_CHANGES = 3, 3, 400
 REACHED = LONGEST_RUN  # lines on either side of a change whose own changes it concerns
 GAIN = 1e-6  # nats; numerically none
@@ -27,7 +29,9 @@ GAIN = 1e-6  # nats; numerically none
 
 @compiled
 def redrawn(drawing, border, step_m):
-    """The drawing with no change left that pays; lines that replace others are moved by `step_m` at first."""
+    """The drawing with no change left that pays; lines that replace others are moved by `step_m` at
+    first.
+    """
     drawing = simplified(drawing, border, step_m)
     for _ in range(ROUNDS):
         before = drawing.cost
@@ -44,7 +48,9 @@ def redrawn(drawing, border, step_m):
 
 @compiled
 def simplified(drawing, border, step_m):
-    """The change that gains most is made, again and again; after each only the gains of lines beside it are asked anew."""
+    """The change that gains most is made, again and again; after each only the gains of lines
+    beside it are asked anew.
+    """
     gains = np.full(len(drawing.lines), np.inf)
     for _ in range(MOST_CHANGES):
         for i in range(len(gains)):
@@ -66,8 +72,10 @@ def simplified(drawing, border, step_m):
 
 @compiled
 def best_change(drawing, i, border):
-    """The cheapest change that begins at line `i`, or none where all are dearer: its cost and the lines, with how many of the old ones
-    the first of them is come in place of, and how many corners are new."""
+    """The cheapest change that begins at line `i`, or none where all are dearer: its cost and the
+    lines, with how many of the old ones the first of them is come in place of, and how many corners
+    are new.
+    """
     n = len(drawing.lines)
     best, lines, gone, fresh = drawing.cost, drawing.lines, 1, 1
     if n > 3:
@@ -88,8 +96,9 @@ def best_change(drawing, i, border):
 def joint_lines(drawing, i, count):
     """Lines (m, 2) that may stand for `count` lines from `i` on.
 
-    They run through the middle of these, or of the first and last of three, which are a step and may also go on as one of
-    them; along the main direction, the chord, the first or the last; a single line also along that of any longer one.
+    They run through the middle of these, or of the first and last of three, which are a step and
+    may also go on as one of them; along the main direction, the chord, the first or the last; a
+    single line also along that of any longer one.
     """
     lines, corners, n = drawing.lines, drawing.corners, len(drawing.lines)
     found, m = np.empty((n + 8, 2)), 0
@@ -113,7 +122,9 @@ def joint_lines(drawing, i, count):
 
 @compiled
 def ways_of(drawing, i, count, chord):
-    """Azimuths (m,) that the one line for `count` from `i` on may have: nearest to the `chord` of all that are common."""
+    """Azimuths (m,) that the one line for `count` from `i` on may have: nearest to the `chord` of
+    all that are common.
+    """
     lines, n = drawing.lines, len(drawing.lines)
     main = chord - quarter_gap(chord - drawing.kappa)
     if count > 1:
@@ -121,7 +132,10 @@ def ways_of(drawing, i, count, chord):
     ways, m = np.empty(n + 1), 1
     ways[0], length = main, side_length(drawing.corners, i)
     for j in range(n):
-        if side_length(drawing.corners, j) > length and abs(quarter_gap(lines[j, 0] - drawing.kappa)) > SAME_RAD:
+        if (
+            side_length(drawing.corners, j) > length
+            and abs(quarter_gap(lines[j, 0] - drawing.kappa)) > SAME_RAD
+        ):
             ways[m] = chord - quarter_gap(chord - lines[j, 0])
             m += 1
     return ways[:m]
@@ -135,7 +149,9 @@ def side_length(corners, i):
 
 @compiled
 def middle_of(corners, i, count):
-    """The middle (2,) of `count` sides from `i` on, weighted by their lengths; of a run of three without the second."""
+    """The middle (2,) of `count` sides from `i` on, weighted by their lengths; of a run of three
+    without the second.
+    """
     n, total, x, y = len(corners), 1e-9, 0.0, 0.0
     for k in range(0, count, 2 if count == LONGEST_RUN else 1):
         a, b = corners[(i + k) % n], corners[(i + k + 1) % n]
@@ -154,7 +170,9 @@ def shifted(drawing, border, step):
         for _ in range(len(drawing.lines)):
             drawing = first_shifted(drawing, border, step)
             lines, corners = np.roll(drawing.lines, -2), np.roll(drawing.corners, -2)  # a line on
-            drawing = Drawing(lines, drawing.kappa, corners, drawing.own, drawing.structure, drawing.cost)
+            drawing = Drawing(
+                lines, drawing.kappa, corners, drawing.own, drawing.structure, drawing.cost
+            )
         if drawing.cost >= before - GAIN:
             break
     return drawing
@@ -179,14 +197,19 @@ def first_shifted(drawing, border, step):
 
 @compiled
 def turned(drawing, border, step):
-    """All lines of each direction turned about their middles by multiples of `step` (rad) for as long as that is cheaper."""
+    """All lines of each direction turned about their middles by multiples of `step` (rad) for as
+    long as that is cheaper.
+    """
     for i in range(len(drawing.lines)):
         if shares_direction(drawing.lines, i):  # turned already
             continue
         for sign in (1.0, -1.0):
             moved = False
             while True:
-                lines, main = drawing.lines.copy(), abs(quarter_gap(drawing.lines[i, 0] - drawing.kappa)) < SAME_RAD
+                lines, main = (
+                    drawing.lines.copy(),
+                    abs(quarter_gap(drawing.lines[i, 0] - drawing.kappa)) < SAME_RAD,
+                )
                 for j in range(len(lines)):
                     if abs(quarter_gap(lines[j, 0] - drawing.lines[i, 0])) < SAME_RAD:
                         x, y = middle_of(drawing.corners, j, 1)

@@ -1,6 +1,8 @@
-"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few corners, with more and with many.
+"""First outlines to be redrawn: the points' alpha shape, pushed out by half their spacing, with few
+corners, with more and with many.
 
-Places in it without points, 4 m2 or more, are courts."""
+Places in it without points, 4 m2 or more, are courts.
+"""
 
 from __future__ import annotations
 
@@ -14,13 +16,16 @@ from ...geometry.alpha_shape import SPACINGS, alpha_shape, default_radius
 from ..walls import on_walls
 from .lines import BACK, SHARPEST, find_corners, lines_through
 
-# points for each of the roof, beyond which walls below wide eaves, as drones see them, would make the spacing half the roof's; airborne
-# scans have fewer, and all that is told in spacings was chosen by those
+# points for each of the roof, beyond which walls below wide eaves, as drones see them, would make
+# the spacing half the roof's; airborne scans have fewer, and all that is told in spacings was
+# chosen by those
 MOST_A_ROOF_POINT = 1.5
 NARROWER = 0.8  # of the usual radius of alpha shapes: bays of two spacings stay open
-# spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost points
+# spacings of points: bays closed, outline pushed out since a wall stands beyond its outermost
+# points
 CLOSING_SPACINGS, PUSH_SPACINGS = 1.0, 0.5
-SIMPLIFY_SPACINGS = (0.7, 0.4, 0.2)  # spacings of points within which corners are dropped: few are left, more, and many
+# spacings of points within which corners are dropped: few are left, more, and many
+SIMPLIFY_SPACINGS = (0.7, 0.4, 0.2)
 # m; closer points drop corners like those: of twice as many no drawing gets better, all take longer
 LEAST_SPACING_M = 0.35
 COARSER, TRIES = 1.3, 12  # factor between tries at few corners, and how many tries
@@ -29,8 +34,10 @@ MOST_CORNERS = 90  # to begin with; the time grows with the square of them
 
 
 class Rough(NamedTuple):
-    """`rings`: of the outline, then of each court in it, corners (n, 2) to begin with, few, more and many, no two neighbouring sides
-    parallel; the outline's run counter-clockwise, courts' clockwise. `spacing` (m) of the points, `shape`: their alpha shape."""
+    """`rings`: of the outline, then of each court in it, corners (n, 2) to begin with, few, more
+    and many, no two neighbouring sides parallel; the outline's run counter-clockwise, courts'
+    clockwise. `spacing` (m) of the points, `shape`: their alpha shape.
+    """
 
     rings: list[list[np.ndarray]]
     spacing: float
@@ -45,17 +52,28 @@ def rough_outline(points: np.ndarray) -> Rough:
     shape = with_large_holes(alpha_shape(xy, NARROWER * thinner * radius, holes=True))
     spacing = thinner * math.sqrt(shape.area / len(xy))
     closed = shapely.buffer(shape, CLOSING_SPACINGS * spacing, join_style="mitre")
-    pushed = shapely.buffer(closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre")
+    pushed = shapely.buffer(
+        closed, (PUSH_SPACINGS - CLOSING_SPACINGS) * spacing, join_style="mitre"
+    )
     pushed = with_large_holes(largest(pushed))
-    filled = [from_farthest_corner(shapely.Polygon(ring)) for ring in (pushed.exterior, *pushed.interiors)]
+    filled = [
+        from_farthest_corner(shapely.Polygon(ring)) for ring in (pushed.exterior, *pushed.interiors)
+    ]
     unit = max(spacing, LEAST_SPACING_M)
-    rings = [[corners_of(ring, spacings * unit) for spacings in SIMPLIFY_SPACINGS] for ring in filled]
-    return Rough(rings[:1] + [[corners[::-1].copy() for corners in court] for court in rings[1:]], spacing, shape)
+    rings = [
+        [corners_of(ring, spacings * unit) for spacings in SIMPLIFY_SPACINGS] for ring in filled
+    ]
+    return Rough(
+        rings[:1] + [[corners[::-1].copy() for corners in court] for court in rings[1:]],
+        spacing,
+        shape,
+    )
 
 
 def telling_count(points: np.ndarray, spacing: float) -> int:
-    """How many of `points` (m, 2 or 3), about `spacing` (m) apart, tell how far that is: all, or where many stand one over another on walls
-    the roof's."""
+    """How many of `points` (m, 2 or 3), about `spacing` (m) apart, tell how far that is: all, or
+    where many stand one over another on walls the roof's.
+    """
     if points.shape[1] < 3 or len(points) < 3:
         return max(len(points), 1)
     roof = int((~on_walls(points, points, spacing)).sum())
@@ -68,18 +86,23 @@ def with_large_holes(polygon: shapely.Polygon) -> shapely.Polygon:
 
 
 def corners_of(polygon: shapely.Polygon, tolerance_m: float) -> np.ndarray:
-    """Its corners less those within so much of a straight line, or within more where they are too many."""
+    """Its corners less those within so much of a straight line, or within more where they are too
+    many.
+    """
     for k in range(TRIES):
         simple = largest(shapely.simplify(polygon, tolerance_m * COARSER**k))
         corners = without_straight_corners(counter_clockwise(simple))
-        if 3 < len(corners) <= MOST_CORNERS and find_corners(lines_through(corners), np.empty_like(corners)):
+        if 3 < len(corners) <= MOST_CORNERS and find_corners(
+            lines_through(corners), np.empty_like(corners)
+        ):
             return corners
     return counter_clockwise(shapely.minimum_rotated_rectangle(polygon))
 
 
 def from_farthest_corner(polygon: shapely.Polygon) -> shapely.Polygon:
-    """The polygon without holes, its ring beginning at the corner farthest from its middle, which is one however it is turned:
-    what is simplified keeps its first corner."""
+    """The polygon without holes, its ring beginning at the corner farthest from its middle, which
+    is one however it is turned: what is simplified keeps its first corner.
+    """
     ring = counter_clockwise(polygon)
     first = int(np.argmax(np.hypot(*(ring - shapely.get_coordinates(polygon.centroid)).T)))
     return shapely.Polygon(np.roll(ring, -first, axis=0))
@@ -94,7 +117,9 @@ def counter_clockwise(polygon: shapely.Polygon) -> np.ndarray:
 
 
 def without_straight_corners(corners: np.ndarray) -> np.ndarray:
-    """The corners less those at which the outline all but goes straight on, or back, the straightest first."""
+    """The corners less those at which the outline all but goes straight on, or back, the
+    straightest first.
+    """
     while len(corners) > 4:
         azimuth = lines_through(corners)[:, 0]
         turn = azimuth - np.roll(azimuth, 1)

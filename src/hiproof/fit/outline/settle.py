@@ -1,9 +1,10 @@
 """Each side of an outline where the points across it put it: undoing the bias of outermost points.
 
-Across a side of length L the density of points is  density L (Phi(d / blur) + walls N(d; blur)):  even inside, with what a
-scanner sees of the wall below the eave piled up on the line. The side's place is the mean of its posterior, over a few values of
-blur and walls. Where points come in rows along the side the gap between rows is wider than chance would have it: the side
-then lies half a gap beyond the last row.
+Across a side of length L the density of points is density L (Phi(d / blur) + walls N(d; blur)):
+even inside, with what a scanner sees of the wall below the eave piled up on the line. The side's
+place is the mean of its posterior, over a few values of blur and walls. Where points come in rows
+along the side the gap between rows is wider than chance would have it: the side then lies half a
+gap beyond the last row.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ BLURS_M, WALLS_M = (
     (0.02, 0.06, 0.12),
     (0.0, 0.3, 1.0),
 )  # points on the wall a metre, as the depth of roof that holds as many
-# m across a side at which it is tried, and between two of them: outlines of points lie inside of walls more than outside
+# m across a side at which it is tried, and between two of them: outlines of points lie inside of
+# walls more than outside
 STEP_M = 0.02
 OFFSETS_M = np.arange(-0.5, 0.7, STEP_M)
-# places a step at which densities are kept; between them they are straight, to a thousandth of their logarithm
+# places a step at which densities are kept; between them they are straight, to a thousandth of
+# their logarithm
 FINE = 32
 DEEP_M, SHALLOW_M, OUTSIDE_M = (
     2.0,
@@ -32,13 +35,18 @@ DEEP_M, SHALLOW_M, OUTSIDE_M = (
     0.8,
 )  # the density is that between shallow and deep; points further out are stray
 LEAST_DENSITY, STRAY = 0.3, 0.02  # shares of the outline's density
-END_M, LONG_M = 0.3, 1.0  # of a side longer than that, its ends do not count: points there may be another side's
-FEWEST, FARTHEST_M = 4, 0.4  # points across a side; fewer tell nothing; m that a side may be moved beyond the last row
-ROW_M, MOSTLY = 0.1, 0.6  # points closer across the side are of one row where most of the depth is between rows
+# of a side longer than that, its ends do not count: points there may be another side's
+END_M, LONG_M = 0.3, 1.0
+# points across a side; fewer tell nothing; m that a side may be moved beyond the last row
+FEWEST, FARTHEST_M = 4, 0.4
+# points closer across the side are of one row where most of the depth is between rows
+ROW_M, MOSTLY = 0.1, 0.6
 
 
 def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
-    """The `lines` (n, 2) of an outline, each moved to where the points `xy` (m, 2) across it put it."""
+    """The `lines` (n, 2) of an outline, each moved to where the points `xy` (m, 2) across it put
+    it.
+    """
     corners, moved = np.empty_like(lines), lines.copy()
     find_corners(lines, corners)
     normals = np.column_stack([np.cos(lines[:, 0]), np.sin(lines[:, 0])])
@@ -50,16 +58,21 @@ def settled(lines: np.ndarray, xy: np.ndarray, density: float) -> np.ndarray:
 def side_offsets(
     xy: np.ndarray, normals: np.ndarray, distances: np.ndarray, ends: np.ndarray, density: float
 ) -> np.ndarray:
-    """How far (m,) outwards the points `xy` (n, 2) put sides that have `normals` (m, 2), lie `distances` (m,) from the origin along
-    these and run between `ends` (m, 2, 2)."""
+    """How far (m,) outwards the points `xy` (n, 2) put sides that have `normals` (m, 2), lie
+    `distances` (m,) from the origin along these and run between `ends` (m, 2, 2).
+    """
     return offsets_by(xy, normals, distances, ends, density, log_densities())
 
 
 @functools.cache
 def log_densities() -> np.ndarray:
-    """Logarithms of the density of points across a side, relative to that inside: (blurs x walls, FINE, k), the places FINE apart in
-    a row, so that those of one point under all offsets lie side by side."""
-    count = round((SHALLOW_M - OFFSETS_M[0] + OUTSIDE_M + OFFSETS_M[-1] - OFFSETS_M[0]) / STEP_M) + 2
+    """Logarithms of the density of points across a side, relative to that inside: (blurs x walls,
+    FINE, k), the places FINE apart in a row, so that those of one point under all offsets lie side
+    by side.
+    """
+    count = (
+        round((SHALLOW_M - OFFSETS_M[0] + OUTSIDE_M + OFFSETS_M[-1] - OFFSETS_M[0]) / STEP_M) + 2
+    )
     return log_densities_at(OFFSETS_M[0] - OUTSIDE_M, count)
 
 
@@ -88,24 +101,34 @@ def offsets_by(xy, normals, distances, ends, density, table):
         low, high = span_of(normals[m], ends[m])
         if high - low > LONG_M:
             low, high = low + END_M, high - END_M
-        offsets[m] = offset(depths_across(xy, normals[m], distances[m], low, high), high - low, density, table)
+        offsets[m] = offset(
+            depths_across(xy, normals[m], distances[m], low, high), high - low, density, table
+        )
     return offsets
 
 
 @compiled
 def span_of(normal, ends):
     """From where to where a side with `ends` (2, 2) runs, square to its `normal`."""
-    first, last = normal[0] * ends[0, 1] - normal[1] * ends[0, 0], normal[0] * ends[1, 1] - normal[1] * ends[1, 0]
+    first, last = (
+        normal[0] * ends[0, 1] - normal[1] * ends[0, 0],
+        normal[0] * ends[1, 1] - normal[1] * ends[1, 0],
+    )
     return min(first, last), max(first, last)
 
 
 @compiled
 def depths_across(xy, normal, distance, low, high):
-    """How deep (k,) inside a side those of the points lie that tell where it is: across it from `low` to `high`, near enough."""
+    """How deep (k,) inside a side those of the points lie that tell where it is: across it from
+    `low` to `high`, near enough.
+    """
     depths, count = np.empty(len(xy)), 0
     for k in range(len(xy)):
         depth = distance - normal[0] * xy[k, 0] - normal[1] * xy[k, 1]
-        if -OUTSIDE_M < depth < DEEP_M and low <= normal[0] * xy[k, 1] - normal[1] * xy[k, 0] <= high:
+        if (
+            -OUTSIDE_M < depth < DEEP_M
+            and low <= normal[0] * xy[k, 1] - normal[1] * xy[k, 0] <= high
+        ):
             depths[count] = depth
             count += 1
     return depths[:count]
@@ -113,7 +136,9 @@ def depths_across(xy, normal, distance, low, high):
 
 @compiled
 def offset(depth, length, density, table):
-    """How far (m) outwards a side of `length` lies of where points `depth` (n,) were measured from."""
+    """How far (m) outwards a side of `length` lies of where points `depth` (n,) were
+    measured from.
+    """
     if len(depth) < FEWEST:
         return 0.0
     inside = 0
@@ -129,7 +154,9 @@ def offset(depth, length, density, table):
 
 @compiled
 def log_likelihoods(depth, a_metre, table):
-    """Log likelihoods (blurs x walls, offsets) of the points `depth` (n,) across a side with `a_metre` points a metre of depth."""
+    """Log likelihoods (blurs x walls, offsets) of the points `depth` (n,) across a side with
+    `a_metre` points a metre of depth.
+    """
     logs = np.empty((len(BLURS_M) * len(WALLS_M), len(OFFSETS_M)))
     for m, walls in enumerate(WALLS_M):
         for q in range(len(OFFSETS_M)):
@@ -146,13 +173,16 @@ def log_likelihoods(depth, a_metre, table):
         then, after = (k, p + 1) if p + 1 < FINE else (k + 1, 0)
         for row in range(len(logs)):
             for q in range(len(OFFSETS_M)):
-                logs[row, q] += (1.0 - beyond) * table[row, p, k + q] + beyond * table[row, after, then + q]
+                logs[row, q] += (1.0 - beyond) * table[row, p, k + q] + beyond * table[
+                    row, after, then + q
+                ]
     return logs + counted * math.log(a_metre)
 
 
 @compiled
 def half_gap(depth):
-    """Distance (m) from a line placed by chance to the next point behind it, or the next row where points lie in rows.
+    """Distance (m) from a line placed by chance to the next point behind it, or the next row where
+    points lie in rows.
 
     That is half the mean gap, wide gaps being hit more often.
     """

@@ -6,10 +6,13 @@ import math
 
 from ...compiled import compiled
 
-SURE_BLURS = 4.0  # standard deviations of the noise from a side, beyond which a point is inside or outside for sure
+# standard deviations of the noise from a side, beyond which a point is inside or outside for sure
+SURE_BLURS = 4.0
 
 
 @compiled
 def share_inside(depth):
-    """How likely a point of the roof is at `depth` inside the side (standard deviations of the noise), from 0 to 1."""
+    """How likely a point of the roof is at `depth` inside the side (standard deviations of the
+    noise), from 0 to 1.
+    """
     return 0.5 * math.erfc(-depth / math.sqrt(2.0))

@@ -1,4 +1,6 @@
-"""How evenly points are spread: a scanner's rows leave no gaps as wide as chance would, so an empty place of theirs says more."""
+"""How evenly points are spread: a scanner's rows leave no gaps as wide as chance would, so an empty
+place of theirs says more.
+"""
 
 from __future__ import annotations
 
@@ -7,13 +9,16 @@ import shapely
 
 CELL_SPACINGS = 2.0  # of square cells: four points in the mean
 FEWEST_CELLS = 9  # fewer tell nothing
-LEAST, MOST = 0.4, 1.2  # what is believed: the most even clouds, roofs with patches that gave no return
+# what is believed: the most even clouds, roofs with patches that gave no return
+LEAST, MOST = 0.4, 1.2
 
 
 def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
-    """Standard deviation of the number of points `xy` (n, 2) in cells well inside their `shape`, over what chance gives.
+    """Standard deviation of the number of points `xy` (n, 2) in cells well inside their `shape`,
+    over what chance gives.
 
-    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.0, 12, 0.5), np.arange(0.0, 12, 0.5)))
+    >>> x, y = (axis.ravel() for axis in np.meshgrid(np.arange(0.0, 12, 0.5), np.arange(0.0, 12,
+    ...     0.5)))
     >>> unevenness(np.column_stack([x, y]), shapely.box(0, 0, 11.5, 11.5), 0.5)
     0.4
     """
@@ -24,7 +29,11 @@ def unevenness(xy: np.ndarray, shape: shapely.Polygon, spacing: float) -> float:
     index = np.floor(xy[shapely.intersects_xy(around, xy)] / cell).astype(int)
     low = index.min(axis=0)
     columns, rows = index.max(axis=0) - low + 1
-    counts = np.bincount((index - low) @ (rows, 1), minlength=columns * rows).reshape(columns, rows).astype(float)
+    counts = (
+        np.bincount((index - low) @ (rows, 1), minlength=columns * rows)
+        .reshape(columns, rows)
+        .astype(float)
+    )
     centres = shapely.points((np.moveaxis(np.indices(counts.shape), 0, -1) + low + 0.5) * cell)
     ring = shape.exterior
     shapely.prepare([shape, ring])

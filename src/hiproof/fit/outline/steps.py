@@ -1,8 +1,10 @@
-"""Runs of sides that become flights of steps where the points across them pay for it: bays, notches, porches. Compiled.
+"""Runs of sides that become flights of steps where the points across them pay for it: bays,
+notches, porches. Compiled.
 
-A run of sides is made one straight side at first. This is cut into columns, and each is given a level outwards or inwards, such
-that points and prices of lines together cost least: two lines a step. What a column's points say of a level does not depend
-on other columns, so the best levels are found exactly, column by column (Potts' model by dynamic programming).
+A run of sides is made one straight side at first. This is cut into columns, and each is given a
+level outwards or inwards, such that points and prices of lines together cost least: two lines a
+step. What a column's points say of a level does not depend on other columns, so the best levels are
+found exactly, column by column (Potts' model by dynamic programming).
 """
 
 from __future__ import annotations
@@ -17,8 +19,10 @@ from .lines import quarter_gap, replaced, replaced_by
 from .moves import GAIN, TURN_RAD
 from .soft import SURE_BLURS
 
-COLUMN_M, LEVEL_M = 0.25, 0.1  # m; along the side, across it: lines are moved more finely afterwards
-DEEPEST_M, FARTHEST_M = 2.0, 1.5  # levels inwards and outwards of the side; larger bays are the rough outline's
+# m; along the side, across it: lines are moved more finely afterwards
+COLUMN_M, LEVEL_M = 0.25, 0.1
+# levels inwards and outwards of the side; larger bays are the rough outline's
+DEEPEST_M, FARTHEST_M = 2.0, 1.5
 LEVELS = round((DEEPEST_M + FARTHEST_M) / LEVEL_M) + 1
 RUN = 5  # sides that become one flight, at most
 INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
@@ -26,7 +30,9 @@ INSIDE = math.log(2.0)  # a point of the roof that costs less is inside
 
 @compiled
 def stepped(drawing, border, longest):
-    """The drawing with sides, and runs of up to `longest` of them, as flights of steps where that is cheaper."""
+    """The drawing with sides, and runs of up to `longest` of them, as flights of steps where that
+    is cheaper.
+    """
     i = 0
     while i < len(drawing.lines):
         best = side_as_flight(drawing, i, border)
@@ -51,8 +57,9 @@ def side_as_flight(drawing, i, border):
 
 @compiled
 def run_as_flight(drawing, i, count, border):
-    """The drawing with `count` sides from `i` on as one flight along the main direction nearest to their chord; itself where they
-    make no such side to begin with."""
+    """The drawing with `count` sides from `i` on as one flight along the main direction nearest to
+    their chord; itself where they make no such side to begin with.
+    """
     start, end = drawing.corners[i], drawing.corners[(i + count) % len(drawing.lines)]
     chord = math.atan2(start[0] - end[0], end[1] - start[1])
     way = chord - quarter_gap(chord - drawing.kappa)
@@ -66,12 +73,19 @@ def run_as_flight(drawing, i, count, border):
 
 @compiled
 def flight_of(drawing, i, border):
-    """Lines (m, 2) in place of side `i`: along it at one level or another, and what joins them at right angles."""
+    """Lines (m, 2) in place of side `i`: along it at one level or another, and what joins them at
+    right angles.
+    """
     azimuth, distance = drawing.lines[i]
-    low, high = along(azimuth, drawing.corners[i]), along(azimuth, drawing.corners[(i + 1) % len(drawing.lines)])
+    low, high = (
+        along(azimuth, drawing.corners[i]),
+        along(azimuth, drawing.corners[(i + 1) % len(drawing.lines)]),
+    )
     columns = max(int((high - low) / COLUMN_M), 1)
     width = (high - low) / columns
-    levels = best_levels(column_costs(drawing, border, azimuth, distance, low, width, columns), 2.0 * border.line)
+    levels = best_levels(
+        column_costs(drawing, border, azimuth, distance, low, width, columns), 2.0 * border.line
+    )
     flight, m = np.empty((2 * columns, 2)), 0
     for k in range(columns):
         if k > 0 and levels[k] == levels[k - 1]:
@@ -107,7 +121,11 @@ def column_costs(drawing, border, azimuth, distance, low, width, columns):
         if depth < 0.0 and not wall and drawing.own[k] < INSIDE:  # beyond another side
             continue
         inner = 0 if wall else min(max(math.ceil((DEEPEST_M - depth - sure) / LEVEL_M), 0), LEVELS)
-        outer = LEVELS if wall else min(max(math.floor((DEEPEST_M - depth + sure) / LEVEL_M) + 1, 0), LEVELS)
+        outer = (
+            LEVELS
+            if wall
+            else min(max(math.floor((DEEPEST_M - depth + sure) / LEVEL_M) + 1, 0), LEVELS)
+        )
         for level in range(inner):
             costs[column, level] += far_out
         for level in range(inner, outer):
@@ -118,7 +136,9 @@ def column_costs(drawing, border, azimuth, distance, low, width, columns):
 
 @compiled
 def band_of(y, azimuth, distance, low, high):
-    """The first and last of points, ascending in `y` (n,), that may lie beside a line between `low` and `high` along it."""
+    """The first and last of points, ascending in `y` (n,), that may lie beside a line between `low`
+    and `high` along it.
+    """
     c, s = math.cos(azimuth), math.sin(azimuth)
     least, most = np.inf, -np.inf
     for out in (distance - DEEPEST_M, distance + FARTHEST_M):
@@ -129,7 +149,9 @@ def band_of(y, azimuth, distance, low, high):
 
 @compiled
 def best_levels(costs, step):
-    """The level of each column (n,) such that `costs` (n, levels) and `step` for each change along them are least."""
+    """The level of each column (n,) such that `costs` (n, levels) and `step` for each change along
+    them are least.
+    """
     n, levels = costs.shape
     came, total = np.empty((n, levels), np.int64), costs[0].copy()
     for k in range(1, n):

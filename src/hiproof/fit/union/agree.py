@@ -17,7 +17,16 @@ from typing import NamedTuple
 import numpy as np
 
 from .corners import SPARED_UNITS, creases_at_corners
-from .finish import LEVEL_SLACK, ROUNDS, SIGN, Planes, cost_of, normal_equations, proper, weighted_moments
+from .finish import (
+    LEVEL_SLACK,
+    ROUNDS,
+    SIGN,
+    Planes,
+    cost_of,
+    normal_equations,
+    proper,
+    weighted_moments,
+)
 from .members import Member, members_of, unknowns_of
 from .objective import misfits
 from .scene import Scene

@@ -18,7 +18,20 @@ from .objective import base_shows, misfits
 from .plan import Plan
 from .regions import THICK_M
 from .scene import Scene
-from .volumes import COLUMNS, DIRECTION, LEVEL, OFFSET, PLANES, REPLACES, U0, U1, V0, V1, is_allowed, roof_heights
+from .volumes import (
+    COLUMNS,
+    DIRECTION,
+    LEVEL,
+    OFFSET,
+    PLANES,
+    REPLACES,
+    U0,
+    U1,
+    V0,
+    V1,
+    is_allowed,
+    roof_heights,
+)
 
 # m2 of a bay, and its share of the outline at most: what is larger has points enough for the search; m of its narrower side
 LEAST_M2, MOST_M2, MOST_SHARE, LEAST_WIDTH_M = 0.25, 12.0, 0.34, 0.3

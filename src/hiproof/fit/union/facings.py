@@ -12,7 +12,19 @@ from .edges import EVERYWHERE, LEAST_GAIN
 from .moves import settled
 from .objective import objective
 from .refit import refit
-from .volumes import DIRECTION, LEAN, LEVEL, OFFSET, SIDES, SLOPE, U0, U1, coefficients, lowest_plane, roof_heights
+from .volumes import (
+    DIRECTION,
+    LEAN,
+    LEVEL,
+    OFFSET,
+    SIDES,
+    SLOPE,
+    U0,
+    U1,
+    coefficients,
+    lowest_plane,
+    roof_heights,
+)
 
 # of a plane towards what its points say; most of a turn as rise over run along its edge; units that a free direction costs
 TURNS, MOST_TURN, FREE_UNITS = 4, 0.45, 1.5

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from .add import COME_BACK, ENOUGH, FEWEST_UNEXPLAINED, REGROWN_UNITS, Ground, add_volumes, unexplained
+from .add import (
+    COME_BACK,
+    ENOUGH,
+    FEWEST_UNEXPLAINED,
+    REGROWN_UNITS,
+    Ground,
+    add_volumes,
+    unexplained,
+)
 from .candidates import HOUSE, Effort, candidates_of, grids_of
 from .improve import improve
 from .moves import without

@@ -12,7 +12,19 @@ import shapely
 from .box import NOWHERE, Box, box_of, clip_to_box
 from .plan import Plan
 from .scene import Scene
-from .volumes import DIRECTION, LEVEL, NUMBER, OFFSET, REPLACES, U0, U1, V0, V1, base_only, roof_heights
+from .volumes import (
+    DIRECTION,
+    LEVEL,
+    NUMBER,
+    OFFSET,
+    REPLACES,
+    U0,
+    U1,
+    V0,
+    V1,
+    base_only,
+    roof_heights,
+)
 
 # m by which the base lies below the lowest point of a roof searched in windows: no window moves it, and it never shows
 BELOW_ALL_M = 1.0

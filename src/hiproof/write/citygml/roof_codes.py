@@ -1,4 +1,6 @@
-"""The roof type of a building or a part as code lists of CityGML name it: SIG3D's, or that of the German surveys (AdV)."""
+"""The roof type of a building or a part as code lists of CityGML name it: SIG3D's, or that of the
+German surveys (AdV).
+"""
 
 from __future__ import annotations
 
@@ -15,9 +17,11 @@ MIXED = {"sig3d": "1130", "adv": "5000"}
 
 
 def roof_type_code(types: Iterable[str], code_list: str = "sig3d") -> str:
-    """The code of roof parts of `types`: their own where all have the same, else that of a mixed roof.
+    """The code of roof parts of `types`: their own where all have the same, else that of a mixed
+    roof.
 
-    >>> roof_type_code(["gable", "asymmetric_gable"]), roof_type_code(["gable", "hip"]), roof_type_code(["hip"], "adv")
+    >>> roof_type_code(["gable", "asymmetric_gable"]), roof_type_code(["gable",
+    ...     "hip"]), roof_type_code(["hip"], "adv")
     ('1030', '1130', '3200')
     """
     codes = {own_code(name, code_list) for name in types}

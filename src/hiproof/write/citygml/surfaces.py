@@ -1,6 +1,8 @@
 """The geometry of one building in CityGML, each function one property or surface.
 
-`place` is each vertex' coordinates as text, `rings` each face's rings: they are made once, though a solid is told more than once."""
+`place` is each vertex' coordinates as text, `rings` each face's rings: they are made once, though a
+solid is told more than once.
+"""
 
 from __future__ import annotations
 
@@ -19,8 +21,9 @@ ROLES = {ROOF: "roof", WALL: "wall", GROUND: "ground"}
 
 
 def surface_ids(faces: tuple[Face, ...], name: str, part: str = "") -> list[str]:
-    """Each face's polygon named by kind and number, that of a building part before it; the building's name comes last, so that no
-    two names meet."""
+    """Each face's polygon named by kind and number, that of a building part before it; the
+    building's name comes last, so that no two names meet.
+    """
     counts = dict.fromkeys(ROLES, 0)
     ids = []
     for face in faces:
@@ -42,7 +45,9 @@ def lod1_solid(solid: Solid | None, units: Units) -> str:
 
 def lod2_solid(polygon_ids: list[str], id: str) -> str:
     """The closed shell under its gml:id, made of the boundary surfaces' own polygons."""
-    members = "".join(f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids)
+    members = "".join(
+        f'<gml:surfaceMember xlink:href="#poly-{polygon_id}"/>' for polygon_id in polygon_ids
+    )
     return (
         f'<bldg:lod2Solid><gml:Solid gml:id="{id}"><gml:exterior><gml:CompositeSurface>{members}'
         "</gml:CompositeSurface></gml:exterior></gml:Solid></bldg:lod2Solid>"
@@ -60,7 +65,10 @@ def multi_surface(rings: list[str]) -> str:
 
 def surface_members(rings: list[str]) -> str:
     return "".join(
-        [f"<gml:surfaceMember><gml:Polygon>{of_face}</gml:Polygon></gml:surfaceMember>" for of_face in rings]
+        [
+            f"<gml:surfaceMember><gml:Polygon>{of_face}</gml:Polygon></gml:surfaceMember>"
+            for of_face in rings
+        ]
     )
 
 
@@ -74,14 +82,21 @@ def terrain_element(lines: list[np.ndarray], level: int) -> str:
     return f"<{tag}><gml:MultiCurve>{members}</gml:MultiCurve></{tag}>"
 
 
-def boundary_surfaces(solid: Solid, figures: RoofFigures, polygon_ids: list[str], rings: list[str]) -> list[str]:
-    """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth in degrees."""
+def boundary_surfaces(
+    solid: Solid, figures: RoofFigures, polygon_ids: list[str], rings: list[str]
+) -> list[str]:
+    """A RoofSurface, WallSurface or GroundSurface for every face; roofs say their slope and azimuth
+    in degrees.
+    """
     surfaces = []
-    for index, (face, polygon_id, of_face) in enumerate(zip(solid.faces, polygon_ids, rings, strict=True)):
+    for index, (face, polygon_id, of_face) in enumerate(
+        zip(solid.faces, polygon_ids, rings, strict=True)
+    ):
         tag = f"bldg:{face.kind}"
         angles = angle_attributes(figures, index) if face.kind == ROOF else ""
         surfaces.append(
-            f'<bldg:boundedBy><{tag} gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
+            f"<bldg:boundedBy><{tag} "
+            f'gml:id="{polygon_id}">{angles}<bldg:lod2MultiSurface><gml:MultiSurface>'
             f'<gml:surfaceMember><gml:Polygon gml:id="poly-{polygon_id}">{of_face}</gml:Polygon>'
             f"</gml:surfaceMember></gml:MultiSurface></bldg:lod2MultiSurface></{tag}></bldg:boundedBy>"
         )
@@ -91,7 +106,11 @@ def boundary_surfaces(solid: Solid, figures: RoofFigures, polygon_ids: list[str]
 def angle_attributes(figures: RoofFigures, index: int) -> str:
     """Slope and azimuth of roof face `index`, as far as they are known."""
     angles = {"slope": figures.face_slope_deg[index], "azimuth": figures.face_azimuth_deg[index]}
-    return "".join(generic_attribute(key, rounded(angle, 3)) for key, angle in angles.items() if math.isfinite(angle))
+    return "".join(
+        generic_attribute(key, rounded(angle, 3))
+        for key, angle in angles.items()
+        if math.isfinite(angle)
+    )
 
 
 def rings_of_faces(faces: Iterable[Face], xyz: np.ndarray) -> list[str]:

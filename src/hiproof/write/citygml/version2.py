@@ -1,8 +1,9 @@
 """CityGML 2.0: a streamed CityModel of LoD2 buildings.
 
-Each building becomes one piece of text, written and dropped, so a city needs no more memory than a street. The
-envelope stands before the buildings but is known only after them: its place is left blank and filled in at the end.
-All ids in the text are names by XML's rules already; what comes from outside is escaped where it enters.
+Each building becomes one piece of text, written and dropped, so a city needs no more memory than a
+street. The envelope stands before the buildings but is known only after them: its place is left
+blank and filled in at the end. All ids in the text are names by XML's rules already; what comes
+from outside is escaped where it enters.
 """
 
 from __future__ import annotations
@@ -58,9 +59,11 @@ def write_citygml(
 ) -> None:
     """Write `buildings` (solids in world metres) to `path` as CityGML 2.0, LoD 2.
 
-    `crs` is anything pyproj understands or None; `prefix` goes before roofer's attribute names; `creation_date` is
-    written on every building if given (never taken from a clock, so that the same input gives the same file); `write` says
-    what is drawn of a building. A building without a solid is written without geometry. Coordinates are written in the unit of `crs`. Raises OutputError when the file cannot be written.
+    `crs` is anything pyproj understands or None; `prefix` goes before roofer's attribute names;
+    `creation_date` is written on every building if given (never taken from a clock, so that the
+    same input gives the same file); `write` says what is drawn of a building. A building without a
+    solid is written without geometry. Coordinates are written in the unit of `crs`. Raises
+    OutputError when the file cannot be written.
     """
     with CityGMLWriter(path, crs, prefix, creation_date, write=write) as writer:
         for building in buildings:
@@ -81,14 +84,19 @@ class CityGMLWriter(BuildingWriter):
         write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
-        self.head = FileHead(crs, write=write or WriteSettings(), prefix=prefix, creation_date=creation_date)
+        self.head = FileHead(
+            crs, write=write or WriteSettings(), prefix=prefix, creation_date=creation_date
+        )
         self.srs_name = srs_name(self.head.crs_of_files)
         self.low, self.high = np.full(3, np.inf), np.full(3, -np.inf)
         self.names = UniqueNames()
 
     def begin(self, stack: ExitStack) -> None:
         declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in self.namespaces.items())
-        self.file.write(f"<?xml version='1.0' encoding='utf-8'?>\n<core:CityModel {declared}{self.root_id}>\n".encode())
+        self.file.write(
+            "<?xml version='1.0' encoding='utf-8'?>\n<core:CityModel "
+            f"{declared}{self.root_id}>\n".encode()
+        )
         self.envelope_at = self.file.tell()
         self.envelope_length = len(self.envelope(np.full(3, WIDEST), np.full(3, WIDEST)))
         self.file.write(b" " * self.envelope_length)
@@ -96,9 +104,13 @@ class CityGMLWriter(BuildingWriter):
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
         osm = self.head.write.osm_tags
-        attributes = building_attributes(building, figures, self.head.prefix, self.head.units.gml, osm)
+        attributes = building_attributes(
+            building, figures, self.head.prefix, self.head.units.gml, osm
+        )
         name = self.names.take(gml_name(building.id))
-        self.add_member(fragment(Sheet(building, figures, attributes, building.id, name, self.head)))
+        self.add_member(
+            fragment(Sheet(building, figures, attributes, building.id, name, self.head))
+        )
 
     def add_member(self, member: Fragment) -> None:
         """Write a building, told in CityGML 2.0."""
@@ -122,7 +134,8 @@ class CityGMLWriter(BuildingWriter):
         srs = "" if self.srs_name is None else f' srsName="{xml_attribute(self.srs_name)}"'
         lower, upper = positions(np.array([low, high]))
         return (
-            f'<gml:boundedBy><gml:Envelope srsDimension="3"{srs}><gml:lowerCorner>{lower}</gml:lowerCorner>'
+            "<gml:boundedBy><gml:Envelope "
+            f'srsDimension="3"{srs}><gml:lowerCorner>{lower}</gml:lowerCorner>'
             f"<gml:upperCorner>{upper}</gml:upperCorner></gml:Envelope></gml:boundedBy>"
         ).encode()
 
@@ -133,7 +146,9 @@ def writer(path: str | os.PathLike, head: FileHead) -> CityGMLWriter:
 
 
 def fragment(sheet: Sheet) -> Fragment:
-    """The cityObjectMember of a building, whose gml:ids end in its name; the root's namespaces are taken as declared."""
+    """The cityObjectMember of a building, whose gml:ids end in its name; the root's namespaces are
+    taken as declared.
+    """
     text = f"<core:cityObjectMember>{building_element(sheet)}</core:cityObjectMember>".encode()
     lines = terrain_lines(sheet)
     if sheet.figures is not None:
@@ -150,7 +165,9 @@ def building_element(sheet: Sheet) -> str:
     building, figures, name, write = sheet.building, sheet.figures, sheet.gml_name, sheet.head.write
     text = [f'<bldg:Building gml:id="bldg-{name}"><gml:name>{xml_text(building.id)}</gml:name>']
     if sheet.head.creation_date is not None:
-        text.append(f"<core:creationDate>{sheet.head.creation_date.isoformat()}</core:creationDate>")
+        text.append(
+            f"<core:creationDate>{sheet.head.creation_date.isoformat()}</core:creationDate>"
+        )
     text += [generic_attribute(key, value) for key, value in sheet.attributes.items()]
     if figures is not None:
         types = types_that_show(building)
@@ -160,7 +177,10 @@ def building_element(sheet: Sheet) -> str:
     if figures is None or (solid := own_solid(sheet)) is None:
         text.append(with_terrain(sheet, "", []))
     else:
-        ids, rings = surface_ids(solid.faces, name), rings_of_faces(solid.faces, in_file(sheet, solid))
+        ids, rings = (
+            surface_ids(solid.faces, name),
+            rings_of_faces(solid.faces, in_file(sheet, solid)),
+        )
         text.append(with_terrain(sheet, lod2_solid(ids, f"solid-{name}"), rings))
         text += boundary_surfaces(solid, figures, ids, rings)
     text += [part_element(sheet, number, part) for number, part in enumerate(sheet.shapes.parts, 1)]
@@ -168,11 +188,17 @@ def building_element(sheet: Sheet) -> str:
 
 
 def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
-    """One bldg:BuildingPart with its solid; its gml:ids have the part's number before the building's name."""
+    """One bldg:BuildingPart with its solid; its gml:ids have the part's number before the
+    building's name.
+    """
     name, ground = f"{number}-{sheet.gml_name}", ground_height(sheet.building, sheet.figures)
     sets = part.attributes.get(f"{OWN}primitives", [])
     text = [f'<bldg:consistsOfBuildingPart><bldg:BuildingPart gml:id="part-{name}">']
-    text += [generic_attribute(key, value) for key, value in part.attributes.items() if not isinstance(value, list)]
+    text += [
+        generic_attribute(key, value)
+        for key, value in part.attributes.items()
+        if not isinstance(value, list)
+    ]
     text += [attribute_set(f"{OWN}primitive_{k}", values) for k, values in enumerate(sets)]
     text.append(roof_and_height(part.types, part.figures, ground, sheet.head.write))
     text.append(lod1_solid(part.block, sheet.head.units.gml))
@@ -187,13 +213,25 @@ def part_element(sheet: Sheet, number: int, part: PartShape) -> str:
 
 def types_that_show(building: Building) -> list[str]:
     """Roof types of the parts that are seen from above."""
-    return [part.type for part, area in zip(building.parts, building.model.shown_m2, strict=True) if area > 0.0]
+    return [
+        part.type
+        for part, area in zip(building.parts, building.model.shown_m2, strict=True)
+        if area > 0.0
+    ]
 
 
-def roof_and_height(types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings) -> str:
-    """roofType of roof parts of `types`, where there are any, and measuredHeight, over the ground."""
+def roof_and_height(
+    types: Iterable[str], figures: RoofFigures, z_ground: float, write: WriteSettings
+) -> str:
+    """roofType of roof parts of `types`, where there are any, and measuredHeight, over the
+    ground.
+    """
     code = roof_type_code(types, write.roof_codes) if types else None
-    roof = "" if code is None else f'<bldg:roofType codeSpace="{CODE_SPACES[write.roof_codes]}">{code}</bldg:roofType>'
+    roof = (
+        ""
+        if code is None
+        else f'<bldg:roofType codeSpace="{CODE_SPACES[write.roof_codes]}">{code}</bldg:roofType>'
+    )
     height = figures.h_max - min(z_ground, figures.h_base)
     return f'{roof}<bldg:measuredHeight uom="m">{height:.4f}</bldg:measuredHeight>'
 
@@ -205,21 +243,31 @@ def level_surfaces(sheet: Sheet) -> str:
         return ""
     upward = Face(tuple(ring[::-1] for ring in shapes.outline.rings), GROUND)
     low = multi_surface(rings_of_faces((upward,), unmoved(sheet)))
-    edge = multi_surface(rings_of_faces((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid))))
-    return f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint><bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
+    edge = multi_surface(
+        rings_of_faces((upward,), sheet.head.units.gml.from_metres(shapes.edge_vertices(solid)))
+    )
+    return (
+        f"<bldg:lod0FootPrint>{low}</bldg:lod0FootPrint>"
+        f"<bldg:lod0RoofEdge>{edge}</bldg:lod0RoofEdge>"
+    )
 
 
 def unmoved(sheet: Sheet) -> np.ndarray:
-    """The vertices (n, 3) of the solid in the file's unit as they would be where the footprint lay before it was moved."""
-    return sheet.head.units.gml.from_metres(sheet.building.solid.vertices - np.array([*sheet.building.shift, 0.0]))
+    """The vertices (n, 3) of the solid in the file's unit as they would be where the footprint lay
+    before it was moved.
+    """
+    return sheet.head.units.gml.from_metres(
+        sheet.building.solid.vertices - np.array([*sheet.building.shift, 0.0])
+    )
 
 
 def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
-    """The building's own solid of LoD2, `shell`, its surfaces, of these `rings`, and the line along which it meets the terrain, as far
-    as asked for.
+    """The building's own solid of LoD2, `shell`, its surfaces, of these `rings`, and the line along
+    which it meets the terrain, as far as asked for.
 
-    GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line, which is the same at all levels,
-    stands before them as LoD1's; without LoD2 it would be the last, and is left out.
+    GDAL and QGIS show the last geometry of a building. Where surfaces are to be that, the line,
+    which is the same at all levels, stands before them as LoD1's; without LoD2 it would be the
+    last, and is left out.
     """
     lines, is_last = terrain_lines(sheet), not sheet.head.write.gml_surfaces
     has_lod2 = "2.2" in sheet.head.write.lods
@@ -230,10 +278,16 @@ def with_terrain(sheet: Sheet, shell: str, rings: list[str]) -> str:
 
 
 def terrain_lines(sheet: Sheet) -> list[np.ndarray]:
-    """The terrain intersection's lines (m, 3) in the file's unit that are lines: two points at least, all known."""
+    """The terrain intersection's lines (m, 3) in the file's unit that are lines: two points at
+    least, all known.
+    """
     if not sheet.head.write.terrain_intersection:
         return []
-    lines = (line for line in sheet.building.terrain_intersection if len(line) > 1 and np.isfinite(line).all())
+    lines = (
+        line
+        for line in sheet.building.terrain_intersection
+        if len(line) > 1 and np.isfinite(line).all()
+    )
     return [sheet.head.units.gml.from_metres(line) for line in lines]
 
 
@@ -243,6 +297,8 @@ def in_file(sheet: Sheet, solid: Solid) -> np.ndarray:
 
 
 def own_solid(sheet: Sheet) -> Solid | None:
-    """The solid that is the building's own: none where its parts have solids, or where none is asked for."""
+    """The solid that is the building's own: none where its parts have solids, or where none is
+    asked for.
+    """
     is_own = "2.2" in sheet.head.write.lods and sheet.figures is not None and not sheet.shapes.parts
     return sheet.building.solid if is_own else None

@@ -1,8 +1,10 @@
-"""CityGML 3.0, made of what stands in CityGML 2.0: other names, another order, an id for every geometry.
+"""CityGML 3.0, made of what stands in CityGML 2.0: other names, another order, an id for every
+geometry.
 
-What 3.0 tells otherwise: surfaces are boundaries of a space and belong to constructions, heights say from where to where
-they were measured, generic attributes are elements of their own, footprint and roof edge are boundaries of level 0, and a
-solid has a shell. So everything that the writer of 2.0 knows stands in 3.0 too.
+What 3.0 tells otherwise: surfaces are boundaries of a space and belong to constructions, heights
+say from where to where they were measured, generic attributes are elements of their own, footprint
+and roof edge are boundaries of level 0, and a solid has a shell. So everything that the writer of
+2.0 knows stands in 3.0 too.
 """
 
 from __future__ import annotations
@@ -31,13 +33,33 @@ NAMESPACES = {
 }
 ID, OLD_ID = f"{{{NAMESPACES['gml']}}}id", f"{{{version2.NAMESPACES['gml']}}}id"
 ORDER = (
-    *("name", "creationDate", "genericAttribute", "boundary", "lod0MultiSurface", "lod1MultiSurface", "lod1Solid"),
-    *("lod2Solid", "lod2MultiSurface", "lod1TerrainIntersectionCurve", "lod2TerrainIntersectionCurve", "height"),
+    *(
+        "name",
+        "creationDate",
+        "genericAttribute",
+        "boundary",
+        "lod0MultiSurface",
+        "lod1MultiSurface",
+        "lod1Solid",
+    ),
+    *(
+        "lod2Solid",
+        "lod2MultiSurface",
+        "lod1TerrainIntersectionCurve",
+        "lod2TerrainIntersectionCurve",
+        "height",
+    ),
     *("roofType", "buildingPart"),
 )
-"""The order of what we write of buildings and their surfaces, as the schemas inherit it: core, construction, building."""
+"""The order of what we write of buildings and their surfaces, as the schemas inherit it: core,
+construction, building.
+"""
 
-GENERIC = {"intAttribute": "IntAttribute", "doubleAttribute": "DoubleAttribute", "stringAttribute": "StringAttribute"}
+GENERIC = {
+    "intAttribute": "IntAttribute",
+    "doubleAttribute": "DoubleAttribute",
+    "stringAttribute": "StringAttribute",
+}
 SET = "genericAttributeSet"
 LEVEL_0 = {"lod0FootPrint": "GroundSurface", "lod0RoofEdge": "RoofSurface"}
 WITH_ID = ("MultiSurface", "CompositeSurface", "Solid", "Polygon", "MultiCurve", "LineString")
@@ -76,7 +98,9 @@ def fragment(sheet: Sheet) -> Fragment:
 
 
 def upgraded(member: Fragment) -> Fragment:
-    """The cityObjectMember of CityGML 2.0 as one of 3.0; the root's namespaces are taken as declared in both."""
+    """The cityObjectMember of CityGML 2.0 as one of 3.0; the root's namespaces are taken as
+    declared in both.
+    """
     declared = " ".join(f'xmlns:{prefix}="{uri}"' for prefix, uri in version2.NAMESPACES.items())
     (old,) = etree.fromstring(f"<root {declared}>".encode() + member.text + b"</root>", HUGE)
     root = etree.Element("root", nsmap=NAMESPACES)
@@ -92,7 +116,12 @@ def building_of(old: Any) -> Any:
     """A Building or BuildingPart with all that is in it, in the order of the schemas."""
     new = made(f"bldg:{local(old)}", **{ID: old.get(OLD_ID)})
     owner = new.get(ID)
-    new.extend(sorted((property_of(child, owner) for child in old), key=lambda child: ORDER.index(local(child))))
+    new.extend(
+        sorted(
+            (property_of(child, owner) for child in old),
+            key=lambda child: ORDER.index(local(child)),
+        )
+    )
     for number, geometry in enumerate(new.iter(*(named(f"gml:{kind}") for kind in WITH_ID)), 1):
         if geometry.get(ID) is None:
             geometry.set(ID, f"geom-{number}-{owner}")
@@ -100,7 +129,10 @@ def building_of(old: Any) -> Any:
 
 
 def property_of(old: Any, owner: str) -> Any:
-    """What 3.0 makes of a property of a building or surface in 2.0; `owner` ends the ids that are new."""
+    """What 3.0 makes of a property of a building or surface in 2.0;
+
+    `owner` ends the ids that are new.
+    """
     name = local(old)
     if name in (*GENERIC, SET):
         return made("core:genericAttribute", generic_of(old))
@@ -108,7 +140,9 @@ def property_of(old: Any, owner: str) -> Any:
         return made("core:boundary", surface_of(old[0], owner))
     if name in LEVEL_0:
         surfaces = made("core:lod0MultiSurface", geometry_of(old[0]))
-        return made("core:boundary", made(f"con:{LEVEL_0[name]}", surfaces, **{ID: f"{name}-{owner}"}))
+        return made(
+            "core:boundary", made(f"con:{LEVEL_0[name]}", surfaces, **{ID: f"{name}-{owner}"})
+        )
     if name == "measuredHeight":
         return made("con:height", height_of(old))
     if name == "consistsOfBuildingPart":
@@ -125,19 +159,29 @@ def generic_of(old: Any) -> Any:
     """A generic attribute, or a named set of them."""
     name = made("gen:name", text=old.get("name"))
     if local(old) == SET:
-        return made("gen:GenericAttributeSet", name, *(made("gen:genericAttribute", generic_of(one)) for one in old))
+        return made(
+            "gen:GenericAttributeSet",
+            name,
+            *(made("gen:genericAttribute", generic_of(one)) for one in old),
+        )
     return made(f"gen:{GENERIC[local(old)]}", name, made("gen:value", text=old[0].text))
 
 
 def surface_of(old: Any, owner: str) -> Any:
     """A RoofSurface, WallSurface or GroundSurface."""
-    properties = sorted((property_of(child, owner) for child in old), key=lambda child: ORDER.index(local(child)))
+    properties = sorted(
+        (property_of(child, owner) for child in old), key=lambda child: ORDER.index(local(child))
+    )
     return made(f"con:{local(old)}", *properties, **{ID: old.get(OLD_ID)})
 
 
 def height_of(old: Any) -> Any:
     """A measuredHeight, which says from where to where it was measured."""
-    told = {"highReference": "highestRoofEdge", "lowReference": "lowestGroundPoint", "status": "measured"}
+    told = {
+        "highReference": "highestRoofEdge",
+        "lowReference": "lowestGroundPoint",
+        "status": "measured",
+    }
     how = [made(f"con:{name}", text=value) for name, value in told.items()]
     return made("con:Height", *how, made("con:value", text=old.text, uom=old.get("uom")))
 

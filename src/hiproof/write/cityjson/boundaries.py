@@ -1,4 +1,6 @@
-"""The geometry of one building in CityJSON: footprint and roof edge, blocks, Solids with semantics."""
+"""The geometry of one building in CityJSON: footprint and roof edge, blocks, Solids
+with semantics.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ LOD_SOLID, LOD_FOOTPRINT = "2.2", "0"
 
 
 class Vertices:
-    """The vertices of one feature as integers: integer * scale + origin, in `units`; equal ones are one."""
+    """The vertices of one feature as integers: integer * scale + origin, in `units`; equal ones are
+    one.
+    """
 
     def __init__(self, origin: np.ndarray, scale: float, units: Units = METRES) -> None:
         self.origin, self.scale, self.units = origin, scale, units
@@ -28,7 +32,11 @@ class Vertices:
 
     def add(self, xyz: np.ndarray) -> list[int]:
         """Indices of the world coordinates `xyz` (n, 3), metres."""
-        integers = np.rint((self.units.from_metres(xyz) - self.origin) / self.scale).astype(np.int64).tolist()
+        integers = (
+            np.rint((self.units.from_metres(xyz) - self.origin) / self.scale)
+            .astype(np.int64)
+            .tolist()
+        )
         return [self.index(tuple(integer)) for integer in integers]
 
     def index(self, integer: tuple[int, int, int]) -> int:
@@ -46,18 +54,26 @@ def building_geometry(
     prefix: str,
     lods: tuple[str, ...],
 ) -> list[dict[str, Any]]:
-    """What is drawn of the building itself, as far as it has it and `lods` ask: the footprint always, roof edge, blocks, solid.
+    """What is drawn of the building itself, as far as it has it and `lods` ask: the footprint
+    always, roof edge, blocks, solid.
 
     Vertices go to `vertices`. A building in parts has no solid of its own.
     """
     if figures is None:
         footprint = level_footprint(building)
-        return [] if footprint is None else [multi_surface(outline_boundaries(footprint, building.z_ground, vertices))]
+        return (
+            []
+            if footprint is None
+            else [multi_surface(outline_boundaries(footprint, building.z_ground, vertices))]
+        )
     solids = []
     if "2.2" in lods and not shapes.parts:
         solids = [
             solid_geometry(
-                building.solid, vertices, LOD_SOLID, roof_surfaces(building, building.solid, figures, prefix)
+                building.solid,
+                vertices,
+                LOD_SOLID,
+                roof_surfaces(building, building.solid, figures, prefix),
             )
         ]
     blocks = [(shapes.lod12, "1.2"), (shapes.lod13, "1.3")]
@@ -80,17 +96,23 @@ def part_geometry(
 
 
 def level_surfaces(building: Building, shapes: Shapes, vertices: Vertices) -> list[dict[str, Any]]:
-    """LoD0: the footprint where it lay before it was moved, and the roof's edge, with semantics to tell them apart by."""
+    """LoD0: the footprint where it lay before it was moved, and the roof's edge, with semantics to
+    tell them apart by.
+    """
     corners, grounds = building.solid.vertices, building.solid.of_kind(GROUND)
     unmoved = corners - np.array([*building.shift, 0.0]) if any(building.shift) else corners
     footprint = multi_surface(ground_boundaries(grounds, unmoved, vertices))
     if shapes.outline is None:
         return [footprint]
-    edge = multi_surface(ground_boundaries((shapes.outline,), shapes.edge_vertices(building.solid), vertices))
+    edge = multi_surface(
+        ground_boundaries((shapes.outline,), shapes.edge_vertices(building.solid), vertices)
+    )
     return [named_surfaces(footprint, GROUND), named_surfaces(edge, ROOF)]
 
 
-def ground_boundaries(grounds: tuple[Face, ...], corners: np.ndarray, vertices: Vertices) -> list[list[list[int]]]:
+def ground_boundaries(
+    grounds: tuple[Face, ...], corners: np.ndarray, vertices: Vertices
+) -> list[list[list[int]]]:
     """Ground faces with their vertices at `corners` (n, 3), turned to look up."""
     return [[vertices.add(corners[list(ring)])[::-1] for ring in face.rings] for face in grounds]
 
@@ -100,13 +122,18 @@ def multi_surface(boundaries: list) -> dict[str, Any]:
 
 
 def named_surfaces(surface: dict[str, Any], kind: str) -> dict[str, Any]:
-    return {**surface, "semantics": {"surfaces": [{"type": kind}], "values": [0] * len(surface["boundaries"])}}
+    return {
+        **surface,
+        "semantics": {"surfaces": [{"type": kind}], "values": [0] * len(surface["boundaries"])},
+    }
 
 
 def solid_geometry(
     solid: Solid, vertices: Vertices, lod: str, roofs: dict[int, dict[str, Any]] | None = None
 ) -> dict[str, Any]:
-    """The Solid: a roof face in `roofs` is a semantic surface of its own, all others of a kind share one."""
+    """The Solid: a roof face in `roofs` is a semantic surface of its own, all others of a kind
+    share one.
+    """
     number = vertices.add(solid.vertices)
     surfaces: list[dict[str, Any]] = []
     shared: dict[str, int] = {}
@@ -120,13 +147,19 @@ def solid_geometry(
                 shared[face.kind] = len(surfaces)
                 surfaces.append({"type": face.kind})
             values.append(shared[face.kind])
-    boundaries = [[[number[vertex] for vertex in ring] for ring in face.rings] for face in solid.faces]
+    boundaries = [
+        [[number[vertex] for vertex in ring] for ring in face.rings] for face in solid.faces
+    ]
     semantics = {"surfaces": surfaces, "values": [values]}
     return {"type": "Solid", "lod": lod, "boundaries": [boundaries], "semantics": semantics}
 
 
-def roof_surfaces(building: Building, solid: Solid, figures: RoofFigures, prefix: str) -> dict[int, dict[str, Any]]:
-    """Semantics of the roof faces of its `solid`, or a part's, by index: slope, azimuth (degrees), the roof part they belong to."""
+def roof_surfaces(
+    building: Building, solid: Solid, figures: RoofFigures, prefix: str
+) -> dict[int, dict[str, Any]]:
+    """Semantics of the roof faces of its `solid`, or a part's, by index: slope, azimuth (degrees),
+    the roof part they belong to.
+    """
     found = {}
     for index, face in enumerate(solid.faces):
         if face.kind != ROOF:
@@ -137,20 +170,29 @@ def roof_surfaces(building: Building, solid: Solid, figures: RoofFigures, prefix
             f"{prefix}azimuth": plain(rounded(figures.face_azimuth_deg[index], 3)),
         }
         if 0 <= face.part < len(building.parts):
-            found[index] |= {f"{OWN}part": int(face.part), f"{OWN}part_type": building.parts[face.part].type}
+            found[index] |= {
+                f"{OWN}part": int(face.part),
+                f"{OWN}part_type": building.parts[face.part].type,
+            }
     return found
 
 
 def level_footprint(building: Building) -> shapely.Polygon | None:
-    """The footprint of a building without a solid, None without one or without a height to draw it at."""
+    """The footprint of a building without a solid, None without one or without a height to draw it
+    at.
+    """
     footprint = building.footprint
     if footprint is None or footprint.is_empty or not math.isfinite(building.z_ground):
         return None
     return footprint
 
 
-def outline_boundaries(outline: shapely.Geometry, z: float, vertices: Vertices) -> list[list[list[int]]]:
-    """Surfaces of the polygons of `outline` at height `z`, outer rings counter-clockwise seen from above."""
+def outline_boundaries(
+    outline: shapely.Geometry, z: float, vertices: Vertices
+) -> list[list[list[int]]]:
+    """Surfaces of the polygons of `outline` at height `z`, outer rings counter-clockwise seen from
+    above.
+    """
     surfaces = []
     for polygon in shapely.get_parts(shapely.normalize(outline)):
         polygon = shapely.geometry.polygon.orient(polygon)

@@ -1,9 +1,10 @@
 """CityJSON 2.0: a sequence of features, one building a line (CityJSONSeq), or one document.
 
-A building is written as soon as it is added and forgotten, so a city needs no more memory than a street. The first
-line must name the offset of all coordinates and their extent, which only the last building settles: its place is
-reserved and filled in at the end. The offset is the first solid's corner rounded down to whole thousands, so that
-small changes of the input leave the integers of all other buildings as they were.
+A building is written as soon as it is added and forgotten, so a city needs no more memory than a
+street. The first line must name the offset of all coordinates and their extent, which only the last
+building settles: its place is reserved and filled in at the end. The offset is the first solid's
+corner rounded down to whole thousands, so that small changes of the input leave the integers of all
+other buildings as they were.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ from ..writer import BuildingWriter
 from .boundaries import Vertices, building_geometry, first_corner, part_geometry
 
 SCALE = 0.0001  # units of the file; tenths of a millimetre, on which solids are composed
-GRID = 1000.0  # units of the file; offsets are whole thousands, so that files of neighbouring tiles often share theirs
+# units of the file; offsets are whole thousands, so that files of neighbouring tiles often share
+# theirs
+GRID = 1000.0
 
 
 def write_cityjson(
@@ -41,11 +44,13 @@ def write_cityjson(
     scale: float = SCALE,
     write: WriteSettings | None = None,
 ) -> None:
-    """Write `buildings` (solids in world metres) to `path`: CityJSONSeq 2.0, or one document if it ends in `.json`.
+    """Write `buildings` (solids in world metres) to `path`: CityJSONSeq 2.0, or one document if it
+    ends in `.json`.
 
-    `crs` is anything pyproj understands or None; coordinates are written in its unit. `prefix` goes before roofer's
-    attribute names; `scale` is the grid that coordinates are rounded to, in the file's unit; `write` says what is drawn of a building. Raises OutputError when the
-    file cannot be written; an older file then stays.
+    `crs` is anything pyproj understands or None; coordinates are written in its unit. `prefix` goes
+    before roofer's attribute names; `scale` is the grid that coordinates are rounded to, in the
+    file's unit; `write` says what is drawn of a building. Raises OutputError when the file cannot
+    be written; an older file then stays.
     """
     with CityJSONWriter(path, crs, prefix, scale, write=write) as writer:
         for building in buildings:
@@ -66,7 +71,10 @@ class CityJSONWriter(BuildingWriter):
     ) -> None:
         super().__init__(path)
         self.head = FileHead(crs, write=write or WriteSettings(), prefix=prefix)
-        self.units, self.reference_system = self.head.units.cityjson, reference_system(self.head.crs_of_files)
+        self.units, self.reference_system = (
+            self.head.units.cityjson,
+            reference_system(self.head.crs_of_files),
+        )
         self.is_document = str(path).endswith(".json")
         self.scale = scale
         self.translate = translate
@@ -77,7 +85,8 @@ class CityJSONWriter(BuildingWriter):
     def begin(self, stack: ExitStack) -> None:
         self.header_length = len(self.header(np.full(3, WIDEST), [WIDEST] * 6))
         self.file.write(b" " * self.header_length + b"\n")
-        # The vertices of a document stand in one list after all objects: they wait in a second file.
+        # The vertices of a document stand in one list after all objects: they wait in a second
+        # file.
         if self.is_document:
             self.waiting = stack.enter_context(scratch(self.path))
 
@@ -85,7 +94,9 @@ class CityJSONWriter(BuildingWriter):
         figures = figures or figures_of(building)
         name = self.ids.take(plain_text(building.id))
         vertices = Vertices(self.origin_for(building), self.scale, self.units)
-        attributes = building_attributes(building, figures, self.head.prefix, self.units, self.head.write.osm_tags)
+        attributes = building_attributes(
+            building, figures, self.head.prefix, self.units, self.head.write.osm_tags
+        )
         sheet = Sheet(building, figures, attributes, name, "", self.head)
         if self.is_document:
             self.add_to_document(city_objects(sheet, vertices), vertices)
@@ -99,7 +110,10 @@ class CityJSONWriter(BuildingWriter):
 
     def widen(self, extent: tuple[float, ...] | None) -> None:
         if extent is not None:
-            self.low, self.high = np.minimum(self.low, extent[:3]), np.maximum(self.high, extent[3:])
+            self.low, self.high = (
+                np.minimum(self.low, extent[:3]),
+                np.maximum(self.high, extent[3:]),
+            )
 
     def origin_for(self, building: Building) -> np.ndarray:
         """The file's offset (3,), settled by the first building that has coordinates."""
@@ -115,7 +129,9 @@ class CityJSONWriter(BuildingWriter):
         for name, city_object in objects.items():
             for geometry in city_object.get("geometry", ()):
                 geometry["boundaries"] = shifted(geometry["boundaries"], self.vertex_count)
-            self.file.write((b",\n" if self.object_count else b"") + dump(name) + b":" + dump(city_object))
+            self.file.write(
+                (b",\n" if self.object_count else b"") + dump(name) + b":" + dump(city_object)
+            )
             self.object_count += 1
         if vertices.grid:
             self.waiting.write((b",\n" if self.vertex_count else b"") + dump(vertices.grid)[1:-1])
@@ -125,7 +141,9 @@ class CityJSONWriter(BuildingWriter):
         if self.is_document:
             self.append_waiting_vertices()
         translate = np.zeros(3) if self.translate is None else self.translate
-        extent = [metres(v) for v in (*self.low, *self.high)] if np.isfinite(self.low).all() else None
+        extent = (
+            [metres(v) for v in (*self.low, *self.high)] if np.isfinite(self.low).all() else None
+        )
         self.file.seek(0)
         self.file.write(self.header(translate, extent).ljust(self.header_length))
 
@@ -163,18 +181,29 @@ def fragment(sheet: Sheet) -> Fragment:
 
 
 def offset_of(corner_xy: np.ndarray) -> np.ndarray:
-    """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole thousands, so that it seldom moves."""
+    """The offset (3,) of a file whose coordinates start at `corner_xy` (2,): whole thousands, so
+    that it seldom moves.
+    """
     return np.append(np.floor(np.asarray(corner_xy) / GRID) * GRID, 0.0)
 
 
 def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
     """CityObjects by id: the building and its parts; their vertices go to `vertices`."""
     name, prefix, lods = sheet.name, sheet.head.prefix, sheet.head.write.lods
-    geometry = building_geometry(sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods)
+    geometry = building_geometry(
+        sheet.building, sheet.figures, sheet.shapes, vertices, prefix, lods
+    )
     whole: dict[str, Any] = {"type": "Building", "attributes": sheet.attributes}
-    parts = {f"{name}-part{k}": part_object(sheet, part, vertices) for k, part in enumerate(sheet.shapes.parts, 1)}
+    parts = {
+        f"{name}-part{k}": part_object(sheet, part, vertices)
+        for k, part in enumerate(sheet.shapes.parts, 1)
+    }
     if geometry:
-        whole = {"type": "Building", "geographicalExtent": list(extent_of(vertices)), "attributes": sheet.attributes}
+        whole = {
+            "type": "Building",
+            "geographicalExtent": list(extent_of(vertices)),
+            "attributes": sheet.attributes,
+        }
         whole["geometry"] = geometry
     if parts:
         whole["children"] = list(parts)
@@ -183,24 +212,42 @@ def city_objects(sheet: Sheet, vertices: Vertices) -> dict[str, dict[str, Any]]:
 
 def part_object(sheet: Sheet, part: PartShape, vertices: Vertices) -> dict[str, Any]:
     """The CityObject of a part of the building."""
-    geometry = part_geometry(sheet.building, part, vertices, sheet.head.prefix, sheet.head.write.lods)
-    return {"type": "BuildingPart", "parents": [sheet.name], "attributes": part.attributes, "geometry": geometry}
+    geometry = part_geometry(
+        sheet.building, part, vertices, sheet.head.prefix, sheet.head.write.lods
+    )
+    return {
+        "type": "BuildingPart",
+        "parents": [sheet.name],
+        "attributes": part.attributes,
+        "geometry": geometry,
+    }
 
 
 def extent_of(vertices: Vertices) -> tuple[float, ...]:
     """Low x y z and high x y z of all vertices."""
     grid = np.array(vertices.grid)
-    low, high = (edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0)))
+    low, high = (
+        edge * vertices.scale + vertices.origin for edge in (grid.min(axis=0), grid.max(axis=0))
+    )
     return tuple(metres(v) for v in (*low, *high))
 
 
 def feature_line(sheet: Sheet, vertices: Vertices) -> Fragment:
     """The CityJSONFeature of a building; `vertices` are empty, about the file's offset."""
     objects = city_objects(sheet, vertices)
-    feature = {"type": "CityJSONFeature", "id": sheet.name, "CityObjects": objects, "vertices": vertices.grid}
+    feature = {
+        "type": "CityJSONFeature",
+        "id": sheet.name,
+        "CityObjects": objects,
+        "vertices": vertices.grid,
+    }
     return Fragment(dump(feature) + b"\n", extent_of(vertices) if vertices.grid else None)
 
 
 def shifted(boundaries: Any, count: int) -> Any:
     """Nested lists of vertex indices, each index raised by `count`."""
-    return boundaries + count if isinstance(boundaries, int) else [shifted(inner, count) for inner in boundaries]
+    return (
+        boundaries + count
+        if isinstance(boundaries, int)
+        else [shifted(inner, count) for inner in boundaries]
+    )

@@ -15,7 +15,9 @@ ALIGNED = 8  # bytes: what tables of properties ask for, and more than arrays of
 
 
 class GlbDocument:
-    """A document as it grows: `tables` are its JSON, views and accessors are added by the methods that fill the buffer."""
+    """A document as it grows: `tables` are its JSON, views and accessors are added by the methods
+    that fill the buffer.
+    """
 
     def __init__(self) -> None:
         asset = {"version": "2.0", "generator": "hiproof"}
@@ -32,7 +34,9 @@ class GlbDocument:
         return len(views) - 1
 
     def accessor(self, values: np.ndarray, target: int = VERTICES, **table: Any) -> int:
-        """Append `values`, (n,) or (n, k) of float32 or unsigned integers, little-endian; the index of their accessor."""
+        """Append `values`, (n,) or (n, k) of float32 or unsigned integers, little-endian; the index
+        of their accessor.
+        """
         accessors = self.tables.setdefault("accessors", [])
         view = self.view(np.ascontiguousarray(values).tobytes(), target=target)
         kind = {
@@ -45,7 +49,9 @@ class GlbDocument:
     def positions(self, places: np.ndarray) -> int:
         """Append `places` (n, 3) as float32 with their bounds; the index of their accessor."""
         places = places.astype("<f4")
-        return self.accessor(places, min=places.min(axis=0).tolist(), max=places.max(axis=0).tolist())
+        return self.accessor(
+            places, min=places.min(axis=0).tolist(), max=places.max(axis=0).tolist()
+        )
 
     def to_bytes(self) -> bytes:
         """The whole file: header, JSON chunk, binary chunk, each padded to four bytes."""

@@ -1,7 +1,8 @@
-"""Binary glTF 2.0 (`.glb`): one node a building, its id the node's name, its attributes the node's `extras`.
+"""Binary glTF 2.0 (`.glb`): one node a building, its id the node's name, its attributes the node's
+`extras`.
 
-Viewers compute in float32, so coordinates are given about an origin that `asset.extras` names. glTF's y axis points up:
-east is x, north is -z.
+Viewers compute in float32, so coordinates are given about an origin that `asset.extras` names.
+glTF's y axis points up: east is x, north is -z.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from .viewed import Look, ViewedModel, told_beside
 def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None = None) -> int:
     """Write `buildings` to `path`; returns how many.
 
-    `crs` is kept as text beside the origin, which is in metres too, whatever the unit of the CRS. Raises OutputError when the file cannot be written.
+    `crs` is kept as text beside the origin, which is in metres too, whatever the unit of the CRS.
+    Raises OutputError when the file cannot be written.
     """
     from ..files import atomic_file
 
@@ -64,7 +66,12 @@ class GlbContent:
         """The whole file."""
         origin = (np.zeros(3) if self.origin is None else self.origin).tolist()
         tables = self.document.tables
-        tables["asset"]["extras"] = {"origin": origin, "unit": "metre", "crs": crs, "axes": "x east, y up, z south"}
+        tables["asset"]["extras"] = {
+            "origin": origin,
+            "unit": "metre",
+            "crs": crs,
+            "axes": "x east, y up, z south",
+        }
         if self.nodes:
             tables["scenes"] = [{"nodes": list(range(len(self.nodes)))}]
             tables |= {"nodes": self.nodes, "meshes": self.meshes}
@@ -73,15 +80,23 @@ class GlbContent:
 
 
 def material_table(look: Look) -> dict[str, Any]:
-    surface = {"baseColorFactor": [*linear_rgb(look.colour), 1.0], "metallicFactor": 0.0, "roughnessFactor": 0.9}
+    surface = {
+        "baseColorFactor": [*linear_rgb(look.colour), 1.0],
+        "metallicFactor": 0.0,
+        "roughnessFactor": 0.9,
+    }
     return {"name": look.name, "pbrMetallicRoughness": surface, "doubleSided": True}
 
 
 def flat_triangles(vertices: np.ndarray, faces: Sequence[Face]) -> tuple[np.ndarray, np.ndarray]:
-    """Corners (3 t, 3) and face normals (3 t, 3) of the triangles of `faces` over `vertices` (n, 3), turned y up."""
+    """Corners (3 t, 3) and face normals (3 t, 3) of the triangles of `faces` over `vertices` (n,
+    3), turned y up.
+    """
     corners, normals = [np.empty((0, 3))], [np.empty((0, 3))]
     directions = face_normals(vertices, faces)
-    for normal, triangles in zip(directions, faces_triangles(vertices, faces, directions), strict=True):
+    for normal, triangles in zip(
+        directions, faces_triangles(vertices, faces, directions), strict=True
+    ):
         corners.append(vertices[triangles.ravel()])
         normals.append(np.tile(normal / max(np.linalg.norm(normal), 1e-12), (triangles.size, 1)))
     return y_up(np.concatenate(corners)), y_up(np.concatenate(normals))

@@ -1,7 +1,9 @@
-"""Wavefront OBJ with its material library: one object a building, groups that name the roof type and kind of surface.
+"""Wavefront OBJ with its material library: one object a building, groups that name the roof type
+and kind of surface.
 
-OBJ has no attributes: the building's id is the object's name, the roof types of its parts are those of groups and materials. Coordinates
-are about an origin that the first lines name, because viewers compute in float32. z points up.
+OBJ has no attributes: the building's id is the object's name, the roof types of its parts are those
+of groups and materials. Coordinates are about an origin that the first lines name, because viewers
+compute in float32. z points up.
 """
 
 from __future__ import annotations
@@ -20,7 +22,8 @@ from .viewed import ViewedModel
 def write_models(path: Path, buildings: Iterable[ViewedModel], crs: str | None = None) -> int:
     """Write `buildings` to `path` with its `.mtl`; returns how many.
 
-    Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file cannot be written.
+    Attributes other than id and roof type have no place in OBJ. Raises OutputError when a file
+    cannot be written.
     """
     from ..files import atomic_file
 
@@ -56,7 +59,10 @@ def building_text(model: ViewedModel, origin: np.ndarray, first: int) -> str:
     for look, faces in model.faces_by_look().items():
         lines += [f"g {name} {look.name}", f"usemtl {look.name.replace(' ', '_')}"]
         for face in faces:
-            lines += ["f " + " ".join(str(first + index) for index in polygon) for polygon in polygons(solid, face)]
+            lines += [
+                "f " + " ".join(str(first + index) for index in polygon)
+                for polygon in polygons(solid, face)
+            ]
     return "\n".join(lines) + "\n"
 
 
@@ -69,5 +75,8 @@ def material_library() -> str:
     """Every material a model may name."""
     colours = {f"roof_{name}": colour for name, colour in type_colours().items()}
     colours |= {"WallSurface": WALL_COLOUR, "GroundSurface": GROUND_COLOUR}
-    entries = ["newmtl {}\nKd {:.3f} {:.3f} {:.3f}\n".format(name, *srgb(colour)) for name, colour in colours.items()]
+    entries = [
+        "newmtl {}\nKd {:.3f} {:.3f} {:.3f}\n".format(name, *srgb(colour))
+        for name, colour in colours.items()
+    ]
     return "\n".join(entries)

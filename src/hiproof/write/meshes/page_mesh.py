@@ -1,4 +1,6 @@
-"""A solid as a page draws it: triangles of roofs and walls, the roof's edges, packed for JavaScript."""
+"""A solid as a page draws it: triangles of roofs and walls, the roof's edges, packed for
+JavaScript.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,9 @@ from .triangles import faces_triangles
 
 @dataclass(frozen=True)
 class Mesh:
-    """Corners (t, 3, 3) of triangles, the part (t,) that each roofs (-1: a wall), ends (e, 2, 3) of the roof's edges."""
+    """Corners (t, 3, 3) of triangles, the part (t,) that each roofs (-1: a wall), ends (e, 2, 3) of
+    the roof's edges.
+    """
 
     corners: np.ndarray
     part: np.ndarray

@@ -12,7 +12,8 @@ from ...model import Face
 
 
 def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
-    """Vertex indices (t, 3) of triangles that tile `face` (holes left out), oriented like its outer ring.
+    """Vertex indices (t, 3) of triangles that tile `face` (holes left out), oriented like its outer
+    ring.
 
     `vertices` (n, 3) in any frame. No vertices are added, so that neighbouring faces stay joined.
 
@@ -25,15 +26,25 @@ def face_triangles(vertices: np.ndarray, face: Face) -> np.ndarray:
 
 def face_normals(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
     """Vector areas (n, 3) of the outer rings of n faces."""
-    return ring_normals([vertices[list(face.rings[0])] for face in faces]) if faces else np.empty((0, 3))
+    return (
+        ring_normals([vertices[list(face.rings[0])] for face in faces])
+        if faces
+        else np.empty((0, 3))
+    )
 
 
-def faces_triangles(vertices: np.ndarray, faces: Sequence[Face], normals: np.ndarray | None = None) -> list[np.ndarray]:
-    """The triangles of every face, as `face_triangles` has them, all cut by one call; `normals` are those of `face_normals`, where a
-    caller has them."""
+def faces_triangles(
+    vertices: np.ndarray, faces: Sequence[Face], normals: np.ndarray | None = None
+) -> list[np.ndarray]:
+    """The triangles of every face, as `face_triangles` has them, all cut by one call;
+
+    `normals` are those of `face_normals`, where a caller has them.
+    """
     others = [number for number, face in enumerate(faces) if not is_triangle(face)]
     normals = face_normals(vertices, faces) if normals is None else normals
-    tiles = iter(cut(vertices, [faces[number].rings for number in others], normals[others]) if others else [])
+    tiles = iter(
+        cut(vertices, [faces[number].rings for number in others], normals[others]) if others else []
+    )
     return [np.array(face.rings[:1], int) if is_triangle(face) else next(tiles) for face in faces]
 
 
@@ -41,25 +52,42 @@ def is_triangle(face: Face) -> bool:
     return len(face.rings) == 1 and len(face.rings[0]) == 3
 
 
-def cut(vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray) -> list[np.ndarray]:
-    """Triangles (t, 3) of faces given by their rings of vertex indices and their normals (n, 3), by constrained Delaunay."""
-    # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they name their vertex.
+def cut(
+    vertices: np.ndarray, faces: Sequence[Sequence[Sequence[int]]], normals: np.ndarray
+) -> list[np.ndarray]:
+    """Triangles (t, 3) of faces given by their rings of vertex indices and their normals (n, 3), by
+    constrained Delaunay.
+    """
+    # Dropping the axis of the largest normal component keeps the plan's coordinates exact, so they
+    # name their vertex.
     axes = np.abs(normals).argmax(axis=1)
     drawn = [vertices[:, [(axis + 1) % 3, (axis + 2) % 3]] for axis in range(3)]
-    plans = [[drawn[axis][list(ring)] for ring in rings] for axis, rings in zip(axes, faces, strict=True)]
+    plans = [
+        [drawn[axis][list(ring)] for ring in rings] for axis, rings in zip(axes, faces, strict=True)
+    ]
     polygons = [shapely.Polygon(outer, holes) for outer, *holes in plans]
-    tiles, owner = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons), return_index=True)
+    tiles, owner = shapely.get_parts(
+        shapely.constrained_delaunay_triangles(polygons), return_index=True
+    )
     corners = shapely.get_coordinates(tiles).reshape(-1, 4, 2)[:, :3]
     (ax, ay), (bx, by) = (corners[:, 1] - corners[:, 0]).T, (corners[:, 2] - corners[:, 0]).T
     turned = (ax * by - ay * bx) * normals[owner, axes[owner]] < 0
     corners[turned] = corners[turned][:, ::-1]
     return [
-        named(corners[owner == number], np.concatenate(plan), [index for ring in rings for index in ring])
+        named(
+            corners[owner == number],
+            np.concatenate(plan),
+            [index for ring in rings for index in ring],
+        )
         for number, (plan, rings) in enumerate(zip(plans, faces, strict=True))
     ]
 
 
 def named(corners: np.ndarray, plan: np.ndarray, indices: Sequence[int]) -> np.ndarray:
-    """Vertex indices (t, 3) of triangles' corners (t, 3, 2), which are among the vertices `plan` (m, 2) with these `indices`."""
+    """Vertex indices (t, 3) of triangles' corners (t, 3, 2), which are among the vertices `plan`
+    (m, 2) with these `indices`.
+    """
     index_at = dict(zip(map(tuple, plan.tolist()), indices, strict=True))
-    return np.array([index_at[tuple(xy)] for xy in corners.reshape(-1, 2).tolist()], int).reshape(-1, 3)
+    return np.array([index_at[tuple(xy)] for xy in corners.reshape(-1, 2).tolist()], int).reshape(
+        -1, 3
+    )

@@ -17,8 +17,11 @@ class Look(NamedTuple):
 
 
 class ViewedModel(NamedTuple):
-    """A building with its solid in world metres; `part_types` are the roof types of its parts by number (`Face.part`), `roof_type` is
-    that of the largest."""
+    """A building with its solid in world metres;
+
+    `part_types` are the roof types of its parts by number (`Face.part`), `roof_type` is that of the
+    largest.
+    """
 
     id: str
     roof_type: str
@@ -36,12 +39,17 @@ class ViewedModel(NamedTuple):
 
 
 def told_beside(own: dict[str, Any], attributes: dict[str, Any]) -> dict[str, Any]:
-    """`own` values by name, then the `attributes`, of which one that has such a name and says something else is called NAME_input.
+    """`own` values by name, then the `attributes`, of which one that has such a name and says
+    something else is called NAME_input.
 
     >>> told_beside({"id": "a", "type": "gable"}, {"id": "a", "type": "church", "year": 1905})
     {'id': 'a', 'type': 'gable', 'type_input': 'church', 'year': 1905}
     """
-    others = {name: value for name, value in attributes.items() if name not in own or str(value) != str(own[name])}
+    others = {
+        name: value
+        for name, value in attributes.items()
+        if name not in own or str(value) != str(own[name])
+    }
     return own | {f"{name}_input" if name in own else name: value for name, value in others.items()}
 
 

@@ -1,7 +1,9 @@
-"""buildings.gpkg: outlines with every attribute, parts and roof surfaces as tables, for QGIS and its like.
+"""buildings.gpkg: outlines with every attribute, parts and roof surfaces as tables, for QGIS and
+its like.
 
-A table's columns need one type each, known before the first row, while the input's attributes may differ from building
-to building: rows wait in a temporary file until the last building has settled the types.
+A table's columns need one type each, known before the first row, while the input's attributes may
+differ from building to building: rows wait in a temporary file until the last building has settled
+the types.
 """
 
 from __future__ import annotations
@@ -37,18 +39,22 @@ LAYERS = {BUILDINGS: "MultiPolygon", "parts": "MultiPolygon", "roof_surfaces": "
 DECLARED = {"parts": PARTS_LAYER, "roof_surfaces": SURFACES_LAYER}
 ROWS_AT_ONCE = 1000  # rows handed to GDAL at once: its overhead is a call's, its memory a row's
 GPKG_VERSION = "1.2"  # what GDAL 3.4 opens without a warning; nothing here needs more
-MOST_COLUMNS = 1998  # of a table in SQLite as GDAL's wheels come, less the number and the geometry of a row
-# GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same file.
+# of a table in SQLite as GDAL's wheels come, less the number and the geometry of a row
+MOST_COLUMNS = 1998
+# GeoPackage notes when a layer last changed; a fixed date keeps the same input giving the same
+# file.
 FIXED_DATE = "2000-01-01T00:00:00.000Z"
 
 
 def write_attributes(
     path: str | os.PathLike, buildings: Iterable[Building], crs: Any = None, prefix: str = PREFIX
 ) -> None:
-    """Write the GeoPackage `path`: layers of the outlines of `buildings` (world coordinates), their parts and roof surfaces.
+    """Write the GeoPackage `path`: layers of the outlines of `buildings` (world coordinates), their
+    parts and roof surfaces.
 
-    A building whose outline is unknown gets a row without geometry. Values of one column are brought to one type: whole
-    numbers and decimals to decimals, anything beside text to text. Geometries are in the unit of `crs`. Of thousands of attributes the last have no column
+    A building whose outline is unknown gets a row without geometry. Values of one column are
+    brought to one type: whole numbers and decimals to decimals, anything beside text to text.
+    Geometries are in the unit of `crs`. Of thousands of attributes the last have no column
     (MOST_COLUMNS). Raises OutputError when the file cannot be written.
     """
     with AttributesWriter(path, crs, prefix) as writer:
@@ -62,7 +68,9 @@ def attributes_with_a_column() -> int:
 
 
 class WaitingRows:
-    """Rows of one table in a temporary file, as the text that their buildings brought, and the types found in each column."""
+    """Rows of one table in a temporary file, as the text that their buildings brought, and the
+    types found in each column.
+    """
 
     def __init__(self, layer: str, file: BinaryIO) -> None:
         self.layer, self.file = layer, file
@@ -76,12 +84,21 @@ class WaitingRows:
         self.file.write(line + b"\n")
 
     def kinds(self, prefix: str, most: int | None = None) -> dict[str, type]:
-        """The one type of every column; of more than `most`, the last of the input's own are left out."""
+        """The one type of every column; of more than `most`, the last of the input's own are left
+        out.
+        """
         declared = {
-            start + a.name: a.kind for start, table in ((prefix, ROOFER), (OWN, HIPROOF), ("", OSM)) for a in table
+            start + a.name: a.kind
+            for start, table in ((prefix, ROOFER), (OWN, HIPROOF), ("", OSM))
+            for a in table
         }
-        declared = {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
-        kinds = {name: column_kind(found, declared.get(name, "text")) for name, found in self.found.items()}
+        declared = (
+            {a.name: a.kind for a in DECLARED[self.layer]} if self.layer in DECLARED else declared
+        )
+        kinds = {
+            name: column_kind(found, declared.get(name, "text"))
+            for name, found in self.found.items()
+        }
         beyond = len(kinds) - (most or len(kinds))
         if beyond > 0:
             own = [name for name in kinds if name not in declared and name != "id"]
@@ -92,7 +109,11 @@ class WaitingRows:
     def batches(self) -> Iterator[list[Row]]:
         """The rows, some thousands at a time; one empty batch if there are none."""
         self.file.seek(0)
-        rows = ((wkb and bytes.fromhex(wkb), values) for line in self.file for wkb, values in json.loads(line))
+        rows = (
+            (wkb and bytes.fromhex(wkb), values)
+            for line in self.file
+            for wkb, values in json.loads(line)
+        )
         yield list(islice(rows, ROWS_AT_ONCE))
         while batch := list(islice(rows, ROWS_AT_ONCE)):
             yield batch
@@ -105,7 +126,11 @@ class AttributesWriter(BuildingWriter):
     reserved: tuple[str, ...] = ("fid", "geom")  # names of columns that the format has itself
 
     def __init__(
-        self, path: str | os.PathLike, crs: Any = None, prefix: str = PREFIX, write: WriteSettings | None = None
+        self,
+        path: str | os.PathLike,
+        crs: Any = None,
+        prefix: str = PREFIX,
+        write: WriteSettings | None = None,
     ) -> None:
         super().__init__(path)
         head = FileHead(crs, write=write or WriteSettings())
@@ -114,11 +139,16 @@ class AttributesWriter(BuildingWriter):
 
     def open(self, stack: ExitStack) -> None:
         self.hidden = stack.enter_context(atomic(self.path))
-        self.waiting = {layer: WaitingRows(layer, stack.enter_context(scratch(self.path))) for layer in self.layers}
+        self.waiting = {
+            layer: WaitingRows(layer, stack.enter_context(scratch(self.path)))
+            for layer in self.layers
+        }
 
     def add(self, building: Building, figures: RoofFigures | None = None) -> None:
         figures = figures or figures_of(building)
-        attributes = building_attributes(building, figures, self.prefix, self.units.gml, self.osm_tags)
+        attributes = building_attributes(
+            building, figures, self.prefix, self.units.gml, self.osm_tags
+        )
         self.put(Fragment(table_rows(building, figures, attributes, self.units.table).to_text()))
 
     def put(self, fragment: Fragment) -> None:
@@ -180,7 +210,8 @@ class AttributesWriter(BuildingWriter):
                 )
         except (DataSourceError, DataLayerError, FeatureError, RuntimeError, OSError) as error:
             raise OutputError(
-                f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions and the space left"
+                f"expected to write {os.fspath(self.path)}, got: {error}; check the permissions "
+                "and the space left"
             ) from error
 
 
@@ -191,7 +222,11 @@ def writer(path: str | os.PathLike, head: FileHead) -> AttributesWriter:
 
 def fragment(sheet: Sheet) -> Fragment:
     """A building's rows in the tables of a run, as text."""
-    return Fragment(table_rows(sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table).to_text())
+    return Fragment(
+        table_rows(
+            sheet.building, sheet.figures, sheet.attributes, sheet.head.units.table
+        ).to_text()
+    )
 
 
 @contextmanager
@@ -215,7 +250,9 @@ def kind_of(value: Any) -> type:
 
 
 def column_kind(found: set[type], declared: str) -> type:
-    """The one type that holds all values found; a figure that is always unknown stays what it is `declared`."""
+    """The one type that holds all values found; a figure that is always unknown stays what it is
+    `declared`.
+    """
     known = found - {type(None)}
     if not known:
         return {"text": str, "count": int}.get(declared, float)
@@ -241,7 +278,8 @@ def objects(values: list[Any]) -> np.ndarray:
 
 
 def column_names(names: Iterable[str], reserved: Iterable[str] = ()) -> list[str]:
-    """Names that SQLite, which does not tell upper from lower case, can hold beside the `reserved` ones.
+    """Names that SQLite, which does not tell upper from lower case, can hold beside the `reserved`
+    ones.
 
     >>> column_names(["id", "Year", "year", "fid"], ["fid"])
     ['id', 'Year', 'year_2', 'fid_2']

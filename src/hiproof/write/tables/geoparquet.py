@@ -1,5 +1,6 @@
-"""buildings.parquet, parts.parquet, roof_surfaces.parquet: the tables as GeoParquet 1.0, for data frames and columnar
-databases (needs pyarrow)."""
+"""buildings.parquet, parts.parquet, roof_surfaces.parquet: the tables as GeoParquet 1.0, for data
+frames and columnar databases (needs pyarrow).
+"""
 
 from __future__ import annotations
 
@@ -20,7 +21,9 @@ GEOMETRY_TYPES = {BUILDINGS: PLAN, "parts": PLAN, "roof_surfaces": ["Polygon Z"]
 
 
 class GeoParquetWriter(AttributesWriter):
-    """Incremental writer of the same rows as the GeoPackage's `layer`; raises InputError where pyarrow is missing."""
+    """Incremental writer of the same rows as the GeoPackage's `layer`; raises InputError where
+    pyarrow is missing.
+    """
 
     reserved = (*AttributesWriter.reserved, GEOMETRY)
 
@@ -44,20 +47,34 @@ class GeoParquetWriter(AttributesWriter):
         schema = self.schema(kinds)
         with pyarrow.parquet.ParquetWriter(self.hidden, schema, compression="zstd") as file:
             for rows in waiting.batches():
-                file.write_table(pyarrow.Table.from_arrays(arrays(rows, kinds, schema), schema=schema))
+                file.write_table(
+                    pyarrow.Table.from_arrays(arrays(rows, kinds, schema), schema=schema)
+                )
 
     def schema(self, kinds: dict[str, type]) -> Any:
-        """Arrow's schema of the columns `kinds` and the geometry, with GeoParquet's description of the latter."""
+        """Arrow's schema of the columns `kinds` and the geometry, with GeoParquet's description of
+        the latter.
+        """
         import pyarrow
         from pyproj import CRS
 
-        types = {bool: pyarrow.bool_(), int: pyarrow.int64(), float: pyarrow.float64(), str: pyarrow.string()}
+        types = {
+            bool: pyarrow.bool_(),
+            int: pyarrow.int64(),
+            float: pyarrow.float64(),
+            str: pyarrow.string(),
+        }
         names = column_names(kinds, self.reserved)
-        fields = [pyarrow.field(name, types[kind]) for name, kind in zip(names, kinds.values(), strict=True)]
+        fields = [
+            pyarrow.field(name, types[kind])
+            for name, kind in zip(names, kinds.values(), strict=True)
+        ]
         crs = None if self.plan_wkt is None else CRS.from_wkt(self.plan_wkt).to_json_dict()
         geometry = {"encoding": "WKB", "geometry_types": GEOMETRY_TYPES[self.layers[0]], "crs": crs}
         geo = {"version": "1.0.0", "primary_column": GEOMETRY, "columns": {GEOMETRY: geometry}}
-        return pyarrow.schema([*fields, pyarrow.field(GEOMETRY, pyarrow.binary())], {"geo": json.dumps(geo)})
+        return pyarrow.schema(
+            [*fields, pyarrow.field(GEOMETRY, pyarrow.binary())], {"geo": json.dumps(geo)}
+        )
 
 
 def writer(path: str | os.PathLike, head: FileHead, layer: str = BUILDINGS) -> GeoParquetWriter:

@@ -29,17 +29,21 @@ from ..meshes.triangles import faces_triangles
 from ..roof_figures import FLAT_SLOPE_DEG
 
 BATCH = 500  # buildings sent at once
-LOCKS = 0x6869  # first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the extension
+# first half of the keys of our advisory locks ("hi"); the second is the prefix's, 0 for the
+# extension
+LOCKS = 0x6869
 # Names of indexes add 15 characters, and PostgreSQL cuts at 63.
 PREFIX = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,47}")
 KINDS = {"number": "double precision", "text": "text"}  # of columns from `area_m2` on
 MEASURES = ", ".join(f"{a.name} {KINDS[a.kind]}" for a in PARTS_LAYER[3:])
 SCHEMA = """
 create table if not exists {buildings} (
-    id text primary key, status text, quality text, roof_type text, attributes jsonb, geom geometry(PolyhedralSurfaceZ, {srid}));
+    id text primary key, status text, quality text, roof_type text, attributes jsonb,
+    geom geometry(PolyhedralSurfaceZ, {srid}));
 alter table {buildings} add column if not exists quality text;
 create table if not exists {roofs} (
-    building_id text references {buildings} (id) on delete cascade, number integer, part integer, type text,
+    building_id text references {buildings} (id) on delete cascade,
+    number integer, part integer, type text,
     slope_deg double precision, azimuth_deg double precision, area_m2 double precision,
     geom geometry(PolygonZ, {srid}), primary key (building_id, number));
 create table if not exists {parts} (
@@ -68,7 +72,11 @@ class Row:
 
 
 def load_rows(
-    dsn: str, rows: Iterator[Row], parts: Iterable[Sequence[tuple]], srid: int = 0, prefix: str = "hiproof"
+    dsn: str,
+    rows: Iterator[Row],
+    parts: Iterable[Sequence[tuple]],
+    srid: int = 0,
+    prefix: str = "hiproof",
 ) -> int:
     """Replace the tables PREFIX_buildings, PREFIX_roofs and PREFIX_parts of the database at `dsn`;
     returns the number of buildings.
@@ -79,12 +87,15 @@ def load_rows(
     """
     if not PREFIX.fullmatch(prefix):
         raise InputError(
-            f"expected a table prefix of at most 48 letters (a to z), digits and underscores, got {prefix!r:.80}; "
+            "expected a table prefix of at most 48 letters (a to z), digits and underscores, got "
+            f"{prefix!r:.80}; "
             "choose another --prefix"
         )
     psycopg = import_psycopg()
     prefix = prefix.lower()  # as PostgreSQL reads names
-    names = {"prefix": prefix} | {table: f"{prefix}_{table}" for table in ("buildings", "roofs", "parts")}
+    names = {"prefix": prefix} | {
+        table: f"{prefix}_{table}" for table in ("buildings", "roofs", "parts")
+    }
     try:
         with (
             psycopg.connect(refuse_half_a_password(dsn), connect_timeout=TIMEOUT_S) as connection,
@@ -122,7 +133,11 @@ def empty_tables(cursor: Any, names: dict[str, str], srid: int) -> None:
     """Make the tables, or empty those that are there and give them the run's reference system."""
     cursor.execute(SCHEMA.format(srid=srid, measures=MEASURES, **names))
     cursor.execute("delete from {buildings}".format(**names))
-    for key, kind in (("buildings", "PolyhedralSurfaceZ"), ("roofs", "PolygonZ"), ("parts", "MultiPolygon")):
+    for key, kind in (
+        ("buildings", "PolyhedralSurfaceZ"),
+        ("roofs", "PolygonZ"),
+        ("parts", "MultiPolygon"),
+    ):
         table = names[key]
         cursor.execute("select Find_SRID(current_schema()::text, %s, 'geom')", (table,))
         if cursor.fetchone() != (srid,):
@@ -135,7 +150,10 @@ def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> No
     cursor.executemany(
         f"insert into {names['buildings']} (id, status, quality, roof_type, attributes, geom)"
         f" values (%s, %s, %s, %s, %s, {geometry})",
-        [(r.id, r.status, r.quality, r.roof_type, json.dumps(r.attributes), polyhedral_wkt(r)) for r in rows],
+        [
+            (r.id, r.status, r.quality, r.roof_type, json.dumps(r.attributes), polyhedral_wkt(r))
+            for r in rows
+        ],
     )
     cursor.executemany(
         f"insert into {names['roofs']} values (%s, %s, %s, %s, %s, %s, %s, {geometry})",
@@ -143,11 +161,16 @@ def insert(cursor: Any, rows: list[Row], names: dict[str, str], srid: int) -> No
     )
 
 
-def insert_parts(cursor: Any, parts: Iterable[Sequence[tuple]], loaded: set[str], table: str, srid: int) -> None:
+def insert_parts(
+    cursor: Any, parts: Iterable[Sequence[tuple]], loaded: set[str], table: str, srid: int
+) -> None:
     """Insert the rows of parts whose building is among those `loaded`."""
     columns = [attribute.name for attribute in PARTS_LAYER]
     values = ", ".join(["%s"] * len(columns))
-    sql = f"insert into {table} ({', '.join(columns)}, geom) values ({values}, ST_SetSRID(%s::geometry, {srid}))"
+    sql = (
+        f"insert into {table} ({', '.join(columns)}, geom) values ({values}, "
+        f"ST_SetSRID(%s::geometry, {srid}))"
+    )
     for some in parts:
         cursor.executemany(sql, [tuple(map(known, row)) for row in some if row[0] in loaded])
 
@@ -175,7 +198,11 @@ def lie_of(rings: list[np.ndarray]) -> tuple[float, float | None, float]:
     normal = np.sum([ring_normal(ring) for ring in rings], axis=0)
     area = float(np.linalg.norm(normal))
     slope = float(np.degrees(np.arctan2(np.hypot(*normal[:2]), abs(normal[2]))))
-    azimuth = float(np.degrees(np.arctan2(normal[0], normal[1])) % 360) if slope >= FLAT_SLOPE_DEG else None
+    azimuth = (
+        float(np.degrees(np.arctan2(normal[0], normal[1])) % 360)
+        if slope >= FLAT_SLOPE_DEG
+        else None
+    )
     return slope, azimuth, area
 
 
@@ -185,12 +212,18 @@ def polyhedral_wkt(row: Row) -> str | None:
     if row.solid is None:
         return None
     places = row.units.from_metres(row.solid.vertices)
-    triangles = [places[t] for face in faces_triangles(row.solid.vertices, row.solid.faces) for t in face]
+    triangles = [
+        places[t] for face in faces_triangles(row.solid.vertices, row.solid.faces) for t in face
+    ]
     return f"POLYHEDRALSURFACE Z ({', '.join(rings_wkt([t]) for t in triangles)})"
 
 
 def rings_wkt(rings: list[np.ndarray]) -> str:
     closed = (np.vstack([ring, ring[:1]]) for ring in rings)
     return (
-        "(" + ", ".join("(" + ", ".join(f"{x:.4f} {y:.4f} {z:.4f}" for x, y, z in ring) + ")" for ring in closed) + ")"
+        "("
+        + ", ".join(
+            "(" + ", ".join(f"{x:.4f} {y:.4f} {z:.4f}" for x, y, z in ring) + ")" for ring in closed
+        )
+        + ")"
     )

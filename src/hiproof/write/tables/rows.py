@@ -1,4 +1,6 @@
-"""The rows of one building in the tables of a run: its outline, its parts where they show, its roof surfaces."""
+"""The rows of one building in the tables of a run: its outline, its parts where they show, its roof
+surfaces.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +38,9 @@ class Rows(NamedTuple):
 
 
 def lines_of(text: bytes) -> dict[str, bytes]:
-    """The line of each table in what `Rows.to_text` wrote. Raises OutputError for what another version did.
+    """The line of each table in what `Rows.to_text` wrote.
+
+    Raises OutputError for what another version did.
 
     >>> lines_of(Rows(((None, {"id": "a"}),)).to_text())
     {'buildings': b'[[null, {"id": "a"}]]', 'parts': b'[]', 'roof_surfaces': b'[]'}
@@ -44,27 +48,43 @@ def lines_of(text: bytes) -> dict[str, bytes]:
     lines = text.split(b"\n")
     if len(lines) != len(Rows._fields):
         raise OutputError(
-            "expected the rows of a building as this version keeps them, got others; begin anew with --restart"
+            "expected the rows of a building as this version keeps them, got others; begin anew "
+            "with --restart"
         )
     return dict(zip(Rows._fields, lines, strict=True))
 
 
 def table_rows(
-    building: Building, figures: RoofFigures | None, attributes: dict[str, Any], units: Units = METRES
+    building: Building,
+    figures: RoofFigures | None,
+    attributes: dict[str, Any],
+    units: Units = METRES,
 ) -> Rows:
-    """The rows of `building`, their geometry in `units`; `attributes` are its own and `figures` those of its solid."""
+    """The rows of `building`, their geometry in `units`;
+
+    `attributes` are its own and `figures` those of its solid.
+    """
     parts = part_rows(building, units)
-    return Rows((building_row(building, attributes, units),), parts, surface_rows(building, figures, units))
+    return Rows(
+        (building_row(building, attributes, units),), parts, surface_rows(building, figures, units)
+    )
 
 
 def building_row(building: Building, attributes: dict[str, Any], units: Units = METRES) -> Row:
-    """The outline of `building` in `units` (None where it is unknown) and its attributes by column."""
-    named = {f"{name}_input" if name.lower() == "id" else name: value for name, value in attributes.items()}
+    """The outline of `building` in `units` (None where it is unknown) and its attributes by
+    column.
+    """
+    named = {
+        f"{name}_input" if name.lower() == "id" else name: value
+        for name, value in attributes.items()
+    }
     return wkb_of(known_outline(building), units), {"id": plain_text(building.id), **named}
 
 
 def known_outline(building: Building) -> shapely.Geometry | None:
-    """The building's outline in world coordinates: the modelled one, else the one asked for, else None."""
+    """The building's outline in world coordinates: the modelled one, else the one asked for, else
+    None.
+    """
     if building.built is None:
         return building.footprint
     roof = building.roof
@@ -72,7 +92,9 @@ def known_outline(building: Building) -> shapely.Geometry | None:
 
 
 def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
-    """A row a part: where it shows, its type, every parameter that it has and its standard deviation."""
+    """A row a part: where it shows, its type, every parameter that it has and its standard
+    deviation.
+    """
     rows = []
     for number, shown in enumerate(building.shown_areas()):
         values = {"building_id": plain_text(building.id), **part_values(building, number, shown)}
@@ -81,8 +103,13 @@ def part_rows(building: Building, units: Units = METRES) -> tuple[Row, ...]:
 
 
 def part_values(building: Building, number: int, shown: shapely.Geometry) -> dict[str, Any]:
-    """What is known of a roof part by column: its type, the area where it is `shown`, place, parameters and their standard deviations."""
-    part, (x, y, z) = building.parts[number], building.roof.frame.to_world(building.parts[number].translation)
+    """What is known of a roof part by column: its type, the area where it is `shown`, place,
+    parameters and their standard deviations.
+    """
+    part, (x, y, z) = (
+        building.parts[number],
+        building.roof.frame.to_world(building.parts[number].translation),
+    )
     return {
         "part": number,
         "type": part.type,
@@ -98,7 +125,9 @@ def part_values(building: Building, number: int, shown: shapely.Geometry) -> dic
 
 
 def cants_in_one(part: Part) -> dict[str, str]:
-    """The column of a part's cants, where it has any: thirty columns that hardly a part fills would hide the others."""
+    """The column of a part's cants, where it has any: thirty columns that hardly a part fills would
+    hide the others.
+    """
     cants = cants_named(part.parameters)
     told = [[rounded(part.parameters[f"{what}_{cant}"]) for what in MEASURES] for cant in cants]
     return {"cants": TEXT.encode(told)} if cants else {}
@@ -106,7 +135,9 @@ def cants_in_one(part: Part) -> dict[str, str]:
 
 def sigmas_of(part: Part) -> dict[str, float]:
     """Standard deviations by column, those of the angles in degrees."""
-    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {name: f"{name}_sigma" for name in SHAPE}
+    columns = {"t_z": "z_eave_sigma", "kappa": "rotation_sigma"} | {
+        name: f"{name}_sigma" for name in SHAPE
+    }
     return {
         columns[name]: rounded(math.degrees(value) if name == "kappa" else value)
         for name, value in part.sigma.items()
@@ -114,7 +145,9 @@ def sigmas_of(part: Part) -> dict[str, float]:
     }
 
 
-def surface_rows(building: Building, figures: RoofFigures | None, units: Units = METRES) -> tuple[Row, ...]:
+def surface_rows(
+    building: Building, figures: RoofFigures | None, units: Units = METRES
+) -> tuple[Row, ...]:
     """A row a roof surface of the solid: its polygon, slope, azimuth, area and part."""
     if figures is None:
         return ()
@@ -142,9 +175,15 @@ def polygons_of(vertices: np.ndarray, faces: Sequence[Face]) -> np.ndarray:
     """The polygons (k,) of faces over `vertices` (n, 3), all made at once."""
     rings = [ring for face in faces for ring in face.rings]
     corners = vertices[[vertex for ring in rings for vertex in ring]]
-    lines = shapely.linearrings(corners, indices=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings]))
+    lines = shapely.linearrings(
+        corners, indices=np.repeat(np.arange(len(rings)), [len(ring) for ring in rings])
+    )
     without_holes = len(rings) == len(faces)  # then in a tenth of the time
-    face_of = None if without_holes else np.repeat(np.arange(len(faces)), [len(face.rings) for face in faces])
+    face_of = (
+        None
+        if without_holes
+        else np.repeat(np.arange(len(faces)), [len(face.rings) for face in faces])
+    )
     return shapely.polygons(lines, indices=face_of)
 
 
@@ -152,4 +191,6 @@ def wkb_of(geometry: shapely.Geometry | None, units: Units) -> bytes | None:
     """A plan geometry (world metres) in `units` as WKB, None of one that holds nothing."""
     if geometry is None or geometry.is_empty:
         return None
-    return shapely.to_wkb(geometry if units == METRES else shapely.transform(geometry, units.from_metres))
+    return shapely.to_wkb(
+        geometry if units == METRES else shapely.transform(geometry, units.from_metres)
+    )

@@ -1,4 +1,6 @@
-"""How QGIS draws the layers of a GeoPackage: styles in the table `layer_styles`, whose defaults QGIS applies by itself."""
+"""How QGIS draws the layers of a GeoPackage: styles in the table `layer_styles`, whose defaults
+QGIS applies by itself.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +15,10 @@ LINE = "50,50,50,255"
 
 
 class Style(NamedTuple):
-    """A colour (#rrggbb) for each value of a layer's column, that of "unknown" for all others; `alpha` lets surfaces below show."""
+    """A colour (#rrggbb) for each value of a layer's column, that of "unknown" for all others;
+
+    `alpha` lets surfaces below show.
+    """
 
     layer: str
     name: str
@@ -27,12 +32,21 @@ STYLES = (
     Style("buildings", "roof types", f"{OWN}roof_type", type_colours(), 0.35),
     Style("parts", "roof types", "type", type_colours(), 0.5),
     Style("roof_surfaces", "roof types", "type", type_colours(), 1.0),
-    Style("buildings", "quality", f"{OWN}quality", GRADE_COLOURS | {"unknown": UNKNOWN_COLOUR}, 0.5, is_default=False),
+    Style(
+        "buildings",
+        "quality",
+        f"{OWN}quality",
+        GRADE_COLOURS | {"unknown": UNKNOWN_COLOUR},
+        0.5,
+        is_default=False,
+    ),
 )
 
 
 def style_rows() -> list[dict[str, Any]]:
-    """The rows of `layer_styles`: by roof type, the default of every layer, and by the quality of the models."""
+    """The rows of `layer_styles`: by roof type, the default of every layer, and by the quality of
+    the models.
+    """
     return [
         {
             "f_table_catalog": "",
@@ -60,15 +74,19 @@ def style_qml(style: Style) -> str:
     """
     kinds = [*(name for name in style.colours if name != "unknown"), "unknown"]
     categories = "".join(
-        f'<category symbol="{k}" value="{"" if name == "unknown" else xml_attribute(name)}" label="{xml_attribute(name)}"'
+        f'<category symbol="{k}" value="{"" if name == "unknown" else xml_attribute(name)}" '
+        f'label="{xml_attribute(name)}"'
         ' render="true"/>'
         for k, name in enumerate(kinds)
     )
-    symbols = "".join(fill_symbol(k, style.colours[name], style.alpha) for k, name in enumerate(kinds))
+    symbols = "".join(
+        fill_symbol(k, style.colours[name], style.alpha) for k, name in enumerate(kinds)
+    )
     return (
         "<!DOCTYPE qgis PUBLIC 'http://mrcc.com/qgis.dtd' 'SYSTEM'>"
         '<qgis version="3.22.0" styleCategories="Symbology">'
-        f'<renderer-v2 type="categorizedSymbol" attr="{style.column}" symbollevels="0" forceraster="0">'
+        f'<renderer-v2 type="categorizedSymbol" attr="{style.column}" symbollevels="0" '
+        'forceraster="0">'
         f"<categories>{categories}</categories><symbols>{symbols}</symbols></renderer-v2></qgis>"
     )
 
@@ -76,10 +94,17 @@ def style_qml(style: Style) -> str:
 def fill_symbol(number: int, colour: str, alpha: float) -> str:
     """A plain fill with thin lines around it; `colour` is #rrggbb."""
     red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
-    options = {"color": f"{red},{green},{blue},{round(255 * alpha)}", "outline_color": LINE, "outline_width": "0.1"}
+    options = {
+        "color": f"{red},{green},{blue},{round(255 * alpha)}",
+        "outline_color": LINE,
+        "outline_width": "0.1",
+    }
     options |= {"outline_width_unit": "MM", "style": "solid", "outline_style": "solid"}
-    told = "".join(f'<Option name="{name}" value="{value}" type="QString"/>' for name, value in options.items())
+    told = "".join(
+        f'<Option name="{name}" value="{value}" type="QString"/>' for name, value in options.items()
+    )
     return (
         f'<symbol type="fill" name="{number}" alpha="1" clip_to_extent="1" force_rhr="0">'
-        f'<layer class="SimpleFill" enabled="1" locked="0" pass="0"><Option type="Map">{told}</Option></layer></symbol>'
+        '<layer class="SimpleFill" enabled="1" locked="0" pass="0"><Option '
+        f'type="Map">{told}</Option></layer></symbol>'
     )

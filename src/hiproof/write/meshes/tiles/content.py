@@ -1,4 +1,6 @@
-"""A tile's file: binary glTF with one mesh of one primitive, whose feature ids are rows of the table of its buildings."""
+"""A tile's file: binary glTF with one mesh of one primitive, whose feature ids are rows of the
+table of its buildings.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +14,19 @@ from .meshes import Mesh
 from .properties import EXTENSION, Property, add_table, schema_of
 
 FEATURES = "EXT_mesh_features"
-PAINTED = {"name": "building", "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.9}}
+PAINTED = {
+    "name": "building",
+    "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 0.9},
+}
 
 
-def tile_glb(meshes: Sequence[Mesh], rows: Sequence[dict[str, Any]], properties: Sequence[Property]) -> bytes:
+def tile_glb(
+    meshes: Sequence[Mesh], rows: Sequence[dict[str, Any]], properties: Sequence[Property]
+) -> bytes:
     """The file of the buildings `meshes`, of which `rows` tells by attribute's name.
 
-    Coordinates are about the tile's middle, which the node's translation gives in float64, so that float32 is enough.
+    Coordinates are about the tile's middle, which the node's translation gives in float64, so that
+    float32 is enough.
     """
     document = GlbDocument()
     corners = np.concatenate([mesh.corners for mesh in meshes])
@@ -31,18 +39,25 @@ def tile_glb(meshes: Sequence[Mesh], rows: Sequence[dict[str, Any]], properties:
         "materials": [PAINTED],
     }
     table = add_table(document, properties, rows)
-    document.tables["extensions"] = {EXTENSION: {"schema": schema_of(properties), "propertyTables": [table]}}
+    document.tables["extensions"] = {
+        EXTENSION: {"schema": schema_of(properties), "propertyTables": [table]}
+    }
     return document.to_bytes()
 
 
 def primitive(document: GlbDocument, meshes: Sequence[Mesh], corners: np.ndarray) -> dict[str, Any]:
     """All triangles as one primitive; corners of a face that are one vertex are written once."""
     ids = np.repeat(np.arange(len(meshes)), [len(mesh.corners) for mesh in meshes])
-    told = np.zeros(len(corners), [("place", "<f4", 3), ("normal", "<f4", 3), ("colour", "u1", 4), ("id", "<f4")])
+    told = np.zeros(
+        len(corners),
+        [("place", "<f4", 3), ("normal", "<f4", 3), ("colour", "u1", 4), ("id", "<f4")],
+    )
     told["place"], told["id"] = corners, ids
     told["normal"] = np.concatenate([mesh.normals for mesh in meshes])
     told["colour"] = np.concatenate([mesh.colours for mesh in meshes])
-    _, first, number = np.unique(told.view(f"V{told.itemsize}"), return_index=True, return_inverse=True)
+    _, first, number = np.unique(
+        told.view(f"V{told.itemsize}"), return_index=True, return_inverse=True
+    )
     order = np.argsort(first)  # as they come, building by building
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
@@ -54,11 +69,20 @@ def primitive(document: GlbDocument, meshes: Sequence[Mesh], corners: np.ndarray
             "COLOR_0": document.accessor(vertices["colour"], normalized=True),
             "_FEATURE_ID_0": document.accessor(vertices["id"]),
         },
-        "indices": document.accessor(indices.astype("<u2" if len(vertices) < 65535 else "<u4"), INDICES),
+        "indices": document.accessor(
+            indices.astype("<u2" if len(vertices) < 65535 else "<u4"), INDICES
+        ),
         "material": 0,
         "extensions": {
             FEATURES: {
-                "featureIds": [{"label": "building", "featureCount": len(meshes), "attribute": 0, "propertyTable": 0}]
+                "featureIds": [
+                    {
+                        "label": "building",
+                        "featureCount": len(meshes),
+                        "attribute": 0,
+                        "propertyTable": 0,
+                    }
+                ]
             }
         },
     }

@@ -1,8 +1,8 @@
 """Places on the globe: world metres of a CRS as Earth-centred coordinates (EPSG:4978), and back.
 
-The plan goes through pyproj's best transformation at hand. Heights of 3D Tiles are above the ellipsoid, those of clouds
-mostly above the geoid, some tens of metres away: between them stands a grid that pyproj may not have, and `Globe.heights`
-says what was done.
+The plan goes through pyproj's best transformation at hand. Heights of 3D Tiles are above the
+ellipsoid, those of clouds mostly above the geoid, some tens of metres away: between them stands a
+grid that pyproj may not have, and `Globe.heights` says what was done.
 """
 
 from __future__ import annotations
@@ -18,16 +18,18 @@ from ....frames import Units
 from ....read.crs import best_of, described, horizontal_crs, parse_crs, units_of, vertical_crs
 
 GEOGRAPHIC, GEOCENTRIC = "EPSG:4979", "EPSG:4978"
-SAME_PLACE_M = 0.005  # m that a place may move on its way to the globe and back; more is a CRS used outside its area
+# m that a place may move on its way to the globe and back; more is a CRS used outside its area
+SAME_PLACE_M = 0.005
 
 
 @dataclass(frozen=True)
 class Globe:
     """How world metres of a CRS become Earth-centred coordinates.
 
-    `transformer` takes the CRS's own coordinates to longitude, latitude (degrees) and, where `is_3d`, height above the
-    ellipsoid; else that is the height plus `geoid_height_m`. `heights` says so in a sentence; `is_known` is False where it
-    is a guess. `accuracy_m` is what pyproj states, None where it does not.
+    `transformer` takes the CRS's own coordinates to longitude, latitude (degrees) and, where
+    `is_3d`, height above the ellipsoid; else that is the height plus `geoid_height_m`. `heights`
+    says so in a sentence; `is_known` is False where it is a guess. `accuracy_m` is what pyproj
+    states, None where it does not.
     """
 
     name: str
@@ -42,7 +44,8 @@ class Globe:
 
     @classmethod
     def of(cls, crs: Any, geoid_height_m: float | None = None) -> Globe:
-        """The globe as seen from `crs` (anything pyproj understands); a `geoid_height_m` given is added to all heights.
+        """The globe as seen from `crs` (anything pyproj understands); a `geoid_height_m` given is
+        added to all heights.
 
         Raises InputError where there is no CRS, or none of a place on the Earth.
 
@@ -55,14 +58,19 @@ class Globe:
         crs = parse_crs(crs)
         if crs is None:
             raise InputError(
-                "expected a CRS, to place the buildings on the globe, got none; say which with --crs EPSG:..."
+                "expected a CRS, to place the buildings on the globe, got none; say which with "
+                "--crs EPSG:..."
             )
-        units, to_centre = units_of(crs, "the models"), Transformer.from_crs(GEOGRAPHIC, GEOCENTRIC, always_xy=True)
+        units, to_centre = (
+            units_of(crs, "the models"),
+            Transformer.from_crs(GEOGRAPHIC, GEOCENTRIC, always_xy=True),
+        )
         exact = with_heights(crs) if geoid_height_m is None else None
         transformer = exact or best_of(horizontal_crs(crs), "EPSG:4326")
         if transformer is None:
             raise InputError(
-                f"expected a CRS that pyproj can place on the globe, got {described(crs)}; name another with --crs"
+                f"expected a CRS that pyproj can place on the globe, got {described(crs)}; name "
+                "another with --crs"
             )
         heights, is_known = heights_told(crs, exact, geoid_height_m)
         accuracy = transformer.accuracy if transformer.accuracy >= 0 else None
@@ -79,25 +87,35 @@ class Globe:
         )
 
     def geographic(self, world: np.ndarray) -> np.ndarray:
-        """Longitude, latitude (degrees) and height above the ellipsoid (n, 3) of world metres (n, 3)."""
+        """Longitude, latitude (degrees) and height above the ellipsoid (n, 3) of world metres (n,
+        3).
+        """
         x, y, z = self.units.from_metres(world).T
         if self.is_3d:
             return np.column_stack(self.transformer.transform(x, y, z))
-        return np.column_stack([*self.transformer.transform(x, y), np.asarray(world)[:, 2] + self.geoid_height_m])
+        return np.column_stack(
+            [*self.transformer.transform(x, y), np.asarray(world)[:, 2] + self.geoid_height_m]
+        )
 
     def to_earth(self, world: np.ndarray) -> np.ndarray:
-        """Earth-centred coordinates (n, 3) of world metres (n, 3). Raises InputError for places that have none."""
+        """Earth-centred coordinates (n, 3) of world metres (n, 3).
+
+        Raises InputError for places that have none.
+        """
         earth = np.column_stack(self.to_centre.transform(*self.geographic(world).T))
         # Projections answer for places beyond their own, but do not find the way back.
         if not np.allclose(self.from_earth(earth), world, rtol=0, atol=SAME_PLACE_M):
             raise InputError(
-                f"expected coordinates in {self.name}, got some that are no place there; say the right CRS with --crs"
+                f"expected coordinates in {self.name}, got some that are no place there; say the "
+                "right CRS with --crs"
             )
         return earth
 
     def from_earth(self, earth: np.ndarray) -> np.ndarray:
         """World metres (n, 3) of Earth-centred coordinates (n, 3)."""
-        longitude, latitude, height = self.to_centre.transform(*np.asarray(earth).T, direction="INVERSE")
+        longitude, latitude, height = self.to_centre.transform(
+            *np.asarray(earth).T, direction="INVERSE"
+        )
         if self.is_3d:
             own = self.transformer.transform(longitude, latitude, height, direction="INVERSE")
             return self.units.to_metres(np.column_stack(own))
@@ -106,7 +124,10 @@ class Globe:
 
 
 def with_heights(crs: Any) -> Any:
-    """The transformation of plan and heights that is more than a guess; None where heights or a grid are missing."""
+    """The transformation of plan and heights that is more than a guess;
+
+    None where heights or a grid are missing.
+    """
     has_heights = vertical_crs(crs) is not None or len(crs.axis_info) == 3
     return best_of(crs, GEOGRAPHIC, allow_ballpark=False) if has_heights else None
 
@@ -115,7 +136,8 @@ def heights_told(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[st
     """What was done with heights as a sentence, and whether they are known to be right."""
     if geoid_height_m is not None:
         return (
-            f"heights above the ellipsoid are those of the models plus {geoid_height_m} m, as --geoid-height says",
+            f"heights above the ellipsoid are those of the models plus {geoid_height_m} m, as "
+            "--geoid-height says",
             True,
         )
     if exact is not None:
@@ -123,20 +145,30 @@ def heights_told(crs: Any, exact: Any, geoid_height_m: float | None) -> tuple[st
     own = vertical_crs(crs)
     advice = "say the geoid's height there with --geoid-height METRES"
     if own is None:
-        return f"{described(crs)} names no heights, so these are taken to be above the ellipsoid; {advice}", False
+        return (
+            f"{described(crs)} names no heights, so these are taken to be above the ellipsoid; "
+            f"{advice}",
+            False,
+        )
     return (
-        f"pyproj has no grid here for {own.name}, so heights are taken to be above the ellipsoid and the buildings may "
-        f"stand some tens of metres too low or high; install it (`projsync`, or PROJ_NETWORK=ON) or {advice}"
+        f"pyproj has no grid here for {own.name}, so heights are taken to be above the ellipsoid "
+        "and the buildings may "
+        "stand some tens of metres too low or high; install it (`projsync`, or PROJ_NETWORK=ON) "
+        f"or {advice}"
     ), False
 
 
 def east_north_up(longitude: float, latitude: float, origin: np.ndarray) -> np.ndarray:
-    """The transform (4, 4) from east, north, up about `origin` (3,), Earth-centred, to Earth-centred coordinates.
+    """The transform (4, 4) from east, north, up about `origin` (3,), Earth-centred, to
+    Earth-centred coordinates.
 
-    >>> east_north_up(0.0, 0.0, np.array([6378137.0, 0.0, 0.0]))[:3, 2].tolist()  # up is away from the centre
+    >>> east_north_up(0.0, 0.0, np.array([6378137.0, 0.0, 0.0]))[:3,
+    ...     2].tolist()  # up is away from the centre
     [1.0, 0.0, 0.0]
     """
-    (sl, cl), (sp, cp) = ((math.sin(a), math.cos(a)) for a in (math.radians(longitude), math.radians(latitude)))
+    (sl, cl), (sp, cp) = (
+        (math.sin(a), math.cos(a)) for a in (math.radians(longitude), math.radians(latitude))
+    )
     transform = np.eye(4)
     transform[:3, 0] = -sl, cl, 0.0
     transform[:3, 1] = -sp * cl, -sp * sl, cp

@@ -1,4 +1,6 @@
-"""One building as triangles of one draw call: places, normals and colours by corner, waiting in a file until its tile is known."""
+"""One building as triangles of one draw call: places, normals and colours by corner, waiting in a
+file until its tile is known.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ from ..viewed import ViewedModel
 
 @dataclass(frozen=True)
 class Mesh:
-    """Corners (3 t, 3), y up, their face's `normals` (3 t, 3) and `colours` (3 t, 4) as linear bytes."""
+    """Corners (3 t, 3), y up, their face's `normals` (3 t, 3) and `colours` (3 t, 4) as linear
+    bytes.
+    """
 
     corners: np.ndarray
     normals: np.ndarray
@@ -35,13 +39,19 @@ class Mesh:
 
 
 def mesh_of(model: ViewedModel, vertices: np.ndarray) -> Mesh:
-    """The mesh of a model whose solid's `vertices` (n, 3) are east, north, up of the tileset's frame."""
+    """The mesh of a model whose solid's `vertices` (n, 3) are east, north, up of the tileset's
+    frame.
+    """
     corners, normals, colours = [], [], []
     for look, faces in model.faces_by_look().items():
         places, facing = flat_triangles(vertices, faces)
         corners.append(places)
         normals.append(facing)
-        colours.append(np.tile(np.round(np.multiply([*linear_rgb(look.colour), 1.0], 255)), (len(places), 1)))
+        colours.append(
+            np.tile(np.round(np.multiply([*linear_rgb(look.colour), 1.0], 255)), (len(places), 1))
+        )
     return Mesh(
-        np.concatenate(corners), np.concatenate(normals).astype("<f4"), np.concatenate(colours).astype(np.uint8)
+        np.concatenate(corners),
+        np.concatenate(normals).astype("<f4"),
+        np.concatenate(colours).astype(np.uint8),
     )

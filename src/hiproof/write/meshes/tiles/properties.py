@@ -1,7 +1,8 @@
-"""What is told of buildings in a tile: a class and a table of EXT_structural_metadata, numbers as float64, all else as text.
+"""What is told of buildings in a tile: a class and a table of EXT_structural_metadata, numbers as
+float64, all else as text.
 
-The extension knows no null: what is unknown is `NO_NUMBER` or empty text, and the class says so. One class serves all
-tiles, so that a style made for one works on every other.
+The extension knows no null: what is unknown is `NO_NUMBER` or empty text, and the class says so.
+One class serves all tiles, so that a style made for one works on every other.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ WHOLE = 2**53  # a larger whole number would not survive as a decimal: it is tol
 TOLD = {
     "id": "the building's id",
     "type": "roof type of the part that shows the largest area",
-    "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see docs/parameters.md)",
+    "parameters": "the roof's parts with types, parameters, positions and rotations, as JSON (see "
+    "docs/parameters.md)",
 } | {
     prefix + a.name: f"{a.meaning} ({a.unit})" if a.unit else a.meaning
     for prefix, table in ((PREFIX, ROOFER), (OWN, HIPROOF), ("", OSM))
@@ -32,7 +34,9 @@ TOLD = {
 
 
 class Property(NamedTuple):
-    """A column: its `id` in the class, the attribute's `name`, and whether its values are numbers."""
+    """A column: its `id` in the class, the attribute's `name`, and whether its values are
+    numbers.
+    """
 
     id: str
     name: str
@@ -52,9 +56,14 @@ class Found:
                 self.are_numbers[name] = known is not False and is_number(value)
 
     def properties(self) -> list[Property]:
-        """The columns that hold them, named as the extension allows: letters, digits, underscores."""
+        """The columns that hold them, named as the extension allows: letters, digits,
+        underscores.
+        """
         names = UniqueNames()
-        return [Property(property_id(names, name), name, bool(kind)) for name, kind in self.are_numbers.items()]
+        return [
+            Property(property_id(names, name), name, bool(kind))
+            for name, kind in self.are_numbers.items()
+        ]
 
 
 def is_number(value: Any) -> bool:
@@ -74,13 +83,18 @@ def schema_of(properties: Iterable[Property]) -> dict[str, Any]:
         False: {"type": "STRING", "noData": ""},
     }
     told = {
-        p.id: {"name": p.name, "description": TOLD.get(p.name, "as given")} | kinds[p.is_number] for p in properties
+        p.id: {"name": p.name, "description": TOLD.get(p.name, "as given")} | kinds[p.is_number]
+        for p in properties
     }
     return {"id": "hiproof", "classes": {CLASS: {"properties": told}}}
 
 
-def add_table(document: GlbDocument, properties: Sequence[Property], rows: Sequence[dict[str, Any]]) -> dict[str, Any]:
-    """The table of `rows`, values by attribute's name; its columns go to the buffer of `document`."""
+def add_table(
+    document: GlbDocument, properties: Sequence[Property], rows: Sequence[dict[str, Any]]
+) -> dict[str, Any]:
+    """The table of `rows`, values by attribute's name; its columns go to the buffer of
+    `document`.
+    """
     columns = {p.id: add_column(document, p, [row.get(p.name) for row in rows]) for p in properties}
     return {"name": "buildings", "class": CLASS, "count": len(rows), "properties": columns}
 
@@ -92,7 +106,8 @@ def add_column(document: GlbDocument, column: Property, values: list[Any]) -> di
     texts = [text_of(value).encode() for value in values]
     ends = np.cumsum([0, *map(len, texts)]).astype("<u4")
     return {
-        # A view may not be empty, so that a column of empty texts holds one byte that none of them uses.
+        # A view may not be empty, so that a column of empty texts holds one byte that none of them
+        # uses.
         "values": document.view(b"".join(texts) or b"\0"),
         "stringOffsets": document.view(ends.tobytes()),
         "stringOffsetType": "UINT32",

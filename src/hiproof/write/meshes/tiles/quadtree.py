@@ -1,7 +1,8 @@
-"""Which building is drawn in which tile: a quadtree in plan whose upper tiles hold the largest buildings.
+"""Which building is drawn in which tile: a quadtree in plan whose upper tiles hold the largest
+buildings.
 
-Every building stands in one tile. A viewer far away draws the upper tiles alone, and what is missing is small: the error
-of a tile is told by the largest building below it.
+Every building stands in one tile. A viewer far away draws the upper tiles alone, and what is
+missing is small: the error of a tile is told by the largest building below it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,9 @@ WIDEST_M = 20_000.0  # beyond, coordinates about a tile's middle lose millimetre
 
 @dataclass(frozen=True)
 class Tile:
-    """A tile: `name` is its way from the root ("r", then a digit a level), `items` (k,) the indices it draws."""
+    """A tile: `name` is its way from the root ("r", then a digit a level), `items` (k,) the indices
+    it draws.
+    """
 
     name: str
     items: np.ndarray
@@ -24,7 +27,9 @@ class Tile:
 
     def below(self) -> np.ndarray:
         """Indices drawn by the tiles below this one."""
-        return np.concatenate([np.empty(0, int), *(np.append(child.items, child.below()) for child in self.children)])
+        return np.concatenate(
+            [np.empty(0, int), *(np.append(child.items, child.below()) for child in self.children)]
+        )
 
 
 def quadtree(
@@ -34,18 +39,25 @@ def quadtree(
     most: int = MOST_TRIANGLES,
     widest: float = WIDEST_M,
 ) -> Tile:
-    """The root of the tree of buildings with `centres` (n, 2), `sizes` (n,) and numbers of `triangles` (n,), metres.
+    """The root of the tree of buildings with `centres` (n, 2), `sizes` (n,) and numbers of
+    `triangles` (n,), metres.
 
-    A tile holds the largest buildings of its square, at least one and else at most `most` triangles, the rest goes to its
-    four quarters; squares wider than `widest` hold none. Indices in a tile are in the order given.
+    A tile holds the largest buildings of its square, at least one and else at most `most`
+    triangles, the rest goes to its four quarters; squares wider than `widest` hold none. Indices in
+    a tile are in the order given.
 
-    >>> tree = quadtree(np.array([[0.0, 0], [1, 1], [9, 9]]), np.array([3.0, 2, 1]), np.array([10, 10, 10]), most=10)
+    >>> tree = quadtree(np.array([[0.0, 0], [1, 1], [9, 9]]), np.array([3.0, 2, 1]), np.array([10,
+    ...     10, 10]), most=10)
     >>> tree.items.tolist(), [(child.name, child.items.tolist()) for child in tree.children]
     ([0], [('r0', [1]), ('r3', [2])])
     """
     low, high = centres.min(axis=0), centres.max(axis=0)
     return grown(
-        "r", np.arange(len(centres)), low, float((high - low).max()), (centres, sizes, triangles, most, widest)
+        "r",
+        np.arange(len(centres)),
+        low,
+        float((high - low).max()),
+        (centres, sizes, triangles, most, widest),
     )
 
 
@@ -60,7 +72,13 @@ def grown(name: str, items: np.ndarray, low: np.ndarray, side: float, told: tupl
     middle = low + side / 2
     quarter = (centres[left] >= middle) @ [1, 2]
     children = [
-        grown(f"{name}{q}", left[quarter == q], low + side / 2 * np.array([q % 2, q // 2]), side / 2, told)
+        grown(
+            f"{name}{q}",
+            left[quarter == q],
+            low + side / 2 * np.array([q % 2, q // 2]),
+            side / 2,
+            told,
+        )
         for q in range(4)
         if (quarter == q).any()
     ]

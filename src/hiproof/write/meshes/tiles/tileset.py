@@ -1,7 +1,8 @@
-"""The tileset of a city: buildings as they come wait in a file; when all are known, each tile is written once.
+"""The tileset of a city: buildings as they come wait in a file; when all are known, each tile is
+written once.
 
-All coordinates are turned one by one into the plane's east, north, up about the first building, so that nothing is lost by the
-Earth's curvature; the root's transform puts that frame on the globe.
+All coordinates are turned one by one into the plane's east, north, up about the first building, so
+that nothing is lost by the Earth's curvature; the root's transform puts that frame on the globe.
 """
 
 from __future__ import annotations
@@ -27,7 +28,9 @@ from .properties import Found
 from .quadtree import MOST_TRIANGLES, Tile, quadtree
 
 TILESET = "tileset.json"
-MISSED = 2.0  # a building left out is an error of so many times its size: at Cesium's 16 pixels, one of eight is missed
+# a building left out is an error of so many times its size: at Cesium's 16 pixels, one of eight is
+# missed
+MISSED = 2.0
 SLACK_M = 0.01  # boxes are wider by so much, for coordinates rounded to float32
 
 
@@ -40,11 +43,12 @@ def write_models(
 ) -> int:
     """Write `buildings` as 3D Tiles 1.1 to `folder`; returns how many.
 
-    `crs` is anything pyproj understands; without one the tiles keep the plane's axes about the first building, for viewers that
-    need no place on the Earth. `geoid_height_m` is added to heights, else pyproj's grid is asked. A tile draws about
-    `most` triangles. An older tileset in `folder` is replaced when all is written. Warns of heights and places that are
-    guessed; raises InputError where no building has a solid or `crs` is of no use, OutputError where `folder` cannot be
-    written or holds something else.
+    `crs` is anything pyproj understands; without one the tiles keep the plane's axes about the
+    first building, for viewers that need no place on the Earth. `geoid_height_m` is added to
+    heights, else pyproj's grid is asked. A tile draws about `most` triangles. An older tileset in
+    `folder` is replaced when all is written. Warns of heights and places that are guessed; raises
+    InputError where no building has a solid or `crs` is of no use, OutputError where `folder`
+    cannot be written or holds something else.
     """
     folder, globe = Path(folder), None if crs is None else Globe.of(crs, geoid_height_m)
     make_room(folder)
@@ -55,11 +59,14 @@ def write_models(
             city.add(model)
         if not city.offsets:
             raise InputError(
-                "expected buildings with solids, got none; their `hiproof_status` says what became of them"
+                "expected buildings with solids, got none; their `hiproof_status` says what became "
+                "of them"
             )
         with whole_folder(folder) as beside:
             tiles = TileFiles(city, beside)
-            tree = quadtree(tiles.boxes.mean(axis=1)[:, :2], tiles.sizes, np.array(city.triangles), most)
+            tree = quadtree(
+                tiles.boxes.mean(axis=1)[:, :2], tiles.sizes, np.array(city.triangles), most
+            )
             text = json.dumps(tiles.tileset(tree), separators=(",", ":"), allow_nan=False)
             (beside / TILESET).write_text(text)
     return len(city.offsets)
@@ -68,17 +75,24 @@ def write_models(
 def warn_of(globe: Globe | None) -> None:
     """Say in a sentence what is guessed of the place."""
     if globe is None:
-        warnings.warn(InputWarning("no CRS is known, so the tiles stand nowhere on the globe; say it with --crs"))
+        warnings.warn(
+            InputWarning(
+                "no CRS is known, so the tiles stand nowhere on the globe; say it with --crs"
+            )
+        )
     elif not globe.is_known:
         warnings.warn(InputWarning(globe.heights))
 
 
 class WaitingCity:
-    """Buildings in a file, and of each what decides where it is drawn: its triangles and its box, east, north, up."""
+    """Buildings in a file, and of each what decides where it is drawn: its triangles and its box,
+    east, north, up.
+    """
 
     def __init__(self, file: BinaryIO, globe: Globe | None) -> None:
         self.file, self.globe, self.found = file, globe, Found()
-        self.transform = np.eye(4)  # from east, north, up to the globe; without one, to world metres
+        # from east, north, up to the globe; without one, to world metres
+        self.transform = np.eye(4)
         self.offsets: list[int] = []
         self.triangles: list[int] = []
         self.boxes: list[np.ndarray] = []
@@ -122,7 +136,12 @@ class TileFiles:
         """The content of tileset.json; the files of all tiles are written."""
         globe, transform, root = self.city.globe, self.city.transform, self.written(tree)
         if globe is None:
-            extras = {"crs": None, "origin": transform[:3, 3].tolist(), "unit": "metre", "axes": "east, north, up"}
+            extras = {
+                "crs": None,
+                "origin": transform[:3, 3].tolist(),
+                "unit": "metre",
+                "axes": "east, north, up",
+            }
         else:
             extras = {"crs": globe.name, "heights": globe.heights, "accuracy_m": globe.accuracy_m}
             root = {"transform": transform.T.ravel().tolist(), **root}
@@ -141,7 +160,10 @@ class TileFiles:
             "refine": "ADD",
         }
         if len(tile.items):
-            told["content"] = {"uri": self.file_of(tile), "boundingVolume": box_of(self.boxes[tile.items])}
+            told["content"] = {
+                "uri": self.file_of(tile),
+                "boundingVolume": box_of(self.boxes[tile.items]),
+            }
         if tile.children:
             told["children"] = [self.written(child) for child in tile.children]
         return told
@@ -154,7 +176,9 @@ class TileFiles:
 
 
 def frame_at(origin: np.ndarray, globe: Globe | None) -> np.ndarray:
-    """The transform (4, 4) from the tileset's frame at `origin` (3,), world metres, to the globe or, without one, to the world."""
+    """The transform (4, 4) from the tileset's frame at `origin` (3,), world metres, to the globe
+    or, without one, to the world.
+    """
     if globe is None:
         frame = np.eye(4)
         frame[:3, 3] = origin
@@ -170,7 +194,9 @@ def box_of(boxes: np.ndarray) -> dict[str, list[float]]:
 
 
 def make_room(folder: Path) -> None:
-    """Make the parent of `folder`; raise OutputError where `folder` is no tileset, so that nothing else is ever replaced."""
+    """Make the parent of `folder`; raise OutputError where `folder` is no tileset, so that nothing
+    else is ever replaced.
+    """
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
         is_ours = not folder.exists() or (
@@ -180,13 +206,16 @@ def make_room(folder: Path) -> None:
         raise output_error(folder, error) from error
     if not is_ours:
         raise OutputError(
-            f"expected a new folder or one with a tileset for the tiles, got {folder}; choose another name"
+            f"expected a new folder or one with a tileset for the tiles, got {folder}; choose "
+            "another name"
         )
 
 
 @contextmanager
 def whole_folder(folder: Path) -> Iterator[Path]:
-    """Yield a hidden folder that takes the place of `folder` when the block ends well, and is removed when not."""
+    """Yield a hidden folder that takes the place of `folder` when the block ends well, and is
+    removed when not.
+    """
     beside = hidden_name(folder)
     older = beside.with_name(beside.name + "-older")
     try:
