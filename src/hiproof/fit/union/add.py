@@ -10,6 +10,7 @@ from ...compiled import compiled
 from .candidates import best_rectangles
 from .edges import EVERYWHERE, LEAST_GAIN, MIN_SIDE_M, move_edges
 from .improve import improve
+from .nearby import MOST_NEAR, box_around, places_near, scattered, scene_near, volumes_near
 from .objective import costs, objective
 from .refit import refit
 from .volumes import DIRECTION, LEAN, REPLACES, SIDES, U0, U1, V0, V1, roof_heights
@@ -98,12 +99,12 @@ def best_addition(volumes, value, ground, candidates):
             least = FREELY_UNITS * scene.evidence if leans_freely(new, scene) else 0.0
             if replacing and len(volumes) > 1:
                 new[REPLACES] = 1.0
-            trial, found = inserted(joined.copy(), scene, min(value, lowest) - least)
+            trial, found = inserted(volumes, value, joined.copy(), scene, min(value, lowest) - least)
             if found < np.inf:
                 best, lowest = trial, found
             if replacing:
                 new[REPLACES] = 0.0
-                best, lowest = with_neighbour_cut(joined, scene, best, lowest, value, least)
+                best, lowest = with_neighbour_cut(volumes, joined, scene, best, lowest, value, least)
     return best, lowest
 
 
@@ -120,7 +121,7 @@ def leans_freely(volume, scene):
 
 
 @compiled
-def with_neighbour_cut(joined, scene, best, lowest, value, least):
+def with_neighbour_cut(volumes, joined, scene, best, lowest, value, least):
     """The best of `best`, `lowest` in cost, and the ways of having the last of the volumes `joined` by cutting one that it overlaps back to
     where it begins."""
     last = len(joined) - 1
@@ -134,7 +135,7 @@ def with_neighbour_cut(joined, scene, best, lowest, value, least):
             if CUT_LEAST_M < over < CUT_MOST_SHARE * (high - low) and high - low - over >= MIN_SIDE_M:
                 cut = joined.copy()
                 cut[j, U0 + edge] = stop
-                trial, found = inserted(cut, scene, min(value, lowest) - least)
+                trial, found = inserted(volumes, value, cut, scene, min(value, lowest) - least)
                 if found < np.inf:
                     best, lowest = trial, found
     return best, lowest
@@ -148,7 +149,27 @@ def overlap(one, other):
 
 
 @compiled
-def inserted(volumes, scene, value):
+def inserted(volumes, value, joined, scene, limit):
+    """The volumes `joined`, which are `volumes` and a new one, with the new one settled by what lies around it.
+
+    Their objective is infinite where it is not below `limit`; `value` is that of `volumes`.
+    """
+    last = len(joined) - 1
+    direction, box = int(joined[last, DIRECTION]), box_around(joined, last)
+    new, n, m = places_near(scene, direction, box)
+    if m > MOST_NEAR * len(new):
+        return settle_new(joined, scene, limit)
+    numbers, near = volumes_near(joined, scene.turn, direction, box), scene_near(scene, direction, box, new, n, m)
+    before = objective(volumes[numbers[:-1]], near, np.inf)
+    rows, found = settle_new(joined[numbers], near, before + limit - value)
+    if found == np.inf:
+        return joined, found
+    trial = scattered(joined, numbers, rows)
+    return trial, objective(trial, scene, limit - LEAST_GAIN)
+
+
+@compiled
+def settle_new(volumes, scene, value):
     """Volumes whose last one is new, that one fitted and its edges moved twice; infinite where that is not below `value`.
 
     One that begins too far above `value` to come below it is given up.

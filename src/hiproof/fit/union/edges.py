@@ -54,7 +54,7 @@ def move_edges(volumes, scene, k, value, reach):
         fixed += scene.evidence * volume_cost(volumes[j])
     charge, boxes = np.zeros((len(volumes), 4)), np.zeros((len(volumes), 4, 4))
     touched = np.zeros((len(volumes), 4), np.bool_)
-    walls, is_charged = walls_of(scene), False
+    walls, is_charged, direction = walls_of(scene), False, int(volumes[k, DIRECTION])
     for edge in range(4):
         places, m = places_of(volumes, scene, k, edge)
         start, opposite = volumes[k, U0 + edge], volumes[k, U0 + (edge ^ 1)]
@@ -62,19 +62,27 @@ def move_edges(volumes, scene, k, value, reach):
         distance, gains, covered = sums_outward(volumes, scene, k, edge, gain, bare)
         places[m] = between_points(distance, gains, sign, start) if reach < SMALL_REACH_M else start
         best, chosen = value - LEAST_GAIN, start
+        first, last = scene.window[direction, 2 * (edge // 2)], scene.window[direction, 2 * (edge // 2) + 1]
+        least = np.full(m + 1, np.inf)  # what the roof costs at each place before its edges are charged
         for q in range(m + 1):
             t = places[q]
-            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M:
+            if abs(t - start) > reach or sign * (t - opposite) < MIN_SIDE_M or not first <= t <= last:
                 continue
             p = np.searchsorted(distance, sign * t, side="right")
-            trial = fixed + (gains[p - 1] if p > 0 else 0.0)
+            least[q] = fixed + (gains[p - 1] if p > 0 else 0.0)
             if always_bare - (covered[p - 1] if p > 0 else 0.0) > BASE_SHARE * scene.n:
-                trial += scene.evidence * BASE_COST
-            if trial >= best or is_repeated(places, q):
+                least[q] += scene.evidence * BASE_COST
+        while True:
+            q = np.argmin(least)
+            t, trial = places[q], least[q]
+            if trial >= best:
+                break
+            least[q] = np.inf
+            if is_repeated(places, q):
                 continue
             if not is_charged:
                 is_charged = True
-                charge_all(volumes, walls, int(volumes[k, DIRECTION]), charge, boxes)
+                charge_all(volumes, walls, direction, charge, boxes)
             trial = charged(volumes, walls, k, edge, t, trial, best, charge, boxes, touched)
             if trial < best:
                 best, chosen = trial, t

@@ -23,6 +23,7 @@ from .moves import (
     refitted,
     without,
 )
+from .nearby import MOST_NEAR, box_around, places_near, scattered, scene_near, volumes_near
 from .objective import objective
 from .volumes import DIRECTION, LEVEL, OFFSET, SETTLED, SIDES, SLOPE, U0, U1, V0, V1
 
@@ -51,8 +52,7 @@ def improve(volumes, scene, value, slopes, rounds):
         while k < len(volumes):
             count, start = len(volumes), value
             if is_unsettled(volumes, k):
-                volumes, value = change_planes(volumes, scene, value, k, slopes)
-                volumes, value = join_neighbours(volumes, scene, value, k)
+                volumes, value = change_nearby(volumes, scene, value, k, slopes)
                 if value == start:
                     volumes[k, SETTLED] = surroundings(volumes, k)
             k = k + 1 if len(volumes) == count else 1
@@ -60,6 +60,32 @@ def improve(volumes, scene, value, slopes, rounds):
         if value > before - 0.05 * scene.evidence:
             break
     return volumes, value
+
+
+@compiled
+def change_nearby(volumes, scene, value, k, slopes):
+    """Change the structure of volume k by what lies around it; it counts where the whole roof is cheaper."""
+    direction, box = int(volumes[k, DIRECTION]), box_around(volumes, k)
+    new, n, m = places_near(scene, direction, box)
+    if m > MOST_NEAR * len(new):
+        return change_structure(volumes, scene, value, k, slopes)
+    numbers, near = volumes_near(volumes, scene.turn, direction, box), scene_near(scene, direction, box, new, n, m)
+    rows = volumes[numbers]
+    before = objective(rows, near, np.inf)
+    rows, found = change_structure(rows, near, before, np.searchsorted(numbers, k), slopes)
+    if found < before - LEAST_GAIN:
+        trial = scattered(volumes, numbers, rows)
+        found = objective(trial, scene, value - LEAST_GAIN)
+        if found < np.inf:
+            return trial, found
+    return volumes, value
+
+
+@compiled
+def change_structure(volumes, scene, value, k, slopes):
+    """All moves that change the planes of volume k, or join it to its neighbours."""
+    volumes, value = change_planes(volumes, scene, value, k, slopes)
+    return join_neighbours(volumes, scene, value, k)
 
 
 @compiled
