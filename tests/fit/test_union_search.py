@@ -421,6 +421,28 @@ def test_a_volume_that_shows_again_behind_its_neighbour_is_cut_short(seed):
     assert found[2, V1] > high - 0.1
 
 
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_volume_that_shows_at_one_line_of_nodes_keeps_its_width(seed):
+    """Both its edges are near the neighbour's edge; drawn in to it they would leave a line."""
+    scene = random_scene(np.random.default_rng(seed))
+    _, V = nodes(scene)
+    line = float(np.sort(V[0])[V.shape[1] // 2])
+    low, high = level(-8.0, line - 0.05, 3.0), level(line + 0.01, 8.0, 3.0)
+    between = level(line - 1.0, line + 1.0, 2.0)
+    volumes = np.vstack([base_only(-50.0), between, low, high])
+    scene = scene._replace(z=heights(volumes, scene.U, scene.V)[0])
+    found, _ = trim(volumes, scene, objective(volumes, scene, np.inf))
+    assert (found[:, U0] < found[:, U0 + 1]).all()
+    assert (found[:, V0] < found[:, V1]).all()
+
+
+def level(low, high, height):
+    """A level volume from v = `low` to v = `high`."""
+    row = base_only(height)[0]
+    row[U0 : V1 + 1] = -8.0, 8.0, low, high
+    return row
+
+
 # --- planes and candidates -------------------------------------------------------------------------------------------
 
 

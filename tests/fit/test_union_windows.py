@@ -9,8 +9,10 @@ from hiproof.compose import check_solid
 from hiproof.fit.union import fit_building
 from hiproof.fit.union.allowed import allowed_shapes
 from hiproof.fit.union.blocks import BLOCK_M2, HeightRaster, cheapest_cut
+from hiproof.fit.union.box import NOWHERE
 from hiproof.fit.union.plan import lay_out_plan
 from hiproof.fit.union.scene import directions_of, scene_of
+from hiproof.fit.union.volumes import U0, V1
 from hiproof.fit.union.whole import Whole
 from hiproof.status import Status
 from points_of_roofs import sampled
@@ -88,3 +90,12 @@ def test_a_cut_falls_on_a_step_and_blocks_are_small():
     step = whole.plan.frame.to_plan(np.array([[8.0, 7.5, 6.0]]))[0]
     assert whole.area > BLOCK_M2
     assert at == pytest.approx(step[axis], abs=2 * raster.pitch)
+
+
+def test_a_volume_without_width_lies_nowhere():
+    whole = whole_of(hall, HALL)
+    line = whole.volumes[0].copy()
+    line[U0 : V1 + 1] = 3.0, 9.0, 4.0, 4.0
+    whole.set_volumes(np.vstack([whole.volumes, line]))
+    assert whole.boxes[1].tolist() == list(NOWHERE)
+    assert whole.volumes_in(whole.box) == []

@@ -10,7 +10,7 @@ import numpy as np
 from .moves import without
 from .objective import objective
 from .scene import Scene, nodes
-from .volumes import DIRECTION, U0, V0, V1, roof_heights
+from .volumes import DIRECTION, U0, U1, V0, V1, roof_heights
 
 HIDDEN_M, COVER_M = 0.35, 0.25  # edges hidden by more are drawn in, to so much beyond what shows
 # m from what shows within which an edge or a corner is the place to draw a side in to
@@ -100,6 +100,8 @@ def drawn_in(
     for place in (*lines_near(volumes, scene, k, edge, seen_to), just_beyond):
         trial = volumes.copy()
         trial[k, edge] = place
+        if not has_width(trial[k]):
+            continue
         found = objective(trial, scene, value + SLACK_UNITS * scene.evidence)
         if np.isfinite(found):
             return trial, found
@@ -118,10 +120,17 @@ def cut_short(
         return volumes, value
     trial = volumes.copy()
     trial[k, edge] = next(iter(lines_near(volumes, scene, k, edge, seen_to)), seen_to)
+    if not has_width(trial[k]):
+        return volumes, value
     found = objective(trial, scene, value + CUT_UNITS * scene.evidence)
     if np.isfinite(found):
         trial, found = drawn_out(trial, scene, found)
     return (trial, found) if found < value + SLACK_UNITS * scene.evidence else (volumes, value)
+
+
+def has_width(row: np.ndarray) -> bool:
+    """Whether a volume's rectangle holds more than a line, as one that shows at one line of nodes may end in."""
+    return bool(row[U0] < row[U1] and row[V0] < row[V1])
 
 
 def lines_near(volumes: np.ndarray, scene: Scene, k: int, edge: int, seen_to: float) -> list[float]:

@@ -72,6 +72,8 @@ class Whole:
 
     def measure_extent(self, row: np.ndarray) -> Box:
         rectangle = Box(*row[[U0, U1, V0, V1]].tolist())
+        if rectangle.u0 >= rectangle.u1 or rectangle.v0 >= rectangle.v1:
+            return NOWHERE
         if row[DIRECTION] == 0:
             return box_of(clip_to_box(self.outline, rectangle))
         c, s = self.scene.turn[int(row[DIRECTION])]
