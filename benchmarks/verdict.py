@@ -2,6 +2,7 @@
 
 usage: python -m benchmarks.verdict [--sources compounds essen ...] [--most 40] [--parity even|odd]
            [--densities 1 2 5 15] [--with-footprints | --without-footprints] [--wrong N]
+           [--keep FOLDER] [--processes 1]
 
 Cases (benchmarks/verdict_cases.py) are reconstructed and compared with their truth on a raster. A
 model is sound if
@@ -14,25 +15,34 @@ model is sound if
 Without a footprint nothing tells that a building goes on where it has no points, so the truth ends
 with them. Printed by density, area, source and defect: cases; the share of sound models; how many
 are called good, fair and poor, and the share of sound ones among each; and how many of the sound
-ones are called good. `--wrong` names cases that are called good and are not sound. The limits of
-evaluate/verdict.py were chosen on even buildings.
+ones are called good. `--wrong` names cases that are called good and are not sound. `--keep` keeps
+models and points in a folder; with these a changed rule of evaluate/verdict.py is judged in
+seconds. Its limits were chosen on even buildings.
 """
 
 from __future__ import annotations
 
 import argparse
+import pickle
 from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
+from multiprocessing import get_context
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import shapely
 from scipy import ndimage
 
 from hiproof import reconstruct
+from hiproof.evaluate import verdict
 from hiproof.evaluate.distance import point_surface_distances
 from hiproof.geometry.rings import ring_normal
-from hiproof.model import ROOF, WALL, Building, Solid
+from hiproof.model import ROOF, WALL, Building, Model, Solid
 from hiproof.status import Grade
 
 from .towns import STEEPEST
@@ -46,17 +56,37 @@ AREAS_M2 = (0.0, 80.0, 200.0, np.inf)
 Polygons = list[list[np.ndarray]]
 
 
+class Block(NamedTuple):
+    """The cases of one source at one density that are reconstructed together."""
+
+    source: str
+    most: int
+    density: float
+    with_footprints: bool
+    parity: str
+
+    @property
+    def file_name(self) -> str:
+        told = "with" if self.with_footprints else "without"
+        return f"{self.source}-{self.most}-{self.density:g}-{told}-{self.parity}.pickle"
+
+
 @dataclass(frozen=True)
 class Outcome:
-    """A case and its model's verdict, with the truth: RMSE of the surface (m) and number of wrong
-    levels.
-    """
+    """A case with its model and the points (n, 3) and unused points (m, 3) that the verdict is found
+    by; and what is true: RMSE of the surface (m) and number of wrong levels."""
 
-    case: Case
-    grade: Grade | None
-    detail: str
+    block: Block
+    id: str
+    defect: str
+    area_m2: float
+    evidence: tuple[Model, np.ndarray, np.ndarray]
     rmse: float
     wrong_levels: int
+
+    @cached_property
+    def grade(self) -> Grade:
+        return verdict.verdict_of(*self.evidence).grade
 
     @property
     def is_sound(self) -> bool:
@@ -79,9 +109,7 @@ def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
 
 
 def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
-    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none; upright ones do
-    not count.
-    """
+    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none; upright ones do not count."""
     z = np.full(len(xy), -np.inf)
     for rings in polygons:
         normal, centre = ring_normal(rings[0]), rings[0].mean(axis=0)
@@ -96,9 +124,7 @@ def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 
 
 def compared(case: Case, building: Building) -> tuple[float, int]:
-    """RMSE (m) between the true surface and the model's, and the number of levels that are missing
-    or invented.
-    """
+    """RMSE (m) between the true surface and the model's, and the number of levels that are missing or invented."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
     area = shapely.transform(case.truth_area, lambda xy: xy - origin[:2])
@@ -138,19 +164,40 @@ def patches(is_off: np.ndarray, step: float, least_m2: float) -> int:
     return int(np.count_nonzero(sizes >= least_m2))
 
 
-def outcomes(
-    sources: list[str], most: int, densities: list[float], footprints: tuple[bool, ...], parity: str
-) -> Iterator[Outcome]:
-    """All cases, reconstructed and compared; a building without a model is left out."""
-    for source in sources:
-        for with_footprints in footprints:
-            for density in densities:
-                for case in cases(source, most, density, with_footprints, parity):
-                    building = reconstruct(case.points, case.footprint, id=case.id)
-                    if building.built is not None:
-                        yield Outcome(
-                            case, building.grade, building.detail, *compared(case, building)
-                        )
+@contextmanager
+def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
+    """Collect what verdicts are asked by inside the block."""
+    original, asked = verdict.verdict_of, []
+
+    def verdict_of(model: Model, points: np.ndarray, unused: np.ndarray) -> verdict.Verdict:
+        asked.append((model, points, unused))
+        return original(model, points, unused)
+
+    verdict.verdict_of = verdict_of
+    try:
+        yield asked
+    finally:
+        verdict.verdict_of = original
+
+
+def outcomes(block: Block, folder: Path | None = None) -> list[Outcome]:
+    """Reconstruct and compare the cases of a block, or read them from `folder`, where they are kept.
+
+    A building without a model is left out.
+    """
+    path = folder / block.file_name if folder else None
+    if path and path.exists():
+        return pickle.loads(path.read_bytes())
+    found = []
+    for case in cases(*block):
+        with collect_evidence() as evidence:
+            building = reconstruct(case.points, case.footprint, id=case.id)
+        if building.built is not None:
+            wrong = compared(case, building)
+            found.append(Outcome(block, case.id, case.defect, case.area_m2, evidence[-1], *wrong))
+    if path:
+        path.write_bytes(pickle.dumps(found))
+    return found
 
 
 def line(name: str, found: list[Outcome]) -> str:
@@ -171,19 +218,16 @@ def table(found: list[Outcome]) -> str:
     """Rows for all outcomes, and by density, area, source and defect."""
     groups: dict[str, Callable[[Outcome], bool]] = {"all": lambda outcome: True}
     groups |= {
-        f"{d:g} points/m2": lambda o, d=d: o.case.density == d
-        for d in sorted({o.case.density for o in found})
+        f"{d:g} points/m2": lambda o, d=d: o.block.density == d
+        for d in sorted({o.block.density for o in found})
     }
     for low, high in pairwise(AREAS_M2):
-        groups[f"{low:g} to {high:g} m2"] = lambda o, low=low, high=high: (
-            low <= o.case.area_m2 < high
-        )
+        groups[f"{low:g} to {high:g} m2"] = lambda o, low=low, high=high: low <= o.area_m2 < high
     groups |= {
-        s: lambda o, s=s: o.case.source == s for s in dict.fromkeys(o.case.source for o in found)
+        s: lambda o, s=s: o.block.source == s for s in dict.fromkeys(o.block.source for o in found)
     }
     groups |= {
-        f"defect: {d}": lambda o, d=d: o.case.defect == d
-        for d in dict.fromkeys(o.case.defect for o in found)
+        f"defect: {d}": lambda o, d=d: o.defect == d for d in dict.fromkeys(o.defect for o in found)
     }
     head = (
         f"{'':24} | cases |  sound |   good  sound |   fair  sound |   poor  sound | of sound: good"
@@ -215,25 +259,33 @@ def main() -> None:
     parser.add_argument(
         "--wrong", type=int, default=0, help="name so many cases called good that are not sound"
     )
+    parser.add_argument("--keep", type=Path, help="folder in which models and points are kept")
+    parser.add_argument("--processes", type=int, default=1)
     a = parser.parse_args()
     footprints = (
         (True,) if a.with_footprints else (False,) if a.without_footprints else (True, False)
     )
-    found = list(outcomes(a.sources, a.most, a.densities, footprints, a.parity))
-    for with_footprints in footprints:
-        own = [
-            outcome for outcome in found if (outcome.case.footprint is not None) == with_footprints
+    blocks = [
+        Block(s, a.most, d, f, a.parity) for f in footprints for s in a.sources for d in a.densities
+    ]
+    if a.keep:
+        a.keep.mkdir(parents=True, exist_ok=True)
+    with ProcessPoolExecutor(a.processes, mp_context=get_context("spawn")) as pool:
+        found = [
+            outcome
+            for block in pool.map(outcomes, blocks, [a.keep] * len(blocks))
+            for outcome in block
         ]
+    for with_footprints in footprints:
+        own = [outcome for outcome in found if outcome.block.with_footprints == with_footprints]
         print(
-            f"{a.parity} buildings, with{'' if with_footprints else 'out'} "
-            f"footprints\n{table(own)}\n",
+            f"{a.parity} buildings, with{'' if with_footprints else 'out'} footprints\n{table(own)}\n",
             flush=True,
         )
     wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
     for o in wrong[: a.wrong]:
-        known = "with" if o.case.footprint is not None else "without"
-        print(f"{o.case.source} {o.case.id} {o.case.density:g}/m2 {known} footprint, "
-              f"{o.case.defect}: RMSE {o.rmse:.2f} m,"
+        known = "with" if o.block.with_footprints else "without"
+        print(f"{o.block.source} {o.id} {o.block.density:g}/m2 {known} footprint, {o.defect}: RMSE {o.rmse:.2f} m,"
               f" wrong levels {o.wrong_levels}")  # fmt: skip
 
 
