@@ -73,8 +73,10 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A case with its model and the points (n, 3) and unused points (m, 3) that the verdict is found
-    by; and what is true: RMSE of the surface (m) and number of wrong levels."""
+    """A case with its model, and how wrong it is: RMSE of the surface (m) and number of wrong levels.
+
+    `evidence` is what the verdict is found by: model, points (n, 3) and unused points (m, 3).
+    """
 
     block: Block
     id: str
@@ -109,7 +111,10 @@ def plan_of(rings: list[np.ndarray]) -> shapely.Geometry:
 
 
 def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
-    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none; upright ones do not count."""
+    """Height (n,) of the highest polygon at `xy` (n, 2), NaN where there is none.
+
+    Upright polygons do not count.
+    """
     z = np.full(len(xy), -np.inf)
     for rings in polygons:
         normal, centre = ring_normal(rings[0]), rings[0].mean(axis=0)
@@ -124,7 +129,7 @@ def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 
 
 def compared(case: Case, building: Building) -> tuple[float, int]:
-    """RMSE (m) between the true surface and the model's, and the number of levels that are missing or invented."""
+    """RMSE (m) between the true surface and the model's, and how many levels are missing or wrong."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
     area = shapely.transform(case.truth_area, lambda xy: xy - origin[:2])
@@ -181,7 +186,7 @@ def collect_evidence() -> Iterator[list[tuple[Model, np.ndarray, np.ndarray]]]:
 
 
 def outcomes(block: Block, folder: Path | None = None) -> list[Outcome]:
-    """Reconstruct and compare the cases of a block, or read them from `folder`, where they are kept.
+    """Reconstruct and compare the cases of a block, or read them from `folder`.
 
     A building without a model is left out.
     """
@@ -278,15 +283,13 @@ def main() -> None:
         ]
     for with_footprints in footprints:
         own = [outcome for outcome in found if outcome.block.with_footprints == with_footprints]
-        print(
-            f"{a.parity} buildings, with{'' if with_footprints else 'out'} footprints\n{table(own)}\n",
-            flush=True,
-        )
+        known = "with" if with_footprints else "without"
+        print(f"{a.parity} buildings, {known} footprints\n{table(own)}\n", flush=True)
     wrong = [outcome for outcome in found if outcome.grade is Grade.GOOD and not outcome.is_sound]
     for o in wrong[: a.wrong]:
         known = "with" if o.block.with_footprints else "without"
-        print(f"{o.block.source} {o.id} {o.block.density:g}/m2 {known} footprint, {o.defect}: RMSE {o.rmse:.2f} m,"
-              f" wrong levels {o.wrong_levels}")  # fmt: skip
+        case = f"{o.block.source} {o.id} {o.block.density:g}/m2 {known} footprint, {o.defect}"
+        print(f"{case}: RMSE {o.rmse:.2f} m, wrong levels {o.wrong_levels}")
 
 
 def sources() -> list[str]:
