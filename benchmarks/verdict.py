@@ -73,7 +73,7 @@ class Block(NamedTuple):
 
 @dataclass(frozen=True)
 class Outcome:
-    """A case with its model, and how wrong it is: RMSE of the surface (m) and number of wrong levels.
+    """A case with its model, and how wrong it is: RMSE (m) of the surface, number of wrong levels.
 
     `evidence` is what the verdict is found by: model, points (n, 3) and unused points (m, 3).
     """
@@ -129,7 +129,7 @@ def heights(polygons: Polygons, xy: np.ndarray) -> np.ndarray:
 
 
 def compared(case: Case, building: Building) -> tuple[float, int]:
-    """RMSE (m) between the true surface and the model's, and how many levels are missing or wrong."""
+    """RMSE (m) between the true and the model's surface; how many levels are missing or wrong."""
     origin = np.append(np.floor(shapely.get_coordinates(case.truth_area.centroid)[0]), 0.0)
     true, model = [solid.moved(-origin) for solid in case.solids], [building.solid.moved(-origin)]
     area = shapely.transform(case.truth_area, lambda xy: xy - origin[:2])
