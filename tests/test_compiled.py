@@ -112,14 +112,70 @@ def files_in(folder):
     return sorted(path.name for path in folder.rglob("*.nbc"))
 
 
+PAIRS = """
+from collections import namedtuple
+from hiproof.compiled import compiled
+
+Pair = namedtuple("Pair", "first second")
+
+@compiled
+def swapped(pair):
+    if len(pair.first) == 0:
+        raise ValueError("expected a number")
+    return Pair(pair.second, pair.first)
+
+@compiled
+def swapped_twice(pair):
+    return swapped(swapped(pair))
+"""
+ASK_PAIRS = """
+import numpy as np
+from town.pairs import Pair, swapped, swapped_twice
+zero, one, none = np.zeros(2), np.ones(1, bool), np.zeros(0)
+twice = swapped_twice(Pair(zero, one))
+print(twice.first, twice.second)
+"""
+ASK_PAIRS_MORE = """
+print(swapped(Pair(zero, one)))
+try:
+    swapped(Pair(none, one))
+except ValueError as error:
+    print(error)
+"""
+
+
 def test_kept_code_is_loaded_by_the_next_process(town):
     assert ask() == (61, False, 0)
-    assert [name.split("-")[0] for name in files_in(town)] == [
-        "inner.number",
-        "middle.doubled",
-        "outer.answer",
-    ]
+    names = ["inner.number", "middle.doubled", "outer.answer"]
+    assert [name.split("-")[0] for name in files_in(town)] == [*names, "outer.answer"]
+    assert [name.split("-")[0] for name in files_in(town) if "-python." in name] == ["outer.answer"]
     assert ask() == (61, True, 0)
+
+
+def test_a_function_that_compiled_code_called_is_called_by_python_as_well(town):
+    """Its wrapper is compiled when it is wanted, kept, and loaded by the next process."""
+    ask()
+    asked = "from town.inner import number; print(number(10), bool(number._cache_hits))"
+    for _ in range(2):
+        assert run(town, "-c", asked).split() == ["30", "True"]
+        assert [name.split("-")[0] for name in files_in(town) if "-python." in name] == [
+            "inner.number",
+            "outer.answer",
+        ]
+    both = "from town.inner import number; from town.outer import answer; "
+    printed = run(town, "-c", both + "print(answer(10), number(10), number(10))")
+    assert printed.split() == ["61", "30", "30"]
+
+
+def test_a_wrapper_made_for_loaded_code_carries_arrays_tuples_and_errors(town):
+    (town / "town" / "pairs.py").write_text(PAIRS)
+    assert run(town, "-c", ASK_PAIRS) == "[0. 0.] [ True]\n"
+    for _ in range(2):
+        pair = "Pair(first=array([ True]), second=array([0., 0.]))"
+        assert run(town, "-c", ASK_PAIRS + ASK_PAIRS_MORE).splitlines()[1:] == [
+            pair,
+            "expected a number",
+        ]
 
 
 @pytest.mark.skipif(
@@ -146,7 +202,7 @@ def test_a_changed_line_makes_what_stands_on_it_new_and_removes_the_old(town):
     unchanged = files_in(town)[0]
     (town / "town" / "middle.py").write_text(MIDDLE.replace("* 2", "* 4"))
     assert ask() == (121, False, 0)
-    assert len(files_in(town)) == 3 and files_in(town)[0] == unchanged
+    assert len(files_in(town)) == 4 and files_in(town)[0] == unchanged
 
 
 def run(packages, *command):
@@ -187,7 +243,7 @@ def test_installing_a_wheel_over_another_runs_the_new_code(tmp_path, monkeypatch
         run(packages, "-m", "pip", "install", "--upgrade", *options, str(wheel))
         importlib.invalidate_caches()
         answers.append(ask())
-        assert len(files_in(packages)) == 3
+        assert len(files_in(packages)) == 4
     assert answers == [(61, False, 0), (81, False, 0)]
 
 
@@ -492,7 +548,8 @@ def test_a_large_function_is_called_and_not_copied(town):
         inner.write_text(LONG.replace("1e9", "1.0").format(factor=factor))
         fast, slow = answers()
         assert fast == pytest.approx(slow, rel=1e-12)
-    one, other = (pickle.loads(path.read_bytes()) for path in sorted(folder.rglob("*.nbc")))
+    codes = [path for path in sorted(folder.rglob("*.nbc")) if "-python." not in path.name]
+    one, other = (pickle.loads(path.read_bytes()) for path in codes)
     assert [callee.name for callee in other[2]] == ["number"] and one[3] == other[2][0]
     kept_files = files_in(town)
     printed = run(town, "-c", "from town.outer import answer; print(answer(10.5))")
@@ -543,10 +600,8 @@ def test_code_of_two_processes_meets_in_a_third_without_mistaking_one_for_the_ot
     for function in functions:
         (town / "town" / f"{function}.py").write_text(LIBRARY.format(function=function))
     alone = [run(town, "-c", ask.format(function)) for function in functions]
-    numbers = [
-        set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes()))
-        for path in town.rglob("*.nbc")
-    ]
+    files = [path for path in town.rglob("*.nbc") if "-python." not in path.name]
+    numbers = [set(re.findall(rb"_ZN5numba\w*?B\d+v(\d+)B", path.read_bytes())) for path in files]
     assert len(numbers) == 2 and all(numbers) and not numbers[0] & numbers[1]
     assert run(town, "-c", "\n".join(map(ask.format, functions))) == "".join(alone)
 

@@ -5,9 +5,10 @@
 
 numba's own cache looks at the file of the function alone, though functions and constants of other
 files are compiled into it, and takes old code for new after an upgrade. Here code belongs to a
-stamp of all its sources (stamp.py) and is kept under it (kept.py); wheels and images carry code for
-a kind of processors (kinds.py); large functions are called, not copied (linking.py); who wants to
-show that something is being compiled is told by news.py.
+stamp of all its sources (stamp.py) and is kept under it (kept.py). Wheels and images carry code for
+a kind of processors (kinds.py). Large functions are called, not copied (linking.py), and only
+functions that Python calls get a wrapper for that (dispatcher.py). Whoever wants to show that
+something is being compiled listens to news.py.
 """
 
 from __future__ import annotations
@@ -43,13 +44,7 @@ def compiled(function: Callable | None = None, *, allocates: bool = True, **opti
     file = Path(function.__code__.co_filename)
     if numba.config.DISABLE_JIT or not file.is_file():
         return numba.njit(**options)(function)
+    from .dispatcher import Dispatcher
     from .kept import Kept
-    from .linking import pipeline_of, without_literals
 
-    kept = Kept(function, file)
-    dispatcher = numba.njit(pipeline_class=pipeline_of(kept.stamp), **options)(function)
-    dispatcher._cache, dispatcher.get_call_template = (
-        kept,
-        without_literals(dispatcher.get_call_template),
-    )
-    return dispatcher
+    return Dispatcher(function, Kept(function, file), options)

@@ -33,6 +33,8 @@ from . import linking, news
 from .kinds import KIND, runs_kind
 from .stamp import PYTHON, stamp_of
 
+WRAPPER = "-python"  # marks the file of a function's wrapper for calls from Python
+
 
 class Kept:
     """One function's code on disk, a file for each tuple of argument types; numba asks it as it
@@ -56,14 +58,13 @@ class Kept:
         its memory alone.
         """
         rtsys.initialize(context)
-        for file in self.places(signature, context.codegen().magic_tuple()):
+        for code in self.read("", signature, context):
             try:
-                kept, *code = pickle.loads(file.read_bytes())
-            except Exception:  # not there, or damaged, of which pickle makes errors of any kind
+                result = linking.rebuilt(context, *code)
+            except Exception:  # damaged inside
                 continue
-            if kept == signature:
-                news.ready.add(self.name)
-                return linking.rebuilt(context, *code)
+            news.ready.add(self.name)
+            return result
         place_to_write(self.folders)
         news.tell()
         return None
@@ -74,17 +75,38 @@ class Kept:
         news.tell()
         if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
             linking.settle(result, self.function, signature)
-            self.keep(signature, result)
+            self.write("", signature, result.library, reduced(result), *linking.links(result))
 
-    def keep(self, signature: Any, result: Any) -> None:
-        """Write it where the next process finds it."""
+    def load_wrapper(self, signature: Any, context: Any) -> tuple[list, bytes] | None:
+        """Return constants and machine code of the wrapper for Python, None where none is kept."""
+        return next(self.read(WRAPPER, signature, context), None)
+
+    def save_wrapper(self, signature: Any, library: Any, environment: Any) -> None:
+        """Keep a wrapper that was just compiled."""
+        if not library.has_dynamic_globals:
+            self.write(
+                WRAPPER, signature, library, environment.consts, library._get_compiled_object()
+            )
+
+    def read(self, part: str, signature: Any, context: Any) -> Iterator[Any]:
+        """What is kept of a `part` of the code, that for this machine's own processor first."""
+        for file in self.places(part, signature, context.codegen().magic_tuple()):
+            try:
+                kept, *content = pickle.loads(file.read_bytes())
+            except Exception:  # not there, or damaged, of which pickle makes errors of any kind
+                continue
+            if kept == signature:
+                yield content
+
+    def write(self, part: str, signature: Any, library: Any, *content: Any) -> None:
+        """Write a `part` of the code where the next process finds it."""
         folder = place_to_write(self.folders)
         if folder is None:
             return
-        file = folder / self.file_name(signature, result.codegen.magic_tuple())
+        file = folder / self.file_name(part, signature, library.codegen.magic_tuple())
         beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
-            beside.write_bytes(dumps((signature, reduced(result), *linking.links(result))))
+            beside.write_bytes(dumps((signature, *content)))
             beside.replace(file)
         except OSError:  # a full disk, a folder that went away
             warn_not_kept()
@@ -93,17 +115,17 @@ class Kept:
             return
         remove_outdated(folder, self.module, self.stamp)
 
-    def places(self, signature: Any, processor: tuple[str, str, str]) -> Iterator[Path]:
-        """Where the code may lie, that for this machine's own processor first."""
+    def places(self, part: str, signature: Any, processor: tuple[str, str, str]) -> Iterator[Path]:
+        """Where a part of the code may lie, that for this machine's own processor first."""
         system, _, _ = processor
         for kind in (processor, (system, KIND, ""))[: 1 + runs_kind()]:
-            name = self.file_name(signature, kind)
+            name = self.file_name(part, signature, kind)
             yield from (folder / name for folder in self.folders)
 
-    def file_name(self, signature: Any, processor: tuple[str, str, str]) -> str:
+    def file_name(self, part: str, signature: Any, processor: tuple[str, str, str]) -> str:
         """`processor` is numba's name of the system, of the processor and of its features."""
         key = hashlib.sha256(repr((signature, processor)).encode()).hexdigest()[:16]
-        return f"{self.start}-{key}.{PYTHON}.nbc"
+        return f"{self.start}-{key}{part}.{PYTHON}.nbc"
 
     def flush(self) -> None:
         """Forget the code that is kept; numba asks for it when a function is to be compiled

@@ -35,7 +35,7 @@ class Callee(NamedTuple):
 
     def load(self) -> None:
         """Have its code in this process, from disk or compiled."""
-        getattr(import_module(self.module), self.name).compile(self.signature)
+        getattr(import_module(self.module), self.name).load(self.signature)
 
 
 class Loaded(JITCodeLibrary):
@@ -74,14 +74,10 @@ def pipeline_of(stamp: str) -> type[compiler.Compiler]:
     return Stamped
 
 
-def without_literals(call_template: Callable) -> Callable:
-    """A dispatcher's `get_call_template` that compiles nothing apart for a caller's constants."""
-
-    def template(args: tuple, kws: dict) -> Any:
-        kws = {name: types.unliteral(kind) for name, kind in kws.items()}
-        return call_template(tuple(map(types.unliteral, args)), kws)
-
-    return template
+def without_literals(args: tuple, kws: dict) -> tuple[tuple, dict]:
+    """Drop constants from the types of a call, so that nothing is compiled apart for them."""
+    named = {name: types.unliteral(kind) for name, kind in kws.items()}
+    return tuple(map(types.unliteral, args)), named
 
 
 def settle(result: Any, function: Callable, signature: Any) -> None:
@@ -134,13 +130,7 @@ def rebuilt(
         environments,
     ) = code
     codegen = context.codegen()
-    codegen._engine._defined_symbols.update(
-        (
-            described.llvm_func_name,
-            described.llvm_cpython_wrapper_name,
-            described.llvm_cfunc_wrapper_name,
-        )
-    )
+    codegen._engine._defined_symbols.add(described.llvm_func_name)
     library = Loaded(codegen, name, *kept)
     library.calls, library.is_called_as = calls, is_called_as
     for environment in environments:
