@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from ...compiled import compiled
-from .objective import costs
+from .objective import ghost_cost, point_cost
 from .plan import Plan
 from .scene import Scene
 from .volumes import DIRECTION, U0, V0, V1, with_and_without
@@ -28,6 +28,7 @@ SHARED_M = 0.3  # m within which a side takes its neighbour's line
 LOOSE_UNITS, UNSUPPORTED_UNITS, FAR_UNITS_A_METRE = 1.2, 0.3, 0.1
 SHOWN_M = 0.5  # m next to a side in which points need its volume, or else it lies hidden
 MOVED_M, MOVES = 1.0, 50  # how far, in how many steps, a side is moved to see how well its points say where it is
+REACH_M = max(GAP_M, MOVED_M)  # beyond a volume's edges, where its sides do not lean
 NATS_A_POINT = 3.0  # of likelihood that a point explained or not makes
 NEEDED, FEWEST_NEEDED = 0.3, 3  # a point that costs so much more without a volume needs it; fewer show nothing
 PLACE_M = 0.03  # standard deviation of where points themselves are in plan: of their swath and in their beam
@@ -80,7 +81,7 @@ def sides_of(volumes: np.ndarray, lines: list[list[Lines]], scene: Scene) -> lis
         sides.append(
             [Side(*side) for side in zip(at.tolist(), lean.tolist(), anchored.tolist(), sigma.tolist(), strict=True)]
         )
-    return [[shared(volumes, sides, k, edge) for edge in range(4)] for k in range(len(volumes))]
+    return share_lines(volumes, sides)
 
 
 def plan_edges(outline: shapely.Polygon, plan: Plan) -> np.ndarray:
@@ -124,9 +125,9 @@ def lines_across(x: np.ndarray, y: np.ndarray, long: np.ndarray, edges: int) -> 
 def sides_of_volume(volumes, k, across_u, across_v, scene):
     """What `Side` says of each side of volume k, on the cheapest of the lines `across_u` and `across_v`: four arrays (4,)."""
     direction = int(volumes[k, DIRECTION])
-    everywhere, without = with_and_without(volumes, scene.U, scene.V, k)
-    gain = np.where(everywhere != without, costs(everywhere, scene) - costs(without, scene), 0.0)
-    uv = scene.U[direction], scene.V[direction]
+    near = near_places(volumes[k], across_u, scene.U[direction], scene.V[direction])
+    gain = gain_of_volume(volumes, k, near, scene)
+    uv = scene.U[direction][near], scene.V[direction][near]
     at, lean, anchored, sigma = volumes[k, U0 : V1 + 1].copy(), np.zeros(4), np.zeros(4, np.bool_), np.zeros(4)
     for edge in range(4):
         lines = across_u if edge < 2 else across_v
@@ -135,6 +136,43 @@ def sides_of_volume(volumes, k, across_u, across_v, scene):
             at[edge], lean[edge], anchored[edge] = lines.start[m], lines.lean[m], True
         sigma[edge] = sigma_of_side(volumes[k], edge, lines, uv, gain, m >= 0)
     return at, lean, anchored, sigma
+
+
+@compiled
+def near_places(volume, across_u, u, v):
+    """The numbers of those places u, v that sides of a volume, or of the outline beside it, may have to do with."""
+    least_u, most_u, least_v, most_v = outline_box(across_u)
+    wide, deep = volume[U0 + 1] - volume[U0], volume[V1] - volume[V0]
+    reach_u, reach_v = REACH_M + 0.5 * LEAN * deep, REACH_M + 0.5 * LEAN * wide
+    u0, u1 = min(volume[U0], most_u) - reach_u, max(volume[U0 + 1], least_u) + reach_u
+    v0, v1 = min(volume[V0], most_v) - reach_v, max(volume[V1], least_v) + reach_v
+    return np.nonzero((u >= u0) & (u <= u1) & (v >= v0) & (v <= v1))[0]
+
+
+@compiled
+def outline_box(across_u):
+    """Lowest and highest u, lowest and highest v of an outline, by the ends of its edges."""
+    u, v = across_u.x_edges, across_u.y_edges
+    return u.min(), u.max(), v.min(), v.max()
+
+
+@compiled
+def gain_of_volume(volumes, k, near, scene):
+    """How much more the places `near` (m,) cost were volume k everywhere than without it (m,)."""
+    everywhere, without = with_and_without(volumes, scene.U[:, near], scene.V[:, near], k)
+    gain = np.zeros(len(near))
+    for i in range(len(near)):
+        if everywhere[i] != without[i]:
+            gain[i] = cost_at(near[i], everywhere[i], scene) - cost_at(near[i], without[i], scene)
+    return gain
+
+
+@compiled
+def cost_at(i, z, scene):
+    """What point or ghost i costs under a roof so high."""
+    if i < scene.n:
+        return point_cost(scene.z[i], z, scene.dead, scene.width)
+    return ghost_cost(z, scene.weight[i], scene.shade[i], scene.low, scene.high)
 
 
 @compiled
@@ -191,15 +229,15 @@ def sigma_of_place(volume, edge, uv, gain):
     axis, at = edge // 2, volume[U0 + edge]
     sign = -1.0 if edge % 2 == 0 else 1.0
     x, y = uv[axis], uv[1 - axis]
-    near = (y >= volume[V0 - 2 * axis]) & (y <= volume[V1 - 2 * axis]) & (np.abs(x - at) < MOVED_M)
-    off, gain = sign * (x[near] - at), gain[near]
-    cost = np.empty(2 * MOVES + 1)
-    for m in range(len(cost)):
-        cost[m] = gain[off <= (m - MOVES) * MOVED_M / MOVES].sum()
+    moved = (np.arange(2 * MOVES + 1) - MOVES) * MOVED_M / MOVES
+    cost = np.zeros(len(moved))
+    for i in range(len(x)):
+        if gain[i] != 0.0 and volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis] and abs(x[i] - at) < MOVED_M:
+            for m in range(len(cost)):
+                cost[m] += gain[i] if sign * (x[i] - at) <= moved[m] else 0.0
     weight = np.exp(-NATS_A_POINT * (cost - cost.min()))
     if max(weight[0], weight[-1]) > LEAST_KNOWN * weight.max():
         return np.inf
-    moved = (np.arange(len(cost)) - MOVES) * MOVED_M / MOVES
     return np.sqrt((weight * moved**2).sum() / weight.sum() + PLACE_M**2)
 
 
@@ -229,22 +267,30 @@ def support(start, lean, x_edges, y_edges, low, high):
     return total
 
 
-def shared(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> Side:
-    """The side, or the anchored line of another volume whose edge lies where this one's does."""
-    own = sides[k][edge]
-    if own.anchored or k == 0:
+def share_lines(volumes: np.ndarray, sides: list[list[Side]]) -> list[list[Side]]:
+    """The sides, on anchored lines of other volumes where edges of these lie where theirs do."""
+    anchored: dict[tuple[float, int], list[tuple[int, Side]]] = {}
+    directions = volumes[:, DIRECTION].tolist()
+    for k, own in enumerate(sides):
+        for edge, side in enumerate(own):
+            if side.anchored:
+                anchored.setdefault((directions[k], edge // 2), []).append((k, side))
+    found = [sides[0]]
+    for k in range(1, len(sides)):
+        u0, u1, v0, v1 = volumes[k, U0 : V1 + 1].tolist()
+        middles = 0.5 * (v0 + v1), 0.5 * (u0 + u1)
+        lines = [[line for j, line in anchored.get((directions[k], axis), ()) if j != k] for axis in (0, 1)]
+        found.append([shared(side, lines[edge // 2], middles[edge // 2]) for edge, side in enumerate(sides[k])])
+    return found
+
+
+def shared(own: Side, lines: list[Side], middle: float) -> Side:
+    """The side, or that of the `lines` of others which lies nearest to it at its `middle` where it is near."""
+    if own.anchored or not lines:
         return own
-    axis = edge // 2
-    middle = 0.5 * (volumes[k, V0 - 2 * axis] + volumes[k, V1 - 2 * axis])
-    best = None
-    for j in range(1, len(volumes)):
-        if j == k or volumes[j, DIRECTION] != volumes[k, DIRECTION]:
-            continue
-        for other in (sides[j][2 * axis], sides[j][2 * axis + 1]):
-            gap = abs(other.at + other.lean * middle - own.at)
-            if other.anchored and gap < SHARED_M and (best is None or gap < best[0]):
-                best = gap, other
-    return own if best is None else Side(best[1].at, best[1].lean)
+    gaps = [abs(line.at + line.lean * middle - own.at) for line in lines]
+    nearest = lines[gaps.index(min(gaps))]
+    return Side(nearest.at, nearest.lean) if min(gaps) < SHARED_M else own
 
 
 def corners_of(sides: list[Side]) -> np.ndarray:
