@@ -26,10 +26,10 @@ def before_welding(monkeypatch, kind, seed):
     """What `weld` is called with for a compound: its problem and the roof as the search left it."""
     seen = {}
 
-    def spy(volumes, sides, agreement, outline, plan, scene, base):
-        seen["problem"] = weld.problem_of(volumes, agreement, outline, plan, scene, base)
+    def spy(volumes, sides, agreement, site, base):
+        seen["problem"] = weld.problem_of(volumes, agreement, site, base)
         seen["state"] = weld.state_before(sides, seen["problem"])
-        return weld.weld(volumes, sides, agreement, outline, plan, scene, base)
+        return weld.weld(volumes, sides, agreement, site, base)
 
     monkeypatch.setattr(union, "weld", spy)
     points, outline = scanned(kind, seed)
@@ -50,11 +50,11 @@ def price(state, problem, box=None):
 @pytest.mark.parametrize(("kind", "seed"), [("L", 1), ("dormered", 2), ("two_level", 3), ("T", 4)])
 def test_a_welded_roof_costs_no_more_and_welding_again_changes_nothing(monkeypatch, kind, seed):
     problem, state = before_welding(monkeypatch, kind, seed)
-    volumes, outline, plan, scene, agreement, base, *_ = problem
-    sides, planes, _ = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
+    volumes, site, agreement, base, *_ = problem
+    sides, planes, _ = weld.weld(volumes, state.sides, agreement, site, base)
     after = state._replace(sides=sides, planes=planes)
     assert price(after, problem) <= price(state, problem)
-    again, *_ = weld.weld(volumes, sides, agreement._replace(planes=planes), outline, plan, scene, base)
+    again, *_ = weld.weld(volumes, sides, agreement._replace(planes=planes), site, base)
     assert again == sides
 
 
@@ -80,14 +80,14 @@ def test_a_window_judges_a_moved_side_as_the_whole_roof_does(monkeypatch, kind, 
 def test_a_side_that_misses_its_corner_by_little_is_moved_back(monkeypatch):
     """Where a welded side is moved by 2 cm, welding leaves no more corners than there were."""
     problem, state = before_welding(monkeypatch, "dormered", 2)
-    volumes, outline, plan, scene, agreement, base, *_ = problem
-    sides, planes, _ = weld.weld(volumes, state.sides, agreement, outline, plan, scene, base)
+    volumes, site, agreement, base, *_ = problem
+    sides, planes, _ = weld.weld(volumes, state.sides, agreement, site, base)
     settled = state._replace(sides=sides, planes=planes)
     for k in range(1, len(volumes)):
         for edge, side in enumerate(sides[k]):
             if not side.anchored and np.isfinite(side.sigma):
                 line = Side(side.at + 0.02, side.lean, False, side.sigma)
                 apart = weld.with_line_moved(volumes, sides, k, edge, line)
-                back, *_ = weld.weld(volumes, apart, agreement._replace(planes=planes), outline, plan, scene, base)
+                back, *_ = weld.weld(volumes, apart, agreement._replace(planes=planes), site, base)
                 moved = state._replace(sides=back, planes=planes)
                 assert price(moved, problem)[1] <= price(settled, problem)[1]

@@ -111,7 +111,7 @@ def fit_building(
     unit = evidence_per_unit(plan.density, COMMON_HOUSE_M2, settings.compound)
     roof, agreement = draw_in_groups(with_bays(volumes, outline, plan, scene, unit), ends, site, known)
     volumes, base = roof.volumes, bool(base_shows(roof.volumes, scene))
-    sides, planes, regions = weld(volumes, roof.sides, agreement, outline, plan, scene, base)
+    sides, planes, regions = weld(volumes, roof.sides, agreement, site, base)
     parts = [
         part_of(volumes[k], planes[k], sides[k], own, plan, scene, types)
         for k, own in places_of(regions, outline, plan)

@@ -46,32 +46,39 @@ class DrawnPlan:
         """The numbers of the planes that show."""
         return np.unique(self.beside[self.beside >= 0])
 
-    def gap(self, edge: int) -> np.ndarray:
-        """How far apart (m) the planes beside an edge are at its two ends; infinite at the outline."""
-        if self.beside[edge].min() < 0:
-            return np.array([np.inf, np.inf])
-        at = np.column_stack([self.places[self.edges[edge]], np.ones(2)])
-        left, right = self.planes[self.beside[edge]]
-        return np.abs(at @ (left - right))
+    @property
+    def gaps(self) -> np.ndarray:
+        """How far apart (m) the planes beside each edge are at its ends (e, 2); infinite at the outline."""
+        left, right = self.planes[self.beside.T]
+        at = np.ones((len(self.edges), 2, 3))
+        at[..., :2] = self.places[self.edges]
+        apart = np.abs(np.matmul(at, (left - right)[..., None])[..., 0])
+        apart[(self.beside < 0).any(axis=1)] = np.inf
+        return apart
 
 
-def draw_plan(
+def part_over(
     regions: list[list[shapely.Polygon]],
     volumes: np.ndarray,
     planes: list[Planes],
-    outline: shapely.Polygon,
     plan: Plan,
     scene: Scene,
-) -> DrawnPlan | None:
-    """Draw volumes over their `regions`; None where these make no plan."""
+) -> tuple[Part, list[tuple[int, int]]]:
+    """All volumes over their `regions` as one part, and whose planes its pieces' are: volume, plane."""
     pieces, owner = [], []
     for k, polygons in enumerate(regions):
-        there = np.flatnonzero(np.isfinite(planes[k].rows[:, 2]))
-        rows = local_planes(planes[k].rows[there], scene.turn[int(volumes[k, DIRECTION])], plan)
-        for polygon in polygons:
-            pieces.append(Piece(polygon, rows))
-            owner += [(k, p) for p in there]
-    roof = Roof((Part("free", tuple(pieces)),), outline, LocalFrame(np.zeros(3)))
+        if polygons:
+            there = np.flatnonzero(np.isfinite(planes[k].rows[:, 2]))
+            turn = scene.turn[int(volumes[k, DIRECTION])]
+            rows = local_planes(planes[k].rows[there], turn, plan)
+            pieces += [Piece(polygon, rows) for polygon in polygons]
+            owner += [(k, p) for p in there.tolist()] * len(polygons)
+    return Part("free", tuple(pieces)), owner
+
+
+def draw_plan(part: Part, owner: list[tuple[int, int]], outline: shapely.Polygon) -> DrawnPlan | None:
+    """Draw a part whose planes have these owners; None where its pieces make no plan."""
+    roof = Roof((part,), outline, LocalFrame(np.zeros(3)))
     options = ComposeSettings()
     try:
         problem = plan_problem(roof)
@@ -98,17 +105,21 @@ def counted_plan(cells, grid_planes: np.ndarray, owner: np.ndarray) -> DrawnPlan
 
 def count_corners(ends: np.ndarray, vertices: np.ndarray) -> int:
     """Count the vertices (n, 3) at the `ends` (m, 2) of edges that are not straight between two."""
-    pairs = np.unique(np.sort(ends[ends[:, 0] != ends[:, 1]], axis=1), axis=0)
-    both = np.concatenate([pairs, pairs[:, ::-1]])
-    both = both[np.argsort(both[:, 0], kind="stable")]
-    at, first, count = np.unique(both[:, 0], return_index=True, return_counts=True)
-    middle = first[count == 2]
-    v, a, b = vertices[at[count == 2]], vertices[both[middle, 1]], vertices[both[middle + 1, 1]]
+    one, other = ends[ends[:, 0] != ends[:, 1]].T
+    size = len(vertices)
+    pairs = np.unique(np.minimum(one, other) * size + np.maximum(one, other))
+    one, other = np.divmod(pairs, size)
+    at = np.concatenate([one, other])
+    beside = np.concatenate([other, one])[np.argsort(at, kind="stable")]
+    count = np.bincount(at, minlength=size)
+    middle = np.flatnonzero(count == 2)
+    first = (np.cumsum(count) - count)[middle]
+    v, a, b = vertices[middle], vertices[beside[first]], vertices[beside[first + 1]]
     way = b - a
     share = ((v - a) * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-12)
     off = np.linalg.norm(v - a - share[:, None] * way, axis=1)
     straight = (off < STRAIGHT_M) & (share > 0.0) & (share < 1.0)
-    return len(at) - int(straight.sum())
+    return int(np.count_nonzero(count)) - int(straight.sum())
 
 
 def count_parameters(rows: np.ndarray, turns: np.ndarray) -> int:

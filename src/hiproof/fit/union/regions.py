@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import NamedTuple
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -19,11 +20,14 @@ from .sides import Side, corners_of
 from .volumes import DIRECTION, LEVEL, OFFSET, REPLACES, U0, V1
 from .whole import PLACE
 
-THICK_M = 0.25  # a gap may be the base's where a disc of this radius fits
+# a gap may be the base's where a disc of this radius fits, and is not where it is smaller than that
+THICK_M, THICK_M2 = 0.25, 0.19
 SHOWS_M = 0.25  # the base shows within a volume where it is above it by more
 # of the base apart from the rest of it, from which on that is a part; of what lies between, that is roofed where it runs on
 PLACE_M2, ROOFED = 1.0, 0.5
+APART_M = 1e-5  # further apart, rounding to the grid of overlays lets no polygons touch
 FAR_M = 1e4  # m beyond all of an outline
+TURN_M2 = 1e-6  # of the parallelogram that two sides of a volume span; numerically none below
 SHAPE_UNITS = 0.5  # what the base must explain better to have a gap
 
 
@@ -38,6 +42,13 @@ class Site(NamedTuple):
     scene: Scene
     known: dict
 
+    def once(self, find: Callable[..., Any], *of: Any) -> Any:
+        """What `find` makes of these very objects, found the first time that it is asked for."""
+        key = find, *map(id, of)
+        if key not in self.known:
+            self.known[key] = find(*of), of  # no other object takes the number of one that is held
+        return self.known[key][0]
+
     def quad(self, volume: np.ndarray, sides: list[Side]) -> tuple[shapely.Polygon, shapely.Geometry]:
         """A volume's plan, and what of it lies inside the outline."""
         key = volume[PLACE].tobytes(), *sides
@@ -48,11 +59,11 @@ class Site(NamedTuple):
 
     def rest(self, quads: list[shapely.Polygon]) -> list[shapely.Polygon]:
         """What of the outline lies in no quad."""
-        key = tuple(map(id, quads))
-        if key not in self.known:
-            covered = with_area(shapely.union_all(quads, grid_size=GRID_M))
-            self.known[key] = polygons_of(shapely.difference(self.outline, covered, grid_size=GRID_M))
-        return self.known[key]
+        return self.once(rest_of, self.outline, *quads)
+
+    def cut_out(self, polygons: list[shapely.Polygon], hole: shapely.Polygon) -> list[shapely.Polygon]:
+        """What is left of the polygons without the `hole`."""
+        return [left for polygon in polygons for left in self.once(difference, polygon, hole)]
 
 
 def regions_of(
@@ -67,9 +78,9 @@ def regions_of(
     regions = [polygons_of(site.outline) if base or len(volumes) == 1 else []]
     for k, (quad, own) in enumerate(cut, start=1):
         if volumes[k, REPLACES]:
-            regions = [cut_out(before, quad) for before in regions]
+            regions = [site.cut_out(before, quad) for before in regions]
         elif regions[0] and not rises_through(volumes[0, OFFSET + LEVEL], volumes[k], planes[k], own, site):
-            regions[0] = cut_out(regions[0], quad)
+            regions[0] = site.cut_out(regions[0], quad)
         regions.append(polygons_of(own))
     return regions if len(volumes) == 1 else gaps_filled(volumes, planes, regions, [quad for quad, _ in cut], site)
 
@@ -113,11 +124,20 @@ def runs_on(one: shapely.Polygon, other: shapely.Polygon, outline: shapely.Polyg
 def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> shapely.Polygon:
     """A volume's plan in local coordinates: inside its sides, or its rectangle where these cross within it."""
     c, s = scene.turn[int(volume[DIRECTION])]
-    for corners in (corners_of(sides), corners_of([Side(float(x)) for x in volume[U0 : V1 + 1]])):
-        quad = shapely.Polygon(plan.frame.xy_local(corners @ np.array([[c, s], [-s, c]])))
-        if quad.is_valid and quad.exterior.is_ccw:
+    for own in (sides, [Side(float(x)) for x in volume[U0 : V1 + 1]]):
+        ring = plan.frame.xy_local(corners_of(own) @ np.array([[c, s], [-s, c]]))
+        quad = shapely.polygons(ring)
+        if is_convex(ring.tolist()) or (quad.is_valid and quad.exterior.is_ccw):
             return quad
     return quad
+
+
+def is_convex(ring: list[list[float]]) -> bool:
+    """Whether four corners clearly turn to the left one after another."""
+    (ax, ay), (bx, by), (cx, cy), (dx, dy) = ring
+    first, second = (bx - ax) * (cy - by) - (by - ay) * (cx - bx), (cx - bx) * (dy - cy) - (cy - by) * (dx - cx)
+    third, last = (dx - cx) * (ay - dy) - (dy - cy) * (ax - dx), (ax - dx) * (by - ay) - (ay - dy) * (bx - ax)
+    return min(first, second, third, last) > TURN_M2
 
 
 def rises_through(base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, site: Site) -> bool:
@@ -154,9 +174,27 @@ def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
     return [part for part in parts if part.geom_type == "Polygon" and part.area > 1e-9]
 
 
-def cut_out(polygons: list[shapely.Polygon], hole: shapely.Polygon) -> list[shapely.Polygon]:
-    """What is left of the polygons without the `hole`."""
-    return [q for p in polygons for q in polygons_of(shapely.difference(p, hole, grid_size=GRID_M))]
+def difference(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shapely.Polygon]:
+    """What is left of a polygon without a hole."""
+    if not shapely.dwithin(polygon, hole, APART_M):
+        ring = shapely.get_coordinates(polygon)
+        if is_overlaid(polygon, ring):  # an overlay would return it from its next corner on
+            return [shapely.polygons(np.concatenate([ring[1:], ring[1:2]]))]
+    elif polygon.area < hole.area and shapely.contains_properly(hole, polygon):
+        return []
+    return polygons_of(shapely.difference(polygon, hole, grid_size=GRID_M))
+
+
+def is_overlaid(polygon: shapely.Polygon, ring: np.ndarray) -> bool:
+    """Whether a polygon is one ring on the grid of overlays, clockwise as they make it."""
+    on_grid = (np.round(ring / GRID_M) / (1.0 / GRID_M) == ring).all()
+    return bool(on_grid) and not shapely.get_num_interior_rings(polygon) and not shapely.is_ccw(polygon.exterior)
+
+
+def rest_of(outline: shapely.Polygon, *quads: shapely.Polygon) -> list[shapely.Polygon]:
+    """What of an outline lies in no quad."""
+    covered = with_area(shapely.union_all(quads, grid_size=GRID_M))
+    return difference(outline, covered)
 
 
 def area_of(parts: Iterable[Part]) -> shapely.Geometry:
@@ -174,27 +212,47 @@ def gaps_filled(
 ) -> list[list]:
     """The regions with every rest of the outline given to the volume beside it, or left to the base where points say so."""
     for gap in site.rest(quads):
-        near, k, q = shares_most(gap, [[], *regions[1:]])
+        near = site.once(widened, gap)
+        k, q = place_beside(near, [[], *regions[1:]], partial(site.once, shared_area))
         if k > 0 and not (regions[0] and is_base(gap, volumes[0], volumes[k], planes[k], site)):
-            wider = with_area(shapely.union_all([regions[k][q], near], grid_size=GRID_M))
-            merged = polygons_of(shapely.intersection(wider, site.outline, grid_size=GRID_M))
+            merged = site.once(merged_inside, regions[k][q], near, site.outline)
             if len(merged) == 1:
                 regions[k][q] = merged[0]
-                regions[0] = cut_out(regions[0], near)
+                regions[0] = site.cut_out(regions[0], near)
                 continue
         if not is_covered(gap, regions[0]):
             regions[0].append(gap)
     return regions
 
 
-def shares_most(gap: shapely.Polygon, polygons: list[list[shapely.Polygon]]) -> tuple[shapely.Polygon, int, int]:
-    """The `gap` a millimetre wider, and the two indices of that one of the `polygons` that shares most of it; zeros where none does."""
-    near = shapely.buffer(gap, 1e-3, quad_segs=1)
-    beside = [(k, q) for k, own in enumerate(polygons) for q, p in enumerate(own) if shapely.intersects(near, p)]
+def widened(gap: shapely.Polygon) -> shapely.Polygon:
+    """The `gap` a millimetre wider."""
+    return shapely.buffer(gap, 1e-3, quad_segs=1)
+
+
+def merged_inside(polygon: shapely.Polygon, near: shapely.Polygon, outline: shapely.Polygon) -> list[shapely.Polygon]:
+    """What two polygons cover together of an outline."""
+    wider = with_area(shapely.union_all([polygon, near], grid_size=GRID_M))
+    return polygons_of(shapely.intersection(wider, outline, grid_size=GRID_M))
+
+
+def shared_area(one: shapely.Polygon, other: shapely.Polygon) -> float:
+    return shapely.intersection(one, other, grid_size=GRID_M).area
+
+
+def place_beside(
+    near: shapely.Polygon, polygons: list[list[shapely.Polygon]], area: Callable[..., float] = shared_area
+) -> tuple[int, int]:
+    """The two indices of that one of the `polygons` that shares most `area` with `near`; zeros where none does."""
+    places = [(k, q) for k, own in enumerate(polygons) for q in range(len(own))]
+    if not places:
+        return 0, 0
+    touch = shapely.intersects(near, [p for own in polygons for p in own])
+    beside = [place for place, there in zip(places, touch.tolist(), strict=True) if there]
     if len(beside) > 1:
-        areas = [shapely.intersection(near, polygons[k][q], grid_size=GRID_M).area for k, q in beside]
+        areas = [area(near, polygons[k][q]) for k, q in beside]
         beside = [max(zip(areas, beside, strict=True))[1]]
-    return near, *(beside[0] if beside else (0, 0))
+    return beside[0] if beside else (0, 0)
 
 
 def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
@@ -206,7 +264,7 @@ def is_covered(gap: shapely.Polygon, polygons: list[shapely.Polygon]) -> bool:
 
 def is_base(gap: shapely.Polygon, base: np.ndarray, volume: np.ndarray, planes: Planes, site: Site) -> bool:
     """Whether a gap is wide enough to be drawn and its points lie on the base rather than on its neighbour continued."""
-    if shapely.buffer(gap, -THICK_M).is_empty:
+    if gap.area < THICK_M2 or shapely.buffer(gap, -THICK_M).is_empty:
         return False
     xy, z = points_in(gap, site)
     continued = misfits(z, heights_over(volume, planes, xy, site), site.scene).sum()

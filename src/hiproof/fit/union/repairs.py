@@ -48,7 +48,7 @@ def find_repairs(
     scene: Scene,
 ) -> list[Repair]:
     """Find everything in `drawn` that might be made to meet, the nearest first."""
-    gaps = np.array([drawn.gap(e) for e in range(len(drawn.edges))]).reshape(-1, 2)
+    gaps = drawn.gaps
     found = list(low_steps(drawn, gaps))
     for k in range(1, len(volumes)):
         places = in_own_axes(drawn.places, int(volumes[k, DIRECTION]), plan, scene)

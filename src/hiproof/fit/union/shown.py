@@ -12,7 +12,7 @@ from ...geometry.rings import GRID_M
 from ...model import Part, Piece
 from ...model.heights import highest_of
 from .plan import Plan
-from .regions import area_of, polygons_of, shares_most
+from .regions import area_of, place_beside, polygons_of, widened
 from .scene import Scene, nodes
 
 SEAM_M = 1e-5  # between corners that are the same but for the grid they lie on
@@ -42,7 +42,8 @@ def with_slivers(parts: list[Part], hidden: Part, widest_m2: float) -> list[Part
     if sum(polygon.area for polygon in bare) > widest_m2:
         return None
     for sliver in bare:
-        near, k, q = shares_most(sliver, [[piece.outline for piece in mine] for mine in pieces])
+        near = widened(sliver)
+        k, q = place_beside(near, [[piece.outline for piece in mine] for mine in pieces])
         if not (pieces and pieces[k]):
             return None  # nothing lies beside the sliver
         outline = pieces[k][q].outline

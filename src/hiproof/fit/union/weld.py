@@ -16,12 +16,14 @@ from typing import NamedTuple
 import numpy as np
 import shapely
 
+from ...model import Part
+from ...model.heights import highest_of
 from .agree import Agreement, fitted, null_space
-from .drawn_plan import DrawnPlan, count_parameters, draw_plan, local_planes
+from .drawn_plan import DrawnPlan, count_parameters, draw_plan, part_over
 from .finish import Planes
 from .objective import costs, misfits
 from .plan import Plan
-from .regions import Site, polygons_of, quad_of, regions_of
+from .regions import Site, polygons_of, regions_of
 from .repairs import Repair, find_repairs
 from .scene import Scene
 from .sides import Side, corners_of
@@ -53,13 +55,23 @@ class Problem(NamedTuple):
     """
 
     volumes: np.ndarray
-    outline: shapely.Polygon
-    plan: Plan
-    scene: Scene
+    site: Site
     agreement: Agreement
     base: bool
     xy: np.ndarray
     order: np.ndarray
+
+    @property
+    def outline(self) -> shapely.Polygon:
+        return self.site.outline
+
+    @property
+    def plan(self) -> Plan:
+        return self.site.plan
+
+    @property
+    def scene(self) -> Scene:
+        return self.site.scene
 
 
 class State(NamedTuple):
@@ -90,12 +102,13 @@ class Window(NamedTuple):
 
 
 class Drawing(NamedTuple):
-    """What a window shows of a roof: regions and plan for each of its sites.
+    """What a window shows of a roof: regions, these as one part, and plan for each of its sites.
 
     A plan is None where its regions make none.
     """
 
     regions: list[list[list[shapely.Polygon]]]
+    parts: list[Part]
     plans: list[DrawnPlan | None]
 
 
@@ -103,13 +116,11 @@ def weld(
     volumes: np.ndarray,
     sides: list[list[Side]],
     agreement: Agreement,
-    outline: shapely.Polygon,
-    plan: Plan,
-    scene: Scene,
+    site: Site,
     base: bool,
 ) -> tuple[list[list[Side]], list[Planes], list[list[shapely.Polygon]]]:
     """Return the sides, planes and regions of all volumes with every repair that pays."""
-    problem = problem_of(volumes, agreement, outline, plan, scene, base)
+    problem = problem_of(volumes, agreement, site, base)
     state = state_before(sides, problem)
     whole = window_of(whole_box(problem), quads_of(state, problem), problem)
     drawing = draw(state, whole, problem)
@@ -122,18 +133,12 @@ def weld(
     return state.sides, state.planes, drawing.regions[0]
 
 
-def problem_of(
-    volumes: np.ndarray,
-    agreement: Agreement,
-    outline: shapely.Polygon,
-    plan: Plan,
-    scene: Scene,
-    base: bool,
-) -> Problem:
+def problem_of(volumes: np.ndarray, agreement: Agreement, site: Site, base: bool) -> Problem:
+    scene = site.scene
     points = np.column_stack([scene.U[0, : scene.n], scene.V[0, : scene.n]])
-    xy = plan.frame.xy_local(points)
+    xy = site.plan.frame.xy_local(points)
     order = np.argsort(xy[:, 0], kind="stable")
-    return Problem(volumes, outline, plan, scene, agreement, base, xy, order)
+    return Problem(volumes, site, agreement, base, xy, order)
 
 
 def state_before(sides: list[list[Side]], problem: Problem) -> State:
@@ -149,9 +154,10 @@ def draw(state: State, window: Window, problem: Problem) -> Drawing:
     volumes, planes = problem.volumes[window.numbers], [state.planes[k] for k in window.numbers]
     sides = [state.sides[k] for k in window.numbers]
     regions = [regions_of(volumes, planes, sides, site, problem.base) for site in window.sites]
-    pairs = zip(regions, window.sites, strict=True)
-    plans = [draw_plan(own, volumes, planes, site.outline, problem.plan, problem.scene) for own, site in pairs]
-    return Drawing(regions, plans)
+    drawn = [part_over(own, volumes, planes, problem.plan, problem.scene) for own in regions]
+    pairs = zip(drawn, window.sites, strict=True)
+    plans = [draw_plan(part, owner, site.outline) for (part, owner), site in pairs]
+    return Drawing(regions, [part for part, _ in drawn], plans)
 
 
 def after_a_round(
@@ -169,19 +175,20 @@ def after_a_round(
     changed: list[shapely.Polygon] = []
     window, price, after_drawing = whole, None, None
     quads = quads_of(state, problem)
+    beyond = owners_beyond(drawn, whole.box)
     for repair in find_repairs(drawn, problem.volumes, state.sides, problem.plan, problem.scene):
         if repair.key in tried or len(tried) >= most:
             continue
         box = box_of(repair, state, problem) if area > WINDOW_M2 else whole.box
         if any(shapely.intersects(box, other) for other in changed):
             continue
-        if not window.box.equals(box):
+        if window.box is not box and not window.box.equals(box):
             window, price = window_of(box, quads, problem), None
+            beyond = owners_beyond(drawn, box)
         after = repaired(state, repair, window, problem)
         if after is None:
             continue
         tried.add(repair.key)
-        beyond = owners_beyond(drawn, window.box)
         if price is None:
             before = drawing if window is whole else draw(state, window, problem)
             price = price_of(state, before, beyond, window, problem)
@@ -215,9 +222,9 @@ def whole_box(problem: Problem) -> shapely.Polygon:
 
 def box_of(repair: Repair, state: State, problem: Problem) -> shapely.Polygon:
     """The window of a repair: around the sides that move and the volumes whose planes change."""
-    volumes, _, plan, scene = problem[:4]
+    volumes, plan, scene = problem.volumes, problem.plan, problem.scene
     owners = {k for _, terms in repair.equations for _, (k, _) in terms}
-    quads = [quad_of(volumes[k], state.sides[k], plan, scene) for k in owners if k > 0]
+    quads = [problem.site.quad(volumes[k], state.sides[k])[0] for k in owners if k > 0]
     places = [shapely.get_coordinates(quad) for quad in quads]
     for (k, edge), side in repair.sides.items():
         c, s = scene.turn[int(volumes[k, DIRECTION])]
@@ -234,8 +241,8 @@ def box_of(repair: Repair, state: State, problem: Problem) -> shapely.Polygon:
 
 def quads_of(state: State, problem: Problem) -> list[shapely.Polygon]:
     """The plans of all volumes but the base, in local coordinates."""
-    volumes, _, plan, scene = problem[:4]
-    return [quad_of(volumes[k], state.sides[k], plan, scene) for k in range(1, len(volumes))]
+    pairs = zip(problem.volumes[1:], state.sides[1:], strict=True)
+    return [problem.site.quad(volume, own)[0] for volume, own in pairs]
 
 
 def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Problem) -> Window:
@@ -254,7 +261,7 @@ def window_of(box: shapely.Polygon, quads: list[shapely.Polygon], problem: Probl
     judges = inside[np.arange(count) * len(inside) // max(count, 1)]
     outline = problem.outline
     if box.covers(outline):
-        sites = [Site(outline, problem.plan, scene, {})]
+        sites = [problem.site]
     else:
         within = polygons_of(shapely.intersection(outline, box))
         sites = [Site(part, problem.plan, seen, {}) for part in within]
@@ -270,35 +277,19 @@ def price_of(
 
     None where no plan comes out.
     """
-    plan, scene, numbers = problem.plan, problem.scene, window.numbers
-    volumes, planes = problem.volumes[numbers], [state.planes[k] for k in numbers]
-    shown, corners, height = set(beyond), 0, np.full(len(window.z), -np.inf)
-    for regions, drawn in zip(drawing.regions, drawing.plans, strict=True):
+    scene, numbers = problem.scene, window.numbers
+    shown, corners = set(beyond), 0
+    for drawn in drawing.plans:
         if drawn is None:
             return None
         corners += drawn.corners
-        shown |= {(int(numbers[k]), int(p)) for k, p in drawn.owner[drawn.shown]}
-        raise_heights(height, regions, volumes, planes, window, plan)
+        shown |= {(int(numbers[k]), p) for k, p in drawn.owner[drawn.shown].tolist()}
     rows = np.array([state.planes[k].rows[p] for k, p in sorted(shown)])
     turns = scene.turn[problem.volumes[[k for k, _ in sorted(shown)], DIRECTION].astype(int)]
+    height, _ = highest_of(drawing.parts, window.xy)
     misfit = window.weight * float(misfits(window.z, height, scene).sum())
     units = PARAMETER_COST * count_parameters(rows, turns) + CORNER_COST * corners
     return misfit + scene.evidence * units, corners
-
-
-def raise_heights(
-    height: np.ndarray, regions: list, volumes: np.ndarray, planes: list[Planes], window: Window, plan: Plan
-) -> None:
-    """Raise the `height` (n,) over a window's points to that of the volumes in whose regions they
-    lie."""
-    x, y = window.xy.T
-    for volume, own, polygons in zip(volumes, planes, regions, strict=True):
-        rows = own.rows[np.isfinite(own.rows[:, 2])]
-        rows = local_planes(rows, window.scene.turn[int(volume[DIRECTION])], plan)
-        for polygon in polygons:
-            inside = shapely.contains_xy(polygon, x, y)
-            z = (window.xy[inside] @ rows[:, :2].T + rows[:, 2]).min(axis=1)
-            height[inside] = np.maximum(height[inside], z)
 
 
 def repaired(state: State, repair: Repair, window: Window, problem: Problem) -> State | None:
