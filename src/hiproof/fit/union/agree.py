@@ -69,12 +69,16 @@ class Asked(NamedTuple):
 
 class Agreement(NamedTuple):
     """All volumes' planes fitted together, the members by their volume's number, and the unknowns: those that the
-    equations which hold leave free, as a basis (p, q), and where they started (p,)."""
+    equations which hold leave free, as a basis (p, q), and where they started (p,).
+
+    `cost` is that of the members' points, None where nothing was fitted together.
+    """
 
     planes: list[Planes]
     members: dict[int, Member]
     basis: np.ndarray
     start: np.ndarray
+    cost: float | None = None
 
 
 def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], scene: Scene) -> Agreement:
@@ -96,7 +100,7 @@ def agreed(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes], s
     worse = roof_misfit(volumes, agreed_planes, scene) - roof_misfit(volumes, planes, scene)
     if worse > MOST_WORSE_SHARE * scene.n:
         return alone
-    return Agreement(agreed_planes, members, found.basis, start)
+    return Agreement(agreed_planes, members, found.basis, start, found.cost)
 
 
 def roof_misfit(volumes: np.ndarray, planes: list[Planes], scene: Scene) -> float:
@@ -119,7 +123,8 @@ def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked]
     Its covariance is what the points tell: a corner of the outline says where planes meet, not how well that is known.
     """
     held, told, basis = np.zeros((0, len(start))), np.zeros((0, len(start))), np.eye(len(start))
-    best = free = fitted(members, basis, start, scene)
+    begun = sums_at_first(members, scene)
+    best = free = fitted(members, basis, start, scene, begun)
     if not math.isfinite(free.cost):  # improper: members keep their planes until a proper fit is found
         rows = [member.rows for member in members]
         best = Fit(start, free.covariance, rows, cost_of_rows(members, rows, scene), basis)
@@ -135,13 +140,14 @@ def fitted_as_asked(members: list[Member], start: np.ndarray, asked: list[Asked]
                 continue
             with_it = np.vstack([held, one.equation])
             left = null_space(with_it)
-            found = fitted(members, left, start, scene)
+            found = fitted(members, left, start, scene, begun)
             if found.cost <= best.cost + worth(one, saved, members, scene):
                 held, basis, best = with_it, left, found
                 told = told if one.spared else np.vstack([told, one.equation])
         asked = later if len(held) > before else []
     if len(held) > len(told):
-        best = replace(best, covariance=fitted(members, null_space(told), start, scene).covariance)
+        as_told = fitted(members, null_space(told), start, scene, begun)
+        best = replace(best, covariance=as_told.covariance)
     return best if len(held) else None
 
 
@@ -259,28 +265,63 @@ def null_space(equations: np.ndarray) -> np.ndarray:
     return rows[int((values > HELD).sum()) :].T
 
 
-def fitted(members: list[Member], basis: np.ndarray, start: np.ndarray, scene: Scene) -> Fit:
-    """All planes by biweighted least squares on their points, over unknowns (p,) that are `basis` (p, q) times any."""
+class Sums(NamedTuple):
+    """Normal equations of all members' unknowns (p, p) and (p,), and of their points: the sum of
+    the weights, and of the weighted squares of what is left."""
+
+    normal: np.ndarray
+    right: np.ndarray
+    weight: float
+    misfit: float
+
+
+def sums_at_first(members: list[Member], scene: Scene) -> Sums:
+    """The sums in the first round of a fit, which starts from the members' planes."""
+    return sums_of(members, [member.rows for member in members], 2.0 * (scene.dead + scene.width))
+
+
+def sums_of(members: list[Member], rows: list[np.ndarray], reach: float) -> Sums:
+    """The sums over points within `reach` (m) of the members' planes `rows`."""
+    size = members[0].own.shape[2]
+    normal, right, total, misfit = np.zeros((size, size)), np.zeros(size), 0.0, 0.0
+    for member, planes in zip(members, rows, strict=True):
+        moments, products, weight, left = weighted_moments(planes, member.points, reach)
+        there = np.isfinite(planes[:, 2])
+        matrix, vector = normal_equations(member.design, moments, products, there)
+        own = slice(member.first, member.first + len(vector))
+        normal[own, own], right[own] = matrix, vector
+        total, misfit = total + weight, misfit + left
+    return Sums(normal, right, total, misfit)
+
+
+def fitted(
+    members: list[Member],
+    basis: np.ndarray,
+    start: np.ndarray,
+    scene: Scene,
+    begun: Sums | None = None,
+) -> Fit:
+    """All planes by biweighted least squares, over unknowns (p,) that are `basis` (p, q) times any.
+
+    `begun` are the sums at first, where these are known.
+    """
     own, rows = np.concatenate([member.own for member in members]), [member.rows for member in members]
     ends = np.cumsum([len(planes) for planes in rows])[:-1]
     absent, scale = np.isnan(np.concatenate(rows)), scene.dead + scene.width
+    sums = begun or sums_at_first(members, scene)
     for turn in range(ROUNDS):
-        normal, right, total, misfit = np.zeros((len(start), len(start))), np.zeros(len(start)), 0.0, 0.0
-        for member, planes in zip(members, rows, strict=True):
-            reach = scale * (2.0 if turn == 0 else 1.5)
-            moments, products, weight, left = weighted_moments(planes, member.points, reach)
-            matrix, vector = normal_equations(member.own, moments, products, np.isfinite(planes[:, 2]))
-            normal, right, total, misfit = normal + matrix, right + vector, total + weight, misfit + left
-        ridge = RIDGE * max(np.trace(normal) / len(start), 1e-6)
-        inverse = basis @ np.linalg.inv(basis.T @ normal @ basis + ridge * np.eye(basis.shape[1])) @ basis.T
-        unknowns = inverse @ (right + ridge * start)
+        sums = sums if turn == 0 else sums_of(members, rows, 1.5 * scale)
+        ridge = RIDGE * max(np.trace(sums.normal) / len(start), 1e-6)
+        held = basis.T @ sums.normal @ basis + ridge * np.eye(basis.shape[1])
+        inverse = basis @ np.linalg.inv(held) @ basis.T
+        unknowns = inverse @ (sums.right + ridge * start)
         every = own @ unknowns
         every[absent] = np.nan
         rows = np.split(every, ends)
     cost = cost_of_rows(members, rows, scene)
     if not all(proper(own, member.walls) for member, own in zip(members, rows, strict=True)):
         cost = np.inf
-    return Fit(unknowns, inverse * misfit / max(total, 1.0), rows, cost, basis)
+    return Fit(unknowns, inverse * sums.misfit / max(sums.weight, 1.0), rows, cost, basis)
 
 
 def cost_of_rows(members: list[Member], rows: list[np.ndarray], scene: Scene) -> float:

@@ -205,13 +205,24 @@ def fitted_with(planes: Planes, wall: Wall, way: Way, start: np.ndarray, points:
     return Planes(rows, cost, design, covariance, (*planes.walls, wall), price)
 
 
+def quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
+    """What so large shares of the values (n,) lie below, between two of these on the line between."""
+    ordered, found = np.sort(values).tolist(), []
+    for share in shares:
+        k, rest = divmod((len(ordered) - 1) * share, 1.0)
+        low, high = ordered[int(k)], ordered[min(int(k) + 1, len(ordered) - 1)]
+        step = high - low
+        found.append(low + step * rest if rest < 0.5 else high - step * (1.0 - rest))
+    return found
+
+
 def start_over(wall: Wall, planes: Planes, points: np.ndarray, scene: Scene) -> np.ndarray:
     """The plane (3,) over `wall` that explains most of `points` (3, m), of some slopes and heights."""
     inclined = planes.rows[np.isfinite(planes.rows[:, 2])][:, :2]
     slopes = {round(x, 2) for x in np.hypot(*inclined.T).tolist() if x > FLATTEST} | set(SLOPES)
     deep = wall.depth[:2] @ points[:2] + wall.depth[2]
-    near = deep < np.quantile(deep, 0.2)
-    lows = np.quantile(points[2, near], [0.02, 0.25, 0.5]).tolist()
+    (near_m,) = quantiles(deep, (0.2,))
+    lows = quantiles(points[2, deep < near_m], (0.02, 0.25, 0.5))
     tried = [slope * wall.depth + [0.0, 0.0, low] for slope in sorted(slopes) for low in lows]
     costs = [cost_of(np.vstack([planes.rows, row]), points, scene.dead, scene.width) for row in tried]
     return tried[int(np.argmin(costs))]

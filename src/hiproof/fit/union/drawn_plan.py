@@ -48,7 +48,7 @@ class DrawnPlan:
 
     @property
     def gaps(self) -> np.ndarray:
-        """How far apart (m) the planes beside each edge are at its ends (e, 2); infinite at the outline."""
+        """How far apart (m) the planes beside each edge are at its ends (e, 2), or infinite."""
         left, right = self.planes[self.beside.T]
         at = np.ones((len(self.edges), 2, 3))
         at[..., :2] = self.places[self.edges]
@@ -64,7 +64,7 @@ def part_over(
     plan: Plan,
     scene: Scene,
 ) -> tuple[Part, list[tuple[int, int]]]:
-    """All volumes over their `regions` as one part, and whose planes its pieces' are: volume, plane."""
+    """All volumes over their `regions` as one part, and whose its planes are: volume, plane."""
     pieces, owner = [], []
     for k, polygons in enumerate(regions):
         if polygons:
@@ -76,7 +76,9 @@ def part_over(
     return Part("free", tuple(pieces)), owner
 
 
-def draw_plan(part: Part, owner: list[tuple[int, int]], outline: shapely.Polygon) -> DrawnPlan | None:
+def draw_plan(
+    part: Part, owner: list[tuple[int, int]], outline: shapely.Polygon
+) -> DrawnPlan | None:
     """Draw a part whose planes have these owners; None where its pieces make no plan."""
     roof = Roof((part,), outline, LocalFrame(np.zeros(3)))
     options = ComposeSettings()

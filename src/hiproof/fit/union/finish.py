@@ -319,7 +319,10 @@ def cost_of(rows, points, dead, width):
 
 def proper(rows: np.ndarray, walls: tuple[Wall, ...] = ()) -> bool:
     """Whether every inclined plane rises from its own side or wall, neither too flat nor too steep."""
-    slopes = rows[0, 0], -rows[1, 0], rows[2, 1], -rows[3, 1], *slopes_over(walls, rows[LEVEL + 1 :])
+    left, right, front, back = rows[:SIDES, :2].tolist()
+    slopes = [left[0], -right[0], front[1], -back[1]]
+    if walls:
+        slopes += slopes_over(walls, rows[LEVEL + 1 :])
     return all(FLATTEST < slope < SLOPE_HIGH for slope in slopes if math.isfinite(slope))
 
 

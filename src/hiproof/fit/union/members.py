@@ -16,12 +16,14 @@ from .volumes import DIRECTION
 class Member:
     """A volume as one of several.
 
-    `rows` (k, 3) are its planes in its own axes, by all p unknowns `own` (k, 3, p) there and `common` (k, 3, p) in the first
-    direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
+    `rows` (k, 3) are its planes in its own axes, by its own unknowns `design` (k, 3, q), which are those from `first` on of
+    all p, and by all of them `own` (k, 3, p) there and `common` (k, 3, p) in the first direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
     the numbers of its planes on which any lie, with the numbers of those.
     """
 
     rows: np.ndarray
+    design: np.ndarray
+    first: int
     own: np.ndarray
     common: np.ndarray
     points: np.ndarray
@@ -41,7 +43,6 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         rows, design, direction = planes[k].rows, planes[k].design, int(volumes[k, DIRECTION])
         own = np.zeros((*design.shape[:2], size))
         own[:, :, start : start + design.shape[2]] = design
-        start += design.shape[2]
         c, s = scene.turn[direction]
         common = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ own
         one = np.ones(len(shown[k]))
@@ -49,6 +50,8 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
         places = np.array([scene.U[0][shown[k]], scene.V[0][shown[k]], one])
         found[k] = Member(
             rows,
+            design,
+            start,
             own,
             common,
             points,
@@ -58,6 +61,7 @@ def members_of(volumes: np.ndarray, sides: list[list[Side]], planes: list[Planes
             planes[k].walls,
             scene.turn[direction],
         )
+        start += design.shape[2]
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -61,7 +62,9 @@ class Site(NamedTuple):
         """What of the outline lies in no quad."""
         return self.once(rest_of, self.outline, *quads)
 
-    def cut_out(self, polygons: list[shapely.Polygon], hole: shapely.Polygon) -> list[shapely.Polygon]:
+    def cut_out(
+        self, polygons: list[shapely.Polygon], hole: shapely.Polygon
+    ) -> list[shapely.Polygon]:
         """What is left of the polygons without the `hole`."""
         return [left for polygon in polygons for left in self.once(difference, polygon, hole)]
 
@@ -134,10 +137,9 @@ def quad_of(volume: np.ndarray, sides: list[Side], plan: Plan, scene: Scene) -> 
 
 def is_convex(ring: list[list[float]]) -> bool:
     """Whether four corners clearly turn to the left one after another."""
-    (ax, ay), (bx, by), (cx, cy), (dx, dy) = ring
-    first, second = (bx - ax) * (cy - by) - (by - ay) * (cx - bx), (cx - bx) * (dy - cy) - (cy - by) * (dx - cx)
-    third, last = (dx - cx) * (ay - dy) - (dy - cy) * (ax - dx), (ax - dx) * (by - ay) - (ay - dy) * (bx - ax)
-    return min(first, second, third, last) > TURN_M2
+    ways = [(x - u, y - v) for (u, v), (x, y) in pairwise([*ring, ring[0]])]
+    turns = [a * d - b * c for (a, b), (c, d) in pairwise([*ways, ways[0]])]
+    return min(turns) > TURN_M2
 
 
 def rises_through(base: float, volume: np.ndarray, planes: Planes, region: shapely.Geometry, site: Site) -> bool:
@@ -188,7 +190,8 @@ def difference(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shapely.
 def is_overlaid(polygon: shapely.Polygon, ring: np.ndarray) -> bool:
     """Whether a polygon is one ring on the grid of overlays, clockwise as they make it."""
     on_grid = (np.round(ring / GRID_M) / (1.0 / GRID_M) == ring).all()
-    return bool(on_grid) and not shapely.get_num_interior_rings(polygon) and not shapely.is_ccw(polygon.exterior)
+    is_ring = not shapely.get_num_interior_rings(polygon)
+    return bool(on_grid) and is_ring and not shapely.is_ccw(polygon.exterior)
 
 
 def rest_of(outline: shapely.Polygon, *quads: shapely.Polygon) -> list[shapely.Polygon]:
@@ -230,7 +233,9 @@ def widened(gap: shapely.Polygon) -> shapely.Polygon:
     return shapely.buffer(gap, 1e-3, quad_segs=1)
 
 
-def merged_inside(polygon: shapely.Polygon, near: shapely.Polygon, outline: shapely.Polygon) -> list[shapely.Polygon]:
+def merged_inside(
+    polygon: shapely.Polygon, near: shapely.Polygon, outline: shapely.Polygon
+) -> list[shapely.Polygon]:
     """What two polygons cover together of an outline."""
     wider = with_area(shapely.union_all([polygon, near], grid_size=GRID_M))
     return polygons_of(shapely.intersection(wider, outline, grid_size=GRID_M))
@@ -241,9 +246,11 @@ def shared_area(one: shapely.Polygon, other: shapely.Polygon) -> float:
 
 
 def place_beside(
-    near: shapely.Polygon, polygons: list[list[shapely.Polygon]], area: Callable[..., float] = shared_area
+    near: shapely.Polygon,
+    polygons: list[list[shapely.Polygon]],
+    area: Callable[..., float] = shared_area,
 ) -> tuple[int, int]:
-    """The two indices of that one of the `polygons` that shares most `area` with `near`; zeros where none does."""
+    """The two indices of that of the `polygons` which shares most `area` with `near`, or zeros."""
     places = [(k, q) for k, own in enumerate(polygons) for q in range(len(own))]
     if not places:
         return 0, 0

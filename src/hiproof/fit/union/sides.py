@@ -140,7 +140,7 @@ def sides_of_volume(volumes, k, across_u, across_v, scene):
 
 @compiled
 def near_places(volume, across_u, u, v):
-    """The numbers of those places u, v that sides of a volume, or of the outline beside it, may have to do with."""
+    """The numbers of the places u, v that a volume's sides, or walls beside these, depend on."""
     least_u, most_u, least_v, most_v = outline_box(across_u)
     wide, deep = volume[U0 + 1] - volume[U0], volume[V1] - volume[V0]
     reach_u, reach_v = REACH_M + 0.5 * LEAN * deep, REACH_M + 0.5 * LEAN * wide
@@ -232,7 +232,8 @@ def sigma_of_place(volume, edge, uv, gain):
     moved = (np.arange(2 * MOVES + 1) - MOVES) * MOVED_M / MOVES
     cost = np.zeros(len(moved))
     for i in range(len(x)):
-        if gain[i] != 0.0 and volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis] and abs(x[i] - at) < MOVED_M:
+        beside = volume[V0 - 2 * axis] <= y[i] <= volume[V1 - 2 * axis]
+        if gain[i] != 0.0 and beside and abs(x[i] - at) < MOVED_M:
             for m in range(len(cost)):
                 cost[m] += gain[i] if sign * (x[i] - at) <= moved[m] else 0.0
     weight = np.exp(-NATS_A_POINT * (cost - cost.min()))
@@ -279,13 +280,15 @@ def share_lines(volumes: np.ndarray, sides: list[list[Side]]) -> list[list[Side]
     for k in range(1, len(sides)):
         u0, u1, v0, v1 = volumes[k, U0 : V1 + 1].tolist()
         middles = 0.5 * (v0 + v1), 0.5 * (u0 + u1)
-        lines = [[line for j, line in anchored.get((directions[k], axis), ()) if j != k] for axis in (0, 1)]
-        found.append([shared(side, lines[edge // 2], middles[edge // 2]) for edge, side in enumerate(sides[k])])
+        among = [anchored.get((directions[k], axis), []) for axis in (0, 1)]
+        lines = [[line for j, line in own if j != k] for own in among]
+        axes = zip((0, 0, 1, 1), sides[k], strict=True)
+        found.append([shared(side, lines[axis], middles[axis]) for axis, side in axes])
     return found
 
 
 def shared(own: Side, lines: list[Side], middle: float) -> Side:
-    """The side, or that of the `lines` of others which lies nearest to it at its `middle` where it is near."""
+    """The side, or the nearest of the `lines` of others where that is near at its `middle`."""
     if own.anchored or not lines:
         return own
     gaps = [abs(line.at + line.lean * middle - own.at) for line in lines]

@@ -76,12 +76,12 @@ class Problem(NamedTuple):
 
 class State(NamedTuple):
     """A roof: its sides and planes, the unknowns that its equations leave free (p, q), and what the
-    points of its members cost under these."""
+    points of its members cost under these, None where they have not been fitted together yet."""
 
     sides: list[list[Side]]
     planes: list[Planes]
     basis: np.ndarray
-    cost: float
+    cost: float | None
 
 
 class Window(NamedTuple):
@@ -143,10 +143,14 @@ def problem_of(volumes: np.ndarray, agreement: Agreement, site: Site, base: bool
 
 def state_before(sides: list[list[Side]], problem: Problem) -> State:
     """The roof as volumes agree on it."""
-    planes, members, basis, start = problem.agreement
-    known = list(members.values())
-    cost = fitted(known, basis, start, problem.scene).cost if known else 0.0
-    return State(sides, list(planes), basis, cost)
+    agreement = problem.agreement
+    return State(sides, list(agreement.planes), agreement.basis, agreement.cost)
+
+
+def cost_of_members(agreement: Agreement, scene: Scene) -> float:
+    """What the points of members cost under the equations that hold between them."""
+    members = list(agreement.members.values())
+    return fitted(members, agreement.basis, agreement.start, scene).cost
 
 
 def draw(state: State, window: Window, problem: Problem) -> Drawing:
@@ -330,7 +334,10 @@ def equalised(
         return None
     known = [replace(member, rows=state.planes[k].rows) for k, member in members.items()]
     found = fitted(known, free, start, problem.scene)
-    if not math.isfinite(found.cost) or found.cost > state.cost + most:
+    before = state.cost
+    if before is None:
+        before = problem.site.once(cost_of_members, problem.agreement, problem.scene)
+    if not math.isfinite(found.cost) or found.cost > before + most:
         return None
     planes = list(state.planes)
     for k, own in zip(members, found.rows, strict=True):
