@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from itertools import combinations
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import shapely
@@ -51,8 +51,9 @@ class Way(NamedTuple):
     more: int
 
 
-# planes by all that they depend on in one scene: their volume, its sides, and the points over which it shows
-Known = dict[tuple[bytes, tuple[Side, ...], bytes], Planes]
+# Planes and roofs by all that they depend on in one scene: planes by their volume, its sides, and
+# the points over which it shows, roofs by their volumes.
+Known = dict[Any, Any]
 
 
 def finished(
@@ -206,7 +207,7 @@ def fitted_with(planes: Planes, wall: Wall, way: Way, start: np.ndarray, points:
 
 
 def quantiles(values: np.ndarray, shares: tuple[float, ...]) -> list[float]:
-    """What so large shares of the values (n,) lie below, between two of these on the line between."""
+    """What so large `shares` of the values (n,) lie below: between two of these, on a line."""
     ordered, found = np.sort(values).tolist(), []
     for share in shares:
         k, rest = divmod((len(ordered) - 1) * share, 1.0)

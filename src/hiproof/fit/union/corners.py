@@ -6,6 +6,7 @@ draughtsman draws. That they meet there is a linear equation between their unkno
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import combinations
 from typing import NamedTuple
@@ -77,13 +78,17 @@ def meet_beside(one: Plane, other: Plane) -> bool:
     """
     if one.member != other.member and LEVEL in (one.number, other.number):
         return False
-    gap, apart = abs(one.height - other.height), break_of(one, other)
-    return bool(apart > LEAST_BREAK and gap < NEAR_M and AT_CORNER_M < gap / apart < NEAR_M)
+    gap = abs(one.height - other.height)
+    if gap >= NEAR_M:
+        return False
+    apart = break_of(one, other)
+    return apart > LEAST_BREAK and AT_CORNER_M < gap / apart < NEAR_M
 
 
 def break_of(one: Plane, other: Plane) -> float:
     """By how much (rise over run) two planes fall differently."""
-    return float(np.hypot(*(one.coefficients - other.coefficients)[:2]))
+    a, b, _ = (one.coefficients - other.coefficients).tolist()
+    return math.hypot(a, b)
 
 
 def is_crease(one: Plane, other: Plane, corner: np.ndarray, members: list[Member], rows: np.ndarray) -> bool:

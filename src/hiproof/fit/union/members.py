@@ -16,9 +16,11 @@ from .volumes import DIRECTION
 class Member:
     """A volume as one of several.
 
-    `rows` (k, 3) are its planes in its own axes, by its own unknowns `design` (k, 3, q), which are those from `first` on of
-    all p, and by all of them `own` (k, 3, p) there and `common` (k, 3, p) in the first direction's; `points` (3, n) its points in its own axes, `places` (3, n) u, v, 1 of them in the first direction's; `seen` are
-    the numbers of its planes on which any lie, with the numbers of those.
+    `rows` (k, 3) are its planes in its own axes: `design` (k, 3, q) times its own unknowns, which
+    are those from number `first` on of all p. `own` (k, 3, p) gives them by all unknowns, `common`
+    (k, 3, p) so in the first direction's axes. `points` (3, n) are its points in its own axes,
+    `places` (3, n) u, v, 1 of them in the first direction's. `seen` are the numbers of its planes
+    on which any lie, with the numbers of those.
     """
 
     rows: np.ndarray

@@ -50,11 +50,15 @@ def find_repairs(
     """Find everything in `drawn` that might be made to meet, the nearest first."""
     gaps = drawn.gaps
     found = list(low_steps(drawn, gaps))
+    owners = np.where(drawn.beside >= 0, drawn.owner[drawn.beside, 0], -1)
     for k in range(1, len(volumes)):
+        own = (owners == k).any(axis=1)
+        free = [edge for edge in range(SIDES) if not sides[k][edge].anchored] if own.any() else []
+        if not free:
+            continue
         places = in_own_axes(drawn.places, int(volumes[k, DIRECTION]), plan, scene)
-        for edge in range(SIDES):
-            if not sides[k][edge].anchored:
-                found += moves_of_side(drawn, gaps, places, k, edge, sides[k][edge])
+        for edge in free:
+            found += moves_of_side(drawn, gaps, places, own, (k, edge), sides[k][edge])
     return sorted(found, key=lambda repair: repair.size)
 
 
@@ -65,18 +69,23 @@ def in_own_axes(xy: np.ndarray, direction: int, plan: Plan, scene: Scene) -> np.
 
 
 def moves_of_side(
-    drawn: DrawnPlan, gaps: np.ndarray, places: np.ndarray, k: int, edge: int, side: Side
+    drawn: DrawnPlan,
+    gaps: np.ndarray,
+    places: np.ndarray,
+    own: np.ndarray,
+    which: tuple[int, int],
+    side: Side,
 ) -> Iterator[Repair]:
-    """Yield moves of one side that shows.
+    """Yield moves of one side, that of (volume, edge), where it shows on edges of its `own` (e,).
 
     It may move parallel to a place nearby, to one at each end, or to the line where its planes
     meet.
     """
+    edge = which[1]
     x, y = places[:, edge // 2], places[:, 1 - edge // 2]
     off = x - side.at - side.lean * y
     along = np.abs(off) < ON_M
-    own = (drawn.owner[drawn.beside, 0] == k) & (drawn.beside >= 0)
-    on_side = along[drawn.edges].all(axis=1) & own.any(axis=1)
+    on_side = along[drawn.edges].all(axis=1) & own
     if not on_side.any():
         return
     ends = np.unique(drawn.edges[on_side])
@@ -85,7 +94,7 @@ def moves_of_side(
     for j, size in zip(near, apart.min(axis=1), strict=True):
         if size < REACH_M:
             moved = Side(float(side.at + off[j]), side.lean, False, side.sigma)
-            yield Repair(float(size), {(k, edge): moved})
+            yield Repair(float(size), {which: moved})
     if len(near):
         first, last = ends[[y[ends].argmin(), y[ends].argmax()]]
         away = [np.hypot(x[near] - x[end], y[near] - y[end]) for end in (first, last)]
@@ -94,14 +103,14 @@ def moves_of_side(
         if size < REACH_M and abs(x[j] - x[i]) < MOST_LEAN * abs(y[j] - y[i]):
             lean = float((x[j] - x[i]) / (y[j] - y[i]))
             moved = Side(float(x[i] - lean * y[i]), lean, False, side.sigma)
-            yield Repair(float(size), {(k, edge): moved})
+            yield Repair(float(size), {which: moved})
     for e in np.flatnonzero(on_side & is_low(gaps)):
         line = fold_line(drawn, places, int(e), edge)
         if line is not None:
             moved = Side(line[0], line[1], False, side.sigma)
             shift = np.abs(moved.at - side.at + (moved.lean - side.lean) * y[drawn.edges[e]]).max()
             if shift < REACH_M:
-                yield Repair(float(shift), {(k, edge): moved})
+                yield Repair(float(shift), {which: moved})
 
 
 def fold_line(drawn: DrawnPlan, places: np.ndarray, e: int, edge: int) -> tuple[float, float] | None:

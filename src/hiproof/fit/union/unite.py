@@ -161,10 +161,13 @@ def fewer(roof: Drawn, own: Collection[int] | None) -> Iterator[np.ndarray]:
 
 def drawn(volumes: np.ndarray, ends: Ends, scene: Scene, known: Known) -> Drawn:
     """The volumes with the sides, on the outline's lines where these are near, and the planes that suit them."""
-    sides = sides_of(volumes, ends.lines, scene)
-    planes = finished(volumes, sides, ends.walls, scene, known)
-    misfit = sum(own.cost + own.price for own in planes)
-    return Drawn(volumes, sides, planes, misfit + structure_cost(volumes, scene))
+    key = volumes.tobytes()
+    if key not in known:
+        sides = sides_of(volumes, ends.lines, scene)
+        planes = finished(volumes, sides, ends.walls, scene, known)
+        misfit = sum(own.cost + own.price for own in planes)
+        known[key] = Drawn(volumes, sides, planes, misfit + structure_cost(volumes, scene))
+    return known[key]
 
 
 def alike(one: np.ndarray, other: np.ndarray) -> bool:
