@@ -319,6 +319,20 @@ def write_wheel(folder, factor):
     return wheel
 
 
+def test_the_runtime_of_numba_is_kept_and_a_damaged_one_compiled_again(town, monkeypatch):
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(town / "kept"))
+    script = "from town.library import answer; import numpy as np; print(answer(np.arange(3.0)))"
+    (town / "town" / "library.py").write_text(LIBRARY.format(function="cumsum"))
+    answers = [run(town, "-c", script) for _ in range(2)]
+    (runtime,) = (town / "kept").rglob("runtime.*.nbc")
+    code = runtime.read_bytes()
+    for damage in (code[:100], b"", pickle.dumps(((), b"", b""))):
+        runtime.write_bytes(damage)
+        answers.append(run(town, "-c", script))
+        assert runtime.read_bytes() == code
+    assert answers == ["[0. 1. 3.]\n"] * 5
+
+
 @pytest.mark.parametrize(
     "damage",
     [lambda whole: whole[:100], lambda whole: b"\x8c\x02\xff\xff" + whole],

@@ -32,7 +32,8 @@ class Dispatcher(CPUDispatcher):
 
     def load(self, signature: Any) -> None:
         """Have the function's code in this process, from disk or compiled, for compiled callers."""
-        super().compile(signature)
+        if tuple(sigutils.normalize_signature(signature)[0]) not in self.overloads:
+            super().compile(signature)
 
     def get_call_template(self, args: tuple, kws: dict) -> tuple:
         """Answer numba's question, when it compiles a caller, what a call returns."""
@@ -72,5 +73,5 @@ class Dispatcher(CPUDispatcher):
         with context.push_code_library(library):
             context.create_cpython_wrapper(library, described, environment, None)
         entry = context.get_executable(library, described, environment)
-        self._cache.save_wrapper(signature, library, environment)
+        self._cache.save_wrapper(signature, context, library, environment.consts)
         return entry

@@ -25,11 +25,10 @@ from typing import Any
 
 import numba
 from numba.core import caching
-from numba.core.runtime import rtsys
 from numba.core.serialize import dumps
 
 from ..errors import NotKeptWarning
-from . import linking, news
+from . import linking, news, runtime
 from .kinds import KIND, runs_kind
 from .stamp import PYTHON, stamp_of
 
@@ -57,7 +56,7 @@ class Kept:
         What numba compiles with (`context.refresh`) is imported when it compiles; kept code needs
         its memory alone.
         """
-        rtsys.initialize(context)
+        start_runtime(context)
         for code in self.read("", signature, context):
             try:
                 result = linking.rebuilt(context, *code)
@@ -75,18 +74,17 @@ class Kept:
         news.tell()
         if not result.library.has_dynamic_globals:  # addresses of this process: not to be kept
             linking.settle(result, self.function, signature)
-            self.write("", signature, result.library, reduced(result), *linking.links(result))
+            context, code = result.target_context, reduced(result)
+            self.write("", signature, context, code, *linking.links(result))
 
     def load_wrapper(self, signature: Any, context: Any) -> tuple[list, bytes] | None:
         """Return constants and machine code of the wrapper for Python, None where none is kept."""
         return next(self.read(WRAPPER, signature, context), None)
 
-    def save_wrapper(self, signature: Any, library: Any, environment: Any) -> None:
+    def save_wrapper(self, signature: Any, context: Any, library: Any, constants: list) -> None:
         """Keep a wrapper that was just compiled."""
         if not library.has_dynamic_globals:
-            self.write(
-                WRAPPER, signature, library, environment.consts, library._get_compiled_object()
-            )
+            self.write(WRAPPER, signature, context, constants, library._get_compiled_object())
 
     def read(self, part: str, signature: Any, context: Any) -> Iterator[Any]:
         """What is kept of a `part` of the code, that for this machine's own processor first."""
@@ -98,12 +96,12 @@ class Kept:
             if kept == signature:
                 yield content
 
-    def write(self, part: str, signature: Any, library: Any, *content: Any) -> None:
+    def write(self, part: str, signature: Any, context: Any, *content: Any) -> None:
         """Write a `part` of the code where the next process finds it."""
         folder = place_to_write(self.folders)
         if folder is None:
             return
-        file = folder / self.file_name(part, signature, library.codegen.magic_tuple())
+        file = folder / self.file_name(part, signature, context.codegen().magic_tuple())
         beside = file.with_name(f"{file.name}.{uuid.uuid4().hex}")
         try:
             beside.write_bytes(dumps((signature, *content)))
@@ -136,12 +134,26 @@ class Kept:
                 file.unlink(missing_ok=True)
 
 
+def start_runtime(context: Any) -> None:
+    """Have numba's runtime in this process, from disk or compiled."""
+    if runtime.is_started():
+        return
+    kept, signature = Kept(start_runtime, Path(runtime.__file__)), ()
+    for code in kept.read("", signature, context):
+        with suppress(TypeError, ValueError, RuntimeError):  # damaged inside
+            return runtime.start(context, *code)
+    kept.write("", signature, context, *runtime.compile_runtime(context))
+
+
 def reduced(result: Any) -> tuple:
-    """What is pickled of a result: without the environments of copied functions that hold no
-    constant, which no code reads; loading them would import half of numba.
+    """Return what is pickled of a result.
+
+    The annotation, half of it all, is for people who look into numba. Environments of copied
+    functions that hold no constant are read by no code; loading them would import half of numba.
     """
-    *code, environments = result._reduce()
-    return *code, tuple(environment for environment in environments if environment.consts)
+    *code, _, reload, environments = result._reduce()
+    kept = tuple(environment for environment in environments if environment.consts)
+    return *code, "", reload, kept
 
 
 def folders(function: Callable, file: str) -> tuple[Path, ...]:

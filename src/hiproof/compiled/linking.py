@@ -125,7 +125,7 @@ def rebuilt(
         signature,
         objectmode,
         lifted,
-        annotation,
+        _,
         _,
         environments,
     ) = code
@@ -140,11 +140,11 @@ def rebuilt(
         typing_context=context.typing_context,
         library=library,
         environment=constants,
-        entry_point=context.get_executable(library, described, constants),
+        entry_point=library,  # a key of numba's; what Python calls is made when it calls
         fndesc=described,
         signature=signature,
         objectmode=objectmode,
         lifted=lifted,
-        type_annotation=annotation,
+        type_annotation=None,
         referenced_envs=environments,
     )
