@@ -180,7 +180,8 @@ def test_every_named_number_has_a_reason():
         ("hiproof", "'torch', 'dask', 'numba', 'scipy', 'onnxruntime'"),
         (
             "hiproof.city.run, hiproof.city.solve",
-            "'dask', 'scipy.ndimage', 'scipy.optimize', 'onnxruntime', 'rasterio'",
+            "'dask', 'scipy.ndimage', 'scipy.optimize', 'scipy.sparse', 'scipy.spatial', "
+            "'onnxruntime', 'rasterio'",
         ),
     ],
     ids=["the package", "a run"],

@@ -11,6 +11,8 @@ import functools
 import numpy as np
 import shapely
 
+from ..geometry.components import label_components
+
 TOUCH_M = 0.2
 """Gap (m) up to which outlines touch: surveys leave slits of a decimetre between houses
 of a row.
@@ -35,15 +37,9 @@ class Outlines:
     @functools.cached_property
     def labels(self) -> np.ndarray:
         """The number (n,) of the row that each outline is in."""
-        from scipy.sparse import coo_array
-        from scipy.sparse.csgraph import connected_components
-
         tree = shapely.STRtree(self.polygons)
         pairs = tree.query(self.polygons, predicate="dwithin", distance=TOUCH_M)
-        count = len(self.polygons)
-        return connected_components(
-            coo_array((np.ones(pairs.shape[1]), pairs), shape=(count, count))
-        )[1]
+        return label_components(len(self.polygons), pairs)
 
     @functools.cached_property
     def boxes(self) -> np.ndarray:

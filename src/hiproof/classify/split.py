@@ -14,6 +14,7 @@ import numpy as np
 import shapely
 
 from ..errors import ErrorReport, InputError, InputWarning, report_error
+from ..geometry.components import label_components
 from ..log import counted
 from ..model import PointCloud
 from ..settings import ReadSettings, Settings
@@ -243,9 +244,6 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
     Occupied cells of half the gap, on the world's own grid, are connected where their centres are
     at most the gap apart; groups come in the order of their first cell, by rows.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     cell_m = gap_m / 2
     cells = np.floor(np.asarray(xy, float)[:, :2] / cell_m).astype(np.int64)
     cells -= cells.min(axis=0) - 2
@@ -257,12 +255,9 @@ def connected_groups(xy: np.ndarray, gap_m: float) -> list[np.ndarray]:
         at = np.minimum(np.searchsorted(occupied, wanted), len(occupied) - 1)
         first = np.flatnonzero(occupied[at] == wanted)
         links.append(np.column_stack([first, at[first]]))
-    rows, others = np.concatenate(links).T
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, others)), shape=(len(occupied),) * 2)
-    count, label = connected_components(graph, directed=False)
-    group_of = label[cell_of]
+    group_of = label_components(len(occupied), np.concatenate(links).T)[cell_of]
     order = np.argsort(group_of, kind="stable")
-    return np.split(order, np.cumsum(np.bincount(group_of, minlength=count))[:-1])
+    return np.split(order, np.cumsum(np.bincount(group_of))[:-1])
 
 
 def named(places: list[Place], xyz: np.ndarray) -> list[FoundBuilding]:

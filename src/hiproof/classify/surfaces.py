@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.components import label_components
 from ..read.thin import hashes
 
 # m; clouds are thinned to one point in such a cube, so that a drone's cloud costs no more
@@ -101,9 +102,6 @@ def connected(
     """Number (v,) of the surface of each voxel: neighbours are of one where both are smooth and lie
     in each other's plane.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     one, other = np.repeat(np.arange(len(xyz)), neighbours.shape[1]), neighbours.ravel()
     both = smooth[one] & smooth[other]
     one, other = one[both], other[both]
@@ -111,7 +109,4 @@ def connected(
     same = np.abs((normal[one] * normal[other]).sum(axis=1)) > np.cos(np.radians(TURN_DEG))
     for end in (one, other):
         same &= np.abs((between * normal[end]).sum(axis=1)) < SMOOTH_M
-    links = coo_array(
-        (np.ones(same.sum(), np.int8), (one[same], other[same])), shape=(len(xyz),) * 2
-    )
-    return connected_components(links, directed=False)[1]
+    return label_components(len(xyz), np.stack([one[same], other[same]]))

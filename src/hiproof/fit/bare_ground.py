@@ -16,7 +16,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import shapely
-from scipy.spatial import cKDTree
 
 from .direction import main_direction
 
@@ -165,6 +164,8 @@ class Scene:
         places = np.column_stack([grid_x.ravel(), grid_y.ravel()])
         inside = shapely.intersects_xy(outline, places[:, 0], places[:, 1])
         value = np.zeros(len(places))
+        from scipy.spatial import cKDTree  # a tenth of a second, which most runs need not spend
+
         to_roof = cKDTree(roof).query(places[inside], distance_upper_bound=FARTHEST_ROOF_M)[0]
         to_ground = cKDTree(ground).query(places[inside], distance_upper_bound=GROUND_REACH_M)[0]
         spacing = float(np.clip(typical_spacing(roof), NEAREST_ROOF_M, FARTHEST_ROOF_M))
