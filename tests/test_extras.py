@@ -34,7 +34,7 @@ PACKAGES = {
     "pyarrow": "parquet",
     "psycopg": "postgis",
     "distributed": "city",
-    "fsspec": "city",
+    "fsspec": "city",  # of points; GeoParquet by address asks for the smaller extra `parquet`
     "matplotlib": "report",
 }
 
@@ -48,6 +48,8 @@ NEEDY = {
     "one primitive by the settings": ("onnxruntime", '[fit]\nparts = "one"', []),
     "other weights": ("onnxruntime", '[segment]\nweights = "{cloud}"', []),
     "GeoParquet": ("pyarrow", "", ["--parquet"]),
+    "footprints in GeoParquet": ("pyarrow", "", ["--footprints", "https://host/a.parquet"]),
+    "footprints of Overture": ("pyarrow", "", ["--footprints", "overture"]),
     "a cluster": ("distributed", "", ["--scheduler", "tcp://127.0.0.1:1"]),
     "footprints from a database": ("psycopg", "", ["--footprints", "postgresql://host/db?table=t"]),
 }
@@ -133,6 +135,15 @@ def test_points_by_address_are_refused_before_anything_is_written(hidden, tmp_pa
     hidden("fsspec")
     with pytest.raises(InputError, match=told("fsspec")):
         reconstruct_area(Request(("https://example.org/a.laz",), tmp_path / "out"))
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("source", ["overture", "https://example.org/a.parquet"])
+def test_footprints_by_address_name_the_extra_of_their_format(source, hidden, tmp_path):
+    pytest.importorskip("pyarrow", reason="the extra `parquet` is not installed")
+    hidden("fsspec")
+    with pytest.raises(InputError, match=r"fsspec for GeoParquet .+'hiproof\[parquet\]'$"):
+        reconstruct_area(Request(("a.laz",), tmp_path / "out", source))
     assert not (tmp_path / "out").exists()
 
 
@@ -248,10 +259,9 @@ def names_in(requirements):
 
 def test_each_sentence_names_the_extra_that_brings_the_package():
     sources = "\n".join(path.read_text(encoding="utf-8") for path in (ROOT / "src").rglob("*.py"))
-    assert dict(re.findall(r'(?<!>> )needed\("(\w+)[\w.]*", "(\w+)"', sources)) == PACKAGES
-    assert [
-        package for package, extra in PACKAGES.items() if package not in names_in(OPTIONAL[extra])
-    ] == []
+    found = set(re.findall(r'(?<!>> )needed\("(\w+)[\w.]*", "(\w+)"', sources))
+    assert found == {*PACKAGES.items(), ("fsspec", "parquet")}
+    assert [pair for pair in found if pair[0] not in names_in(OPTIONAL[pair[1]])] == []
     assert names_in(PROJECT["dependencies"]).isdisjoint(PACKAGES)
     assert names_in(OPTIONAL["all"]) == {"hiproof", *PACKAGES.values()}
 

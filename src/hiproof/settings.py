@@ -84,6 +84,11 @@ class ReadSettings:
         choices=("auto", "metre", "foot", "us-survey-foot"),
         option="--unit",
     )
+    overture_catalogue: str = setting(
+        "https://stac.overturemaps.org/catalog.json",
+        "address of Overture Maps' STAC catalogue, whose latest release `--footprints overture` "
+        "reads, or of the catalogue of one release",
+    )
     override_columns: tuple[str, ...] = setting(
         (),
         'columns of the footprints that overrule the fit, as COLUMN=KEY such as "daktype=type" '

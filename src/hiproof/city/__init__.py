@@ -10,6 +10,7 @@ overrides     what is known better of some buildings, and which of them have to 
 table_values  values of columns as overrides want them
 changed       a run whose footprints changed: what is the same stays
 prepare       the plan made: which buildings there are, from footprints or the cloud
+from_overture footprints of an Overture Maps release, kept as a file before they are read
 frame         the CRS and units of an area
 classes       which classes of points may be roofs
 registration  the common shift of all footprints, before there are tiles

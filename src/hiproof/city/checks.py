@@ -36,7 +36,10 @@ def refuse_missing_packages(request: Any) -> None:
     """Raise InputError where a package is not installed that this request needs, and most
     do not.
     """
+    from ..read import geoparquet
     from ..read.database import import_psycopg, is_database
+    from ..read.geoparquet import is_parquet
+    from ..read.overture import is_overture
     from ..read.remote import import_fsspec, is_url
 
     if request.scheduler:
@@ -51,10 +54,12 @@ def refuse_missing_packages(request: Any) -> None:
         from ..read.raster import import_rasterio
 
         import_rasterio()
+    if is_overture(request.footprints) or is_parquet(request.footprints or ""):
+        geoparquet.import_pyarrow()
+        if is_overture(request.footprints) or is_url(request.footprints):
+            geoparquet.import_fsspec()
     if request.settings.write.parquet:
-        from ..write.tables.geoparquet import import_pyarrow
-
-        import_pyarrow()
+        geoparquet.import_pyarrow()
 
 
 def refuse_settings(settings: Settings) -> None:

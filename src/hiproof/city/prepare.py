@@ -20,6 +20,7 @@ from ..write.reprojected import crs_of_files
 from ..write.tables.geopackage import attributes_with_a_column
 from .classes import settle_classes
 from .from_cloud import jobs_from_cloud
+from .from_overture import with_overture
 from .outlines import MOST_ROW_M
 from .plan import (
     Job,
@@ -48,6 +49,7 @@ def make_plan(request: Request) -> WorkPlan:
     from .frame import plan_bounds, settle_frame
 
     headers = read_headers(request.clouds)
+    request = with_overture(request, headers)
     frame = settle_frame(request, headers)
     refuse_box_elsewhere(request.bbox, plan_bounds(headers))
     # opened only to be told now if it cannot be read, and not after all points are sorted

@@ -30,6 +30,7 @@ from .bundles import bundles_of, remove_bundles
 from .checks import refuse_unusable
 from .cores import as_many_as_pay
 from .executors import make_executor
+from .from_overture import kept_or_named, source_of
 from .ledger import Failure, Ledger
 from .lock import held
 from .merge import merge, output_files
@@ -334,12 +335,13 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
     """run.json: version, effective settings, inputs, counts, timings: the only file of a run that
     knows the time.
     """
+    footprints = kept_or_named(request)
     record = {
         "hiproof": __version__,
         "settings": plan.settings.to_dict(),
         "inputs": {
             "clouds": list(request.clouds),
-            "footprints": request.footprints,
+            "footprints": footprints,
             "layer": request.layer,
             "id_attribute": request.id_attribute,
             "where": request.where,
@@ -348,6 +350,7 @@ def write_run_record(request: Request, plan: WorkPlan, summary: Summary) -> None
             "overrides": request.overrides,
             "started_in": str(Path.cwd()),  # what is not an address or absolute is meant from there
         },
+        "footprints_source": source_of(footprints),
         "crs": plan.crs_wkt,
         "transformations": [operation.to_dict() for operation in plan.operations],
         "registration": plan.registration and plan.registration.to_dict(),

@@ -19,6 +19,7 @@ from .convert import convert
 from .demo import demo
 from .edit import edit
 from .evaluate import evaluate
+from .footprints import footprints
 from .load import load
 from .reconstruct import reconstruct
 from .report import report
@@ -99,6 +100,7 @@ for command in (
     convert,
     view,
     classify,
+    footprints,
     segment,
     train,
 ):

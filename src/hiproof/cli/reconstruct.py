@@ -23,7 +23,11 @@ def reconstruct(
     ],
     out: Annotated[Path, typer.Option(help="folder for the results")],
     footprints: Annotated[
-        str | None, typer.Option(help="building polygons; without them the cloud is split")
+        str | None,
+        typer.Option(
+            help="building polygons: a file, an address, a PostGIS table, or overture for those of "
+            "Overture Maps (extra `parquet`); without them the cloud is split"
+        ),
     ] = None,
     layer: Annotated[
         str | None, typer.Option(help="layer of the footprints, where a file has several")

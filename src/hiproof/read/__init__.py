@@ -24,6 +24,10 @@ features      a layer's features, odd attributes as text
 wkb           its geometries, surfaces in space among them
 polygons      polygons put right
 database      footprints from PostGIS
+geoparquet    GeoParquet files, of which only the row groups around an extent are fetched
+parquet_table footprints from such a file
+stac          static STAC catalogues
+overture      footprints of an Overture Maps release
 overlap       whether footprints lie where the cloud does
 assign        which points belong to which footprint
 cell_kernel   points and cells; compiled

@@ -34,9 +34,11 @@ from .crs import (
 )
 from .database import is_database, read_table, table_crs
 from .features import read_layer
+from .geoparquet import is_parquet
 from .layers import list_layers, source_of
 from .operations import find_operation, warn_if_coarse
 from .overlap import refuse_degrees, told_box
+from .parquet_table import parquet_crs, read_parquet
 from .polygons import is_surface, simple_polygons
 from .remote import is_url
 from .wkb import geometries_of
@@ -119,11 +121,13 @@ def footprint_crs(path: str | Path, layer: str | int | None = None) -> CRS | Non
     """
     if is_database(path):
         return plan_crs(table_crs(str(path)))
+    if is_parquet(path):
+        return plan_crs(parquet_crs(path))
     source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
     return plan_crs(reading(lambda: pyogrio.read_info(source, layer=layer), path)["crs"])
 
 
-def plan_crs(text: str | None) -> CRS | None:
+def plan_crs(text: str | CRS | None) -> CRS | None:
     """The CRS that a vector file names, None for one of heights alone and for GeoPackage's
     "undefined".
     """
@@ -165,6 +169,13 @@ def read_features(
     if is_database(path):
         return read_table(str(path), where)
     refuse_missing(path)
+    if is_parquet(path):
+        found = read_parquet(
+            path, layer, where, lambda crs: bbox and box_in(plan_crs(crs), bbox, bbox_crs)
+        )
+        refuse_nothing(path, len(found[1]), found[0]["total_bounds"], where, bbox)
+        refuse_lines(found[2], path)
+        return found
     source, layer = reading(lambda: source_of(str(path), one_layer(path, layer)), path)
     info = reading(lambda: pyogrio.read_info(source, layer=layer), path)
     chosen = {"where": where, "bbox": bbox and box_in(plan_crs(info["crs"]), bbox, bbox_crs)}
@@ -181,24 +192,9 @@ def read_features(
         raise InputError(
             f"expected polygons in {path}, got a table without geometry; name another file or layer"
         )
-    if not len(wkb) and (where or bbox):
-        said = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
-        raise InputError(
-            f"expected footprints in {path} ({told_box(info['total_bounds'])}) that {said} let "
-            "through, got none; relax or leave out what does not fit"
-        )
-    if not len(wkb):
-        raise InputError(
-            f"expected footprints in {path}, got a layer without features; name another file or "
-            "layer"
-        )
+    refuse_nothing(path, len(wkb), info["total_bounds"], where, bbox)
     geometries = geometries_of(wkb)
-    kinds = {g.geom_type for g in geometries if g is not None}
-    if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
-        raise InputError(
-            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or "
-            "close the lines first"
-        )
+    refuse_lines(geometries, path)
 
     def known_of(name: str) -> np.ndarray:
         # of all columns: in some formats those left out are empty to the condition as well
@@ -209,6 +205,40 @@ def read_features(
         return values[list(told["fields"]).index(name)]
 
     return meta, numbers, geometries, as_declared(meta["fields"], meta["dtypes"], columns, known_of)
+
+
+def refuse_nothing(
+    path: str | Path,
+    count: int,
+    bounds: Sequence[float] | None,
+    where: str | None,
+    bbox: Box | None,
+) -> None:
+    """Raise InputError where `count` is 0: no features in a layer that lies in `bounds`, or none
+    that a condition or a box lets through.
+    """
+    if count:
+        return
+    if where or bbox:
+        said = " and ".join(name for name, value in (("--where", where), ("--bbox", bbox)) if value)
+        lies = "" if bounds is None else f" ({told_box(bounds)})"
+        raise InputError(
+            f"expected footprints in {path}{lies} that {said} let through, got none; relax or "
+            "leave out what does not fit"
+        )
+    raise InputError(
+        f"expected footprints in {path}, got a layer without features; name another file or layer"
+    )
+
+
+def refuse_lines(geometries: np.ndarray, path: str | Path) -> None:
+    """Raise InputError where none of the geometries can be an outline."""
+    kinds = {g.geom_type for g in geometries if g is not None}
+    if kinds and not any("Polygon" in kind or kind == "GeometryCollection" for kind in kinds):
+        raise InputError(
+            f"expected polygons in {path}, got {', '.join(sorted(kinds))}; name another layer, or "
+            "close the lines first"
+        )
 
 
 def refuse_missing(path: str | Path) -> None:

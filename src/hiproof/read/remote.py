@@ -15,6 +15,7 @@ from ..extras import needed
 from ..masking import remember
 
 BLOCK_BYTES = 1 << 20  # bytes a request; a server's answer takes longer than a megabyte's way
+SILENCE_S = 60.0  # s that a server may be silent; fsspec waits for five minutes in all
 
 
 def is_url(path: str | Path) -> bool:
@@ -27,21 +28,25 @@ def is_url(path: str | Path) -> bool:
 
 
 @contextmanager
-def opened(path: str | Path) -> Iterator[BinaryIO]:
+def opened(path: str | Path, expected: str = "a point cloud", **reading: Any) -> Iterator[BinaryIO]:
     """A seekable binary file at a path or an address.
 
-    Raises InputError where an address cannot be opened.
+    `reading` are options of fsspec's files. Raises InputError, which says what was `expected`,
+    where an address cannot be opened.
     """
-    with open_address(str(path)) if is_url(path) else Path(path).open("rb") as file:
+    with (
+        open_address(str(path), expected, **reading) if is_url(path) else Path(path).open("rb")
+    ) as file:
         yield file
 
 
-def open_address(url: str) -> BinaryIO:
+def open_address(url: str, expected: str = "a point cloud", **reading: Any) -> BinaryIO:
     fsspec = import_fsspec()
     remember(url)
     try:
         # buffered once more: fsspec's own files read lines of any length only
-        return io.BufferedReader(fsspec.open(url, "rb", block_size=BLOCK_BYTES).open())
+        options = {"block_size": BLOCK_BYTES, **reading, **options_of(url)}
+        return io.BufferedReader(fsspec.open(url, "rb", **options).open())
     except ImportError as error:
         raise InputError(
             f"expected what fsspec needs to open {url}, got: {error}; install it"
@@ -50,8 +55,18 @@ def open_address(url: str) -> BinaryIO:
         # of what it cannot reach fsspec itself tells the address alone
         told = error.__cause__ or error
         raise InputError(
-            f"expected a point cloud at {url}, got: {str(told) or type(told).__name__}; check it"
+            f"expected {expected} at {url}, got: {str(told) or type(told).__name__}; check it"
         ) from error
+
+
+def options_of(url: str) -> dict[str, Any]:
+    """What fsspec's file system for an address is told, beside its defaults."""
+    if not url.lower().startswith(("http://", "https://")):
+        return {}
+    from aiohttp import ClientTimeout
+
+    timeout = ClientTimeout(total=None, sock_connect=SILENCE_S, sock_read=SILENCE_S)
+    return {"client_kwargs": {"timeout": timeout}}
 
 
 def import_fsspec() -> Any:

@@ -8,7 +8,7 @@ import json
 import os
 from typing import Any
 
-from ...extras import needed
+from ...read.geoparquet import import_pyarrow
 from ...settings import WriteSettings
 from ..building_attributes import PREFIX
 from ..head import FileHead
@@ -91,8 +91,3 @@ def arrays(rows: list[Row], kinds: dict[str, type], schema: Any) -> list:
         for (name, kind), type in zip(kinds.items(), schema.types, strict=False)
     ]
     return [*columns, pyarrow.array([outline for outline, _ in rows], schema.types[-1])]
-
-
-def import_pyarrow() -> None:
-    """Raise InputError where what writes GeoParquet is missing."""
-    needed("pyarrow", "parquet", "GeoParquet")

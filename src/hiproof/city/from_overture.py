@@ -1,0 +1,152 @@
+"""Footprints of an Overture Maps release for a run's clouds: kept as a GeoPackage, and read from
+there like those of any file.
+
+Overture deletes its old releases, so that what a run was made from is only known where it is kept.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import warnings
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from ..errors import InputError, OutputError, SettingsError
+from ..log import LOGGER, counted
+from ..masking import masked_values
+from ..read.overture import TYPES, OvertureFootprints, is_overture, read_overture
+from ..write.files import atomic
+from .request import Request
+
+if TYPE_CHECKING:
+    from ..read.pointcloud import PointFileHeader
+
+KEPT = "overture.gpkg"
+"""The file in a run's own folder."""
+
+SOURCE = "hiproof_source"
+"""The entry of a GeoPackage's metadata that tells where its footprints come from, as JSON."""
+
+HALF_TURN = 180.0  # degrees of longitude that no clouds extend over on one side of the meridian
+SIDE_PARTS = 16  # of each side of a cloud's box: its sides are curves in longitude and latitude
+
+
+def with_overture(request: Request, headers: list[PointFileHeader]) -> Request:
+    """`request` with footprints that are a file: those of Overture's release are fetched and kept
+    in the run's own folder.
+    """
+    if not is_overture(request.footprints):
+        return request
+    path = kept_file(request.out)
+    keep_footprints(request, headers, path)
+    return dataclasses.replace(request, footprints=str(path), layer=None)
+
+
+def kept_file(out: Path) -> Path:
+    """Where the run in the folder `out` keeps the footprints that it fetches."""
+    return Path(out) / ".hiproof" / KEPT
+
+
+def kept_or_named(request: Request) -> str | None:
+    """The footprints from which a run is made: what it has kept, else what the request names."""
+    return str(kept_file(request.out)) if is_overture(request.footprints) else request.footprints
+
+
+def keep_footprints(request: Request, headers: list[PointFileHeader], path: Path) -> dict[str, Any]:
+    """Write the footprints of Overture's release that lie in the clouds' extent to a GeoPackage.
+
+    The layer of `request` names one of Overture's types. Returns where they come from. Raises
+    SettingsError for another layer, InputError for clouds without a CRS and where the release
+    cannot be read.
+    """
+    kind = request.layer or TYPES[0]
+    if kind not in TYPES:
+        raise SettingsError(
+            f"expected --layer to be one of Overture's types {' and '.join(TYPES)}, got {kind!r}; "
+            "without it buildings are read"
+        )
+    catalogue = request.settings.read.overture_catalogue
+    found = read_overture(catalogue, extent_of(request, headers), kind)
+    write_geopackage(found, path)
+    LOGGER.info(
+        "%s of Overture's release %s",
+        counted(len(found.table), "footprint"),
+        found.note["release"],
+    )
+    return found.note
+
+
+def extent_of(request: Request, headers: list[PointFileHeader]) -> shapely.Geometry:
+    """The boxes of the point files in longitude and latitude, as one geometry.
+
+    Raises InputError where no file names a CRS, and for an extent across the 180th meridian.
+    """
+    from ..read.crs import names_place, parse_crs, way_between
+    from ..read.pointcloud import common_crs
+    from .frame import plan_bounds
+
+    read = request.settings.read
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # it is said when the frame is settled
+        crs = common_crs({h.path: h.crs for h in headers}, parse_crs(read.crs), read.unit)
+    if not names_place(crs):
+        raise InputError(
+            f"expected clouds that name their CRS with --footprints overture, got {headers[0].path}"
+            " without one; name it with --crs"
+        )
+    transformer = way_between(crs, CRS("OGC:CRS84"))
+    bounds = plan_bounds(headers)
+    sides = np.maximum(bounds[:, 2:] - bounds[:, :2], 1e-6).max(axis=1)
+    boxes = shapely.segmentize(shapely.box(*bounds.T), sides / SIDE_PARTS)
+    extent = shapely.union_all(
+        shapely.transform(boxes, lambda xy: np.column_stack(transformer.transform(*xy.T)))
+    )
+    west, _, east, _ = extent.bounds
+    if not east - west < HALF_TURN:
+        raise InputError(
+            f"expected clouds on one side of the 180th meridian with --footprints overture, got "
+            f"clouds from {west:.2f} to {east:.2f} degrees; run each side alone"
+        )
+    return extent
+
+
+def write_geopackage(found: OvertureFootprints, path: Path) -> None:
+    """Write footprints with where they come from; the file appears whole or not at all."""
+    import pyogrio
+
+    options: dict[str, Any] = {
+        "layer": found.note["type"],
+        "driver": "GPKG",
+        "geometry_name": "geometry",
+        "geometry_type": "Unknown",
+        "crs": "EPSG:4326",
+        "dataset_metadata": {SOURCE: json.dumps(masked_values(found.note))},
+    }
+    with atomic(path) as beside:
+        try:
+            pyogrio.raw.write_arrow(found.table, str(beside), **options)
+        except RuntimeError as error:  # the base of pyogrio's own
+            raise OutputError(
+                f"expected to write {path}, got: {error}; check the path and the space left"
+            ) from error
+
+
+def source_of(path: str | None) -> dict[str, Any] | None:
+    """Where the footprints of a GeoPackage come from, None where it does not tell or is not
+    there.
+    """
+    import pyogrio
+    from pyogrio.errors import DataSourceError
+
+    if not path or not str(path).endswith(".gpkg") or not Path(path).is_file():
+        return None
+    try:
+        told = pyogrio.read_info(path, layer=0)["dataset_metadata"] or {}
+        return json.loads(told[SOURCE])
+    except (DataSourceError, KeyError, ValueError):
+        return None

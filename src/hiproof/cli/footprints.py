@@ -1,0 +1,50 @@
+"""`hiproof footprints`: building footprints of the clouds' extent, kept as a file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def footprints(
+    clouds: Annotated[
+        list[str],
+        typer.Argument(help="point files (LAS, LAZ, COPC, XYZ, CSV, PLY) or folders of them"),
+    ],
+    out: Annotated[Path, typer.Option(help="GeoPackage to write")],
+    layer: Annotated[str | None, typer.Option(help="building (default) or building_part")] = None,
+    crs: Annotated[
+        str | None, typer.Option(help="CRS of the clouds (default: as their files say)")
+    ] = None,
+    config: Annotated[
+        Path | None, typer.Option(help="settings file (default: hiproof.toml beside the data)")
+    ] = None,
+) -> None:
+    """Fetch the building footprints of the clouds' extent from Overture Maps (extra `parquet`).
+
+    Pass the file to `hiproof reconstruct --footprints`, with or without a network. Example:
+
+    hiproof footprints tile.laz --out footprints.gpkg
+    """
+    from ..city.from_overture import keep_footprints
+    from ..city.prepare import read_headers
+    from ..city.request import Request
+    from ..read.pointcloud import expand_paths
+    from ..settings import Settings
+    from .reconstruct import settings_beside
+
+    config = config or settings_beside(*clouds)
+    settings = Settings.from_toml(config) if config else Settings()
+    files = tuple(map(str, expand_paths(tuple(clouds))))
+    request = Request(
+        files, out, layer=layer, settings=settings.replace({"read": {"crs": crs}} if crs else {})
+    )
+    note = keep_footprints(request, read_headers(files), out)
+    sources = ", ".join(source["dataset"] for source in note["sources"])
+    typer.echo(
+        f"{out}: {note['footprints']:,} footprints of {note['name']} {note['release']} "
+        f"({note['licence']}; from {sources or 'unnamed sources'}). Attribute them as "
+        f"{note['attribution']}."
+    )

@@ -1,0 +1,274 @@
+"""GeoParquet files through pyarrow, local or by address: of a file with boxes for its rows, only
+the row groups that meet an extent are fetched.
+
+Reads the versions 0.4 to 1.1 of the format: geometries as WKB, or as polygons and multipolygons in
+Arrow's own lists.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import shapely
+from pyproj import CRS
+
+from ..errors import InputError
+from ..extras import needed
+from .crs import parse_crs
+from .remote import is_url, opened
+from .wkb import geometries_of
+
+MAGIC = b"PAR1"
+"""The first bytes of every Parquet file."""
+
+SUFFIXES = (".parquet", ".geoparquet")
+"""By which a file is known whose bytes are not at hand."""
+
+LONGITUDE_LATITUDE = "OGC:CRS84"
+"""The CRS of a file that names none (GeoParquet 1.1, section "crs")."""
+
+SIDES = ("xmin", "ymin", "xmax", "ymax")
+"""The sides of a box, as columns of boxes are named."""
+
+LISTS = {
+    "polygon": shapely.GeometryType.POLYGON,
+    "multipolygon": shapely.GeometryType.MULTIPOLYGON,
+}
+"""Encodings of surfaces that are lists of coordinates (GeoParquet 1.1, section "encoding")."""
+
+
+@dataclass(frozen=True)
+class GeometryColumn:
+    """The geometry of a file as its metadata describe it.
+
+    `others` are further columns of geometries. `sides` are the columns of a row's box, each the
+    names on the way to it, None where the file has none. `bounds` is the box of all rows, None
+    where it is not told.
+    """
+
+    name: str
+    encoding: str
+    crs: CRS | None
+    others: tuple[str, ...]
+    sides: tuple[tuple[str, ...], ...] | None
+    bounds: tuple[float, ...] | None
+
+
+def is_parquet(path: str | Path) -> bool:
+    """Whether a footprint source is a Parquet file: by its first bytes, at an address by its
+    suffix.
+
+    >>> is_parquet("https://example.org/a.parquet?token=1"), is_parquet("postgresql://host/db")
+    (True, False)
+    """
+    if is_url(path):
+        return urlsplit(str(path)).path.lower().endswith(SUFFIXES)
+    if str(path).startswith("/vsi"):
+        return False
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(len(MAGIC)) == MAGIC or str(path).lower().endswith(SUFFIXES)
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def open_parquet(path: str | Path) -> Iterator[Any]:
+    """Yield pyarrow's ParquetFile of a path or an address.
+
+    Raises InputError for what cannot be opened, and for whatever goes wrong in the block while it
+    is read.
+    """
+    parquet = import_pyarrow()
+    if is_url(path):
+        import_fsspec()
+    # exact ranges: a Parquet file tells where everything lies
+    with opened(path, "GeoParquet footprints", cache_type="none") as source:
+        try:
+            with parquet.ParquetFile(source, pre_buffer=True) as file:
+                yield file
+        except (InputError, MemoryError):
+            raise
+        except Exception as error:  # pyarrow's kinds, and those of each of fsspec's file systems
+            raise InputError(
+                f"expected a GeoParquet file at {path}, got: {str(error) or type(error).__name__}; "
+                "check the file, or copy or download it again"
+            ) from error
+
+
+def geometry_column(file: Any, path: str | Path) -> GeometryColumn:
+    """The main geometry of an open file. Raises InputError where it has none of a known kind."""
+    try:
+        geo = json.loads((file.metadata.metadata or {})[b"geo"])
+        name = geo["primary_column"]
+        told = geo["columns"][name]
+        encoding = str(told.get("encoding", "WKB"))
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise InputError(
+            f"expected GeoParquet in {path}, got a Parquet file that describes no geometry "
+            '(no "geo" in its metadata); convert it with geopandas or DuckDB'
+        ) from error
+    if encoding.upper() != "WKB" and encoding not in LISTS:
+        raise InputError(
+            f"expected polygons in {path}, got geometries encoded as {encoding}; name another file"
+        )
+    bounds = told.get("bbox")
+    return GeometryColumn(
+        name=name,
+        encoding=encoding,
+        crs=parse_crs(told.get("crs", LONGITUDE_LATITUDE)),
+        others=tuple(other for other in geo["columns"] if other != name),
+        sides=sides_of_rows(told, file.schema_arrow),
+        # of a box in space the middle two sides are those in plan
+        bounds=tuple(bounds[:2] + bounds[len(bounds) // 2 :][:2]) if bounds else None,
+    )
+
+
+def sides_of_rows(told: dict[str, Any], schema: Any) -> tuple[tuple[str, ...], ...] | None:
+    """The columns of a row's box: those that the metadata name, else the fields of a column `bbox`,
+    as files from before version 1.1 have it.
+    """
+    from pyarrow import types
+
+    covering = (told.get("covering") or {}).get("bbox")
+    if covering:
+        return tuple(tuple(covering[side]) for side in SIDES)
+    kind = {field.name: field.type for field in schema}.get("bbox")
+    if kind is None or not types.is_struct(kind):
+        return None
+    names = {field.name for field in kind.fields}
+    return tuple(("bbox", side) for side in SIDES) if names.issuperset(SIDES) else None
+
+
+def attribute_names(file: Any, column: GeometryColumn) -> list[str]:
+    """The columns of an open file that are neither geometries nor their boxes."""
+    boxes = {way[0] for way in column.sides or ()}
+    without = {column.name, *column.others, *boxes}
+    return [name for name in file.schema_arrow.names if name not in without]
+
+
+def read_rows(
+    file: Any,
+    column: GeometryColumn,
+    names: Sequence[str],
+    extent: shapely.Geometry | None = None,
+) -> tuple[Any, np.ndarray]:
+    """The columns `names` and the geometry of the rows whose boxes meet `extent` (in the file's
+    CRS; None for all) as Arrow's table, and the numbers of these rows in the file.
+    """
+    import pyarrow
+
+    counts = [file.metadata.row_group(i).num_rows for i in range(file.num_row_groups)]
+    first = np.cumsum([0, *counts])
+    boxes = sorted({way[0] for way in column.sides or ()}) if extent is not None else []
+    wanted = list(dict.fromkeys([*names, column.name, *boxes]))
+    tables = [file.schema_arrow.empty_table().select(wanted)]
+    numbers = [np.zeros(0, np.int64)]
+    for group in groups_meeting(file, column, extent):
+        table = file.read_row_group(group, columns=wanted)
+        met = rows_meeting(table, column, extent)
+        tables.append(table.take(met))
+        numbers.append(first[group] + met)
+    table = pyarrow.concat_tables(tables)
+    return table.select([*names, column.name]), np.concatenate(numbers)
+
+
+def groups_meeting(file: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> list[int]:
+    """The row groups that may hold rows in `extent`, by what the file tells of their boxes."""
+    groups = range(file.num_row_groups)
+    if extent is None or column.sides is None:
+        return list(groups)
+    leaf_of = {file.schema.column(i).path: i for i in range(len(file.schema))}
+    leaves = [leaf_of.get(".".join(way)) for way in column.sides]
+    if None in leaves:
+        return list(groups)
+    boxes = np.array(
+        [[bound_of(file, i, leaf, k) for k, leaf in enumerate(leaves)] for i in groups]
+    )
+    boxes = boxes.reshape(-1, len(SIDES))
+    unknown = ~np.isfinite(boxes).all(axis=1)
+    met = shapely.intersects(shapely.box(*np.where(unknown[:, None], 0.0, boxes).T), extent)
+    return np.flatnonzero(met | unknown).tolist()
+
+
+def bound_of(file: Any, group: int, leaf: Any, side: int) -> float:
+    """The least (of xmin and ymin) or greatest value of a column in a row group; NaN where the file
+    does not tell.
+    """
+    told = file.metadata.row_group(group).column(leaf).statistics
+    if told is None or not told.has_min_max:
+        return float("nan")
+    return float(told.min if side < 2 else told.max)
+
+
+def rows_meeting(table: Any, column: GeometryColumn, extent: shapely.Geometry | None) -> np.ndarray:
+    """Numbers of the rows of `table` whose boxes meet `extent`, in ascending order."""
+    if extent is None:
+        return np.arange(len(table))
+    if column.sides is None:
+        boxes = shapely.bounds(geometries_in(table, column))
+    else:
+        boxes = np.column_stack([numbers_at(table, way) for way in column.sides])
+    known = np.isfinite(boxes).all(axis=1)
+    met = np.zeros(len(table), bool)
+    shapely.prepare(extent)
+    met[known] = shapely.intersects(extent, shapely.box(*boxes[known].T))
+    return np.flatnonzero(met)
+
+
+def numbers_at(table: Any, way: Sequence[str]) -> np.ndarray:
+    """The numbers (n,) of the column that the names on the `way` lead to, NaN where there is
+    none.
+    """
+    import pyarrow.compute
+
+    values = table.column(way[0])
+    if len(way) > 1:
+        values = pyarrow.compute.struct_field(values, list(way[1:]))
+    return np.array(values.cast("float64").to_numpy(), float)
+
+
+def geometries_in(table: Any, column: GeometryColumn) -> np.ndarray:
+    """The geometries (n,) of a table, None where a row has none."""
+    values = table.column(column.name)
+    if column.encoding not in LISTS:
+        bodies = np.empty(len(table), object)
+        bodies[:] = values.to_pylist()
+        return geometries_of(bodies)
+    geometries = np.empty(len(table), object)
+    known = values.drop_null().combine_chunks()
+    geometries[values.is_valid().to_numpy()] = surfaces_of(known, LISTS[column.encoding])
+    return geometries
+
+
+def surfaces_of(lists: Any, kind: shapely.GeometryType) -> np.ndarray:
+    """Surfaces (n,) of Arrow's lists of coordinates, none of them null."""
+    from pyarrow import types
+
+    offsets = []
+    while types.is_list(lists.type) or types.is_large_list(lists.type):
+        starts = lists.offsets.to_numpy()
+        offsets.append(starts - starts[0])
+        lists = lists.flatten()
+    axes = [field.name for field in lists.type.fields]
+    values = dict(zip(axes, lists.flatten(), strict=True))
+    xy = np.column_stack([values[axis].to_numpy(zero_copy_only=False) for axis in "xy"])
+    return shapely.from_ragged_array(kind, xy, tuple(reversed(offsets)))
+
+
+def import_pyarrow() -> Any:
+    """What reads and writes GeoParquet. Raises InputError where it is missing."""
+    needed("pyarrow", "parquet", "GeoParquet")
+    return needed("pyarrow.parquet", "parquet", "GeoParquet")
+
+
+def import_fsspec() -> Any:
+    """What reads GeoParquet by address. Raises InputError where it is missing."""
+    return needed("fsspec", "parquet", "GeoParquet by address")

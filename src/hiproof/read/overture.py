@@ -1,0 +1,149 @@
+"""Building footprints of an Overture Maps release: its STAC catalogue lists GeoParquet files with
+their boxes, and of each file only the row groups that meet an extent are fetched.
+
+Layout: a catalogue of releases, of which `latest` names one, holds a catalogue a release, that a
+catalogue a theme, that a collection a type, and that an item a file
+(https://docs.overturemaps.org/guides/).
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import shapely
+
+from ..errors import InputError
+from .geoparquet import geometries_in, geometry_column, import_pyarrow, open_parquet, read_rows
+from .stac import Document, asset_of, items_meeting, read_document
+
+KEYWORD = "overture"
+"""What stands for the release in place of a file of footprints."""
+
+THEME = "buildings"
+TYPES = ("building", "building_part")
+"""The theme of buildings and its types; the parts of a building lie inside its own outline."""
+
+ATTRIBUTES = ("height", "min_height", "num_floors", "roof_shape", "building_id")
+"""What of a building goes with its outline; `building_id` is that of a part's building."""
+
+ATTRIBUTION = "© OpenStreetMap contributors, Overture Maps Foundation"
+
+
+@dataclass(frozen=True)
+class OvertureFootprints:
+    """Outlines and attributes as Arrow's table (`id`, attributes, `geometry` as WKB in longitude
+    and latitude) in the order of their ids, and where they come from: `note`, ready for JSON.
+    """
+
+    table: Any
+    note: dict[str, Any]
+
+
+def is_overture(source: Any) -> bool:
+    """Whether a footprint source stands for Overture's release."""
+    return source == KEYWORD
+
+
+def read_overture(
+    catalogue: str, extent: shapely.Geometry, kind: str = TYPES[0]
+) -> OvertureFootprints:
+    """The footprints of a type that meet `extent`, in longitude and latitude, those under ground
+    left out.
+
+    `catalogue` is the address of the catalogue of releases, the latest of which is read, or that of
+    one release. Raises InputError where it cannot be read or has no footprints there.
+    """
+    import_pyarrow()
+    release, collection = find_collection(catalogue, kind)
+    items = items_meeting(collection, extent)
+    tables = [read_file(asset_of(item, ".parquet"), extent) for item in items]
+    if not sum(map(len, tables)):
+        raise InputError(
+            f"expected footprints of Overture's type {kind} in the extent of the clouds "
+            f"({', '.join(f'{side:.5f}' for side in extent.bounds)} in degrees), got none; check "
+            "the CRS of the clouds, or leave --footprints out"
+        )
+    table = joined(tables)
+    note = {
+        "name": "Overture Maps",
+        "release": release,
+        "type": kind,
+        "licence": collection.content.get("license") or "ODbL-1.0",
+        "attribution": ATTRIBUTION,
+        "catalogue": catalogue,
+        "footprints": len(table),
+        "sources": sources_of(table),
+    }
+    return OvertureFootprints(table.drop_columns(["sources"]), note)
+
+
+def find_collection(catalogue: str, kind: str) -> tuple[str, Document]:
+    """The release that a catalogue names as its latest, or is itself, and its collection of a
+    type.
+    """
+    document = read_document(catalogue)
+    if THEME not in document.children():
+        releases = document.children()
+        latest = document.content.get("latest") or max(releases, default="")
+        document = child_of(document, str(latest))
+    release = document.content.get("release:version") or document.content.get("id")
+    return str(release), child_of(child_of(document, THEME), kind)
+
+
+def child_of(document: Document, name: str) -> Document:
+    """The child of a document in the folder `name`. Raises InputError where there is none."""
+    children = document.children()
+    if name not in children:
+        raise InputError(
+            f"expected {name!r} in Overture's catalogue {document.address}, got "
+            f"{', '.join(children) or 'no links'}; check the setting read.overture_catalogue"
+        )
+    return read_document(children[name])
+
+
+def read_file(address: str, extent: shapely.Geometry) -> Any:
+    """The rows of a file of a release that meet `extent` and are not under ground."""
+    import pyarrow
+    from pyarrow import compute
+
+    with open_parquet(address) as file:
+        column = geometry_column(file, address)
+        own = file.schema_arrow.names
+        names = [n for n in ("id", *ATTRIBUTES, "is_underground", "sources") if n in own]
+        table, _ = read_rows(file, column, names, extent)
+    geometries = geometries_in(table, column)
+    met = shapely.intersects(geometries, extent)
+    if "is_underground" in names:
+        met &= ~compute.fill_null(table.column("is_underground"), False).to_numpy()
+        table = table.drop_columns(["is_underground"])
+    wkb = shapely.to_wkb(shapely.force_2d(geometries[met]))
+    table = table.take(np.flatnonzero(met)).drop_columns([column.name])
+    return table.append_column("geometry", pyarrow.array(wkb.tolist(), pyarrow.binary()))
+
+
+def joined(tables: list[Any]) -> Any:
+    """All rows in the order of their ids, whichever file holds them."""
+    import pyarrow
+
+    table = pyarrow.concat_tables(tables, promote_options="default")
+    if "sources" not in table.column_names:
+        table = table.append_column("sources", pyarrow.nulls(len(table)))
+    return table.sort_by("id")
+
+
+def sources_of(table: Any) -> list[dict[str, Any]]:
+    """The data sets from which the rows of a table come, with their licences where these are told
+    and how many rows each has a share in.
+    """
+    counts: Counter[tuple[str, str | None]] = Counter()
+    for sources in table.column("sources").to_pylist():
+        found = {(str(one.get("dataset")), one.get("license")) for one in sources or ()}
+        counts.update(found)
+    by_name = sorted(counts.items(), key=lambda pair: (pair[0][0], pair[0][1] or ""))
+    return [
+        {"dataset": dataset, "licence": licence, "footprints": count}
+        for (dataset, licence), count in by_name
+    ]

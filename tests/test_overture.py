@@ -1,0 +1,218 @@
+"""Footprints of an Overture Maps release: from a small one of the same layout, served on the
+loopback address.
+"""
+
+import json
+import sys
+
+import numpy as np
+import pyogrio
+import pytest
+import shapely
+from pyproj import Transformer
+
+import planted
+from hiproof.city import run as city_run
+from hiproof.city.prepare import make_plan
+from hiproof.city.run import Request, reconstruct_area
+from hiproof.cli import main
+from hiproof.errors import InputError, SettingsError
+from hiproof.read.footprints import read_footprints
+from hiproof.settings import Settings
+from range_server import serving
+from run_records import RECORDS
+from tiny_town import CRS, make_town, write_cloud, write_town
+
+pyarrow = pytest.importorskip("pyarrow.parquet", reason="the extra `parquet` is not installed")
+pytest.importorskip("aiohttp", reason="needs fsspec[http], part of the extra `parquet`")
+
+from overture_release import (  # noqa: E402
+    GOOGLE,
+    OSM,
+    RELEASE,
+    building,
+    write_release,
+)
+
+pytestmark = pytest.mark.filterwarnings("ignore:.*PROJ knows no better way")
+TO_DEGREES = Transformer.from_crs("EPSG:28992", "OGC:CRS84", always_xy=True)
+TOWN = make_town()
+FOOTER_BYTES = 1 << 16  # that pyarrow reads of a file's end at first
+
+
+def in_degrees(polygon):
+    return shapely.transform(polygon, lambda xy: np.column_stack(TO_DEGREES.transform(*xy.T)))
+
+
+def shifted(polygon, x, y=0.0):
+    return shapely.transform(polygon, lambda xy: xy + [x, y])
+
+
+def town_rows():
+    """The rows of the town in several row groups: its houses, a cellar below one of them, and
+    others far away.
+    """
+    houses = list(TOWN.footprints.items())
+    known = dict(height=8.5, num_floors=2, roof_shape="gabled", min_height=0.0)
+    near = [building(f"gers-{id}", in_degrees(area)) for id, area in houses]
+    near[0] |= known
+    near[1]["sources"] = [OSM, GOOGLE]
+    cellar = building("gers-cellar", in_degrees(shifted(houses[0][1], 2)), is_underground=True)
+    beside = building("gers-beside", in_degrees(shifted(houses[0][1], 0, 60)))
+    # of so many vertices that a row group is larger than what readers take for a file's end
+    detailed = shapely.segmentize(houses[0][1], 0.02)
+    far = [
+        building(f"gers-far-{i}", in_degrees(shifted(detailed, 3000 + 100 * i))) for i in range(40)
+    ]
+    return near, [cellar, beside], far
+
+
+def first_byte(told, group):
+    """Where a row group begins in its file."""
+    columns = [told.row_group(group).column(i) for i in range(told.num_columns)]
+    return min(c.dictionary_page_offset or c.data_page_offset for c in columns)
+
+
+@pytest.fixture
+def served(tmp_path, monkeypatch):
+    """A folder with the cloud of the town, settings that name the release's catalogue, and the file
+    that lists the ranges asked for.
+    """
+    monkeypatch.setattr(city_run, "solve_tile", planted.solve_quickly)
+    monkeypatch.setattr(city_run, "pieces_of", lambda request: ())  # solved without compiled code
+    folder, log = tmp_path / "served", tmp_path / "ranges"
+    folder.mkdir()
+    log.touch()
+    near, odd, far = town_rows()
+    with serving(folder, log) as address:
+        # the far ones of the first file stand in row groups of their own
+        parts = [building("gers-part", near[0]["outline"], building_id="gers-house-0")]
+        files = {"building": [near + far[:20], odd + far[20:30], far[30:]]}
+        catalogue = write_release(folder, address, files | {"building_part": [parts]})
+        settings = Settings.from_dict(
+            {"read": {"overture_catalogue": catalogue}, "reconstruct": {"align": "off"}}
+        )
+        cloud, _ = write_town(tmp_path, TOWN)
+        yield cloud, settings, log
+
+
+def command(monkeypatch, *arguments):
+    """Exit code of the command."""
+    monkeypatch.setattr(sys, "argv", ["hiproof", *map(str, arguments)])
+    with pytest.raises(SystemExit) as ended:
+        main()
+    return ended.value.code
+
+
+def test_a_run_takes_the_buildings_of_the_clouds_extent(served, tmp_path):
+    cloud, settings, _ = served
+    out = tmp_path / "out"
+    summary = reconstruct_area(Request((str(cloud),), out, "overture", settings=settings))
+    assert summary.buildings == len(TOWN.footprints)
+    known = {f.id: f for f in read_footprints(out / ".hiproof/overture.gpkg", target_crs=CRS)}
+    assert sorted(known) == sorted(f"gers-{id}" for id in TOWN.footprints)
+    for id, area in TOWN.footprints.items():
+        assert shapely.hausdorff_distance(known[f"gers-{id}"].polygon, area) < 1e-3
+    assert known["gers-house-0"].attributes == {
+        "id": "gers-house-0",
+        "height": 8.5,
+        "min_height": 0.0,
+        "num_floors": 2,
+        "roof_shape": "gabled",
+    }
+    record = json.loads((out / "run.json").read_text())
+    source = record["footprints_source"]
+    assert (source["name"], source["release"], source["licence"], source["type"]) == (
+        "Overture Maps",
+        RELEASE,
+        "ODbL-1.0",
+        "building",
+    )
+    assert source["sources"] == [
+        {"dataset": "Google Open Buildings", "licence": "CC-BY-4.0", "footprints": 1},
+        {"dataset": "OpenStreetMap", "licence": "ODbL-1.0", "footprints": 4},
+    ]
+    assert record["inputs"]["footprints"] == str(out / ".hiproof" / "overture.gpkg")
+
+
+def test_a_kept_file_gives_the_same_models(served, tmp_path, monkeypatch, capsys):
+    cloud, settings, _ = served
+    config, kept = tmp_path / "settings.toml", tmp_path / "kept.gpkg"
+    config.write_text(settings.to_toml())
+    assert command(monkeypatch, "footprints", cloud, "--out", kept, "--config", config) == 0
+    told = capsys.readouterr().out
+    assert f"{kept}: 4 footprints of Overture Maps {RELEASE} (ODbL-1.0" in told
+    _, _, _, columns = pyogrio.raw.read(kept, columns=["id", "height", "num_floors", "roof_shape"])
+    first = [column[0] for column in columns]
+    assert first == ["gers-house-0", 8.5, 2, "gabled"]
+    for name, footprints in (("direct", "overture"), ("kept", str(kept))):
+        request = Request((str(cloud),), tmp_path / name, footprints, settings=settings)
+        reconstruct_area(request)
+    for name in RECORDS:
+        direct, again = ((tmp_path / folder / name).read_bytes() for folder in ("direct", "kept"))
+        assert direct == again
+    notes = [
+        json.loads((tmp_path / folder / "run.json").read_text())["footprints_source"]
+        for folder in ("direct", "kept")
+    ]
+    assert notes[0] == notes[1]
+
+
+def test_only_the_row_groups_that_meet_the_extent_are_fetched(served, tmp_path, monkeypatch):
+    cloud, settings, log = served
+    config = tmp_path / "settings.toml"
+    config.write_text(settings.to_toml())
+    command(monkeypatch, "footprints", cloud, "--out", tmp_path / "a.gpkg", "--config", config)
+    asked = {}
+    for line in log.read_text().splitlines():
+        path, start, stop = line.split()
+        asked.setdefault(path.lstrip("/"), []).append((int(start), int(stop)))
+    assert sorted(path.rpartition("/")[2][:10] for path in asked) == ["part-00000", "part-00001"]
+    for path, ranges in asked.items():
+        told = pyarrow.ParquetFile(tmp_path / "served" / path).metadata
+        size = (tmp_path / "served" / path).stat().st_size
+        assert told.num_row_groups > 2
+        # the row group that holds the town with what is buffered, and the file's end
+        assert all(
+            stop <= first_byte(told, 2) or start >= size - FOOTER_BYTES for start, stop in ranges
+        )
+
+
+def test_parts_are_read_as_a_layer(served, tmp_path):
+    cloud, settings, _ = served
+
+    def plan_of(layer):
+        request = Request((str(cloud),), tmp_path, "overture", layer=layer, settings=settings)
+        return make_plan(request)
+
+    (job,) = plan_of("building_part").jobs
+    assert (job.id, job.footprint.attributes["building_id"]) == ("gers-part", "gers-house-0")
+    with pytest.raises(SettingsError, match="building and building_part, got 'roofs'"):
+        plan_of("roofs")
+
+
+def test_a_cloud_without_crs_is_refused_in_one_sentence(served, tmp_path):
+    _, settings, log = served
+    cloud = write_cloud(tmp_path / "nowhere.laz", TOWN.xyz, TOWN.classification, crs=None)
+    with pytest.raises(InputError, match=r"^expected clouds that name their CRS.+--crs$"):
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=settings))
+    assert log.read_text() == ""
+
+
+def test_clouds_across_the_180th_meridian_are_refused(served, tmp_path):
+    """Their box in longitude and latitude would be a band around the Earth."""
+    _, settings, log = served
+    east = np.array([[815_000.0, 8_140_000.0, 2.0], [830_000.0, 8_141_000.0, 3.0]])
+    cloud = write_cloud(
+        tmp_path / "fiji.laz", east, np.array([6, 6], np.uint8), "EPSG:32760", east[0]
+    )
+    with pytest.raises(InputError, match=r"one side of the 180th meridian.+; run each side alone$"):
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=settings))
+    assert log.read_text() == ""
+
+
+def test_a_run_without_a_network_is_refused_in_one_sentence(served, tmp_path):
+    cloud, _, _ = served
+    gone = Settings.from_dict({"read": {"overture_catalogue": "http://127.0.0.1:9/catalog.json"}})
+    with pytest.raises(InputError, match=r"^expected a STAC catalogue at http://127.+network$"):
+        reconstruct_area(Request((str(cloud),), tmp_path / "out", "overture", settings=gone))
