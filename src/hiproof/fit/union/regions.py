@@ -179,19 +179,10 @@ def polygons_of(geometry: shapely.Geometry) -> list[shapely.Polygon]:
 def difference(polygon: shapely.Polygon, hole: shapely.Polygon) -> list[shapely.Polygon]:
     """What is left of a polygon without a hole."""
     if not shapely.dwithin(polygon, hole, APART_M):
-        ring = shapely.get_coordinates(polygon)
-        if is_overlaid(polygon, ring):  # an overlay would return it from its next corner on
-            return [shapely.polygons(np.concatenate([ring[1:], ring[1:2]]))]
-    elif polygon.area < hole.area and shapely.contains_properly(hole, polygon):
+        return [polygon]
+    if polygon.area < hole.area and shapely.contains_properly(hole, polygon):
         return []
     return polygons_of(shapely.difference(polygon, hole, grid_size=GRID_M))
-
-
-def is_overlaid(polygon: shapely.Polygon, ring: np.ndarray) -> bool:
-    """Whether a polygon is one ring on the grid of overlays, clockwise as they make it."""
-    on_grid = (np.round(ring / GRID_M) / (1.0 / GRID_M) == ring).all()
-    is_ring = not shapely.get_num_interior_rings(polygon)
-    return bool(on_grid) and is_ring and not shapely.is_ccw(polygon.exterior)
 
 
 def rest_of(outline: shapely.Polygon, *quads: shapely.Polygon) -> list[shapely.Polygon]:

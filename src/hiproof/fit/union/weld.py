@@ -356,9 +356,9 @@ def with_line_moved(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: 
 
 def on_one_line(volumes: np.ndarray, sides: list[list[Side]], k: int, edge: int) -> list[tuple[int, int]]:
     """The sides, as (volume, edge), on the line of side `edge` of volume k and off the outline."""
-    was = sides[k][edge]
-    alike = np.flatnonzero(volumes[1:, DIRECTION] == volumes[k, DIRECTION]) + 1
-    every = [(int(j), e) for j in alike for e in (edge & 2, edge | 1)]
+    was, at = sides[k][edge], sides[k][edge].at
+    alike = (np.flatnonzero(volumes[1:, DIRECTION] == volumes[k, DIRECTION]) + 1).tolist()
+    every = [(j, e) for j in alike for e in (edge & 2, edge | 1) if abs(sides[j][e].at - at) < ONE_LINE_M]
     return [(j, e) for j, e in every if is_one_line(sides[j][e], was)]
 
 
