@@ -2,6 +2,7 @@
 loopback address.
 """
 
+import dataclasses
 import json
 import sys
 
@@ -16,6 +17,7 @@ from hiproof.city import run as city_run
 from hiproof.city.prepare import make_plan
 from hiproof.city.run import Request, reconstruct_area
 from hiproof.cli import main
+from hiproof.cli.reconstruct import settings_beside
 from hiproof.errors import InputError, SettingsError
 from hiproof.read.footprints import read_footprints
 from hiproof.settings import Settings
@@ -135,12 +137,33 @@ def test_a_run_takes_the_buildings_of_the_clouds_extent(served, tmp_path):
     assert record["inputs"]["footprints"] == str(out / ".hiproof" / "overture.gpkg")
 
 
+def test_a_finished_run_asks_for_no_network(served, tmp_path):
+    cloud, settings, _ = served
+    request = Request((str(cloud),), tmp_path / "out", "overture", settings=settings)
+    first = reconstruct_area(request)
+    (tmp_path / "served" / "catalog.json").unlink()
+    assert reconstruct_area(request).by_status == first.by_status
+    with pytest.raises(InputError, match="expected a STAC catalogue"):
+        reconstruct_area(dataclasses.replace(request, restart=True))
+
+
+def test_settings_beside_are_not_looked_for_where_overture_is(served, tmp_path, monkeypatch):
+    """The word names no file, so that the folder in which a run starts has no part in it."""
+    (tmp_path / "start").mkdir()
+    (tmp_path / "start" / "hiproof.toml").write_text("[fit]\nparts = 'one'\n")
+    monkeypatch.chdir(tmp_path / "start")
+    assert settings_beside(str(served[0]), "overture") is None
+
+
 def test_a_kept_file_gives_the_same_models(served, tmp_path, monkeypatch, capsys):
     cloud, settings, _ = served
     config, kept = tmp_path / "settings.toml", tmp_path / "kept.gpkg"
     config.write_text(settings.to_toml())
     assert command(monkeypatch, "footprints", cloud, "--out", kept, "--config", config) == 0
     told = capsys.readouterr().out
+    other = tmp_path / "kept.geojson"
+    assert command(monkeypatch, "footprints", cloud, "--out", other, "--config", config) == 2
+    assert "expected --out to name a GeoPackage" in capsys.readouterr().err
     assert f"{kept}: 4 footprints of Overture Maps {RELEASE} (ODbL-1.0" in told
     _, _, _, columns = pyogrio.raw.read(kept, columns=["id", "height", "num_floors", "roof_shape"])
     first = [column[0] for column in columns]

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from ..errors import SettingsError
+
 
 def footprints(
     clouds: Annotated[
@@ -35,6 +37,8 @@ def footprints(
     from ..settings import Settings
     from .reconstruct import settings_beside
 
+    if out.suffix.lower() != ".gpkg":
+        raise SettingsError(f"expected --out to name a GeoPackage such as f.gpkg, got {out}")
     config = config or settings_beside(*clouds)
     settings = Settings.from_toml(config) if config else Settings()
     files = tuple(map(str, expand_paths(tuple(clouds))))

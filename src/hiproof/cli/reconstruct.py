@@ -115,7 +115,10 @@ def settings_beside(*inputs: str | None) -> Path | None:
 
     Raises SettingsError where there are two: which of them counts is not to be guessed.
     """
-    paths = [Path(name) for name in inputs if name and "://" not in name]
+    from ..read.overture import is_overture
+
+    named = [name for name in inputs if name and "://" not in name and not is_overture(name)]
+    paths = [Path(name) for name in named]
     folders = dict.fromkeys((path if path.is_dir() else path.parent).absolute() for path in paths)
     found = [folder / BESIDE for folder in folders if (folder / BESIDE).is_file()]
     if len(found) > 1:
