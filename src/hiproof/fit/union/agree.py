@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import accumulate, combinations, pairwise
 from statistics import median
 from typing import NamedTuple
 
@@ -306,7 +306,7 @@ def fitted(
     `begun` are the sums at first, where these are known.
     """
     own, rows = np.concatenate([member.own for member in members]), [member.rows for member in members]
-    ends = np.cumsum([len(planes) for planes in rows])[:-1]
+    ends = [*accumulate(map(len, rows), initial=0)]
     absent, scale = np.isnan(np.concatenate(rows)), scene.dead + scene.width
     sums = begun or sums_at_first(members, scene)
     for turn in range(ROUNDS):
@@ -317,7 +317,7 @@ def fitted(
         unknowns = inverse @ (sums.right + ridge * start)
         every = own @ unknowns
         every[absent] = np.nan
-        rows = np.split(every, ends)
+        rows = [every[low:high] for low, high in pairwise(ends)]
     cost = cost_of_rows(members, rows, scene)
     if not all(proper(own, member.walls) for member, own in zip(members, rows, strict=True)):
         cost = np.inf

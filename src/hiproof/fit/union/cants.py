@@ -198,8 +198,9 @@ def height_by_unknowns(planes: Planes, place: np.ndarray) -> np.ndarray:
 
 def fitted_with(planes: Planes, wall: Wall, way: Way, start: np.ndarray, points: np.ndarray, scene: Scene) -> Planes:
     """All planes of a volume fitted with one more over `wall`, from `start` (3,) on."""
-    before = np.pad(planes.design, ((0, 0), (0, 0), (0, way.more)))
-    design = np.concatenate([before, way.design[None]])
+    count, _, width = planes.design.shape
+    design = np.zeros((count + 1, 3, width + way.more))
+    design[:count, :, :width], design[count] = planes.design, way.design
     begun = np.vstack([planes.rows, start])
     rows, covariance, cost = least_squares(begun, design, points, scene.dead, scene.width)
     price = planes.price + scene.evidence * PARAMETER_COST * max(way.more, 1)
@@ -224,6 +225,10 @@ def start_over(wall: Wall, planes: Planes, points: np.ndarray, scene: Scene) -> 
     deep = wall.depth[:2] @ points[:2] + wall.depth[2]
     (near_m,) = quantiles(deep, (0.2,))
     lows = quantiles(points[2, deep < near_m], (0.02, 0.25, 0.5))
+    rows = np.vstack([planes.rows, np.zeros(3)])
     tried = [slope * wall.depth + [0.0, 0.0, low] for slope in sorted(slopes) for low in lows]
-    costs = [cost_of(np.vstack([planes.rows, row]), points, scene.dead, scene.width) for row in tried]
+    costs = []
+    for row in tried:
+        rows[-1] = row
+        costs.append(cost_of(rows, points, scene.dead, scene.width))
     return tried[int(np.argmin(costs))]

@@ -178,7 +178,7 @@ def after_a_round(
     most = MOST_TRIALS * max(area / WINDOW_M2, 1.0)
     changed: list[shapely.Polygon] = []
     window, price, after_drawing = whole, None, None
-    quads = quads_of(state, problem)
+    quads = quads_of(state, problem) if area > WINDOW_M2 else []
     beyond = owners_beyond(drawn, whole.box)
     for repair in find_repairs(drawn, problem.volumes, state.sides, problem.plan, problem.scene):
         if repair.key in tried or len(tried) >= most:
